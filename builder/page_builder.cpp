@@ -1,0 +1,171 @@
+#include "builder/page_builder.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "octree/leaf_math.h"
+
+namespace vcp {
+
+namespace {
+
+// Splitting a crowded hard leaf is given up where the children together repeat its triangles more often than
+// this: a fan's centre or long triangles gain nothing from smaller leaves.
+constexpr double kMaxRepetition = 3.5;
+
+// Leaves are merged only while their own error leaves this part of the tolerance unused.
+constexpr double kMergeTrial = 0.35;
+
+double errorOf(const SoftLeaf& leaf) {
+    return (leaf.certificate.maxValue + wallOf(leaf.wall)) * leaf.box.edgeCells() / leaf.certificate.minSlope;
+}
+
+class TreeBuilder {
+public:
+    TreeBuilder(PageGeometry& geometry, double tolerance) : geometry_(geometry), tolerance_(tolerance) { fillOccupancy(); }
+
+    PageTree run() {
+        tree_.nodes.emplace_back();
+        build(0, {glm::ivec3(0), geometry_.cells() * kSubcells});
+        return std::move(tree_);
+    }
+
+private:
+    using Kind = TreeNode::Kind;
+
+    /// occupancy_[l]: cubes of 2^l cells that the mesh touches.
+    void fillOccupancy() {
+        const int n = geometry_.cells();
+        const auto index = [](int side, int x, int y, int z) { return static_cast<size_t>(x + side * (y + side * z)); };
+        occupancy_.emplace_back(static_cast<size_t>(n) * n * n);
+        for (int z = 0; z < n; ++z)
+            for (int y = 0; y < n; ++y)
+                for (int x = 0; x < n; ++x) occupancy_[0][index(n, x, y, z)] = geometry_.occupied({x, y, z});
+        for (int m = n / 2; m >= 1; m /= 2) {
+            std::vector<uint8_t> up(static_cast<size_t>(m) * m * m, 0);
+            for (int z = 0; z < 2 * m; ++z)
+                for (int y = 0; y < 2 * m; ++y)
+                    for (int x = 0; x < 2 * m; ++x) up[index(m, x / 2, y / 2, z / 2)] |= occupancy_.back()[index(2 * m, x, y, z)];
+            occupancy_.push_back(std::move(up));
+        }
+    }
+
+    bool occupied(const NodeBox& box) const {
+        int level = 0;
+        while (kSubcells << level < box.edge) ++level;
+        const int n = geometry_.cells() >> level;
+        const glm::ivec3 c = box.lower / box.edge;
+        return occupancy_[level][static_cast<size_t>(c.x + n * (c.y + n * c.z))] != 0;
+    }
+
+    /// Fills node `index`: a box of at least a cell.
+    void build(uint32_t index, const NodeBox& box) {
+        tree_.nodes[index].box = box;
+        if (!occupied(box)) return;
+        if (box.edge == kSubcells) {
+            std::vector<uint32_t> around, inside;
+            geometry_.trianglesOf(box, around, inside);
+            return fillCell(index, box, around, inside, 0);
+        }
+        const uint32_t first = addChildren(index);
+        for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(static_cast<int>(i)));
+        merge(index);
+    }
+
+    /// A cell or less: soft if it certifies, hard if its triangles are few or splitting gains nothing, else split.
+    void fillCell(uint32_t index, const NodeBox& box, const std::vector<uint32_t>& around, const std::vector<uint32_t>& inside, uint32_t depth) {
+        tree_.nodes[index].box = box;
+        if (inside.empty()) return;
+        if (const auto certificate = certify(box, around)) return makeSoft(index, *certificate);
+        if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth) return makeHard(index, inside);
+        std::array<std::vector<uint32_t>, 8> childAround, childInside;
+        size_t together = 0;
+        for (int i = 0; i < 8; ++i) {
+            geometry_.filter(box.child(i), around, childAround[i], childInside[i]);
+            together += childInside[i].size();
+        }
+        if (double(together) > kMaxRepetition * double(inside.size())) return makeHard(index, inside);
+        const uint32_t first = addChildren(index);
+        for (uint32_t i = 0; i < 8; ++i) fillCell(first + i, box.child(static_cast<int>(i)), childAround[i], childInside[i], depth + 1);
+    }
+
+    uint32_t addChildren(uint32_t index) {
+        const uint32_t first = static_cast<uint32_t>(tree_.nodes.size());
+        const NodeBox box = tree_.nodes[index].box;
+        for (uint32_t i = 0; i < 8; ++i) tree_.nodes.push_back({.box = box.child(static_cast<int>(i))});
+        tree_.nodes[index].kind = Kind::Internal;
+        tree_.nodes[index].index = first;
+        return first;
+    }
+
+    std::optional<Certificate> certify(const NodeBox& box, const std::vector<uint32_t>& around) {
+        triangles_.clear();
+        for (const uint32_t k : around) triangles_.push_back(&geometry_.triangle(k));
+        const auto corner = [&](int i) -> const CornerVector& { return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)); };
+        const Certificate certificate = certifyLeaf(box.lowerCells(), box.edgeCells(), triangles_, tolerance_, corner, scratch_);
+        if (!certificate.soft) return {};
+        return certificate;
+    }
+
+    void makeSoft(uint32_t index, const Certificate& certificate) {
+        tree_.nodes[index].kind = Kind::Soft;
+        tree_.nodes[index].index = static_cast<uint32_t>(tree_.soft.size());
+        tree_.soft.push_back({tree_.nodes[index].box, certificate, 0});
+    }
+
+    void makeHard(uint32_t index, const std::vector<uint32_t>& triangles) {
+        tree_.nodes[index].kind = Kind::Hard;
+        tree_.nodes[index].index = static_cast<uint32_t>(tree_.hard.size());
+        tree_.hard.push_back({tree_.nodes[index].box, triangles});
+    }
+
+    /// The merging rule (Demir and Westermann 2015, section 3, with a true bound): eight siblings become one
+    /// leaf where one leaf represents the mesh within tolerance, or is hard with few triangles.
+    void merge(uint32_t index) {
+        const uint32_t first = tree_.nodes[index].index;
+        size_t soft = 0, hard = 0;
+        double worst = 0;
+        for (uint32_t c = first; c < first + 8; ++c) {
+            if (tree_.nodes[c].kind == Kind::Internal) return;
+            soft += tree_.nodes[c].kind == Kind::Soft;
+            worst = std::max(worst, tree_.nodes[c].kind == Kind::Soft ? errorOf(tree_.soft[tree_.nodes[c].index]) : 0.0);
+            hard += tree_.nodes[c].kind == Kind::Hard;
+        }
+        const NodeBox box = tree_.nodes[index].box;
+        std::vector<uint32_t> around, inside;
+        if (soft + hard > 0) {
+            // A larger leaf errs by the third power of its edge; one that cannot succeed is not tried.
+            if (hard == 0 && (box.edge > kMaxSoftCells * kSubcells || worst > kMergeTrial * tolerance_)) return;
+            geometry_.trianglesOf(box, around, inside);
+        }
+        const std::optional<Certificate> certificate = soft > 0 && hard == 0 ? certify(box, around) : std::nullopt;
+        const bool hardFits = hard > 0 && inside.size() <= kMergedHardTriangles;
+        if (soft + hard > 0 && !certificate && !hardFits) return;
+        // The children and their leaves are the last ones made.
+        tree_.nodes.resize(first);
+        tree_.soft.resize(tree_.soft.size() - soft);
+        tree_.hard.resize(tree_.hard.size() - hard);
+        tree_.nodes[index].kind = Kind::Empty;
+        if (certificate) makeSoft(index, *certificate);
+        if (hardFits) makeHard(index, inside);
+    }
+
+    PageGeometry& geometry_;
+    double tolerance_;
+    PageTree tree_;
+    std::vector<std::vector<uint8_t>> occupancy_;
+    std::vector<const CertifiedTriangle*> triangles_;
+    CertificateScratch scratch_;
+};
+
+}  // namespace
+
+PageTree buildPageTree(PageGeometry& geometry, double tolerance) { return TreeBuilder(geometry, tolerance).run(); }
+
+double PageTree::certifiedError() const {
+    double error = 0;
+    for (const SoftLeaf& leaf : soft) error = std::max(error, errorOf(leaf));
+    return error;
+}
+
+}  // namespace vcp

@@ -1,0 +1,52 @@
+// Builds one page: the octree of certified leaves over the triangles of one subvolume.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "builder/lattice_mesh.h"
+#include "builder/page_geometry.h"
+
+namespace vcp {
+
+/// A hard leaf keeps splitting above so many triangles, down to kMaxSubcellDepth halvings of a cell.
+inline constexpr size_t kHardLeafTriangles = 12;
+/// Hard siblings become one leaf when they have at most so many triangles together.
+inline constexpr size_t kMergedHardTriangles = 6;
+/// Largest soft leaf, in cells: beyond it the closest points of its corners are not certainly the mesh's.
+inline constexpr int kMaxSoftCells = 8;
+
+/// A node of the octree under construction.
+struct TreeNode {
+    enum class Kind : uint8_t { Empty, Soft, Hard, Internal };
+    Kind kind = Kind::Empty;
+    NodeBox box;
+    uint32_t index = 0;  ///< among the soft or hard leaves; when internal, of the first of 8 consecutive children
+};
+
+struct SoftLeaf {
+    NodeBox box;
+    Certificate certificate;
+    uint32_t wall = 0;  ///< wall code
+};
+
+struct HardLeaf {
+    NodeBox box;
+    std::vector<uint32_t> triangles;  ///< local numbers, ascending
+};
+
+/// The octree of a page, before it is encoded. Node 0 is the root.
+struct PageTree {
+    std::vector<TreeNode> nodes;
+    std::vector<SoftLeaf> soft;
+    std::vector<HardLeaf> hard;
+    /// Largest distance of the rendered surface from this level's mesh, in cells.
+    [[nodiscard]] double certifiedError() const;
+};
+
+/// `tolerance`: cells, for soft leaves.
+PageTree buildPageTree(PageGeometry& geometry, double tolerance);
+
+}  // namespace vcp

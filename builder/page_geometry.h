@@ -1,0 +1,98 @@
+// The triangles around one subvolume, in page space, arranged so that cells find their triangles and corners
+// their closest points.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "builder/lattice_mesh.h"
+#include "builder/leaf_certificate.h"
+#include "builder/triangle_geometry.h"
+
+namespace vcp {
+
+/// Octree positions count in subcells, so that leaves may be smaller than a cell.
+inline constexpr int kSubcells = 8;
+
+/// A cube of the octree: lowest corner and edge in subcells of the page.
+struct NodeBox {
+    glm::ivec3 lower{0};
+    int edge = 0;
+
+    [[nodiscard]] glm::dvec3 lowerCells() const { return glm::dvec3(lower) / double(kSubcells); }
+    [[nodiscard]] double edgeCells() const { return double(edge) / kSubcells; }
+    [[nodiscard]] glm::dvec3 centreCells() const { return lowerCells() + edgeCells() / 2; }
+    [[nodiscard]] NodeBox child(int octant) const {
+        return {lower + (edge / 2) * glm::ivec3(octant & 1, octant >> 1 & 1, octant >> 2), edge / 2};
+    }
+};
+
+class PageGeometry {
+public:
+    /// `triangles`: of `mesh`, ascending, all that come within kBinMarginCells of the page at `page` (Morton
+    /// position, in pages of 2^log2Cells cells).
+    PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page, uint32_t log2Cells);
+
+    [[nodiscard]] int cells() const { return cells_; }
+    [[nodiscard]] glm::i32vec3 originLattice() const { return origin_; }
+    /// Whether the mesh touches a closed cell of the page.
+    [[nodiscard]] bool occupied(glm::ivec3 cell) const { return occupied_[cellIndex(cell)] != 0; }
+
+    /// Local triangle numbers (ascending) that touch the box widened by kCertificateMarginCells; of them, those
+    /// that touch the closed box itself in `inside`. Boxes of at least a cell.
+    void trianglesOf(const NodeBox& box, std::vector<uint32_t>& around, std::vector<uint32_t>& inside);
+    /// The same for a smaller box, from the triangles around its parent.
+    void filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around, std::vector<uint32_t>& inside) const;
+
+    /// Exact closest point of a corner (position in subcells) among the page's triangles, the smallest
+    /// (squared distance, triangle) winning. Exact for the whole mesh where it is within 2 cells.
+    const CornerVector& corner(glm::ivec3 subcells);
+
+    [[nodiscard]] const CertifiedTriangle& triangle(uint32_t local) const { return triangles_[local]; }
+    /// Vertex numbers in the mesh.
+    [[nodiscard]] const std::array<uint32_t, 3>& vertices(uint32_t local) const { return vertices_[local]; }
+    /// Largest stray of the vertices of the triangles that touch the page, in cells.
+    [[nodiscard]] double stray() const { return stray_; }
+
+private:
+    void loadTriangles(std::span<const uint32_t> triangles);
+    void markBadEdges();
+    void fillCells();
+    CornerVector searchCorner(glm::dvec3 p);
+    [[nodiscard]] size_t cellIndex(glm::ivec3 cell) const {
+        const int side = cells_ + 2 * kBorder;
+        return static_cast<size_t>(cell.x + kBorder + side * (cell.y + kBorder + side * (cell.z + kBorder)));
+    }
+
+    /// Bounding box of a triangle; lattice coordinates of a page are exact in float.
+    struct Bounds {
+        glm::vec3 lower, upper;
+    };
+
+    static constexpr int kBorder = 2;  ///< cells around the page that are searched for closest points
+
+    const LatticeMesh& mesh_;
+    int cells_;
+    glm::i32vec3 origin_;
+    double stray_ = 0;
+    std::vector<CertifiedTriangle> triangles_;
+    std::vector<std::array<uint32_t, 3>> vertices_;
+    std::vector<BoxOverlap> overlap_;
+    std::vector<Bounds> bounds_;
+    std::vector<uint32_t> cellTriangles_;  ///< cell by cell: those that touch the closed cell, then those within the margin
+    std::vector<uint32_t> cellBegin_;      ///< in cellTriangles_, one more than cells
+    std::vector<uint32_t> cellTouchEnd_;   ///< end of those that touch
+    std::vector<uint8_t> occupied_;
+    std::vector<uint32_t> stamp_;
+    uint32_t stampNow_ = 0;
+    std::vector<uint32_t> gridCorner_;                        ///< corners of cells: number in corners_ + 1, 0: not searched
+    std::unordered_map<uint64_t, uint32_t> subcellCorner_;    ///< the same for corners within cells
+    std::deque<CornerVector> corners_;
+};
+
+}  // namespace vcp

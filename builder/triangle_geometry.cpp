@@ -1,0 +1,124 @@
+#include "builder/triangle_geometry.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/common.hpp>
+
+namespace vcp {
+
+namespace {
+
+constexpr double kTouch = 1e-9;
+
+/// Closest point to the origin of the segment a b, as the weight of b.
+double closestOnSegment(glm::dvec3 a, glm::dvec3 b, double& squared) {
+    const glm::dvec3 u = b - a;
+    const double length2 = glm::dot(u, u);
+    const double w = length2 > 0 ? std::clamp(-glm::dot(a, u) / length2, 0.0, 1.0) : 0.0;
+    const glm::dvec3 q = a + w * u;
+    squared = glm::dot(q, q);
+    return w;
+}
+
+}  // namespace
+
+ClosestPoint closestOnTriangle(glm::dvec3 query, const Triangle3& t) {
+    const glm::dvec3 a = t[0] - query, b = t[1] - query, c = t[2] - query;
+    const glm::dvec3 u = b - a, v = c - a, n = glm::cross(u, v);
+    const double n2 = glm::dot(n, n);
+    ClosestPoint best;
+    if (n2 > 0) {
+        const double wc = -glm::dot(glm::cross(u, a), n), wb = -glm::dot(glm::cross(a, v), n);
+        if (wb >= 0 && wc >= 0 && wb + wc <= n2) {
+            const double distance = glm::dot(a, n) / n2;
+            best.offset = distance * n;
+            best.squared = glm::dot(best.offset, best.offset);
+            best.weights = {1 - (wb + wc) / n2, wb / n2, wc / n2};
+            return best;
+        }
+    }
+    double ab = 0, bc = 0, ca = 0;
+    const double wab = closestOnSegment(a, b, ab), wbc = closestOnSegment(b, c, bc), wca = closestOnSegment(c, a, ca);
+    if (ab <= bc && ab <= ca) {
+        best = {a + wab * u, ab, {1 - wab, wab, 0}};
+    } else if (bc <= ca) {
+        best = {b + wbc * (c - b), bc, {0, 1 - wbc, wbc}};
+    } else {
+        best = {c + wca * (a - c), ca, {wca, 0, 1 - wca}};
+    }
+    return best;
+}
+
+BoxOverlap::BoxOverlap(const Triangle3& t) : t_(t) {
+    for (int i = 0; i < 3; ++i) edge_[i] = t[(i + 1) % 3] - t[i];
+    normal_ = glm::cross(edge_[0], edge_[1]);
+    lower_ = glm::min(t[0], glm::min(t[1], t[2]));
+    upper_ = glm::max(t[0], glm::max(t[1], t[2]));
+}
+
+bool BoxOverlap::test(glm::dvec3 centre, double half) const {
+    half += kTouch;
+    for (int i = 0; i < 3; ++i)
+        if (lower_[i] > centre[i] + half || upper_[i] < centre[i] - half) return false;
+    const glm::dvec3 a = t_[0] - centre;
+    if (std::abs(glm::dot(normal_, a)) > half * (std::abs(normal_.x) + std::abs(normal_.y) + std::abs(normal_.z))) return false;
+    const glm::dvec3 b = t_[1] - centre, c = t_[2] - centre;
+    for (const glm::dvec3& e : edge_) {
+        // Axes e x (x, y, z): two components of the projection each.
+        const double ax = e.z * a.y - e.y * a.z, bx = e.z * b.y - e.y * b.z, cx = e.z * c.y - e.y * c.z;
+        const double rx = half * (std::abs(e.z) + std::abs(e.y));
+        if (std::min(ax, std::min(bx, cx)) > rx || std::max(ax, std::max(bx, cx)) < -rx) return false;
+        const double ay = e.x * a.z - e.z * a.x, by = e.x * b.z - e.z * b.x, cy = e.x * c.z - e.z * c.x;
+        const double ry = half * (std::abs(e.x) + std::abs(e.z));
+        if (std::min(ay, std::min(by, cy)) > ry || std::max(ay, std::max(by, cy)) < -ry) return false;
+        const double az = e.y * a.x - e.x * a.y, bz = e.y * b.x - e.x * b.y, cz = e.y * c.x - e.x * c.y;
+        const double rz = half * (std::abs(e.y) + std::abs(e.x));
+        if (std::min(az, std::min(bz, cz)) > rz || std::max(az, std::max(bz, cz)) < -rz) return false;
+    }
+    return true;
+}
+
+bool segmentMeetsBox(glm::dvec3 a, glm::dvec3 b, glm::dvec3 centre, double half) {
+    half += kTouch;
+    a -= centre;
+    b -= centre;
+    double t0 = 0, t1 = 1;
+    for (int i = 0; i < 3; ++i) {
+        const double d = b[i] - a[i];
+        if (d == 0) {
+            if (std::abs(a[i]) > half) return false;
+            continue;
+        }
+        double enter = (-half - a[i]) / d, leave = (half - a[i]) / d;
+        if (enter > leave) std::swap(enter, leave);
+        t0 = std::max(t0, enter);
+        t1 = std::min(t1, leave);
+        if (t0 > t1) return false;
+    }
+    return true;
+}
+
+void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, std::vector<glm::dvec3>& polygon,
+               std::vector<glm::dvec3>& scratch) {
+    polygon.assign(triangle.begin(), triangle.end());
+    for (int axis = 0; axis < 3; ++axis) {
+        for (const double side : {1.0, -1.0}) {
+            const double limit = side > 0 ? upper[axis] : -lower[axis];
+            bool inside = true;
+            for (const glm::dvec3& p : polygon) inside = inside && side * p[axis] <= limit;
+            if (inside) continue;
+            scratch.clear();
+            for (size_t i = 0; i < polygon.size(); ++i) {
+                const glm::dvec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
+                const double dp = limit - side * p[axis], dq = limit - side * q[axis];
+                if (dp >= 0) scratch.push_back(p);
+                if ((dp < 0) != (dq < 0)) scratch.push_back(p + (q - p) * (dp / (dp - dq)));
+            }
+            polygon.swap(scratch);
+            if (polygon.size() < 3) return polygon.clear();
+        }
+    }
+}
+
+}  // namespace vcp

@@ -1,0 +1,71 @@
+# Installs the libraries, their public headers, the program and the CMake package.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# What a user's find_package(vcp) must find again, for each target that our libraries link.
+function(vcp_dependency_line result target)
+    set(packages
+        Threads::Threads Threads glm::glm glm fmt::fmt fmt TBB::tbb TBB Vulkan::Vulkan Vulkan Vulkan::Headers Vulkan
+        PNG::PNG PNG glfw glfw3 FastFloat::fast_float FastFloat nlohmann_json::nlohmann_json nlohmann_json
+        spdlog::spdlog spdlog CLI11::CLI11 CLI11 ZLIB::ZLIB ZLIB CURL::libcurl CURL JPEG::JPEG JPEG imgui::imgui imgui)
+    set(line "")
+    if(target MATCHES "^PkgConfig::(.+)$")
+        set(module ${CMAKE_MATCH_1})
+        string(REPLACE ";" " " modules "${${module}_MODULE_NAME}")
+        if(NOT modules)
+            set(modules ${module})
+        endif()
+        set(line "find_dependency(PkgConfig)\npkg_check_modules(${module} REQUIRED QUIET IMPORTED_TARGET ${modules})")
+    elseif(target IN_LIST packages)
+        list(FIND packages ${target} index)
+        math(EXPR index "${index} + 1")
+        list(GET packages ${index} package)
+        set(line "find_dependency(${package})")
+    elseif(target MATCHES "::")
+        message(FATAL_ERROR "vcp: ${target} is linked by an installed library, but cmake/VcpInstall.cmake does not know its package")
+    endif()
+    set(${result} "${line}" PARENT_SCOPE)
+endfunction()
+
+set(vcp_installed "")
+set(VCP_DEPENDENCIES "")
+foreach(folder octree builder mesostructure streaming render viewer)
+    if(NOT TARGET vcp_${folder})
+        continue()
+    endif()
+    list(APPEND vcp_installed vcp_${folder})
+    set_target_properties(vcp_${folder} PROPERTIES EXPORT_NAME ${folder})
+    if(BUILD_SHARED_LIBS)
+        set_target_properties(vcp_${folder} PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR} INSTALL_RPATH "$ORIGIN")
+    endif()
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vcp/${folder}
+        FILES_MATCHING PATTERN "*.h")
+    get_target_property(links vcp_${folder} INTERFACE_LINK_LIBRARIES)
+    foreach(link IN LISTS links)
+        # A private dependency of a static library is wrapped in $<LINK_ONLY:...>.
+        string(REGEX REPLACE "^\\$<LINK_ONLY:(.*)>$" "\\1" link "${link}")
+        if(link AND NOT link MATCHES "^vcp(_|::)")
+            vcp_dependency_line(line ${link})
+            list(APPEND VCP_DEPENDENCIES "${line}")
+        endif()
+    endforeach()
+endforeach()
+list(REMOVE_DUPLICATES VCP_DEPENDENCIES)
+list(JOIN VCP_DEPENDENCIES "\n" VCP_DEPENDENCIES)
+
+if(TARGET vcp)
+    if(BUILD_SHARED_LIBS)
+        set_target_properties(vcp PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+    endif()
+    install(TARGETS vcp RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+
+set(vcp_package ${CMAKE_INSTALL_LIBDIR}/cmake/vcp)
+install(TARGETS ${vcp_installed} EXPORT vcpTargets
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT vcpTargets NAMESPACE vcp:: DESTINATION ${vcp_package})
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/vcpConfig.cmake.in ${PROJECT_BINARY_DIR}/vcpConfig.cmake
+    INSTALL_DESTINATION ${vcp_package})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/vcpConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/vcpConfig.cmake ${PROJECT_BINARY_DIR}/vcpConfigVersion.cmake DESTINATION ${vcp_package})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -1,0 +1,25 @@
+# vcp_library(NAME SOURCES... ): one static or shared library a folder, with the project's warnings.
+# vcp_options(TARGET): the project's language level, warnings and sanitizers.
+
+function(vcp_options target)
+    target_compile_features(${target} PUBLIC cxx_std_20)
+    set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion)
+    # Results must not depend on how a compiler fuses or reorders arithmetic.
+    target_compile_options(${target} PRIVATE -ffp-contract=off)
+    if(VCP_WERROR)
+        target_compile_options(${target} PRIVATE -Werror)
+    endif()
+    if(VCP_SANITIZE)
+        target_compile_options(${target} PRIVATE -fsanitize=${VCP_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+        target_link_options(${target} PUBLIC -fsanitize=${VCP_SANITIZE})
+    endif()
+endfunction()
+
+function(vcp_library name)
+    add_library(vcp_${name} ${ARGN})
+    add_library(vcp::${name} ALIAS vcp_${name})
+    target_include_directories(vcp_${name} PUBLIC
+        $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/vcp>)
+    vcp_options(vcp_${name})
+endfunction()

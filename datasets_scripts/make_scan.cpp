@@ -1,0 +1,176 @@
+// make_scan: writes a procedural scan of any size as a binary PLY file, to a file or a pipe.
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "datasets_scripts/scan_mesh.h"
+
+namespace {
+
+using namespace vcp;
+using namespace vcp::scan;
+
+constexpr std::string_view kHelp =
+    "make_scan: writes a procedural statue as a binary PLY file, as a scanner might have left it:\n"
+    "carved, noisy, with thin parts, slivers, an open border, holes and overlapping passes.\n"
+    "\n"
+    "usage: make_scan [--triangles N] [--seed S] [--colour] [--utm] [--parts] -o FILE|-\n"
+    "\n"
+    "  --triangles N  exactly so many triangles, 10000 to 1000000000 (500000)\n"
+    "  --seed S       another pose, other folds, other stone (1); the same seed gives the same bytes\n"
+    "  --colour       vertex colours\n"
+    "  --utm          double positions, z up, with an origin in UTM coordinates\n"
+    "  --parts        prints the parts and their counts on stderr\n"
+    "  -o FILE|-      the file to write, or - for a pipe\n"
+    "  --help         this text\n"
+    "\n"
+    "Memory does not grow with N. Exit status: 0 done, 1 failed, 2 wrong usage.\n";
+
+struct Arguments {
+    ScanOptions scan;
+    std::string out;
+    bool help = false, parts = false;
+};
+
+Result<uint64_t> number(std::string_view option, std::string_view text, uint64_t least, uint64_t most) {
+    uint64_t value = 0;
+    const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (problem != std::errc() || end != text.data() + text.size() || value < least || value > most)
+        return Error{ErrorCode::Usage, std::string(option) + " wants a whole number from " + std::to_string(least) +
+                                           " to " + std::to_string(most) + ", not '" + std::string(text) + "'"};
+    return value;
+}
+
+Result<Arguments> parse(int argc, char** argv) {
+    Arguments arguments;
+    for (int i = 1; i < argc; ++i) {
+        const std::string_view option = argv[i];
+        const bool takesValue = option == "--triangles" || option == "--seed" || option == "-o";
+        if (takesValue && i + 1 == argc) return Error{ErrorCode::Usage, std::string(option) + " wants a value"};
+        if (option == "--help" || option == "-h")
+            arguments.help = true;
+        else if (option == "--colour")
+            arguments.scan.colour = true;
+        else if (option == "--utm")
+            arguments.scan.utm = true;
+        else if (option == "--parts")
+            arguments.parts = true;
+        else if (option == "-o")
+            arguments.out = argv[++i];
+        else if (option == "--triangles") {
+            const auto value = number(option, argv[++i], kMinTriangles, kMaxTriangles);
+            if (!value) return value.error();
+            arguments.scan.triangles = *value;
+        } else if (option == "--seed") {
+            const auto value = number(option, argv[++i], 0, UINT64_MAX);
+            if (!value) return value.error();
+            arguments.scan.seed = *value;
+        } else
+            return Error{ErrorCode::Usage, "unknown option '" + std::string(option) + "'; see make_scan --help"};
+    }
+    if (!arguments.help && arguments.out.empty())
+        return Error{ErrorCode::Usage, "-o FILE is missing (or -o - for a pipe)"};
+    return arguments;
+}
+
+Error ioError(const std::string& file, const std::string& what) {
+    return {ErrorCode::Io, what + ": " + std::strerror(errno), file};
+}
+
+/// A file that appears under its name only when it is whole; or a pipe or device, written directly.
+class Output {
+public:
+    static Result<Output> open(const std::string& path) {
+        Output output;
+        output.path_ = path;
+        if (path == "-") {
+            output.descriptor_ = STDOUT_FILENO;
+            return output;
+        }
+        struct stat status {};
+        const bool special = ::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode);
+        output.written_ = special ? path : path + ".partial";
+        output.descriptor_ =
+            ::open(output.written_.c_str(), O_WRONLY | O_CLOEXEC | (special ? 0 : O_CREAT | O_TRUNC), 0666);
+        if (output.descriptor_ < 0) return ioError(path, "cannot be written");
+        return output;
+    }
+
+    Result<void> write(std::span<const std::byte> bytes) const {
+        while (!bytes.empty()) {
+            const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
+            if (count < 0 && errno == EINTR) continue;
+            if (count < 0) return ioError(path_, "write failed");
+            bytes = bytes.subspan(size_t(count));
+        }
+        return {};
+    }
+
+    /// Gives the file its name.
+    Result<void> finish() const {
+        if (partial() && ::fsync(descriptor_) != 0) return ioError(path_, "fsync failed");
+        if (::close(descriptor_) != 0) return ioError(path_, "close failed");
+        if (partial() && std::rename(written_.c_str(), path_.c_str()) != 0)
+            return ioError(path_, "cannot be put in place");
+        return {};
+    }
+
+    void discard() const {
+        if (partial()) std::remove(written_.c_str());
+    }
+
+private:
+    [[nodiscard]] bool partial() const { return !written_.empty() && written_ != path_; }
+
+    std::string path_, written_;
+    int descriptor_ = -1;
+};
+
+void printParts(const ScanMesh& mesh) {
+    for (const GridPart& grid : mesh.parts())
+        std::fprintf(stderr, "%-24s %-6s %10llu vertices %10llu triangles\n", grid.part.name.c_str(),
+                     grid.part.closed() ? "closed" : "open", static_cast<unsigned long long>(grid.vertices),
+                     static_cast<unsigned long long>(grid.triangles));
+}
+
+Result<void> run(const Arguments& arguments) {
+    const ScanMesh mesh(arguments.scan);
+    if (arguments.parts) printParts(mesh);
+    auto output = Output::open(arguments.out);
+    if (!output) return output.error();
+    auto result = mesh.writePly([&](std::span<const std::byte> bytes) { return output->write(bytes); });
+    if (result) result = output->finish();
+    if (!result) output->discard();
+    return result;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    // A reader that closes the pipe is an error to report, not a reason to die silently.
+    std::signal(SIGPIPE, SIG_IGN);
+    const auto arguments = parse(argc, argv);
+    if (!arguments) {
+        std::fprintf(stderr, "make_scan: %s\n", arguments.error().line().c_str());
+        return 2;
+    }
+    if (arguments->help) {
+        std::fwrite(kHelp.data(), 1, kHelp.size(), stdout);
+        return 0;
+    }
+    if (const auto result = run(*arguments); !result) {
+        std::fprintf(stderr, "make_scan: %s\n", result.error().line().c_str());
+        return 1;
+    }
+    return 0;
+}

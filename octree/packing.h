@@ -1,0 +1,35 @@
+// 32-bit packing of vectors to the closest point, of vertices and of normals.
+//
+// Two packings of a VCP: the default (11 bits distance, 10 + 10 bits octahedral direction, 1 bit sign;
+// decoded by octree/shared/leaf_math.h) and the paper's (13 bits square root of the distance, 9 + 10 bits
+// spherical angles; Demir and Westermann 2015, section 4.1). At 19 against 20 direction bits both are
+// equally accurate within 20 %; the default needs no trigonometry to decode and carries a sign.
+#pragma once
+
+#include <cstdint>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+namespace vcp {
+
+/// Packs a distance (in leaf edges, 0 to kPackedDistanceRange, clamped), the unit direction from the closest
+/// point to the corner, and on which side of the leaf's surface the corner lies. The direction is kept where
+/// the distance is 0. Precondition: |direction| = 1 +- 1e-6.
+uint32_t packVector(double distance, glm::dvec3 direction, bool negative);
+
+/// The same vector on the other side.
+inline uint32_t flipSide(uint32_t code) { return code ^ 0x80000000u; }
+
+/// The paper's packing of v = closest point - corner, with |v| clamped to `range`. A zero vector loses its
+/// direction, as in the paper.
+uint32_t packVectorSpherical(glm::dvec3 v, double range);
+glm::dvec3 unpackVectorSpherical(uint32_t code, double range);
+
+/// Octahedral normal in 16 + 16 bits; `crease` goes to the lowest bit (kNormalCreaseBit).
+uint32_t packNormal(glm::dvec3 normal, bool crease);
+
+/// Three 21-bit fields, x in the lowest bits of the first word. Precondition: each below 2^21.
+glm::u32vec2 pack21(uint32_t x, uint32_t y, uint32_t z);
+
+}  // namespace vcp

@@ -1,0 +1,125 @@
+// The reference ray-caster: slow, obvious, in double. It says what a picture must show.
+//
+// A ray visits every page of a cut and every node of a page whose closed box it touches, nearest first,
+// and tests every leaf it meets. It trusts no clearance and steps over nothing, so that what it does not
+// hit is not there; the GPU's traversal is compared with it ray by ray. The surface inside a leaf is
+// octree/shared/leaf_math.h, in double or, to show what single precision costs, in float.
+//
+// A hit is the first crossing of f = 0 in a soft leaf, a wall of a soft leaf where |f| is within the leaf's
+// wall tolerance (not where the ray starts or ends inside the leaf), or a triangle of a hard leaf within
+// the leaf's box, widened by kIntervalSlack.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+/// By how much the triangles of hard leaves are widened, in cells of the page's level.
+inline constexpr double kTriangleSlack = 1e-4;
+/// How far outside of its leaf a hit with a triangle may lie along the ray, in cells of the page's level.
+inline constexpr double kIntervalSlack = 1e-4;
+
+/// Pages of one dataset in memory. Loading is for one thread at a time; reading for any once it is done.
+class PageCache {
+public:
+    PageCache(std::shared_ptr<const ByteReader> reader, Dataset dataset);
+    /// Pages that are in memory already, one for each entry of `dataset.pages`; for tests and builders.
+    /// Errors: what parsePage says.
+    static Result<PageCache> fromPages(Dataset dataset, std::vector<PageBytes> pages);
+    /// Opens a .vcp file without loading a page. Errors: what openFile and readDataset say.
+    static Result<PageCache> open(const std::filesystem::path& path);
+
+    /// Loads what is not loaded yet. Errors: what readPage says; Usage for a page that does not exist.
+    Result<void> load(uint64_t page);
+    Result<void> load(std::span<const uint64_t> pages);
+    Result<void> loadLevel(uint32_t level);
+    Result<void> loadAll();
+
+    [[nodiscard]] const Dataset& dataset() const { return dataset_; }
+    /// A loaded page, or null. Valid as long as the cache.
+    [[nodiscard]] const PageView* view(uint64_t page) const;
+    /// Decompressed bytes held.
+    [[nodiscard]] uint64_t bytes() const;
+
+private:
+    struct Loaded {
+        PageBytes bytes;
+        PageView view;
+    };
+    std::shared_ptr<const ByteReader> reader_;
+    Dataset dataset_;
+    std::vector<std::unique_ptr<Loaded>> pages_;
+};
+
+/// All pages of a level: each level holds the whole surface. levels - 1 (or anything larger) is the finest.
+std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level);
+
+struct Ray {
+    glm::dvec3 origin{0};        ///< world
+    glm::dvec3 direction{0};     ///< |direction| = 1
+    double tMin = 0;             ///< world units along the direction
+    double tMax = std::numeric_limits<double>::infinity();
+};
+
+struct RayHit {
+    double t = 0;                ///< distance along the ray, world units
+    glm::dvec3 position{0};      ///< world
+    glm::dvec3 normal{0};        ///< unit, world, facing the ray's origin
+    uint64_t page = 0;           ///< number in the directory
+    uint32_t level = 0;
+    uint32_t node = 0;           ///< the leaf's node word; nodeType(node) is kNodeSoft or kNodeHard
+    uint32_t triangle = 0;       ///< of a hard leaf: its record's number in the page
+    bool onWall = false;         ///< accepted by the wall tolerance, not by a crossing
+    glm::dvec3 leafMin{0};       ///< the leaf's lowest corner, in cells from the page's
+    double leafEdge = 0;         ///< in cells
+    double certifiedError = 0;   ///< of the page, world units
+};
+
+/// Exact counts of the work of rays; add up over calls.
+struct CastCounters {
+    uint64_t rays = 0, pages = 0, nodes = 0, softLeaves = 0, hardLeaves = 0, triangles = 0;
+};
+
+struct CastOptions {
+    bool singlePrecision = false;  ///< leaf maths in float (f32), as on the GPU; traversal stays in double
+    int steps = 64;                ///< Illinois steps; 64 are full precision, a GPU makes a few
+};
+
+class ReferenceCaster {
+public:
+    /// `cut`: pages, all loaded, none of which is an ancestor of another; every ray is cast against exactly
+    /// these. `cache` must outlive the caster. Errors: Usage where a page is not loaded or the cut overlaps.
+    static Result<ReferenceCaster> create(const PageCache& cache, std::span<const uint64_t> cut,
+                                          CastOptions options = {});
+
+    /// First hit with tMin <= t <= tMax. Any thread; counters belong to the caller.
+    [[nodiscard]] std::optional<RayHit> cast(const Ray& ray, CastCounters* counters = nullptr) const;
+
+    /// First hit in each leaf the ray meets, sorted by t; for verification.
+    [[nodiscard]] std::vector<RayHit> castAll(const Ray& ray, CastCounters* counters = nullptr) const;
+
+    [[nodiscard]] const PageCache& cache() const { return *cache_; }
+
+private:
+    enum class Mark : uint8_t { None, Above, Chosen };
+    ReferenceCaster(const PageCache& cache, CastOptions options) : cache_(&cache), options_(options) {}
+
+    const PageCache* cache_;
+    CastOptions options_;
+    std::vector<Mark> marks_;  ///< of each page: in the cut, above one that is, or neither
+
+    friend class CastWalk;
+};
+
+}  // namespace vcp

@@ -1,0 +1,86 @@
+// Result<T>: how every module of vcp reports what went wrong with data, files and devices.
+//
+// No exception crosses a module; asserts are for bugs only. An Error is one clear line:
+// "FILE: ELEMENT: byte N: what is wrong; what to do". Library code never prints it, the caller does.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace vcp {
+
+enum class ErrorCode {
+    InvalidInput,  ///< the bytes of an input are wrong (mesh, .vcp, camera file)
+    Io,            ///< open, read, write, fsync, rename, no space
+    Unsupported,   ///< valid, but of a version, format or feature that this build does not know
+    Limit,         ///< a memory, size or count limit would be exceeded
+    Device,        ///< Vulkan: no device, out of memory, lost
+    Usage,         ///< the caller's arguments contradict each other
+    Cancelled,     ///< the caller asked to stop
+};
+
+struct Error {
+    ErrorCode code = ErrorCode::InvalidInput;
+    std::string message;                ///< what is wrong, and what to do where that helps
+    std::string file = {};              ///< path as the user gave it; empty when no file is concerned
+    std::string element = {};           ///< "vertex 17", "line 12", "page 5"; empty when none
+    std::optional<uint64_t> byte = {};  ///< offset in the file of the first wrong byte
+
+    /// The one line shown to a person.
+    [[nodiscard]] std::string line() const {
+        std::string text;
+        if (!file.empty()) text += file + ": ";
+        if (!element.empty()) text += element + ": ";
+        if (byte) text += "byte " + std::to_string(*byte) + ": ";
+        return text + message;
+    }
+};
+
+/// A value or an Error. `Result<void>` carries no value.
+template <class T>
+class [[nodiscard]] Result {
+public:
+    Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}
+    Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}
+
+    [[nodiscard]] bool ok() const { return state_.index() == 0; }
+    explicit operator bool() const { return ok(); }
+    [[nodiscard]] T& value() & { return std::get<0>(state_); }
+    [[nodiscard]] const T& value() const& { return std::get<0>(state_); }
+    [[nodiscard]] T&& value() && { return std::get<0>(std::move(state_)); }
+    T& operator*() & { return value(); }
+    const T& operator*() const& { return value(); }
+    T&& operator*() && { return std::move(*this).value(); }
+    T* operator->() { return &value(); }
+    const T* operator->() const { return &value(); }
+    [[nodiscard]] const Error& error() const { return std::get<1>(state_); }
+
+private:
+    std::variant<T, Error> state_;
+};
+
+template <>
+class [[nodiscard]] Result<void> {
+public:
+    Result() = default;
+    Result(Error error) : error_(std::move(error)) {}
+
+    [[nodiscard]] bool ok() const { return !error_.has_value(); }
+    explicit operator bool() const { return ok(); }
+    [[nodiscard]] const Error& error() const { return *error_; }
+
+private:
+    std::optional<Error> error_;
+};
+
+}  // namespace vcp
+
+/// Returns the error of `expr` from the enclosing function, if there is one.
+#define VCP_TRY(expr)                                    \
+    do {                                                 \
+        if (auto vcpTried = (expr); !vcpTried)           \
+            return vcpTried.error();                     \
+    } while (false)

@@ -1,0 +1,236 @@
+// The surface inside a leaf: decoding, evaluation, intersection. Compiles as GLSL (Real = float) and as
+// C++ in float and double (octree/leaf_math.h), so that the tests of the C++ cover the shader.
+// Only the common subset of GLSL and GLM is used: no swizzles, no in/out arguments.
+//
+// Source: Demir and Westermann 2015, section 2.2, replaced by the half-gradient surface of
+// docs/surface.md: f(x) = sum w_i(x) [ D_i + 1/2 N_i . (x - p_i) ] with signed distances D_i, oriented
+// directions N_i and trilinear weights w_i; exact where the surface is a quadric's level set.
+
+// Octahedral direction, 10 + 10 bits (Meyer et al. 2010). Unit length.
+INLINE Real3 decodeDirection(uint code) {
+    Real x = Real(code & 1023u) * Real(2.0 / 1023.0) - Real(1.0);
+    Real y = Real((code >> 10) & 1023u) * Real(2.0 / 1023.0) - Real(1.0);
+    Real z = Real(1.0) - abs(x) - abs(y);
+    Real fold = max(-z, Real(0.0));
+    x += x >= Real(0.0) ? -fold : fold;
+    y += y >= Real(0.0) ? -fold : fold;
+    Real scale = inversesqrt(x * x + y * y + z * z);
+    return Real3(x * scale, y * scale, z * scale);
+}
+
+// Octahedral normal, 16 + 16 bits; the lowest bit is the crease flag and costs no visible accuracy.
+INLINE Real3 decodeNormal(uint code) {
+    Real x = Real(code & 0xfffeu) * Real(2.0 / 65534.0) - Real(1.0);
+    Real y = Real(code >> 16) * Real(2.0 / 65535.0) - Real(1.0);
+    Real z = Real(1.0) - abs(x) - abs(y);
+    Real fold = max(-z, Real(0.0));
+    x += x >= Real(0.0) ? -fold : fold;
+    y += y >= Real(0.0) ? -fold : fold;
+    Real scale = inversesqrt(x * x + y * y + z * z);
+    return Real3(x * scale, y * scale, z * scale);
+}
+
+// Distance of a packed vector, in leaf edges, and the side of the surface its corner is on.
+INLINE Real decodeDistance(uint code) {
+    return Real(code & kPackedDistanceMax) * (Real(kPackedDistanceRange) / Real(kPackedDistanceMax));
+}
+INLINE Real decodeSide(uint code) { return (code >> 31) != 0u ? Real(-1.0) : Real(1.0); }
+
+// Position of a packed vertex in page space (cells).
+INLINE Real3 decodeVertex(uint lo, uint hi) {
+    uint y = (lo >> 21) | ((hi & 0x3ffu) << 11);
+    int ix = int(lo & kField21Mask) - kLatticeBias;
+    int iy = int(y) - kLatticeBias;
+    int iz = int((hi >> 10) & kField21Mask) - kLatticeBias;
+    return Real3(Real(ix), Real(iy), Real(iz)) * (Real(1.0) / Real(kLatticePerCell));
+}
+
+// The three vertex numbers of a triangle record are packed like a vertex, without bias.
+INLINE uint decodeIndex0(uint lo) { return lo & kField21Mask; }
+INLINE uint decodeIndex1(uint lo, uint hi) { return (lo >> 21) | ((hi & 0x3ffu) << 11); }
+INLINE uint decodeIndex2(uint hi) { return (hi >> 10) & kField21Mask; }
+
+// Leaf space with the leaf's axis as x and the next axes, cyclically, as y and z: for the weights only.
+INLINE Real3 rotateToAxis(Real3 x, uint axis) {
+    return axis == 0u ? x : axis == 1u ? Real3(x.y, x.z, x.x) : Real3(x.z, x.x, x.y);
+}
+
+// A soft leaf, decoded. Corners of the axis' lower face in the members ending in 0, of its upper face in
+// those ending in 1. f(x) = sum w_i (a_i + g_i . x); g is half the oriented direction.
+struct LeafField {
+    Real4 a0, a1;
+    Real4 gx0, gx1;
+    Real4 gy0, gy1;
+    Real4 gz0, gz1;
+    uint axis;
+};
+
+INLINE LeafField decodeLeaf(uint4 face0, uint4 face1, uint axis) {
+    Real3 n0 = decodeDirection(face0.x >> 11), n1 = decodeDirection(face0.y >> 11);
+    Real3 n2 = decodeDirection(face0.z >> 11), n3 = decodeDirection(face0.w >> 11);
+    Real3 m0 = decodeDirection(face1.x >> 11), m1 = decodeDirection(face1.y >> 11);
+    Real3 m2 = decodeDirection(face1.z >> 11), m3 = decodeDirection(face1.w >> 11);
+    Real4 s0 = Real4(decodeSide(face0.x), decodeSide(face0.y), decodeSide(face0.z), decodeSide(face0.w));
+    Real4 s1 = Real4(decodeSide(face1.x), decodeSide(face1.y), decodeSide(face1.z), decodeSide(face1.w));
+    Real4 d0 = Real4(decodeDistance(face0.x), decodeDistance(face0.y), decodeDistance(face0.z), decodeDistance(face0.w));
+    Real4 d1 = Real4(decodeDistance(face1.x), decodeDistance(face1.y), decodeDistance(face1.z), decodeDistance(face1.w));
+    Real4 h0 = s0 * Real(0.5), h1 = s1 * Real(0.5);
+    LeafField leaf;
+    leaf.axis = axis;
+    leaf.gx0 = Real4(n0.x, n1.x, n2.x, n3.x) * h0;
+    leaf.gy0 = Real4(n0.y, n1.y, n2.y, n3.y) * h0;
+    leaf.gz0 = Real4(n0.z, n1.z, n2.z, n3.z) * h0;
+    leaf.gx1 = Real4(m0.x, m1.x, m2.x, m3.x) * h1;
+    leaf.gy1 = Real4(m0.y, m1.y, m2.y, m3.y) * h1;
+    leaf.gz1 = Real4(m0.z, m1.z, m2.z, m3.z) * h1;
+    // a_i = D_i - 1/2 N_i . p_i. The corner p_i has, by axis, 0 or 1 along it and these along the next two.
+    Real4 next = Real4(0.0, 1.0, 0.0, 1.0), last = Real4(0.0, 0.0, 1.0, 1.0);
+    Real4 along0 = axis == 0u ? leaf.gy0 * next + leaf.gz0 * last
+                 : axis == 1u ? leaf.gz0 * next + leaf.gx0 * last
+                              : leaf.gx0 * next + leaf.gy0 * last;
+    Real4 along1 = axis == 0u ? leaf.gx1 + leaf.gy1 * next + leaf.gz1 * last
+                 : axis == 1u ? leaf.gy1 + leaf.gz1 * next + leaf.gx1 * last
+                              : leaf.gz1 + leaf.gx1 * next + leaf.gy1 * last;
+    leaf.a0 = d0 * s0 - along0;
+    leaf.a1 = d1 * s1 - along1;
+    return leaf;
+}
+
+// Bilinear weights of a face's corners.
+INLINE Real4 faceWeights(Real y, Real z) {
+    Real4 wy = Real4(Real(1.0) - y, y, Real(1.0) - y, y);
+    Real4 wz = Real4(Real(1.0) - z, Real(1.0) - z, z, z);
+    return wy * wz;
+}
+
+INLINE Real leafValue(LeafField leaf, Real3 x) {
+    Real3 r = rotateToAxis(x, leaf.axis);
+    Real4 w = faceWeights(r.y, r.z);
+    Real4 l0 = leaf.a0 + leaf.gx0 * x.x + leaf.gy0 * x.y + leaf.gz0 * x.z;
+    Real4 l1 = leaf.a1 + leaf.gx1 * x.x + leaf.gy1 * x.y + leaf.gz1 * x.z;
+    return dot(w, l0) * (Real(1.0) - r.x) + dot(w, l1) * r.x;
+}
+
+// Blended direction (not normalized): continuous over faces, unlike the gradient of f.
+INLINE Real3 leafNormal(LeafField leaf, Real3 x) {
+    Real3 r = rotateToAxis(x, leaf.axis);
+    Real4 w = faceWeights(r.y, r.z);
+    Real4 w0 = w * (Real(1.0) - r.x);
+    Real4 w1 = w * r.x;
+    return Real3(dot(w0, leaf.gx0) + dot(w1, leaf.gx1), dot(w0, leaf.gy0) + dot(w1, leaf.gy1),
+                 dot(w0, leaf.gz0) + dot(w1, leaf.gz1));
+}
+
+// f restricted to the segment p + u d, u in [0, 1]: sum w_i(p + u d) (A_i + u B_i). The members p and d
+// are rotated to the leaf's axis.
+struct RayField {
+    Real4 A0, A1, B0, B1;
+    Real3 p, d;
+};
+
+INLINE RayField restrictToRay(LeafField leaf, Real3 p, Real3 d) {
+    RayField ray;
+    ray.A0 = leaf.a0 + leaf.gx0 * p.x + leaf.gy0 * p.y + leaf.gz0 * p.z;
+    ray.A1 = leaf.a1 + leaf.gx1 * p.x + leaf.gy1 * p.y + leaf.gz1 * p.z;
+    ray.B0 = leaf.gx0 * d.x + leaf.gy0 * d.y + leaf.gz0 * d.z;
+    ray.B1 = leaf.gx1 * d.x + leaf.gy1 * d.y + leaf.gz1 * d.z;
+    ray.p = rotateToAxis(p, leaf.axis);
+    ray.d = rotateToAxis(d, leaf.axis);
+    return ray;
+}
+
+INLINE Real rayValue(RayField ray, Real u) {
+    Real4 w = faceWeights(ray.p.y + u * ray.d.y, ray.p.z + u * ray.d.z);
+    Real x = ray.p.x + u * ray.d.x;
+    return dot(w, ray.A0 + ray.B0 * u) * (Real(1.0) - x) + dot(w, ray.A1 + ray.B1 * u) * x;
+}
+
+INLINE Real wallTolerance(uint node) {
+    Real code = Real((node >> kSoftWallShift) & kSoftWallMask);
+    return max(Real(kWallRounding), Real(kWallUnit) * code * code);
+}
+
+INLINE Real dipBound(uint node) {
+    uint code = node >> kSoftDipShift & 3u;
+    return code == 0u ? Real(0.004) : code == 1u ? Real(0.02) : code == 2u ? Real(0.1) : Real(1e30);
+}
+
+// First crossing of the segment with f = 0, as u in [0, 1], or -1.
+// wallIn, wallOut: |f| that counts as a hit at u = 0 and u = 1 (0 where that end is not a wall);
+// dip: how far f can swing between two ends on the same side (see page_layout.h).
+// The bracket is refined by the Illinois variant of false position, `steps` times.
+INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int steps) {
+    Real fa = rayValue(ray, Real(0.0));
+    if (abs(fa) <= wallIn) return Real(0.0);
+    Real fb = rayValue(ray, Real(1.0));
+    Real a = Real(0.0), b = Real(1.0);
+    bool below = fa < Real(0.0);
+    if ((fb < Real(0.0)) == below) {
+        Real end = abs(fb) <= wallOut ? Real(1.0) : Real(-1.0);
+        if (min(abs(fa), abs(fb)) > dip) return end;
+        // Both ends on one side: look where the parabola through the middle turns.
+        Real fm = rayValue(ray, Real(0.5));
+        b = Real(0.5);
+        if ((fm < Real(0.0)) == below) {
+            Real curve = Real(2.0) * (fa + fb - Real(2.0) * fm);
+            Real slope = Real(4.0) * fm - Real(3.0) * fa - fb;
+            Real turn = -slope / (Real(2.0) * curve);
+            if (!(turn > Real(0.0) && turn < Real(1.0))) return end;
+            fm = rayValue(ray, turn);
+            if ((fm < Real(0.0)) == below) return end;
+            b = turn;
+        }
+        fb = fm;
+    }
+    int side = 0;
+    for (int i = 0; i < steps; i++) {
+        Real u = a + (b - a) * (fa / (fa - fb));
+        Real fu = rayValue(ray, u);
+        if ((fu < Real(0.0)) == below) {
+            a = u;
+            fa = fu;
+            if (side == -1) fb *= Real(0.5);
+            side = -1;
+        } else {
+            b = u;
+            fb = fu;
+            if (side == 1) fa *= Real(0.5);
+            side = 1;
+        }
+    }
+    return a + (b - a) * (fa / (fa - fb));
+}
+
+// Where the line q + s d (|d| about 1) meets triangle a b c, in page space: x = s, y and z the weights of
+// b and c; x = 1e30 where it does not. Vertices are taken relative to q, edges are widened by
+// `slack` cells, so that no ray slips between triangles that share an edge or an edge's point.
+INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real slack) {
+    Real3 va = a - q, vb = b - q, vc = c - q;
+    Real3 ab = b - a, bc = c - b, ca = a - c;
+    Real3 n = cross(ab, c - a);
+    Real nd = dot(n, d);
+    Real flip = nd < Real(0.0) ? Real(-1.0) : Real(1.0);
+    // Signed volumes of d with each edge; all have the sign of nd inside.
+    Real wa = flip * dot(d, cross(vb, vc));
+    Real wb = flip * dot(d, cross(vc, va));
+    Real wc = flip * dot(d, cross(va, vb));
+    Real3 miss = Real3(Real(1e30), Real(0.0), Real(0.0));
+    if (wa < -slack * sqrt(dot(bc, bc)) || wb < -slack * sqrt(dot(ca, ca)) || wc < -slack * sqrt(dot(ab, ab))) return miss;
+    if (!(abs(nd) > Real(0.0))) return miss;
+    // Weights below 0 are cut off and the hit is the triangle's point with the weights that are left. A ray in
+    // the slack must pass near that point: along needles and for grazing rays the widened edges reach far.
+    // So must, less strictly, any ray: seen edge-on, a needle's weights are rounding alone.
+    bool outside = wa < Real(0.0) || wb < Real(0.0) || wc < Real(0.0);
+    wa = max(wa, Real(0.0));
+    wb = max(wb, Real(0.0));
+    wc = max(wc, Real(0.0));
+    Real total = wa + wb + wc;
+    if (!(total > Real(0.0))) return miss;
+    Real scale = Real(1.0) / total;
+    Real3 at = (va * wa + vb * wb + vc * wc) * scale;
+    Real s = dot(at, d);
+    Real3 off = at - d * s;
+    Real limit = (outside ? Real(4.0) : Real(40.0)) * slack;
+    if (dot(off, off) > limit * limit) return miss;
+    return Real3(s, wb * scale, wc * scale);
+}

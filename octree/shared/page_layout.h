@@ -1,0 +1,72 @@
+// Layout of a page: the bytes of one subvolume, in the file (decompressed), in memory and in the GPU
+// pool. Compiles as C++ (inside namespace vcp) and as GLSL; octree/page.h is the C++ entrance.
+//
+// A page covers S = 2^log2Cells cells per edge of its level. Its coordinates ("page space") have the
+// page's lowest corner as origin and the level's cell edge as unit. All sections begin on 16 bytes:
+//
+//   offset            bytes               section
+//   0                 64                  PageHeader (C++ only; the renderer has it in its page table)
+//   64                32 * groups         nodes: groups of 8 child words, child i at octant x + 2y + 4z
+//   ...               16 * faces          faces: 4 packed vectors each, see "soft leaf"
+//   ...               8 * triangles       triangle records of hard leaves: 3 vertex numbers, 21 bits each
+//   ...               8 * vertices        vertices of those triangles: 3 coordinates, 21 bits each
+//   ...               4 * vertices        their normals, octahedral 16 + 16 bits, and a crease flag
+//
+// A colour page, when the dataset has colour, is parallel to it: 16 bytes a face (4 x RGBA8, the corner
+// order of the face), then 4 bytes a vertex.
+//
+// Node word, bits 31..30:
+//   00 internal   bits 29..0: number of the group of its 8 children (greater than its own group)
+//   01 empty      bits 29..0: clearance in 1/256 cell, rounded down. The node's box, grown by it on
+//                 every side and clamped to the page, holds no surface (so a ball of it is safe too)
+//   10 soft leaf  bits 21..0: first face; 23..22: axis; 27..24: wall code; 29..28: dip code
+//   11 hard leaf  bits 21..0: first triangle record; 29..22: count, 1 to 254; 255: the first record's
+//                 low word holds the count and the triangles follow it
+//
+// Soft leaf: two consecutive faces, perpendicular to `axis`, hold its 8 corners; neighbours along the
+// axis share the face between them. Leaf space is page space shifted to the leaf's lowest corner and
+// scaled so that the leaf is the unit cube. Corner c of a face sits at c & 1 on the next axis and at
+// c >> 1 on the one after it, cyclically. Directions are in leaf space, from the surface to the corner;
+// the sign says on which side of the leaf's surface the corner lies.
+
+const uint kPageHeaderBytes = 64u;
+const uint kNodeTypeShift = 30u;
+const uint kNodeInternal = 0u;
+const uint kNodeEmpty = 1u;
+const uint kNodeSoft = 2u;
+const uint kNodeHard = 3u;
+const uint kNodePayloadMask = 0x3fffffffu;
+const uint kLeafIndexMask = 0x3fffffu;
+const uint kSoftAxisShift = 22u;
+const uint kSoftWallShift = 24u;
+const uint kSoftWallMask = 15u;
+const uint kSoftDipShift = 28u;
+const uint kHardCountShift = 22u;
+const uint kHardCountMask = 255u;
+const uint kHardCountLong = 255u;
+const float kClearancePerCell = 256.0f;
+
+// Leaves may be smaller than a cell where many triangles meet: up to this many further halvings.
+const uint kMaxSubcellDepth = 3u;
+
+// 21-bit fields of triangles and vertices. Vertices sit on the level's lattice: 2048 steps a cell, from
+// 512 cells below the page's origin to 512 cells above it.
+const uint kField21Mask = 0x1fffffu;
+const int kLatticePerCell = 2048;
+const int kLatticeBias = 1048576;
+
+// A vertex normal is not to be interpolated across a crease: this bit of the packed normal says so.
+const uint kNormalCreaseBit = 1u;
+
+// Packed vector (default packing): 11 bits distance, 10 + 10 bits octahedral direction, 1 bit sign.
+// The vector to the closest point is -distance * direction, whatever the sign.
+const float kPackedDistanceRange = 1.7320509f;  // sqrt(3) leaf edges, rounded up
+const uint kPackedDistanceMax = 2047u;
+
+// Wall code: |f| on a leaf's wall up to which a ray is taken to have hit there, in leaf edges.
+// Code 0: only rounding is bridged. Code k: kWallUnit * k^2 leaf edges.
+const float kWallRounding = 2e-6f;
+const float kWallUnit = 0.0005f;
+
+// Dip code: bound on how far f can swing between two points of a leaf on the same side of the surface,
+// in leaf edges: 0.004, 0.02, 0.1, unbounded.

@@ -1,0 +1,159 @@
+// The .vcp file, version 1.
+//
+//   offset   bytes        content
+//   0        4096         FileHeader: what is in the file, tables of the levels, where the directory is
+//   4096     4096 * n     directory: blocks of 51 PageEntries and a hash; coarse level first, Morton order
+//                         (x lowest) within a level, so that the coarsest pages' entries and the header are
+//                         within the first 16 KiB
+//   ...                   pages, in the order of the directory, each on 256 bytes: geometry, then colour;
+//                         each a zstd frame; zero bytes between
+//   end-64   64           CommitRecord, written last
+//
+// Every header, block and page carries an XXH3-64; a file whose commit record, header or size disagree was
+// not finished or was changed. Sizes, counts and offsets are checked before use: a hostile file wastes
+// neither memory nor time. All numbers little endian. Readers refuse versions they do not know.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "octree/page.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+inline constexpr uint32_t kFileVersion = 1;
+inline constexpr uint32_t kMaxLevels = 24;
+inline constexpr uint64_t kDirectoryOffset = 4096;
+inline constexpr uint64_t kBlockBytes = 4096;
+inline constexpr uint32_t kEntriesPerBlock = 51;
+inline constexpr uint64_t kPageAlignment = 256;
+
+/// One level's row in the header.
+struct LevelRow {
+    uint64_t firstEntry = 0;
+    uint64_t pages = 0;
+    double certifiedError = 0;  ///< largest of its pages, world units
+};
+
+/// First 4096 bytes of the file (the rest of them is zero).
+struct FileHeader {
+    char magic[8] = {'V', 'C', 'P', '\r', '\n', '\x1a', '\n', '\0'};
+    uint32_t version = kFileVersion;
+    uint32_t headerBytes = 4096;
+    uint64_t fileBytes = 0;
+    uint64_t pages = 0;
+    double origin[3] = {};  ///< world position of the lowest corner of the root page
+    double cell = 0;        ///< edge of a cell of the finest level, world units
+    double errorTarget = 0; ///< what the builder was asked for, world units
+    double certifiedErrorMax = 0;  ///< of the finest level, world units
+    double boundsMin[3] = {};      ///< of the mesh, world units
+    double boundsMax[3] = {};
+    uint32_t levels = 0;    ///< 1 to kMaxLevels
+    uint32_t log2Cells = 0; ///< cells an edge of a page: 2^log2Cells
+    uint32_t flags = 0;     ///< bit 0: has colour
+    uint32_t reserved = 0;
+    uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
+    uint64_t leaves = 0;      ///< soft and hard, of the finest level
+    uint64_t hardLeaves = 0;  ///< of the finest level
+    LevelRow level[kMaxLevels] = {};
+    uint64_t hash = 0;  ///< XXH3-64 of the 4096 bytes with this field zero
+};
+inline constexpr uint32_t kFlagColour = 1;
+static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 && offsetof(FileHeader, triangles) == 144);
+static_assert(offsetof(FileHeader, level) == 184 && sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 && sizeof(FileHeader) <= 4096);
+
+/// One page in the directory.
+struct PageEntry {
+    uint64_t morton = 0;  ///< position of the subvolume among those of its level, 21 bits an axis
+    uint64_t offset = 0;  ///< of the stored geometry in the file
+    uint64_t hash = 0;    ///< XXH3-64 of the stored geometry
+    uint64_t colourOffset = 0;
+    uint64_t colourHash = 0;
+    uint32_t storedBytes = 0;  ///< in the file
+    uint32_t pageBytes = 0;    ///< decompressed
+    uint32_t colourStoredBytes = 0;
+    uint32_t colourBytes = 0;
+    uint32_t firstChild = 0;  ///< entry of the first child page; children are consecutive, in octant order
+    uint32_t leaves = 0;      ///< soft and hard
+    uint32_t hardLeaves = 0;
+    float certifiedError = 0;  ///< world units, rounded up
+    uint8_t childMask = 0;     ///< octants that have a page on the next level
+    uint8_t level = 0;
+    uint8_t reserved[6] = {};
+};
+static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 && offsetof(PageEntry, childMask) == 72);
+
+struct CommitRecord {
+    char magic[8] = {'V', 'C', 'P', 'c', 'o', 'm', 'm', 't'};
+    uint64_t fileBytes = 0;
+    uint64_t headerHash = 0;
+    uint64_t directoryHash = 0;  ///< XXH3-64 of all directory blocks
+    uint64_t reserved[3] = {};
+    uint64_t hash = 0;  ///< XXH3-64 of the 56 bytes before
+};
+static_assert(sizeof(CommitRecord) == 64);
+
+/// Header and directory of a .vcp file, checked. Plain data: copy, share, read from any thread.
+struct Dataset {
+    FileHeader header;
+    std::vector<PageEntry> pages;
+
+    [[nodiscard]] bool hasColour() const { return (header.flags & kFlagColour) != 0; }
+    /// Edge of a cell of `level`, world units.
+    [[nodiscard]] double cellOf(uint32_t level) const;
+    /// World position of the lowest corner of a page.
+    [[nodiscard]] glm::dvec3 originOf(const PageEntry& page) const;
+    /// Edge of a page, world units.
+    [[nodiscard]] double edgeOf(const PageEntry& page) const;
+};
+
+/// Where the bytes of a file come from: bounded reads at an offset. Implemented by streaming/ (file, HTTP,
+/// faulty) and by tests. Any thread may call read.
+class ByteReader {
+public:
+    virtual ~ByteReader() = default;
+    virtual Result<void> read(uint64_t offset, std::span<std::byte> bytes) const = 0;
+    [[nodiscard]] virtual uint64_t size() const = 0;
+    [[nodiscard]] virtual const std::string& name() const = 0;
+};
+
+/// Opens a local file for bounded reads (pread). Errors: Io.
+Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
+
+/// Reads and checks header, directory and commit record; no page. Errors: InvalidInput, Unsupported, Io;
+/// each names the file and the byte.
+Result<Dataset> readDataset(const ByteReader& reader);
+
+/// A page's decompressed bytes, 16-byte aligned.
+struct PageBytes {
+    std::vector<uint4> geometry;
+    std::vector<uint4> colour;  ///< empty when not asked for or absent
+
+    [[nodiscard]] std::span<const std::byte> geometryBytes() const { return std::as_bytes(std::span(geometry)); }
+    [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
+};
+
+/// Reads, verifies (hash), decompresses and checks (parsePage) one page. Safe on hostile bytes: allocates at
+/// most the entry's pageBytes, which readDataset has bounded. Any thread.
+Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
+
+/// Reads every byte of the file and checks it, also those between pages. Calls `progress(bytes done)` now and
+/// then; it returns false to cancel. Errors: the first thing that is wrong.
+Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t) = nullptr, void* user = nullptr);
+
+/// XXH3-64.
+uint64_t hashBytes(std::span<const std::byte> bytes);
+
+/// Interleaves three 21-bit coordinates, x lowest; and back.
+uint64_t mortonEncode(glm::u32vec3 cell);
+glm::u32vec3 mortonDecode(uint64_t code);
+
+}  // namespace vcp

@@ -1,0 +1,142 @@
+#include "octree/vcp_writer.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <zstd.h>
+
+namespace vcp {
+
+namespace {
+
+constexpr int kCompressionLevel = 3;
+
+uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
+uint64_t directoryBytes(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes; }
+
+std::vector<std::byte> compress(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return {};
+    std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
+    const size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kCompressionLevel);
+    out.resize(ZSTD_isError(size) ? 0 : size);  // cannot fail with a buffer of compressBound
+    return out;
+}
+
+Error ioError(const std::filesystem::path& file, const char* what, int error) {
+    std::string message = std::string(what) + ": " + std::strerror(error);
+    if (error == ENOSPC) message += "; free some space or choose another folder";
+    return {.code = ErrorCode::Io, .message = message, .file = file.string()};
+}
+
+Result<void> syncFolder(const std::filesystem::path& file) {
+    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return ioError(folder, "cannot open the folder", errno);
+    const bool ok = ::fsync(fd) == 0 || errno == EINVAL;  // some file systems have no fsync of folders
+    const int error = errno;
+    ::close(fd);
+    if (!ok) return ioError(folder, "cannot make the folder durable", error);
+    return {};
+}
+
+}  // namespace
+
+StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
+    StoredPage page;
+    page.geometry = compress(geometry);
+    page.colour = compress(colour);
+    page.geometryBytes = static_cast<uint32_t>(geometry.size());
+    page.colourBytes = static_cast<uint32_t>(colour.size());
+    return page;
+}
+
+Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path& output, uint64_t pages) {
+    std::unique_ptr<VcpWriter> writer(new VcpWriter);
+    writer->output_ = output;
+    writer->partial_ = output;
+    writer->partial_ += ".partial";
+    writer->pages_ = pages;
+    writer->end_ = alignPage(kDirectoryOffset + directoryBytes(pages));
+    if (std::error_code ignored; std::filesystem::is_directory(output, ignored))
+        return Error{.code = ErrorCode::Io, .message = "is a folder; give a file name", .file = output.string()};
+    writer->file_ = ::open(writer->partial_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (writer->file_ < 0) return ioError(output, "cannot write here", errno);
+    return writer;
+}
+
+VcpWriter::~VcpWriter() {
+    if (file_ < 0) return;
+    ::close(file_);
+    ::unlink(partial_.c_str());
+}
+
+Result<void> VcpWriter::write(uint64_t offset, std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+        const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return ioError(output_, "write failed", n == 0 ? EIO : errno);
+        offset += static_cast<uint64_t>(n);
+        bytes = bytes.subspan(static_cast<size_t>(n));
+    }
+    return {};
+}
+
+Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
+    entry.offset = end_;
+    entry.storedBytes = static_cast<uint32_t>(page.geometry.size());
+    entry.pageBytes = page.geometryBytes;
+    entry.hash = hashBytes(page.geometry);
+    VCP_TRY(write(end_, page.geometry));
+    end_ = alignPage(end_ + page.geometry.size());
+    if (!page.colour.empty()) {
+        entry.colourOffset = end_;
+        entry.colourStoredBytes = static_cast<uint32_t>(page.colour.size());
+        entry.colourBytes = page.colourBytes;
+        entry.colourHash = hashBytes(page.colour);
+        VCP_TRY(write(end_, page.colour));
+        end_ = alignPage(end_ + page.colour.size());
+    }
+    entries_.push_back(entry);
+    return {};
+}
+
+Result<uint64_t> VcpWriter::commit(FileHeader header) {
+    std::vector<std::byte> directory(directoryBytes(pages_));
+    for (size_t i = 0; i < entries_.size(); ++i) {
+        std::byte* block = directory.data() + i / kEntriesPerBlock * kBlockBytes;
+        std::memcpy(block + i % kEntriesPerBlock * sizeof(PageEntry), &entries_[i], sizeof(PageEntry));
+    }
+    for (size_t at = 0; at < directory.size(); at += kBlockBytes) {
+        const uint64_t hash = hashBytes(std::span(directory).subspan(at, kBlockBytes - 8));
+        std::memcpy(directory.data() + at + kBlockBytes - 8, &hash, 8);
+    }
+    VCP_TRY(write(kDirectoryOffset, directory));
+
+    header.pages = pages_;
+    header.fileBytes = end_ + sizeof(CommitRecord);
+    header.hash = 0;
+    std::vector<std::byte> first(kDirectoryOffset);
+    std::memcpy(first.data(), &header, sizeof header);
+    header.hash = hashBytes(first);
+    std::memcpy(first.data(), &header, sizeof header);
+    VCP_TRY(write(0, first));
+
+    CommitRecord commit;
+    commit.fileBytes = header.fileBytes;
+    commit.headerHash = header.hash;
+    commit.directoryHash = hashBytes(directory);
+    commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash)));
+    // The record is the promise that all else is there: it goes out after the rest is durable.
+    if (::fsync(file_) != 0) return ioError(output_, "cannot make the file durable", errno);
+    VCP_TRY(write(end_, std::as_bytes(std::span(&commit, 1))));
+    if (::fsync(file_) != 0) return ioError(output_, "cannot make the file durable", errno);
+    if (::rename(partial_.c_str(), output_.c_str()) != 0) return ioError(output_, "cannot rename the finished file", errno);
+    ::close(file_);
+    file_ = -1;
+    VCP_TRY(syncFolder(output_));
+    return header.fileBytes;
+}
+
+}  // namespace vcp

@@ -1,0 +1,23 @@
+// The structs of render/shared/frame_layout.h in C++.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+namespace vcp::frame {
+
+using uint = uint32_t;
+using vec4 = glm::vec4;
+using ivec4 = glm::ivec4;
+using uvec4 = glm::uvec4;
+
+#include "render/shared/frame_layout.h"
+
+static_assert(sizeof(FrameConstants) == 240 && offsetof(FrameConstants, originLattice) == 96);
+static_assert(offsetof(FrameConstants, picture) == 128 && offsetof(FrameConstants, backgroundBottom) == 224);
+static_assert(sizeof(FrameCounters) == 16);
+
+}  // namespace vcp::frame

@@ -1,0 +1,115 @@
+#include "render/frame_setup.h"
+
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/exponential.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+namespace vcp {
+
+namespace {
+
+glm::vec4 toVec4(glm::dvec3 v) { return glm::vec4(glm::vec3(v), 0); }
+
+frame::uint shadingMode(ShadingMode mode) {
+    switch (mode) {
+        case ShadingMode::Lit: return frame::kShadeLit;
+        case ShadingMode::Clay: return frame::kShadeClay;
+        case ShadingMode::Normals: return frame::kShadeNormals;
+        case ShadingMode::Steps: return frame::kShadeSteps;
+    }
+    return frame::kShadeLit;
+}
+
+/// Directions of the picture's corner and of a step of a pixel.
+struct PicturePlane {
+    glm::dvec3 corner, stepX, stepY;
+};
+PicturePlane picturePlane(const CameraBasis& basis, uint32_t width, uint32_t height) {
+    return {basis.up * basis.halfHeight - basis.right * basis.halfWidth, basis.right * (2 * basis.halfWidth / width),
+            basis.up * (-2 * basis.halfHeight / height)};
+}
+
+/// Splits the eye, in finest cells from the root's corner, into a lattice point and a small rest where it is
+/// near enough for the lattice; from farther away single precision is finer than any pixel.
+void setOrigin(frame::FrameConstants& c, glm::dvec3 eye, double rootCells) {
+    const double latticePerCell = double(c.lattice.x);
+    c.originLattice = glm::ivec4(0);
+    if (glm::all(glm::greaterThan(eye, glm::dvec3(-0.5 * rootCells))) && glm::all(glm::lessThan(eye, glm::dvec3(1.5 * rootCells)))) {
+        const glm::dvec3 lattice = glm::floor(eye * latticePerCell);
+        c.originLattice = glm::ivec4(glm::ivec3(lattice), 0);
+        eye -= lattice / latticePerCell;
+    }
+    c.origin += toVec4(eye);
+}
+
+}  // namespace
+
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes) {
+    frame::FrameConstants c{};
+    const FileHeader header = dataset != nullptr ? dataset->header : FileHeader{.cell = 1, .levels = 1, .log2Cells = 5};
+    const CameraBasis basis = cameraBasis(request.camera, request.width, request.height);
+    const PicturePlane plane = picturePlane(basis, request.width, request.height);
+    if (request.camera.projection == Projection::Perspective) {
+        c.direction = toVec4(basis.forward + plane.corner);
+        c.directionX = toVec4(plane.stepX);
+        c.directionY = toVec4(plane.stepY);
+    } else {
+        c.direction = toVec4(basis.forward);
+        c.origin = toVec4(plane.corner / header.cell);
+        c.originX = toVec4(plane.stepX / header.cell);
+        c.originY = toVec4(plane.stepY / header.cell);
+    }
+    const int latticeBits = int(frame::kLatticeBits) - int(header.log2Cells) - int(header.levels - 1);
+    c.lattice = {std::ldexp(1.0f, latticeBits), std::ldexp(1.0f, -latticeBits), 0, 0};
+    const glm::dvec3 corner(header.origin[0], header.origin[1], header.origin[2]);
+    setOrigin(c, (request.camera.eye - corner) / header.cell, std::ldexp(1.0, int(header.log2Cells + header.levels) - 1));
+
+    c.picture = {request.width, request.height, (request.width + frame::kTileSize - 1) / frame::kTileSize,
+                 (request.height + frame::kTileSize - 1) / frame::kTileSize};
+    c.mode = {header.log2Cells, header.levels - 1, stripes, shadingMode(request.shading.mode)};
+    const Shading& s = request.shading;
+    const glm::dvec3 light = glm::normalize(glm::dvec3(s.lightDirection));
+    c.lightDirection = toVec4(s.lightFollowsCamera ? basis.right * light.x + basis.up * light.y - basis.forward * light.z : light);
+    c.upDirection = toVec4(s.lightFollowsCamera ? basis.up : glm::normalize(request.camera.up));
+    c.clay = glm::vec4(s.clay, 0);
+    c.backgroundTop = glm::vec4(s.backgroundTop, 0);
+    c.backgroundBottom = glm::vec4(s.backgroundBottom, 0);
+    return c;
+}
+
+SelectionView selectionView(const FrameRequest& request) {
+    const CameraBasis basis = cameraBasis(request.camera, request.width, request.height);
+    SelectionView view;
+    view.eye = request.camera.eye;
+    view.orthographic = request.camera.projection == Projection::Orthographic;
+    view.pixelsPerUnit = request.height / (2 * basis.halfHeight);
+    view.errorPixels = request.errorPixels;
+    const double ahead = view.orthographic ? 0 : 1;
+    const double w = view.orthographic ? basis.halfWidth : 0, h = view.orthographic ? basis.halfHeight : 0;
+    view.planes = {glm::dvec4(basis.right + basis.forward * (ahead * basis.halfWidth), w),
+                   glm::dvec4(-basis.right + basis.forward * (ahead * basis.halfWidth), w),
+                   glm::dvec4(basis.up + basis.forward * (ahead * basis.halfHeight), h),
+                   glm::dvec4(-basis.up + basis.forward * (ahead * basis.halfHeight), h)};
+    return view;
+}
+
+Result<void> checkRequest(const FrameRequest& request) {
+    const auto usage = [](const char* what) { return Error{.code = ErrorCode::Usage, .message = what}; };
+    const Camera& camera = request.camera;
+    if (request.width < 1 || request.height < 1 || request.width > 16384 || request.height > 16384)
+        return usage("a picture is 1 to 16384 pixels wide and high");
+    if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
+    const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
+    if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up)) return usage("the camera has coordinates that are not numbers");
+    const double sine = glm::length(glm::cross(camera.forward, camera.up));
+    if (!(sine > 1e-9 * glm::length(camera.forward) * glm::length(camera.up))) return usage("the camera's forward and up directions are parallel or zero");
+    if (camera.projection == Projection::Perspective && !(camera.verticalFov > 0 && camera.verticalFov < 3.1))
+        return usage("the camera's field of view must be above 0 and below 3.1 radians");
+    if (camera.projection == Projection::Orthographic && !(camera.orthographicHeight > 0)) return usage("the camera's height must be above 0");
+    return {};
+}
+
+}  // namespace vcp

@@ -1,0 +1,28 @@
+// The frame's page tree, as the shaders read it: the pages of the cut and all pages above them, as
+// records of render/shared/frame_layout.h. Pure.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <glm/vec4.hpp>
+
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+/// Where a resident page is, and what the shader must know of its header.
+struct ResidentPage {
+    PageHeader header;
+    uint32_t texel = 0;        ///< in the page pool
+    uint32_t colourTexel = 0;  ///< in the colour pool; 0 without colour
+};
+
+/// Texels of the table, three a record, the root's first. `cut`: numbers of pages, none above another;
+/// `pageOf(page)`: of a page of the cut. An empty cut gives a root without children.
+std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
+                                  const std::function<const ResidentPage&(uint64_t)>& pageOf);
+
+}  // namespace vcp

@@ -1,0 +1,207 @@
+#include "render/passes/frame_resources.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <vector>
+
+#include "render/vulkan/check.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+constexpr VkDescriptorType kUniform = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+
+struct Binding {
+    VkDescriptorType type;
+    uint32_t count;
+};
+constexpr Binding kBindings[] = {
+    {kUniform, 1},
+    {kTexels, frame::kMaxPoolChunks}, {kStorage, frame::kMaxPoolChunks},
+    {kTexels, frame::kMaxPoolChunks}, {kStorage, frame::kMaxPoolChunks},
+    {kTexels, 1}, {kStorage, 1},
+    {kStorage, 1}, {kTexels, 1},
+    {kStorage, 1}, {kTexels, 1},
+    {kStorage, 1}, {kTexels, 1},
+    {kStorage, 1},
+    {kStorage, 1},
+};
+constexpr uint32_t kBindingCount = std::size(kBindings);
+
+}  // namespace
+
+Result<std::unique_ptr<FrameResources>> FrameResources::create(Device& device) {
+    std::unique_ptr<FrameResources> made(new FrameResources(device));
+    VCP_TRY(made->createLayout());
+    auto constants = device.createBuffer(sizeof(frame::FrameConstants), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    if (!constants) return constants.error();
+    made->constants_ = std::move(*constants);
+    auto counters = device.createBuffer(sizeof(frame::FrameCounters),
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Local);
+    if (!counters) return counters.error();
+    made->counters_ = std::move(*counters);
+    auto none = made->wordBuffer(16, 0, VK_FORMAT_R32G32B32A32_UINT);
+    if (!none) return none.error();
+    made->none_ = std::move(*none);
+    const glm::uvec4 empty[frame::kRecordTexels] = {};
+    VCP_TRY(made->setTable(empty));
+    return made;
+}
+
+Result<void> FrameResources::createLayout() {
+    std::vector<VkDescriptorSetLayoutBinding> bindings;
+    std::vector<VkDescriptorPoolSize> sizes;
+    for (uint32_t i = 0; i < kBindingCount; ++i) {
+        bindings.push_back({i, kBindings[i].type, kBindings[i].count, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+        sizes.push_back({kBindings[i].type, kBindings[i].count});
+    }
+    VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
+    set.bindingCount = kBindingCount;
+    set.pBindings = bindings.data();
+    VCP_VK(vkCreateDescriptorSetLayout, device_.handle(), &set, nullptr, &setLayout_);
+    VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+    layout.setLayoutCount = 1;
+    layout.pSetLayouts = &setLayout_;
+    VCP_VK(vkCreatePipelineLayout, device_.handle(), &layout, nullptr, &layout_);
+    VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+    pool.maxSets = 1;
+    pool.poolSizeCount = static_cast<uint32_t>(sizes.size());
+    pool.pPoolSizes = sizes.data();
+    VCP_VK(vkCreateDescriptorPool, device_.handle(), &pool, nullptr, &descriptorPool_);
+    VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+    allocation.descriptorPool = descriptorPool_;
+    allocation.descriptorSetCount = 1;
+    allocation.pSetLayouts = &setLayout_;
+    VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &set_);
+    return {};
+}
+
+FrameResources::~FrameResources() {
+    vkDestroyDescriptorPool(device_.handle(), descriptorPool_, nullptr);
+    vkDestroyPipelineLayout(device_.handle(), layout_, nullptr);
+    vkDestroyDescriptorSetLayout(device_.handle(), setLayout_, nullptr);
+}
+
+Result<WordBuffer> FrameResources::wordBuffer(uint64_t words, VkBufferUsageFlags more, VkFormat format) const {
+    WordBuffer made;
+    auto buffer = device_.createBuffer(words * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | more, MemoryUse::Local);
+    if (!buffer) return buffer.error();
+    made.buffer = std::move(*buffer);
+    auto view = device_.createTexelView(made.buffer, format, words * 4);
+    if (!view) return view.error();
+    made.view = std::move(*view);
+    return made;
+}
+
+Result<void> FrameResources::resize(PictureSize size, bool colour) {
+    if (size == size_ && (colourPlane_ || !colour)) return {};
+    const uint64_t tiles = uint64_t{size.tilesX()} * size.tilesY();
+    auto starts = wordBuffer(tiles, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+    if (!starts) return starts.error();
+    auto list = wordBuffer(frame::kTileListHeader + tiles, VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT);
+    if (!list) return list.error();
+    auto hits = wordBuffer(size.pixels() * (colour ? 3 : 2), VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+    if (!hits) return hits.error();
+    auto picture = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Local);
+    if (!picture) return picture.error();
+    tileStarts_ = std::move(*starts);
+    tileList_ = std::move(*list);
+    hits_ = std::move(*hits);
+    picture_ = std::move(*picture);
+    size_ = size;
+    colourPlane_ = colour;
+    setStale_ = true;
+    return {};
+}
+
+Result<void> FrameResources::setTable(std::span<const glm::uvec4> table) {
+    if (table_.buffer.bytes() < table.size_bytes()) {
+        const uint64_t words = std::bit_ceil(std::max<uint64_t>(table.size_bytes() / 4, 1024));
+        auto grown = wordBuffer(words, VK_BUFFER_USAGE_TRANSFER_DST_BIT, VK_FORMAT_R32G32B32A32_UINT);
+        if (!grown) return grown.error();
+        table_ = std::move(*grown);
+        setStale_ = true;
+    }
+    if (std::byte* mapped = table_.buffer.mapped()) {
+        std::memcpy(mapped, table.data(), table.size_bytes());
+        return {};
+    }
+    auto staging = device_.createBuffer(table.size_bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
+    if (!staging) return staging.error();
+    std::memcpy(staging->mapped(), table.data(), table.size_bytes());
+    return device_.submitAndWait([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, table.size_bytes()};
+        vkCmdCopyBuffer(commands, staging->handle(), table_.buffer.handle(), 1, &region);
+    });
+}
+
+void FrameResources::setPools(const PagePool* pages, const PagePool* colours) {
+    pages_ = pages;
+    colours_ = colours;
+    setStale_ = true;
+}
+
+void FrameResources::writeSet() {
+    VkDescriptorBufferInfo buffers[kBindingCount][frame::kMaxPoolChunks] = {};
+    VkBufferView views[kBindingCount][frame::kMaxPoolChunks] = {};
+    const auto useBuffer = [&](uint32_t binding, uint32_t i, const Buffer& buffer) {
+        buffers[binding][i] = {buffer.handle(), 0, std::min<uint64_t>(buffer.bytes(), device_.limits().maxStorageBufferRange)};
+    };
+    const auto usePool = [&](uint32_t binding, const PagePool* pool) {
+        for (uint32_t i = 0; i < frame::kMaxPoolChunks; ++i) {
+            // Every element must be valid; those past the last chunk are never read.
+            const uint32_t chunk = pool != nullptr ? std::min(i, pool->chunks() - 1) : 0;
+            views[binding][i] = pool != nullptr ? pool->view(chunk) : none_.view.handle();
+            useBuffer(binding + 1, i, pool != nullptr ? pool->chunk(chunk) : none_.buffer);
+        }
+    };
+    useBuffer(0, 0, constants_);
+    usePool(1, pages_);
+    usePool(3, colours_);
+    views[5][0] = table_.view.handle();
+    useBuffer(6, 0, table_.buffer);
+    useBuffer(7, 0, tileStarts_.buffer);
+    views[8][0] = tileStarts_.view.handle();
+    useBuffer(9, 0, tileList_.buffer);
+    views[10][0] = tileList_.view.handle();
+    useBuffer(11, 0, hits_.buffer);
+    views[12][0] = hits_.view.handle();
+    useBuffer(13, 0, picture_);
+    useBuffer(14, 0, counters_);
+
+    VkWriteDescriptorSet writes[kBindingCount];
+    for (uint32_t i = 0; i < kBindingCount; ++i) {
+        writes[i] = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
+        writes[i].dstSet = set_;
+        writes[i].dstBinding = i;
+        writes[i].descriptorCount = kBindings[i].count;
+        writes[i].descriptorType = kBindings[i].type;
+        writes[i].pBufferInfo = buffers[i];
+        writes[i].pTexelBufferView = views[i];
+    }
+    vkUpdateDescriptorSets(device_.handle(), kBindingCount, writes, 0, nullptr);
+    setStale_ = false;
+}
+
+void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants& constants) {
+    if (setStale_) writeSet();
+    vkCmdUpdateBuffer(commands, constants_.handle(), 0, sizeof(constants), &constants);
+    vkCmdFillBuffer(commands, counters_.handle(), 0, VK_WHOLE_SIZE, 0);
+    const uint32_t list[frame::kTileListHeader] = {frame::kTileRow, 0, 1, 0};
+    vkCmdUpdateBuffer(commands, tileList_.buffer.handle(), 0, sizeof(list), list);
+    barrierTransferToAll(commands);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set_, 0, nullptr);
+}
+
+Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv, const PassConstants& c, std::span<const uint32_t> more) {
+    std::vector<uint32_t> values{c.access == PageAccess::TexelBuffer, c.poolChunks, c.chunkShift, c.colour, c.countSteps};
+    values.insert(values.end(), more.begin(), more.end());
+    ++pipelinesMade_;
+    return ComputePipeline::create(device_, layout_, spirv, values);
+}
+
+}  // namespace vcp

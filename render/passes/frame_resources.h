@@ -1,0 +1,98 @@
+// What the passes share: the descriptor set, its layout, and the buffers that depend on the picture's size.
+//
+// binding   what                           written by        read by
+//  0        frame constants                CPU (upload)      all
+//  1, 2     page pool, texels and storage  page_pool         beam, trace
+//  3, 4     colour pool                    page_pool         trace with kColour
+//  5, 6     page table                     CPU (upload)      beam, trace
+//  7, 8     tile starts                    beam              trace, shade
+//  9, 10    tile list, indirect dispatch   beam              trace
+// 11, 12    hits                           trace             shade, readback
+// 13        picture                        shade             readback, present
+// 14        counters                       trace             readback
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "render/frame.h"
+#include "render/page_pool.h"
+#include "render/vulkan/compute_pipeline.h"
+#include "render/vulkan/device.h"
+
+namespace vcp {
+
+struct PictureSize {
+    uint32_t width = 0, height = 0;
+    bool operator==(const PictureSize&) const = default;
+    [[nodiscard]] uint64_t pixels() const { return uint64_t{width} * height; }
+    [[nodiscard]] uint32_t tilesX() const { return (width + frame::kTileSize - 1) / frame::kTileSize; }
+    [[nodiscard]] uint32_t tilesY() const { return (height + frame::kTileSize - 1) / frame::kTileSize; }
+};
+
+/// Values of the specialization constants that all passes have (bindings.glsl).
+struct PassConstants {
+    PageAccess access = PageAccess::TexelBuffer;
+    uint32_t poolChunks = 1, chunkShift = 26;
+    bool colour = false, countSteps = false;
+    bool operator==(const PassConstants&) const = default;
+};
+
+/// A buffer that shaders read as 32-bit texels as well.
+struct WordBuffer {
+    Buffer buffer;
+    TexelView view;
+};
+
+class FrameResources {
+public:
+    static Result<std::unique_ptr<FrameResources>> create(Device& device);
+    ~FrameResources();
+    FrameResources(const FrameResources&) = delete;
+    FrameResources& operator=(const FrameResources&) = delete;
+
+    /// Makes the buffers fit. `colour`: whether hits have a plane for colours. Errors: Device.
+    Result<void> resize(PictureSize size, bool colour);
+    /// Writes the table for the next frame; grows its buffer. Errors: Device.
+    Result<void> setTable(std::span<const glm::uvec4> table);
+    /// Null pools: nothing is shown.
+    void setPools(const PagePool* pages, const PagePool* colours);
+
+    /// Copies the constants, clears counters and tile list, binds the set. Ends with barrierTransferToAll.
+    void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
+
+    [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
+    [[nodiscard]] PictureSize size() const { return size_; }
+    [[nodiscard]] const Buffer& hits() const { return hits_.buffer; }
+    [[nodiscard]] const Buffer& picture() const { return picture_; }
+    [[nodiscard]] const Buffer& tileStarts() const { return tileStarts_.buffer; }
+    [[nodiscard]] const Buffer& tileList() const { return tileList_.buffer; }
+    [[nodiscard]] const Buffer& counters() const { return counters_; }
+
+    /// One pipeline of this layout; counts it.
+    Result<ComputePipeline> pipeline(std::span<const uint32_t> spirv, const PassConstants& constants, std::span<const uint32_t> more = {});
+    [[nodiscard]] uint32_t pipelinesMade() const { return pipelinesMade_; }
+
+private:
+    explicit FrameResources(Device& device) : device_(device) {}
+    Result<void> createLayout();
+    Result<WordBuffer> wordBuffer(uint64_t words, VkBufferUsageFlags more, VkFormat format = VK_FORMAT_R32_UINT) const;
+    void writeSet();
+
+    Device& device_;
+    VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
+    VkPipelineLayout layout_ = VK_NULL_HANDLE;
+    VkDescriptorPool descriptorPool_ = VK_NULL_HANDLE;
+    VkDescriptorSet set_ = VK_NULL_HANDLE;
+
+    PictureSize size_;
+    bool colourPlane_ = false;
+    Buffer constants_, picture_, counters_;
+    WordBuffer tileStarts_, tileList_, hits_, table_, none_;
+    const PagePool* pages_ = nullptr;
+    const PagePool* colours_ = nullptr;
+    bool setStale_ = true;
+    uint32_t pipelinesMade_ = 0;
+};
+
+}  // namespace vcp

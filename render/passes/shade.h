@@ -1,0 +1,27 @@
+// The picture from the hits (shaders/shade.comp).
+// Reads constants, tile starts, hits. Writes the picture. Before: the trace pass. After:
+// barrierComputeToReadback, recorded here.
+#pragma once
+
+#include <map>
+#include <tuple>
+
+#include "render/passes/frame_resources.h"
+
+namespace vcp {
+
+class ShadePass {
+public:
+    /// Makes the variant's pipeline on first use. Errors: Device.
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants);
+    /// Precondition: prepare().
+    void record(VkCommandBuffer commands, const FrameResources& resources) const;
+    /// Forgets all variants: pools with another layout are to come.
+    void clear() { variants_.clear(); }
+
+private:
+    std::map<std::tuple<bool, bool, bool>, ComputePipeline> variants_;
+    const ComputePipeline* current_ = nullptr;
+};
+
+}  // namespace vcp

@@ -1,0 +1,27 @@
+// First hits of the pixels of listed tiles (shaders/trace.comp).
+// Reads constants, pools, table, tile starts and list. Writes hits, counters. Before: the beam pass. After:
+// barrierComputeToCompute, recorded here.
+#pragma once
+
+#include <map>
+#include <tuple>
+
+#include "render/passes/frame_resources.h"
+
+namespace vcp {
+
+class TracePass {
+public:
+    /// Makes the variant's pipeline on first use. Errors: Device.
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants);
+    /// Precondition: prepare().
+    void record(VkCommandBuffer commands, const FrameResources& resources) const;
+    /// Forgets all variants: pools with another layout are to come.
+    void clear() { variants_.clear(); }
+
+private:
+    std::map<std::tuple<bool, bool, bool>, ComputePipeline> variants_;
+    const ComputePipeline* current_ = nullptr;
+};
+
+}  // namespace vcp

@@ -1,0 +1,180 @@
+// Ray-casts a dataset with Vulkan: device, page pool, passes, pictures.
+//
+// The life of a frame, from outside:
+//
+//   auto renderer = Renderer::create(options);         // device, fixed pool of options.budgetBytes
+//   renderer->open(dataset, source);                   // starts the loader threads
+//   each time round:
+//     update = renderer->update(request);              // never waits: takes in pages that have arrived,
+//                                                      // chooses the cut, sends the loader its wishes
+//     if (update.changed || request differs from the last one drawn)
+//         renderer->render(request);                   // draws the cut of the last update
+//     renderer->present(width, height);                // window only
+//   renderer->readPicture();                           // what render() drew
+//
+// A picture without a window is settle(request), render(request), readPicture(). The same request and the
+// same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+#include <vulkan/vulkan_core.h>
+
+#include "octree/result.h"
+#include "octree/vcp_file.h"
+#include "render/camera.h"
+#include "render/picture.h"
+#include "streaming/page_source.h"
+
+namespace vcp {
+
+/// A Vulkan device as `vcp devices` shows it.
+struct DeviceInfo {
+    uint32_t index = 0;  ///< in the order of the Vulkan loader
+    std::string name;
+    std::string type;    ///< "discrete", "integrated", "virtual", "cpu", "other"
+    std::string driver;  ///< name and version
+    bool software = false;
+    bool usable = false; ///< Vulkan 1.2 with a compute queue
+    bool chosen = false; ///< what an empty or the given choice selects
+};
+
+/// Devices of this machine; `choice` as in RendererOptions::device marks the chosen one.
+/// Errors: Device, where Vulkan cannot be loaded or there is no device, or where `choice` names none.
+Result<std::vector<DeviceInfo>> listDevices(const std::string& choice = {});
+
+/// How shaders read pages: Auto takes texel buffers on software devices, storage buffers elsewhere.
+enum class PageAccess { Auto, TexelBuffer, StorageBuffer };
+
+/// What a window gives: the instance extensions it needs and a function that makes the surface
+/// (glfwGetRequiredInstanceExtensions, glfwCreateWindowSurface).
+struct SurfaceSource {
+    std::vector<std::string> instanceExtensions;
+    std::function<VkResult(VkInstance, VkSurfaceKHR*)> createSurface;
+};
+
+struct RendererOptions {
+    std::string device;             ///< index, or part of the name in any case; empty: the best one
+    uint64_t budgetBytes = 512ull << 20;  ///< of the page pool, never exceeded; at least 1 MiB
+    bool colour = true;             ///< false: colour pages are neither read nor allocated
+    bool validation = false;        ///< validation layers, core and synchronization; see validationMessages
+    PageAccess access = PageAccess::Auto;
+    uint32_t loaderThreads = 2;
+    std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
+};
+
+enum class ShadingMode {
+    Lit,     ///< vertex colours where there are any, else clay; light and hemisphere
+    Clay,    ///< one colour
+    Normals, ///< normal as colour
+    Steps,   ///< false colour: traversal steps per ray (compiles the counting variant on first use)
+};
+
+struct Shading {
+    ShadingMode mode = ShadingMode::Lit;
+    bool lightFollowsCamera = true;
+    glm::vec3 lightDirection{-0.35f, 0.55f, 0.75f};  ///< towards the light: in camera axes (right, up, back)
+                                                     ///< where it follows the camera, else in world axes
+    glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
+    glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};    ///< linear
+    glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
+
+    bool operator==(const Shading&) const = default;
+};
+
+/// All that a picture depends on, beside the pages.
+struct FrameRequest {
+    Camera camera;
+    uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
+    double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
+    Shading shading;
+    bool beam = true;          ///< beam pass; the picture is the same without it, only later
+    bool countSteps = false;   ///< fills FrameStats::steps and fetches (a slower variant)
+
+    bool operator==(const FrameRequest&) const = default;
+};
+
+struct UpdateResult {
+    bool changed = false;  ///< the cut differs from that of the update before
+    bool settled = false;  ///< nothing that this view wants is missing, loading or queued
+    bool drawable = false; ///< at least the coarsest page is there
+    double errorPixels = 0;     ///< largest projected certified error in the cut (inf without a page)
+    uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
+    uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
+    uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
+    std::vector<Error> problems;  ///< pages that cannot be read; each is reported once
+};
+
+struct FrameStats {
+    uint64_t rays = 0;        ///< pixels
+    uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
+    uint64_t hitPixels = 0;
+    double msBeam = 0, msTrace = 0, msShade = 0;  ///< GPU timestamps; 0 where the device has none
+    double msFrame = 0;       ///< from submission to completion, wall clock
+    uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
+    uint64_t poolBytes = 0;     ///< allocated for the pool
+    uint64_t colourBytes = 0;   ///< of these, for colour
+    uint32_t pagesInCut = 0;
+    uint32_t pipelines = 0;     ///< made since create()
+};
+
+/// What one pixel shows.
+struct PixelHit {
+    double depth;         ///< distance from the ray's origin, world units
+    glm::dvec3 position;  ///< world space
+    glm::vec3 normal;     ///< unit, towards the viewer
+};
+
+class Renderer {
+public:
+    /// Errors: Device (no such device, no memory for the pool), Usage (options contradict each other).
+    static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
+    ~Renderer();
+    Renderer(const Renderer&) = delete;
+    Renderer& operator=(const Renderer&) = delete;
+
+    [[nodiscard]] const DeviceInfo& device() const;
+    [[nodiscard]] PageAccess access() const;
+
+    /// Shows a dataset, in place of the one before. Its pages come from `source` in loader threads.
+    Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
+    /// Stops the loader and forgets all pages.
+    void close();
+
+    /// See the top of this file. Errors: Device. Problems of single pages are in the result.
+    Result<UpdateResult> update(const FrameRequest& request);
+    /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
+    /// returns true (asked several times a second).
+    Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
+
+    /// Draws the cut of the last update and waits for the GPU. Without a dataset: background.
+    Result<FrameStats> render(const FrameRequest& request);
+
+    /// Of the last render(). Errors: Usage, where nothing was drawn yet; Device.
+    Result<Picture> readPicture();
+    Result<std::vector<float>> readDepth();        ///< world units along the unit ray; infinity where no hit
+    Result<std::vector<glm::vec3>> readNormals();  ///< unit, towards the viewer; 0 where no hit
+    /// One pixel of the last render(); nothing where the ray hit nothing or the pixel is outside.
+    Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
+
+    /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
+    /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.
+    /// Precondition: options.surface. Errors: Device.
+    Result<void> present(uint32_t width, uint32_t height);
+
+    /// Validation messages (warnings and errors) since create(); always empty without options.validation.
+    [[nodiscard]] std::vector<std::string> validationMessages() const;
+
+private:
+    struct State;
+    explicit Renderer(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,119 @@
+// Walking along a ray through one page, leaf by leaf. Page space: cells of the page's level, origin at its
+// lowest corner. Positions within are also kept as integers in eighths of a cell (the smallest leaf), so
+// that which node comes next across a face is never a matter of rounding.
+
+struct PageRay {
+    vec3 start;      // where the ray enters the page or begins
+    vec3 direction, inverse;
+    vec3 exit;       // where it leaves the page
+    vec3 farWalls;   // 0 or cells an edge: the page's walls it may leave by
+    float cells;     // an edge
+    float tauExit;   // distance from start to exit
+    bool beginsHere; // the ray begins inside the page
+};
+
+const float kSubcells = 8.0;  // 2^kMaxSubcellDepth
+
+// A place on the ray: distance from the page's start, and the subcell.
+struct Place {
+    float tau;
+    ivec3 subcell;
+    bool inPage;
+};
+
+// Bits of an octree node's box, in subcells, and its group of siblings; two groups above it for going
+// back without starting at the root.
+struct Descent {
+    uint group, parent, grandparent;  // texels; kNoGroup: not remembered
+    int bits;                         // log2 of the edge of the group's box
+    uint node;
+};
+const uint kNoGroup = 0xffffffffu;
+
+uint octantAt(ivec3 place, int bit) {
+    ivec3 b = (place >> bit) & 1;
+    return uint(b.x | b.y << 1 | b.z << 2);
+}
+
+// Follows internal nodes down to the leaf or empty node at `subcell`. `steps` counts fetches.
+void descend(inout Descent at, uint nodesTexel, uint rootOnly, uint root, ivec3 subcell, inout uint steps) {
+    while (true) {
+        uint octant = octantAt(subcell, at.bits - 1);
+        uint node = texelWord(fetchTexel(at.group + (octant >> 2)), octant & 3u);
+        at.node = rootOnly != 0u ? root : node;
+        steps++;
+        if (at.node >> kNodeTypeShift != kNodeInternal) return;
+        at.grandparent = at.parent;
+        at.parent = at.group;
+        at.group = nodesTexel + 2u * (at.node & kNodePayloadMask);
+        at.bits--;
+    }
+}
+
+// Goes up to the lowest remembered group that holds the new place.
+void ascend(inout Descent at, ivec3 from, ivec3 to, uint rootGroup, int rootBits) {
+    ivec3 changed = from ^ to;
+    int up = findMSB(uint(changed.x | changed.y | changed.z)) + 1 - at.bits;
+    uint group = up <= 0 ? at.group : up == 1 ? at.parent : up == 2 ? at.grandparent : kNoGroup;
+    if (up == 1) {
+        at.parent = at.grandparent;
+        at.grandparent = kNoGroup;
+    }
+    if (up >= 2) {
+        at.parent = kNoGroup;
+        at.grandparent = kNoGroup;
+    }
+    bool lost = group == kNoGroup;
+    at.group = lost ? rootGroup : group;
+    at.bits = lost ? rootBits : at.bits + max(up, 0);
+}
+
+// Leaves the box lo..hi, which the ray is in, by the wall it meets first.
+Place leaveBox(PageRay ray, Place from, vec3 lo, vec3 hi) {
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
+    vec3 walls = mix(lo, hi, ahead);
+    vec3 t = (walls - ray.start) * ray.inverse;
+    float nearest = minOf(t);
+    bvec3 through = equal(t, vec3(nearest));
+    Place to;
+    to.tau = max(from.tau, nearest);
+    vec3 p = clamp(ray.start + to.tau * ray.direction, lo, hi);
+    ivec3 sideways = clamp(ivec3(floor(p * kSubcells)), ivec3(floor(lo * kSubcells)), ivec3(ceil(hi * kSubcells)) - 1);
+    ivec3 across = mix(ivec3(ceil(walls * kSubcells)) - 1, ivec3(floor(walls * kSubcells)), ahead);
+    to.subcell = mix(sideways, across, through);
+    bvec3 outer = equal(walls, ray.farWalls);
+    to.inPage = !((through.x && outer.x) || (through.y && outer.y) || (through.z && outer.z));
+    return to;
+}
+
+// The part of the ray inside a leaf. A function of ray, page and leaf alone: however the walk came here, the
+// same leaf gives the same answer; neighbours evaluate the same points at the wall between them.
+struct LeafSegment {
+    vec3 from, to;  // page space
+    float tauFrom, tauTo;
+    bool fromWall;  // false where the ray begins inside the leaf
+};
+
+LeafSegment segmentInLeaf(PageRay ray, vec3 lo, float edge) {
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
+    vec3 hi = lo + edge;
+    vec3 nearWalls = mix(hi, lo, ahead), farWalls = mix(lo, hi, ahead);
+    vec3 t0 = (nearWalls - ray.start) * ray.inverse, t1 = (farWalls - ray.start) * ray.inverse;
+    float first = maxOf(t0), last = minOf(t1);
+    LeafSegment s;
+    s.fromWall = first > 0.0 || !ray.beginsHere;
+    s.tauFrom = max(first, 0.0);
+    s.from = clamp(ray.start + first * ray.direction, lo, hi);
+    s.from = mix(s.from, nearWalls, equal(t0, vec3(first)));
+    if (first <= 0.0) s.from = ray.start;
+    s.tauTo = max(last, s.tauFrom);
+    bvec3 through = equal(t1, vec3(last));
+    s.to = clamp(ray.start + last * ray.direction, lo, hi);
+    s.to = mix(s.to, farWalls, through);
+    bvec3 outer = equal(farWalls, ray.farWalls);
+    if ((through.x && outer.x) || (through.y && outer.y) || (through.z && outer.z)) {
+        s.to = ray.exit;
+        s.tauTo = max(ray.tauExit, s.tauFrom);
+    }
+    return s;
+}

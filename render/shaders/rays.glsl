@@ -1,0 +1,39 @@
+// Rays of the picture and the lattice that pages sit on (render/shared/frame_layout.h).
+
+struct Ray {
+    vec3 origin;     // finest cells, relative to frame.originLattice
+    vec3 direction;  // unit, no component 0
+    vec3 inverse;
+};
+
+// No component may be 0: 1e-18 of a cell sideways is less than any rounding.
+vec3 withoutZeros(vec3 d) {
+    vec3 tiny = mix(vec3(-1e-18), vec3(1e-18), greaterThanEqual(d, vec3(0.0)));
+    return mix(d, tiny, lessThan(abs(d), vec3(1e-18)));
+}
+
+Ray rayAt(vec2 point) {
+    Ray ray;
+    ray.origin = frame.origin.xyz + point.x * frame.originX.xyz + point.y * frame.originY.xyz;
+    vec3 d = frame.direction.xyz + point.x * frame.directionX.xyz + point.y * frame.directionY.xyz;
+    ray.direction = withoutZeros(d * inversesqrt(dot(d, d)));
+    ray.inverse = 1.0 / ray.direction;
+    return ray;
+}
+
+// Lattice plane minus the ray's origin, in finest cells: one rounding of an exact difference.
+vec3 fromOrigin(Ray ray, ivec3 planes) {
+    return vec3(planes - frame.originLattice.xyz) * frame.lattice.y - ray.origin;
+}
+
+// Distances to three lattice planes. Depends on nothing but the ray and the planes, so that all who ask get
+// the same answer.
+vec3 planeDistances(Ray ray, ivec3 planes) { return fromOrigin(ray, planes) * ray.inverse; }
+
+// The lattice point next to the ray's point at distance s.
+ivec3 latticePoint(Ray ray, float s) {
+    return frame.originLattice.xyz + ivec3(round((ray.origin + s * ray.direction) * frame.lattice.x));
+}
+
+float minOf(vec3 v) { return min(v.x, min(v.y, v.z)); }
+float maxOf(vec3 v) { return max(v.x, max(v.y, v.z)); }

@@ -1,0 +1,63 @@
+// What the CPU hands to the shaders for a frame. Compiles as C++ (render/frame.h) and as GLSL; every
+// struct is made of 16-byte vectors, so that both agree on the layout, and a test reads the offsets back
+// out of the SPIR-V.
+//
+// Lattice: the root page's edge is 2^30 lattice units, so every page's box has integer corners; points
+// where rays cross page walls are rounded to it, and both pages at a wall see the same point.
+// Ray parameter: cells of the finest level along the unit direction, from the eye (orthographic: from the
+// picture's plane).
+
+const uint kLatticeBits = 30u;
+const uint kTileSize = 8u;
+const uint kMaxPoolChunks = 8u;
+
+// A tile list is dispatched in rows of this many workgroups.
+const uint kTileRow = 256u;
+
+// Shading modes, as in ShadingMode.
+const uint kShadeLit = 0u;
+const uint kShadeClay = 1u;
+const uint kShadeNormals = 2u;
+const uint kShadeSteps = 3u;
+
+struct FrameConstants {
+    // Ray of the picture's point x, y (pixels): origin + x originX + y originY, in finest cells relative to
+    // originLattice; direction + x directionX + y directionY, not normalized.
+    vec4 origin, originX, originY;
+    vec4 direction, directionX, directionY;
+    ivec4 originLattice;
+    // Lattice units a finest cell; its reciprocal; largest and smallest exponent of pages: see uvec4s.
+    vec4 lattice;
+    // width, height, tiles in x, tiles in y
+    uvec4 picture;
+    // log2 of cells an edge of a page; levels - 1; stripes of the tile list; shading mode
+    uvec4 mode;
+    vec4 lightDirection;  // unit, world axes, towards the light
+    vec4 upDirection;     // unit: where the hemisphere's light comes from
+    vec4 clay;
+    vec4 backgroundTop, backgroundBottom;
+};
+
+// A node of the frame's page tree: three texels of the table.
+//   0: flags, first child (number in the table), root word of the page, texel of the page in the pool
+//   1: texels of faces, triangles, vertices, normals
+//   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory, 0
+// flags: bits 0..7 octants that have a child; bit 8: this page is in the cut.
+const uint kRecordTexels = 3u;
+const uint kRecordInCut = 256u;
+
+// The list of tiles to trace. Three words of an indirect dispatch, the count, then tile numbers.
+const uint kTileListHeader = 4u;
+
+// Start distance of a tile in which no ray can hit.
+const float kTileEmpty = 3e38;
+
+// Depth of a pixel whose ray hits nothing.
+const float kNoHit = 3e38;
+
+struct FrameCounters {
+    uint hitPixels;
+    uint tracedTiles;
+    uint steps;
+    uint fetches;
+};

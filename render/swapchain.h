@@ -1,0 +1,47 @@
+// The window's pictures.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "render/passes/frame_resources.h"
+#include "render/vulkan/device.h"
+
+namespace vcp {
+
+/// Owns the surface. One thread.
+class Swapchain {
+public:
+    /// Takes the surface over.
+    Swapchain(VkInstance instance, Device& device, VkSurfaceKHR surface) : instance_(instance), device_(device), surface_(surface) {}
+    ~Swapchain();
+    Swapchain(const Swapchain&) = delete;
+    Swapchain& operator=(const Swapchain&) = delete;
+
+    /// Shows an RGBA8 picture, scaled to the window's framebuffer; waits until it is handed over. Does
+    /// nothing where the framebuffer has no area. Errors: Device.
+    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window);
+
+private:
+    Result<void> recreate(PictureSize window);
+    Result<void> makePictureImage(PictureSize size);
+    void destroySwapchain();
+    void destroyAfterResize();
+    void destroyPictureImage();
+    void record(VkCommandBuffer commands, const Buffer& picture, VkImage target) const;
+
+    VkInstance instance_;
+    Device& device_;
+    VkSurfaceKHR surface_;
+    VkSwapchainKHR swapchain_ = VK_NULL_HANDLE;
+    std::vector<VkImage> images_;
+    std::vector<VkSemaphore> shown_;  // one an image: free again when the image comes back
+    VkSemaphore acquired_ = VK_NULL_HANDLE;
+    PictureSize window_;  // as asked for
+    VkExtent2D extent_{};
+    VkImage pictureImage_ = VK_NULL_HANDLE;  // the picture, as something that can be scaled
+    VkDeviceMemory pictureMemory_ = VK_NULL_HANDLE;
+    PictureSize pictureSize_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,195 @@
+#include "render/vulkan/device.h"
+
+#include <cstring>
+#include <utility>
+
+#include "render/vulkan/check.h"
+
+namespace vcp {
+
+Buffer& Buffer::operator=(Buffer&& other) noexcept {
+    if (this == &other) return *this;
+    destroy();
+    device_ = std::exchange(other.device_, VK_NULL_HANDLE);
+    buffer_ = std::exchange(other.buffer_, VK_NULL_HANDLE);
+    memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
+    mapped_ = std::exchange(other.mapped_, nullptr);
+    bytes_ = std::exchange(other.bytes_, 0);
+    return *this;
+}
+
+void Buffer::destroy() {
+    if (device_ == VK_NULL_HANDLE) return;
+    vkDestroyBuffer(device_, buffer_, nullptr);
+    vkFreeMemory(device_, memory_, nullptr);
+}
+
+TexelView& TexelView::operator=(TexelView&& other) noexcept {
+    if (this == &other) return *this;
+    destroy();
+    device_ = std::exchange(other.device_, VK_NULL_HANDLE);
+    view_ = std::exchange(other.view_, VK_NULL_HANDLE);
+    return *this;
+}
+
+void TexelView::destroy() {
+    if (device_ != VK_NULL_HANDLE) vkDestroyBufferView(device_, view_, nullptr);
+}
+
+Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface) {
+    auto physical = instance.physicalDevices();
+    if (!physical) return physical.error();
+    std::vector<DeviceInfo> infos;
+    for (uint32_t i = 0; i < physical->size(); ++i) infos.push_back(describeDevice((*physical)[i], i));
+    auto chosen = chooseDevice(infos, choice);
+    if (!chosen) return chosen.error();
+
+    std::unique_ptr<Device> made(new Device);
+    made->physical_ = (*physical)[*chosen];
+    made->info_ = infos[*chosen];
+    made->info_.chosen = true;
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(made->physical_, &properties);
+    made->limits_ = properties.limits;
+    vkGetPhysicalDeviceMemoryProperties(made->physical_, &made->memory_);
+    VCP_TRY(made->chooseQueue(surface));
+    VCP_TRY(made->createDevice(surface != VK_NULL_HANDLE));
+    return made;
+}
+
+Result<void> Device::chooseQueue(VkSurfaceKHR surface) {
+    uint32_t count = 0;
+    vkGetPhysicalDeviceQueueFamilyProperties(physical_, &count, nullptr);
+    std::vector<VkQueueFamilyProperties> families(count);
+    vkGetPhysicalDeviceQueueFamilyProperties(physical_, &count, families.data());
+    for (uint32_t i = 0; i < count; ++i) {
+        // Blits to a window's pictures need a graphics queue.
+        const VkQueueFlags wanted = surface != VK_NULL_HANDLE ? VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT : VK_QUEUE_COMPUTE_BIT;
+        if ((families[i].queueFlags & wanted) != wanted) continue;
+        VkBool32 shows = VK_TRUE;
+        if (surface != VK_NULL_HANDLE) VCP_VK(vkGetPhysicalDeviceSurfaceSupportKHR, physical_, i, surface, &shows);
+        if (shows != VK_TRUE) continue;
+        family_ = i;
+        timestampNanoseconds_ = families[i].timestampValidBits > 0 ? double(limits_.timestampPeriod) : 0;
+        return {};
+    }
+    return Error{.code = ErrorCode::Device, .message = "device '" + info_.name + "' has no queue that computes and shows pictures"};
+}
+
+Result<void> Device::createDevice(bool withSwapchain) {
+    const float priority = 1;
+    VkDeviceQueueCreateInfo queue{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
+    queue.queueFamilyIndex = family_;
+    queue.queueCount = 1;
+    queue.pQueuePriorities = &priority;
+
+    const char* swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+    VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
+    info.queueCreateInfoCount = 1;
+    info.pQueueCreateInfos = &queue;
+    info.enabledExtensionCount = withSwapchain ? 1 : 0;
+    info.ppEnabledExtensionNames = &swapchain;
+    VCP_VK(vkCreateDevice, physical_, &info, nullptr, &device_);
+    vkGetDeviceQueue(device_, family_, 0, &queue_);
+
+    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    pool.queueFamilyIndex = family_;
+    VCP_VK(vkCreateCommandPool, device_, &pool, nullptr, &commandPool_);
+    VkCommandBufferAllocateInfo commands{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    commands.commandPool = commandPool_;
+    commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    commands.commandBufferCount = 1;
+    VCP_VK(vkAllocateCommandBuffers, device_, &commands, &commands_);
+    const VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    VCP_VK(vkCreateFence, device_, &fence, nullptr, &fence_);
+    const VkPipelineCacheCreateInfo cache{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
+    VCP_VK(vkCreatePipelineCache, device_, &cache, nullptr, &pipelineCache_);
+    return {};
+}
+
+Device::~Device() {
+    if (device_ == VK_NULL_HANDLE) return;
+    vkDestroyPipelineCache(device_, pipelineCache_, nullptr);
+    vkDestroyFence(device_, fence_, nullptr);
+    vkDestroyCommandPool(device_, commandPool_, nullptr);
+    vkDestroyDevice(device_, nullptr);
+}
+
+Result<uint32_t> Device::memoryType(uint32_t allowed, MemoryUse use) const {
+    constexpr VkMemoryPropertyFlags kLocal = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+    constexpr VkMemoryPropertyFlags kMapped = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+    // Local memory is mapped only where it is all one memory: a discrete device's mapped window is small.
+    const bool unified = info_.software || info_.type == "integrated";
+    std::vector<VkMemoryPropertyFlags> wishes;
+    if (use == MemoryUse::Local) wishes = unified ? std::vector{kLocal | kMapped | kCached, kLocal | kMapped, kLocal} : std::vector{kLocal};
+    if (use == MemoryUse::Upload) wishes = {kMapped};
+    if (use == MemoryUse::Readback) wishes = {kMapped | kCached, kMapped};
+    for (const VkMemoryPropertyFlags wish : wishes)
+        for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i)
+            if ((allowed >> i & 1) != 0 && (memory_.memoryTypes[i].propertyFlags & wish) == wish) return i;
+    return Error{.code = ErrorCode::Device, .message = "device '" + info_.name + "' has no fitting memory"};
+}
+
+Result<Buffer> Device::createBuffer(uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const {
+    Buffer made;
+    made.device_ = device_;
+    made.bytes_ = bytes;
+    VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
+    info.size = bytes;
+    info.usage = usage;
+    VCP_VK(vkCreateBuffer, device_, &info, nullptr, &made.buffer_);
+    VkMemoryRequirements needs;
+    vkGetBufferMemoryRequirements(device_, made.buffer_, &needs);
+    auto type = memoryType(needs.memoryTypeBits, use);
+    if (!type) return type.error();
+    VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
+    allocation.allocationSize = needs.size;
+    allocation.memoryTypeIndex = *type;
+    VCP_VK(vkAllocateMemory, device_, &allocation, nullptr, &made.memory_);
+    VCP_VK(vkBindBufferMemory, device_, made.buffer_, made.memory_, 0);
+    if ((memory_.memoryTypes[*type].propertyFlags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {
+        void* mapped = nullptr;
+        VCP_VK(vkMapMemory, device_, made.memory_, 0, VK_WHOLE_SIZE, 0, &mapped);
+        made.mapped_ = static_cast<std::byte*>(mapped);
+    }
+    return made;
+}
+
+Result<TexelView> Device::createTexelView(const Buffer& buffer, VkFormat format, uint64_t bytes) const {
+    TexelView made;
+    made.device_ = device_;
+    VkBufferViewCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO};
+    info.buffer = buffer.handle();
+    info.format = format;
+    info.range = bytes;
+    VCP_VK(vkCreateBufferView, device_, &info, nullptr, &made.view_);
+    return made;
+}
+
+Result<VkCommandBuffer> Device::beginCommands() {
+    VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    VCP_VK(vkBeginCommandBuffer, commands_, &begin);
+    return commands_;
+}
+
+Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
+    VCP_VK(vkEndCommandBuffer, commands_);
+    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_TRANSFER_BIT;
+    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
+    submit.waitSemaphoreCount = wait != VK_NULL_HANDLE ? 1 : 0;
+    submit.pWaitSemaphores = &wait;
+    submit.pWaitDstStageMask = &stage;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands_;
+    submit.signalSemaphoreCount = signal != VK_NULL_HANDLE ? 1 : 0;
+    submit.pSignalSemaphores = &signal;
+    VCP_VK(vkQueueSubmit, queue_, 1, &submit, fence_);
+    VCP_VK(vkWaitForFences, device_, 1, &fence_, VK_TRUE, UINT64_MAX);
+    VCP_VK(vkResetFences, device_, 1, &fence_);
+    return {};
+}
+
+}  // namespace vcp

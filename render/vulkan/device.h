@@ -1,0 +1,122 @@
+// A logical device with one queue, its buffers, compute pipelines and commands.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <vulkan/vulkan_core.h>
+
+#include "octree/result.h"
+#include "render/renderer.h"
+#include "render/vulkan/instance.h"
+
+namespace vcp {
+
+class Device;
+
+/// A buffer with memory of its own. Move-only; destroyed with its last owner, before the device.
+class Buffer {
+public:
+    Buffer() = default;
+    ~Buffer() { destroy(); }
+    Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+    Buffer& operator=(Buffer&& other) noexcept;
+
+    [[nodiscard]] VkBuffer handle() const { return buffer_; }
+    [[nodiscard]] uint64_t bytes() const { return bytes_; }
+    /// Mapped memory, or null where the CPU cannot see it.
+    [[nodiscard]] std::byte* mapped() const { return mapped_; }
+
+private:
+    friend class Device;
+    void destroy();
+
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkBuffer buffer_ = VK_NULL_HANDLE;
+    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    std::byte* mapped_ = nullptr;
+    uint64_t bytes_ = 0;
+};
+
+/// A view of a buffer as texels. Move-only.
+class TexelView {
+public:
+    TexelView() = default;
+    ~TexelView() { destroy(); }
+    TexelView(TexelView&& other) noexcept { *this = std::move(other); }
+    TexelView& operator=(TexelView&& other) noexcept;
+    [[nodiscard]] VkBufferView handle() const { return view_; }
+
+private:
+    friend class Device;
+    void destroy();
+
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkBufferView view_ = VK_NULL_HANDLE;
+};
+
+/// Where a buffer lives. Local: in the device's memory, mapped where the device allows it (software and
+/// integrated devices). Upload: written by the CPU, read by copies or shaders. Readback: written by the
+/// device, read by the CPU.
+enum class MemoryUse { Local, Upload, Readback };
+
+class Device {
+public:
+    /// `choice` as in RendererOptions::device; a surface asks for the swapchain extension and a queue that
+    /// can show pictures. Errors: Device.
+    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface);
+    ~Device();
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    [[nodiscard]] VkDevice handle() const { return device_; }
+    [[nodiscard]] VkPhysicalDevice physical() const { return physical_; }
+    [[nodiscard]] VkQueue queue() const { return queue_; }
+    [[nodiscard]] uint32_t queueFamily() const { return family_; }
+    [[nodiscard]] VkPipelineCache pipelineCache() const { return pipelineCache_; }
+    [[nodiscard]] const DeviceInfo& info() const { return info_; }
+    [[nodiscard]] const VkPhysicalDeviceLimits& limits() const { return limits_; }
+    /// Nanoseconds a timestamp step, 0 where the queue has no timestamps.
+    [[nodiscard]] double timestampNanoseconds() const { return timestampNanoseconds_; }
+
+    /// Errors: Device (out of memory).
+    Result<Buffer> createBuffer(uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
+    /// A memory type among the bits `allowed`. Errors: Device.
+    Result<uint32_t> memoryType(uint32_t allowed, MemoryUse use) const;
+    Result<TexelView> createTexelView(const Buffer& buffer, VkFormat format, uint64_t bytes) const;
+
+    /// Records nothing itself: hands `record` a command buffer, submits it and waits until it is done.
+    template <class Record>
+    Result<void> submitAndWait(Record record) {
+        auto commands = beginCommands();
+        if (!commands) return commands.error();
+        record(*commands);
+        return endCommandsAndWait();
+    }
+    Result<VkCommandBuffer> beginCommands();
+    /// With semaphores: waits for `wait` before transfers, signals `signal`.
+    Result<void> endCommandsAndWait(VkSemaphore wait = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
+
+private:
+    Device() = default;
+    Result<void> chooseQueue(VkSurfaceKHR surface);
+    Result<void> createDevice(bool withSwapchain);
+
+    VkPhysicalDevice physical_ = VK_NULL_HANDLE;
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkQueue queue_ = VK_NULL_HANDLE;
+    VkCommandPool commandPool_ = VK_NULL_HANDLE;
+    VkCommandBuffer commands_ = VK_NULL_HANDLE;
+    VkFence fence_ = VK_NULL_HANDLE;
+    VkPipelineCache pipelineCache_ = VK_NULL_HANDLE;
+    uint32_t family_ = 0;
+    double timestampNanoseconds_ = 0;
+    DeviceInfo info_;
+    VkPhysicalDeviceLimits limits_{};
+    VkPhysicalDeviceMemoryProperties memory_{};
+};
+
+}  // namespace vcp

@@ -1,0 +1,55 @@
+// The Vulkan instance, what its validation layers say, and the choice of a device.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <vulkan/vulkan_core.h>
+
+#include "octree/result.h"
+#include "render/renderer.h"
+
+namespace vcp {
+
+/// Warnings and errors of the validation layers. Any thread may add.
+class ValidationLog {
+public:
+    void add(std::string message);
+    [[nodiscard]] std::vector<std::string> messages() const;
+
+private:
+    mutable std::mutex mutex_;
+    std::vector<std::string> messages_;
+};
+
+class Instance {
+public:
+    /// Vulkan 1.2. With `validation`: core and synchronization checks into log(). Errors: Device.
+    static Result<std::unique_ptr<Instance>> create(bool validation, const std::vector<std::string>& extensions);
+    ~Instance();
+    Instance(const Instance&) = delete;
+    Instance& operator=(const Instance&) = delete;
+
+    [[nodiscard]] VkInstance handle() const { return instance_; }
+    [[nodiscard]] const ValidationLog& log() const { return *log_; }
+    Result<std::vector<VkPhysicalDevice>> physicalDevices() const;
+
+private:
+    Instance() = default;
+    Result<void> connectLog();
+
+    VkInstance instance_ = VK_NULL_HANDLE;
+    VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+    std::unique_ptr<ValidationLog> log_ = std::make_unique<ValidationLog>();
+};
+
+DeviceInfo describeDevice(VkPhysicalDevice device, uint32_t index);
+
+/// Index of the device that `choice` means among `devices` (pure; see RendererOptions::device). An empty
+/// choice takes the usable device of the best type: discrete, integrated, virtual, other, cpu; the first
+/// of equals. Errors: Device, naming what there is.
+Result<uint32_t> chooseDevice(const std::vector<DeviceInfo>& devices, const std::string& choice);
+
+}  // namespace vcp

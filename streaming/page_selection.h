@@ -1,0 +1,63 @@
+// Which pages a view wants and which it draws: the cut through the tree of pages. Pure: no threads, no
+// clock, no GPU; the same input gives the same output.
+//
+// A page is refined, that is replaced by all its children, where its certified error projects to more than
+// errorPixels at the point of its box nearest to the eye. The largest projected error goes first, while the
+// children fit into the budget; so a budget too small for the view relaxes the error evenly over the
+// picture. Pages outside of the view's frustum are not refined. A refined page stays wanted beneath its
+// children: it is what is drawn when they have to go.
+//
+// Source: Demir and Westermann 2015, section 4.4, with certified errors in place of voxel sizes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+/// What selection must know of a camera.
+struct SelectionView {
+    glm::dvec3 eye{0};
+    bool orthographic = false;
+    /// Pixels a world unit: at distance 1 (perspective) or anywhere (orthographic).
+    double pixelsPerUnit = 1;
+    /// Inward planes of the frustum: a point x is outside of a plane where dot(xyz, x - eye) + w < 0.
+    std::array<glm::dvec4, 4> planes{};
+    double errorPixels = 0.5;
+};
+
+struct WantedPage {
+    uint64_t page;
+    double priority;  ///< projected error in pixels of what is drawn without it; the root's is infinite
+};
+
+struct Selection {
+    /// The ideal cut and all pages above it, parents before children, most urgent first.
+    std::vector<WantedPage> wanted;
+    std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
+    double errorPixels = 0;     ///< largest projected error in the cut, of pages in view; infinite without one
+    bool complete = false;      ///< all that is wanted is resident
+    bool relaxed = false;       ///< the budget kept a page from being refined
+};
+
+/// `pageBytes[i]`: what page i takes of the budget. `resident[i]`: whether it may be drawn. `unavailable[i]`:
+/// it cannot be read; its parent is drawn in its place. All three have one element a page of the dataset.
+Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
+                      std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
+                      std::span<const uint8_t> unavailable);
+
+/// Certified error of a page in pixels, at the point of its box nearest to the eye; infinite where the eye
+/// is inside of the box.
+double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
+
+/// Whether a page's box touches the view's frustum (no false negatives).
+bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
+
+}  // namespace vcp

@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# make_scan from the outside: file and pipe agree, errors are one clear line, nothing half-written stays.
+#   make_scan_test.sh MAKE_SCAN WORK_DIR
+set -euo pipefail
+make_scan=$1 work=$2
+rm -rf "$work"
+mkdir -p "$work"
+cd "$work"
+
+fail() { echo "FAILED: $*"; exit 1; }
+
+# Runs make_scan; checks the exit status, and that stderr is one line that contains the text.
+refuses() {
+    local status=$1 text=$2
+    shift 2
+    local got=0
+    "$make_scan" "$@" >out.txt 2>err.txt || got=$?
+    [ "$got" -eq "$status" ] || fail "$*: exit status $got, not $status"
+    [ "$(wc -l <err.txt)" -eq 1 ] || fail "$*: $(wc -l <err.txt) lines on stderr"
+    grep -q -- "$text" err.txt || fail "$*: '$(cat err.txt)' does not say '$text'"
+}
+
+"$make_scan" --triangles 30000 --seed 9 --colour -o file.ply
+"$make_scan" --triangles 30000 --seed 9 --colour -o - | cat >pipe.ply
+cmp file.ply pipe.ply || fail "a pipe gives other bytes than a file"
+head -c 400 file.ply | grep -aq '^element face 30000$' || fail "the header does not say 30000 faces"
+"$make_scan" --help | grep -q -- --triangles || fail "--help"
+
+refuses 2 "-o FILE is missing" --triangles 10000
+refuses 2 "10000 to 1000000000" --triangles 9999 -o x.ply
+refuses 2 "10000 to 1000000000" --triangles 1000000001 -o x.ply
+refuses 2 "10000 to 1000000000" --triangles 1e5 -o x.ply
+refuses 2 "--seed wants" --seed -1 -o x.ply
+refuses 2 "wants a value" -o
+refuses 2 "unknown option '--colors'" --colors -o x.ply
+refuses 1 "missing/x.ply: cannot be written" -o missing/x.ply
+refuses 1 "No space left" -o /dev/full
+[ -e /dev/full ] || fail "/dev/full was removed"
+
+# A file size limit stands in for a full disk; the old file must survive.
+echo old >kept.ply
+status=0
+(trap '' XFSZ; ulimit -f 100; exec "$make_scan" --triangles 100000 -o kept.ply) 2>err.txt || status=$?
+[ "$status" -eq 1 ] || fail "full disk: exit status $status"
+grep -q "kept.ply: write failed" err.txt || fail "full disk: $(cat err.txt)"
+[ "$(cat kept.ply)" = old ] || fail "full disk: the old file was touched"
+[ ! -e kept.ply.partial ] || fail "full disk: kept.ply.partial was left"
+
+# A reader that goes away is an error, not a signal.
+status=0
+{ "$make_scan" --triangles 1000000 -o - 2>err.txt || echo $? >status.txt; } | head -c 10 >/dev/null
+[ "$(cat status.txt)" = 1 ] || fail "closed pipe: exit status $(cat status.txt)"
+grep -q "Broken pipe" err.txt || fail "closed pipe: $(cat err.txt)"
+
+# The same memory for a hundred times the triangles: both fit a limit that neither mesh would.
+(ulimit -v 65536; exec "$make_scan" --triangles 10000 -o - >/dev/null) || fail "10 thousand in 64 MiB"
+(ulimit -v 65536; exec "$make_scan" --triangles 4000000 -o - >/dev/null) || fail "4 million in 64 MiB"
+echo passed

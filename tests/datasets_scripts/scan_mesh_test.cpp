@@ -1,0 +1,203 @@
+// The scan generator: exact counts, the same bytes for a seed, closed parts closed, memory bounded.
+#include "datasets_scripts/scan_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include "datasets_scripts/procedural_noise.h"
+
+namespace vcp::scan {
+namespace {
+
+std::vector<std::byte> bytesOf(const ScanMesh& mesh) {
+    std::vector<std::byte> bytes;
+    const auto result = mesh.writePly([&](std::span<const std::byte> piece) -> Result<void> {
+        EXPECT_LE(piece.size(), ScanMesh::kBufferBytes);
+        bytes.insert(bytes.end(), piece.begin(), piece.end());
+        return {};
+    });
+    EXPECT_TRUE(result.ok());
+    return bytes;
+}
+
+struct Mesh {
+    std::vector<glm::dvec3> positions;
+    std::vector<std::array<uint32_t, 3>> triangles;
+};
+
+/// Reads back what was written, without colour or UTM.
+Mesh parse(const ScanMesh& mesh, const std::vector<std::byte>& bytes) {
+    Mesh parsed;
+    const std::byte* at = bytes.data() + mesh.header().size();
+    for (uint64_t i = 0; i < mesh.vertices(); ++i, at += 12) {
+        std::array<float, 3> p;
+        std::memcpy(p.data(), at, 12);
+        parsed.positions.emplace_back(p[0], p[1], p[2]);
+    }
+    for (uint64_t i = 0; i < mesh.triangles(); ++i, at += 13) {
+        EXPECT_EQ(at[0], std::byte{3});
+        std::array<uint32_t, 3> corners;
+        std::memcpy(corners.data(), at + 1, 12);
+        parsed.triangles.push_back(corners);
+    }
+    EXPECT_EQ(at, bytes.data() + bytes.size());
+    return parsed;
+}
+
+TEST(ScanMesh, CountsAreExact) {
+    for (const uint64_t triangles : {10'000u, 10'001u, 12'345u, 99'999u, 250'000u})
+        for (const bool colour : {false, true}) {
+            const ScanMesh mesh({.triangles = triangles, .seed = 7, .colour = colour, .utm = colour});
+            EXPECT_EQ(mesh.triangles(), triangles);
+            EXPECT_EQ(bytesOf(mesh).size(), mesh.fileBytes()) << triangles;
+        }
+}
+
+TEST(ScanMesh, PlansUpToABillion) {
+    for (const uint64_t triangles : {kMinTriangles, uint64_t(1'000'003), uint64_t(99'999'999), kMaxTriangles}) {
+        const ScanMesh mesh({.triangles = triangles});
+        uint64_t vertices = 0, sum = 0;
+        for (const GridPart& part : mesh.parts()) {
+            EXPECT_EQ(part.firstVertex, vertices);
+            EXPECT_EQ(part.firstTriangle, sum);
+            EXPECT_GT(part.triangles, 0u) << part.part.name;
+            vertices += part.vertices;
+            sum += part.triangles;
+        }
+        EXPECT_EQ(sum, triangles);
+        EXPECT_EQ(vertices, mesh.vertices());
+        EXPECT_LT(vertices, std::numeric_limits<uint32_t>::max());
+        // The strip takes the rest, which must stay a rest.
+        EXPECT_LT(mesh.parts().back().triangles, triangles / 20);
+    }
+}
+
+TEST(ScanMesh, SeedDecidesEveryByte) {
+    const ScanOptions options{.triangles = 20'000, .seed = 3, .colour = true};
+    ScanOptions other = options;
+    other.seed = 4;
+    const auto first = bytesOf(ScanMesh(options));
+    EXPECT_EQ(first, bytesOf(ScanMesh(options)));
+    EXPECT_NE(first, bytesOf(ScanMesh(other)));
+}
+
+TEST(ScanMesh, BytesAreTheSameOnEverySystem) {
+    uint64_t sum = 0;
+    for (const std::byte byte : bytesOf(ScanMesh({.triangles = 10'000, .seed = 1, .colour = true})))
+        sum = hash(sum ^ uint64_t(byte));
+    EXPECT_EQ(sum, 0xc0412ae4ae40fc7cu) << std::hex << "0x" << sum;
+}
+
+TEST(ScanMesh, ClosedPartsAreClosedAndFaceOutward) {
+    const ScanMesh mesh({.triangles = 10'000});
+    const Mesh parsed = parse(mesh, bytesOf(mesh));
+    for (const GridPart& part : mesh.parts()) {
+        std::map<std::pair<uint32_t, uint32_t>, int> edges;
+        double volume = 0;
+        for (uint64_t i = part.firstTriangle; i < part.firstTriangle + part.triangles; ++i) {
+            const auto& t = parsed.triangles[i];
+            for (int k = 0; k < 3; ++k) {
+                ASSERT_GE(t[k], part.firstVertex);
+                ASSERT_LT(t[k], part.firstVertex + part.vertices);
+                ++edges[{t[k], t[(k + 1) % 3]}];
+            }
+            volume += glm::dot(parsed.positions[t[0]], glm::cross(parsed.positions[t[1]], parsed.positions[t[2]])) / 6;
+        }
+        size_t unmatched = 0;
+        for (const auto& [edge, count] : edges) {
+            EXPECT_EQ(count, 1) << part.part.name << ": an edge is used twice in one direction";
+            unmatched += !edges.contains({edge.second, edge.first});
+        }
+        if (part.part.closed()) {
+            EXPECT_EQ(unmatched, 0u) << part.part.name;
+            EXPECT_GT(volume, 0) << part.part.name;
+        } else {
+            EXPECT_GT(unmatched, 0u) << part.part.name;
+        }
+    }
+}
+
+TEST(ScanMesh, ShawlHasHolesAtAnySize) {
+    for (const uint64_t triangles : {kMinTriangles, uint64_t(1'000'000)}) {
+        const ScanMesh mesh({.triangles = triangles});
+        const auto& parts = mesh.parts();
+        const auto shawl = std::ranges::find_if(parts, [](const GridPart& part) { return part.part.name == "shawl"; });
+        ASSERT_NE(shawl, parts.end());
+        EXPECT_LT(shawl->triangles, 2 * (shawl->columns - 1) * (shawl->rows - 1));
+    }
+}
+
+TEST(ScanMesh, HasSliversAndNoPointTriangles) {
+    const ScanMesh mesh({.triangles = 50'000});
+    const Mesh parsed = parse(mesh, bytesOf(mesh));
+    size_t slivers = 0, points = 0;
+    for (const auto& t : parsed.triangles) {
+        const glm::dvec3 a = parsed.positions[t[0]], b = parsed.positions[t[1]], c = parsed.positions[t[2]];
+        const double longest = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+        const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
+        slivers += longest * longest > 20 * 2 * area;
+        points += longest < 1e-6;
+    }
+    EXPECT_GT(slivers, 50u);
+    EXPECT_EQ(points, 0u);
+}
+
+TEST(ScanMesh, UtmKeepsTheShapeInDoubles) {
+    const ScanMesh plain({.triangles = 10'000}), utm({.triangles = 10'000, .utm = true});
+    const auto floats = bytesOf(plain), doubles = bytesOf(utm);
+    const std::byte* a = floats.data() + plain.header().size();
+    const std::byte* b = doubles.data() + utm.header().size();
+    double firstShift[3] = {};
+    for (uint64_t i = 0; i < plain.vertices(); ++i, a += 12, b += 24) {
+        float p[3];
+        double q[3];
+        std::memcpy(p, a, 12);
+        std::memcpy(q, b, 24);
+        const double shift[3] = {q[0] - p[0], q[1] + p[2], q[2] - p[1]};
+        for (int k = 0; k < 3; ++k) {
+            if (i == 0) firstShift[k] = shift[k];
+            ASSERT_NEAR(shift[k], firstShift[k], 1e-6) << "vertex " << i;
+        }
+        ASSERT_GT(q[1], 1e6);
+    }
+}
+
+TEST(ScanMesh, StopsAtTheFirstWriteError) {
+    const ScanMesh mesh({.triangles = 500'000});
+    int calls = 0;
+    const auto result = mesh.writePly([&](std::span<const std::byte>) -> Result<void> {
+        if (++calls < 3) return {};
+        return Error{ErrorCode::Io, "full"};
+    });
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().message, "full");
+    EXPECT_EQ(calls, 3);
+}
+
+TEST(ProceduralNoise, SineAgreesWithTheLibrary) {
+    for (int i = -4000; i <= 4000; ++i) {
+        const double turns = i / 977.0;
+        EXPECT_NEAR(sinTurns(turns), std::sin(turns * 2 * M_PI), 1e-9) << turns;
+        EXPECT_NEAR(cosTurns(turns), std::cos(turns * 2 * M_PI), 1e-9) << turns;
+    }
+}
+
+TEST(ProceduralNoise, IsContinuousAcrossCells) {
+    const Noise noise(5);
+    for (int i = 0; i < 1000; ++i) {
+        const uint64_t h = hash(uint64_t(i));
+        const glm::dvec3 p(std::floor(10 * signedUnit(h)), 10 * signedUnit(h, 21), 10 * signedUnit(h, 42));
+        EXPECT_NEAR(noise(p - glm::dvec3(1e-9, 0, 0)), noise(p + glm::dvec3(1e-9, 0, 0)), 1e-7) << "seed " << i;
+    }
+}
+
+}  // namespace
+}  // namespace vcp::scan

@@ -1,0 +1,76 @@
+// What must hold for every mesh file, however hostile: it is read, or refused in one line; what was read keeps
+// the contract of MeshStream; and the answer does not depend on how the file was cut into windows.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "builder/byte_source.h"
+#include "builder/mesh_stream.h"
+
+namespace vcp::fuzz {
+
+inline void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "broken: %s\n", what);
+    std::abort();
+}
+
+struct Outcome {
+    std::string error;
+    std::vector<glm::dvec3> positions;
+    std::vector<Rgba8> colours;
+    std::vector<std::array<uint64_t, 3>> triangles;
+};
+
+inline Outcome readMesh(Result<std::unique_ptr<MeshStream>> stream) {
+    Outcome mesh;
+    if (!stream) {
+        mesh.error = stream.error().line();
+        return mesh;
+    }
+    MeshChunk chunk;
+    while (true) {
+        const auto more = (*stream)->next(chunk);
+        if (!more) {
+            mesh.error = more.error().line();
+            return mesh;
+        }
+        require(*more == (!chunk.positions.empty() || !chunk.triangles.empty()), "an empty chunk ends the mesh");
+        if (!*more) break;
+        require(chunk.positions.size() < 200'000 && chunk.triangles.size() < 2'000'000, "a chunk is bounded");
+        mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
+        mesh.colours.insert(mesh.colours.end(), chunk.colours.begin(), chunk.colours.end());
+        mesh.triangles.insert(mesh.triangles.end(), chunk.triangles.begin(), chunk.triangles.end());
+    }
+    const MeshInfo& info = (*stream)->info();
+    require(mesh.colours.size() == (info.hasColour ? mesh.positions.size() : 0), "a colour for each vertex");
+    require(!info.vertices || *info.vertices == mesh.positions.size(), "the declared vertices are there");
+    for (const glm::dvec3& p : mesh.positions)
+        require(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z), "positions are finite");
+    for (const auto& triangle : mesh.triangles)
+        for (const uint64_t vertex : triangle) require(vertex < mesh.positions.size(), "indices are in range");
+    return mesh;
+}
+
+using Opener = Result<std::unique_ptr<MeshStream>> (*)(ByteSource);
+
+inline void checkMesh(Opener open, std::string_view bytes) {
+    const Outcome whole = readMesh(open(ByteSource::fromMemory(bytes, "fuzz")));
+    require(whole.error.find('\n') == std::string::npos, "an error is one line");
+    for (const size_t window : {1, 37}) {
+        const Outcome cut = readMesh(open(ByteSource::fromMemory(bytes, "fuzz", window)));
+        require(cut.error.empty() == whole.error.empty(), "windows do not change the outcome");
+        if (!whole.error.empty()) continue;
+        require(cut.positions == whole.positions, "windows do not change positions");
+        require(cut.colours == whole.colours, "windows do not change colours");
+        require(cut.triangles == whole.triangles, "windows do not change triangles");
+    }
+}
+
+}  // namespace vcp::fuzz

@@ -1,0 +1,219 @@
+// Pages made from a formula, for tests that must not depend on the builder: every cell that a signed distance
+// function passes through is a soft leaf, everything else is empty with an honest clearance.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "octree/packing.h"
+#include "octree/page.h"
+#include "octree/vcp_file.h"
+
+namespace vcp::test {
+
+/// A surface with a signed distance, in world space.
+struct SignedDistance {
+    double distance = 0;      ///< negative inside
+    glm::dvec3 outward{0};    ///< unit gradient of the distance
+};
+using SignedDistanceField = std::function<SignedDistance(glm::dvec3)>;
+
+inline SignedDistanceField sphere(glm::dvec3 centre, double radius) {
+    return [=](glm::dvec3 p) -> SignedDistance {
+        const glm::dvec3 v = p - centre;
+        const double r = glm::length(v);
+        return {r - radius, r > 0 ? v / r : glm::dvec3(0, 0, 1)};
+    };
+}
+
+/// `normal` of length 1; inside is where dot(p, normal) < offset.
+inline SignedDistanceField plane(glm::dvec3 normal, double offset) {
+    return [=](glm::dvec3 p) -> SignedDistance { return {glm::dot(p, normal) - offset, normal}; };
+}
+
+inline SignedDistanceField torus(glm::dvec3 centre, double ring, double tube) {
+    return [=](glm::dvec3 p) -> SignedDistance {
+        const glm::dvec3 v = p - centre;
+        const double around = std::max(std::hypot(v.x, v.y), 1e-12);
+        const glm::dvec3 spine = glm::dvec3(v.x, v.y, 0) * (ring / around);
+        const double r = std::max(glm::length(v - spine), 1e-12);
+        return {r - tube, (v - spine) / r};
+    };
+}
+
+struct AnalyticPage {
+    PageBytes bytes;
+    uint32_t softLeaves = 0;
+};
+
+// Builds one page; `axis` is the axis along which its leaves share faces.
+class AnalyticPageBuilder {
+public:
+    AnalyticPageBuilder(const SignedDistanceField& field, glm::dvec3 origin, double cell, uint32_t log2Cells, uint32_t axis,
+                        float certifiedErrorCells, uint32_t wallCode)
+        : field_(field), origin_(origin), cell_(cell), axis_(axis), wallCode_(wallCode) {
+        header_.log2Cells = log2Cells;
+        header_.certifiedError = certifiedErrorCells;
+    }
+
+    AnalyticPage build() {
+        collectLeaves(glm::ivec3(0), 1 << header_.log2Cells);
+        layFaces();
+        header_.root = node(glm::ivec3(0), 1 << header_.log2Cells);
+        header_.groups = static_cast<uint32_t>(nodes_.size() / 8);
+        header_.faces = static_cast<uint32_t>(faces_.size());
+        header_.softLeaves = static_cast<uint32_t>(leaves_.size());
+        const PageSections s = pageSections(header_);
+        AnalyticPage page;
+        page.softLeaves = header_.softLeaves;
+        page.bytes.geometry.resize(s.end / 16);
+        auto* out = reinterpret_cast<std::byte*>(page.bytes.geometry.data());
+        std::memcpy(out, &header_, sizeof(header_));
+        if (!nodes_.empty()) std::memcpy(out + s.nodes, nodes_.data(), nodes_.size() * 4);
+        if (!faces_.empty()) std::memcpy(out + s.faces, faces_.data(), faces_.size() * 16);
+        return page;
+    }
+
+private:
+    /// Distance from a box's centre to the surface beyond the box's half diagonal, in cells; below 0: perhaps inside.
+    double clearance(glm::ivec3 lowest, int edge) const {
+        const glm::dvec3 centre = origin_ + (glm::dvec3(lowest) + 0.5 * edge) * cell_;
+        return std::abs(field_(centre).distance) / cell_ - 0.5 * edge * std::sqrt(3.0) - 1e-9;
+    }
+
+    void collectLeaves(glm::ivec3 lowest, int edge) {
+        if (clearance(lowest, edge) > 0) return;
+        if (edge == 1) {
+            const std::array<int, 3> key = {lowest[(axis_ + 2) % 3], lowest[(axis_ + 1) % 3], lowest[axis_]};
+            leaves_[key] = 0;
+            return;
+        }
+        for (int o = 0; o < 8; ++o) collectLeaves(lowest + glm::ivec3(o & 1, o >> 1 & 1, o >> 2) * (edge / 2), edge / 2);
+    }
+
+    /// Leaves in runs along the axis; a run of n leaves has n + 1 faces.
+    void layFaces() {
+        std::array<int, 3> last = {-1, -1, -2};
+        for (auto& [key, face] : leaves_) {
+            const bool continues = key[0] == last[0] && key[1] == last[1] && key[2] == last[2] + 1;
+            if (!continues) faces_.push_back(faceAt(key));
+            face = static_cast<uint32_t>(faces_.size() - 1);
+            faces_.push_back(faceAt({key[0], key[1], key[2] + 1}));
+            last = key;
+        }
+    }
+
+    uint4 faceAt(std::array<int, 3> key) const {
+        uint4 face;
+        for (int c = 0; c < 4; ++c) {
+            glm::dvec3 corner;
+            corner[axis_] = key[2];
+            corner[(axis_ + 1) % 3] = key[1] + (c & 1);
+            corner[(axis_ + 2) % 3] = key[0] + (c >> 1);
+            const SignedDistance s = field_(origin_ + corner * cell_);
+            const bool inside = s.distance < 0;
+            face[c] = packVector(std::abs(s.distance) / cell_, inside ? -s.outward : s.outward, inside);
+        }
+        return face;
+    }
+
+    uint32_t node(glm::ivec3 lowest, int edge) {
+        const double clear = clearance(lowest, edge);
+        // Clearance is from the box: the ball around the centre less the half diagonal, twice rounded down.
+        if (clear > 0) return emptyNode(std::max(0.0, clear - 0.01));
+        if (edge == 1) {
+            const uint32_t face = leaves_.at({lowest[(axis_ + 2) % 3], lowest[(axis_ + 1) % 3], lowest[axis_]});
+            return kNodeSoft << kNodeTypeShift | face | axis_ << kSoftAxisShift | wallCode_ << kSoftWallShift | 3u << kSoftDipShift;
+        }
+        const size_t group = nodes_.size() / 8;
+        nodes_.resize(nodes_.size() + 8);
+        for (int o = 0; o < 8; ++o)
+            nodes_[8 * group + o] = node(lowest + glm::ivec3(o & 1, o >> 1 & 1, o >> 2) * (edge / 2), edge / 2);
+        return static_cast<uint32_t>(group);
+    }
+
+    const SignedDistanceField& field_;
+    glm::dvec3 origin_;
+    double cell_;
+    uint32_t axis_, wallCode_;
+    PageHeader header_;
+    std::map<std::array<int, 3>, uint32_t> leaves_;  ///< to their first face
+    std::vector<uint4> faces_;
+    std::vector<uint32_t> nodes_;
+};
+
+struct AnalyticOptions {
+    glm::dvec3 origin{0};      ///< of the root page, world
+    double finestCell = 1;     ///< world
+    uint32_t levels = 1;
+    uint32_t log2Cells = 4;
+    uint32_t axis = 0;
+    uint32_t wallCode = 1;
+    double errorCells = 0.05;  ///< certified error of every page, in its cells
+};
+
+struct AnalyticDataset {
+    Dataset dataset;
+    std::vector<PageBytes> pages;
+};
+
+/// A dataset of `levels` levels; pages without a leaf are left out.
+inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const AnalyticOptions& o) {
+    AnalyticDataset result;
+    FileHeader& h = result.dataset.header;
+    for (int i = 0; i < 3; ++i) h.origin[i] = o.origin[i];
+    h.cell = o.finestCell;
+    h.levels = o.levels;
+    h.log2Cells = o.log2Cells;
+    h.certifiedErrorMax = o.errorCells * o.finestCell;
+    const auto makePage = [&](uint32_t level, glm::u32vec3 at, AnalyticPage& page) {
+        const double cell = o.finestCell * std::exp2(double(o.levels - 1 - level));
+        const glm::dvec3 origin = o.origin + glm::dvec3(at) * cell * std::exp2(double(o.log2Cells));
+        page = AnalyticPageBuilder(field, origin, cell, o.log2Cells, o.axis, static_cast<float>(o.errorCells), o.wallCode).build();
+        return page.softLeaves > 0;
+    };
+    const auto add = [&](uint32_t level, glm::u32vec3 at, AnalyticPage page) {
+        PageEntry entry;
+        entry.morton = mortonEncode(at);
+        entry.level = static_cast<uint8_t>(level);
+        entry.leaves = page.softLeaves;
+        entry.pageBytes = static_cast<uint32_t>(page.bytes.geometryBytes().size());
+        entry.certifiedError = static_cast<float>(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
+        result.dataset.pages.push_back(entry);
+        result.pages.push_back(std::move(page.bytes));
+        ++h.level[level].pages;
+    };
+    AnalyticPage page;
+    makePage(0, glm::u32vec3(0), page);
+    add(0, glm::u32vec3(0), std::move(page));
+    size_t first = 0;
+    for (uint32_t level = 1; level < o.levels; ++level) {
+        const size_t end = result.dataset.pages.size();
+        h.level[level].firstEntry = end;
+        for (size_t parent = first; parent < end; ++parent) {
+            const glm::u32vec3 at = mortonDecode(result.dataset.pages[parent].morton);
+            result.dataset.pages[parent].firstChild = static_cast<uint32_t>(result.dataset.pages.size());
+            for (uint32_t octant = 0; octant < 8; ++octant) {
+                const glm::u32vec3 child = at * 2u + glm::u32vec3(octant & 1, octant >> 1 & 1, octant >> 2);
+                AnalyticPage childPage;
+                if (!makePage(level, child, childPage)) continue;
+                result.dataset.pages[parent].childMask |= static_cast<uint8_t>(1u << octant);
+                add(level, child, std::move(childPage));
+            }
+        }
+        first = end;
+    }
+    h.pages = result.dataset.pages.size();
+    for (uint32_t level = 0; level < o.levels; ++level)
+        h.level[level].certifiedError = o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level));
+    return result;
+}
+
+}  // namespace vcp::test

@@ -1,0 +1,417 @@
+// The executable as people and scripts meet it: exit status, stdout, stderr, files.
+#include <algorithm>
+#include <cctype>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "render/renderer.h"
+#include "test_folder.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+struct Ran {
+    int status = -1;
+    std::string out, err;
+
+    [[nodiscard]] size_t errLines() const { return static_cast<size_t>(std::count(err.begin(), err.end(), '\n')); }
+};
+
+class CommandLine : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        folder_ = std::make_unique<TestFolder>("vcp_command_line_test");
+        writeBall(ball(), 60, 120);
+    }
+    static void TearDownTestSuite() { folder_.reset(); }
+
+    static fs::path ball() { return *folder_ / "ball.ply"; }
+
+    /// The ball's dataset, built once.
+    static fs::path dataset() {
+        const fs::path file = *folder_ / "ball.vcp";
+        if (!fs::exists(file)) {
+            const Ran ran = run({"build", ball().string(), "-o", file.string()});
+            EXPECT_EQ(ran.status, 0) << ran.err;
+        }
+        return file;
+    }
+
+    /// Starts `vcp`; the caller waits for it.
+    static pid_t start(const std::vector<std::string>& arguments, const std::string& out = "out", bool smallFiles = false) {
+        const fs::path outFile = out[0] == '/' ? fs::path(out) : *folder_ / out, errFile = *folder_ / "err";
+        const pid_t child = fork();
+        if (child != 0) return child;
+        dup2(open(outFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
+        dup2(open(errFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
+        setenv("XDG_CACHE_HOME", (*folder_ / "cache").c_str(), 1);
+        unsetenv("DISPLAY");
+        unsetenv("WAYLAND_DISPLAY");
+        if (smallFiles) {
+            // Writes beyond 8 KiB fail, as on a full disk.
+            std::signal(SIGXFSZ, SIG_IGN);
+            const rlimit limit{8192, 8192};
+            setrlimit(RLIMIT_FSIZE, &limit);
+        }
+        std::vector<char*> argv = {const_cast<char*>("vcp")};
+        for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+        argv.push_back(nullptr);
+        execv(VCP_EXECUTABLE, argv.data());
+        _exit(127);
+    }
+
+    static Ran wait(pid_t child) {
+        Ran ran;
+        int status = 0;
+        waitpid(child, &status, 0);
+        ran.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+        ran.out = contentOf(*folder_ / "out");
+        ran.err = contentOf(*folder_ / "err");
+        return ran;
+    }
+
+    static Ran run(const std::vector<std::string>& arguments) { return wait(start(arguments)); }
+
+    /// One line on stderr that names `named`; nothing on stdout; the status.
+    static void expectFailure(const Ran& ran, int status, const std::string& named) {
+        EXPECT_EQ(ran.status, status) << ran.err;
+        EXPECT_EQ(ran.out, "");
+        EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+        EXPECT_EQ(ran.err.substr(0, 5), "vcp: ") << ran.err;
+        EXPECT_NE(ran.err.find(named), std::string::npos) << ran.err << " does not name " << named;
+    }
+
+    static void write(const fs::path& file, const std::string& content) { std::ofstream(file, std::ios::binary) << content; }
+
+    static bool hasDevice() { return listDevices().ok(); }
+
+    static std::unique_ptr<TestFolder> folder_;
+};
+std::unique_ptr<TestFolder> CommandLine::folder_;
+
+constexpr const char* kCommands[] = {"build", "info", "verify", "render", "view", "devices", "bench"};
+
+TEST_F(CommandLine, HelpOfEveryCommandBothWays) {
+    const Ran all = run({"--help"});
+    EXPECT_EQ(all.status, 0);
+    EXPECT_EQ(run({"help"}).out, all.out);
+    for (const std::string command : kCommands) {
+        EXPECT_NE(all.out.find("\n  " + command + " "), std::string::npos) << command;
+        const Ran asked = run({command, "--help"}), told = run({"help", command});
+        EXPECT_EQ(asked.status, 0) << command;
+        EXPECT_EQ(told.status, 0) << command;
+        EXPECT_EQ(asked.out, told.out);
+        EXPECT_EQ(asked.err, "");
+        EXPECT_NE(asked.out.find("vcp " + command), std::string::npos) << asked.out;
+    }
+}
+
+TEST_F(CommandLine, Version) {
+    const Ran ran = run({"--version"});
+    EXPECT_EQ(ran.status, 0);
+    EXPECT_EQ(ran.out.substr(0, 4), "vcp ");
+    EXPECT_TRUE(std::isdigit(ran.out.at(4)));
+}
+
+TEST_F(CommandLine, WrongUsageEndsWith2) {
+    const std::string mesh = ball().string();
+    const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+        {{}, "subcommand"},
+        {{"fly"}, "fly"},
+        {{"help", "fly"}, "fly"},
+        {{"build"}, "vcp help build"},
+        {{"build", mesh}, "--output"},
+        {{"build", mesh, "-o", "x.vcp", "--cell", "wide"}, "wide"},
+        {{"build", mesh, "-o", "x.vcp", "--cell", "1%"}, "1%"},
+        {{"build", mesh, "-o", "x.vcp", "--error", "-1"}, "--error"},
+        {{"build", mesh, "-o", "x.vcp", "--threads", "0"}, "--threads"},
+        {{"build", mesh, "-o", "x.vcp", "--colour", "mauve"}, "mauve"},
+        {{"build", mesh, "-o", "x.vcp", "--progress", "loud"}, "loud"},
+        {{"build", mesh, "-o", "x.vcp", "--unknown"}, "--unknown"},
+        {{"info"}, "FILE"},
+        {{"verify"}, "FILE"},
+        {{"render", mesh}, "--output"},
+        {{"render", mesh, "-o", "x.png", "--size", "big"}, "big"},
+        {{"render", mesh, "-o", "x.png", "--size", "0x5"}, "0x5"},
+        {{"render", mesh, "-o", "x.png", "--budget", "1K"}, "1K"},
+        {{"render", mesh, "-o", "x.png", "--depth", "x.jpg"}, "x.jpg"},
+        {{"render", mesh, "-o", "x.png", "--light", "moon"}, "moon"},
+        {{"render", mesh, "-o", "x.png", "--error-pixels", "0"}, "--error-pixels"},
+        {{"view"}, "IN"},
+    };
+    for (const auto& [arguments, named] : cases) expectFailure(run(arguments), 2, named);
+}
+
+// Every command, every kind of file that is no good: one line that names it.
+TEST_F(CommandLine, BadInputsEndWith1AndNameTheFile) {
+    const fs::path empty = *folder_ / "empty.ply", garbage = *folder_ / "garbage.ply", missing = *folder_ / "missing.ply";
+    const fs::path emptyDataset = *folder_ / "empty.vcp", garbageDataset = *folder_ / "garbage.vcp";
+    const fs::path missingDataset = *folder_ / "missing.vcp", out = *folder_ / "bad_out";
+    write(empty, "");
+    write(emptyDataset, "");
+    std::string noise;
+    for (unsigned i = 0; i < 9000; ++i) noise += static_cast<char>(i * 2654435761u >> 13);
+    write(garbage, noise);
+    write(garbageDataset, noise);
+    const std::string truncated = contentOf(ball()).substr(0, 2000);
+    write(*folder_ / "truncated.ply", truncated);
+
+    for (const fs::path& mesh : {empty, garbage, missing, *folder_ / "truncated.ply", folder_->path()}) {
+        expectFailure(run({"build", mesh.string(), "-o", out.string()}), 1, mesh.string());
+        expectFailure(run({"render", mesh.string(), "-o", out.string()}), 1, mesh.string());
+        expectFailure(run({"view", mesh.string()}), 1, mesh.string());
+        expectFailure(run({"verify", dataset().string(), "--against", mesh.string()}), 1, mesh.string());
+        EXPECT_FALSE(fs::exists(out));
+        EXPECT_FALSE(fs::exists(out.string() + ".partial"));
+    }
+    for (const fs::path& file : {emptyDataset, garbageDataset, missingDataset, folder_->path()}) {
+        expectFailure(run({"info", file.string()}), 1, file.string());
+        expectFailure(run({"info", file.string(), "--json"}), 1, file.string());
+        expectFailure(run({"verify", file.string()}), 1, file.string());
+    }
+    for (const fs::path& file : {emptyDataset, garbageDataset, missingDataset}) {
+        expectFailure(run({"render", file.string(), "-o", out.string()}), 1, file.string());
+        expectFailure(run({"view", file.string()}), 1, file.string());
+        EXPECT_FALSE(fs::exists(out));
+    }
+    if (fs::exists(*folder_ / "cache" / "vcp")) {
+        EXPECT_TRUE(fs::is_empty(*folder_ / "cache" / "vcp")) << "a failed build left something in the cache";
+    }
+}
+
+TEST_F(CommandLine, MeshIsNoDatasetForInfoAndVerify) {
+    expectFailure(run({"info", ball().string()}), 1, ball().string());
+    expectFailure(run({"verify", ball().string()}), 1, ball().string());
+}
+
+TEST_F(CommandLine, BuildReportsWhatProgramsRelyOn) {
+    const fs::path file = *folder_ / "reported.vcp";
+    const Ran ran = run({"build", ball().string(), "-o", file.string(), "--json", "--progress", "json"});
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json json = Json::parse(ran.out);
+    for (const char* field : {"triangles", "degenerate_triangles", "seconds", "peak_rss_bytes", "temp_bytes", "file_bytes", "levels",
+                              "subvolumes", "leaves", "hard_leaves", "cell", "certified_error_max"})
+        EXPECT_TRUE(json.contains(field) && json[field].is_number()) << field;
+    EXPECT_EQ(json["triangles"], 14160);
+    EXPECT_EQ(json["file_bytes"], fs::file_size(file));
+    EXPECT_GT(json["peak_rss_bytes"], 1 << 20);
+    std::istringstream progress(ran.err);
+    for (std::string line; std::getline(progress, line);) EXPECT_TRUE(Json::parse(line).contains("fraction")) << line;
+
+    const Json info = Json::parse(run({"info", file.string(), "--json"}).out);
+    for (const char* field : {"triangles", "degenerate_triangles", "levels", "subvolumes", "leaves", "hard_leaves", "cell",
+                              "certified_error_max", "file_bytes"})
+        EXPECT_EQ(info[field], json[field]) << field;
+    EXPECT_EQ(info["level"].size(), json["levels"].get<size_t>());
+    EXPECT_EQ(info["level"].back()["certified_error_max"], json["certified_error_max"]);
+
+    const Json verified = Json::parse(run({"verify", file.string(), "--json"}).out);
+    EXPECT_EQ(verified["ok"], true);
+    EXPECT_EQ(verified["pages"], json["subvolumes"]);
+    EXPECT_EQ(verified["bytes"], json["file_bytes"]);
+}
+
+TEST_F(CommandLine, SameBytesWhateverTheThreads) {
+    const fs::path one = *folder_ / "one.vcp", three = *folder_ / "three.vcp";
+    ASSERT_EQ(run({"build", ball().string(), "-o", one.string(), "--threads", "1"}).status, 0);
+    ASSERT_EQ(run({"build", ball().string(), "-o", three.string(), "--threads", "3"}).status, 0);
+    EXPECT_EQ(contentOf(one), contentOf(three));
+}
+
+TEST_F(CommandLine, VerifyMeasuresAgainstTheMesh) {
+    const Ran ran = run({"verify", dataset().string(), "--against", ball().string(), "--json", "--samples", "20000"});
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json json = Json::parse(ran.out);
+    EXPECT_EQ(json["ok"], true);
+    for (const char* way : {"mesh_to_surface", "surface_to_mesh"}) {
+        for (const char* quantile : {"p50", "p95", "p99", "max"}) EXPECT_TRUE(json[way][quantile].is_number());
+        EXPECT_LE(json[way]["max"].get<double>(), json["certified_error_max"].get<double>() * (1 + 1e-6));
+    }
+    EXPECT_GE(json["samples"].get<uint64_t>(), 20000u);
+}
+
+TEST_F(CommandLine, VerifyRefusesAnotherMesh) {
+    const fs::path other = *folder_ / "other.ply";
+    writeBall(other, 7, 9);
+    const Ran ran = run({"verify", dataset().string(), "--against", other.string(), "--json", "--samples", "2000"});
+    EXPECT_EQ(ran.status, 1);
+    EXPECT_EQ(Json::parse(ran.out)["ok"], false);
+    EXPECT_NE(ran.err.find("more than the certified"), std::string::npos) << ran.err;
+}
+
+TEST_F(CommandLine, VerifyFindsAChangedByteAnywhere) {
+    const std::string whole = contentOf(dataset());
+    const fs::path file = *folder_ / "changed.vcp";
+    for (size_t i = 0; i < 24; ++i) {
+        std::string changed = whole;
+        changed[i * (whole.size() - 1) / 23] ^= 0x10;
+        write(file, changed);
+        const Ran ran = run({"verify", file.string()});
+        expectFailure(ran, 1, file.string());
+        EXPECT_EQ(Json::parse(run({"verify", file.string(), "--json"}).out)["ok"], false);
+    }
+}
+
+TEST_F(CommandLine, RenderReportsWhatProgramsRelyOn) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const fs::path png = *folder_ / "ball.png", depth = *folder_ / "ball.pfm", normals = *folder_ / "normals.png";
+    const Ran ran = run({"render", dataset().string(), "-o", png.string(), "--size", "160x120", "--depth", depth.string(), "--normals",
+                         normals.string(), "--json"});
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json json = Json::parse(ran.out);
+    for (const char* field : {"frames", "ms_per_frame", "rays_per_second", "hit_pixels", "resident_bytes", "bytes_read", "error_pixels",
+                              "pipelines"})
+        EXPECT_TRUE(json.contains(field) && json[field].is_number()) << field;
+    EXPECT_EQ(json["settled"], true);
+    EXPECT_TRUE(json["device"].is_string());
+    EXPECT_GT(json["hit_pixels"], 160 * 120 / 5);
+    EXPECT_LE(json["error_pixels"].get<double>(), 0.5);
+    const auto picture = readPng(png);
+    ASSERT_TRUE(picture) << picture.error().line();
+    EXPECT_EQ(picture->width, 160u);
+    EXPECT_EQ(fs::file_size(depth), 160u * 120 * 4 + std::string("Pf\n160 120\n-1.0\n").size());
+    EXPECT_GT(fs::file_size(normals), 100u);
+}
+
+TEST_F(CommandLine, RenderOfAMeshBuildsItOnce) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const fs::path first = *folder_ / "first.png", second = *folder_ / "second.png", built = *folder_ / "built.png";
+    ASSERT_EQ(run({"render", ball().string(), "-o", first.string(), "--size", "64x64"}).status, 0);
+    const auto datasets = [&] {
+        return std::distance(fs::directory_iterator(*folder_ / "cache" / "vcp"), fs::directory_iterator());
+    };
+    const auto count = datasets();
+    EXPECT_GE(count, 1);
+    ASSERT_EQ(run({"render", ball().string(), "-o", second.string(), "--size", "64x64"}).status, 0);
+    ASSERT_EQ(run({"render", dataset().string(), "-o", built.string(), "--size", "64x64"}).status, 0);
+    EXPECT_EQ(datasets(), count);
+    EXPECT_EQ(contentOf(first), contentOf(second));
+    EXPECT_EQ(contentOf(first), contentOf(built));
+}
+
+TEST_F(CommandLine, CamerasByNameAndByFile) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const fs::path camera = *folder_ / "camera.json", png = *folder_ / "camera.png";
+    const Ran named = run({"render", dataset().string(), "-o", png.string(), "--size", "64x64", "--camera", "iso", "--json"});
+    ASSERT_EQ(named.status, 0) << named.err;
+    const std::string picture = contentOf(png);
+    write(camera, Json::parse(named.out)["camera"].dump());
+    ASSERT_EQ(run({"render", dataset().string(), "-o", png.string(), "--size", "64x64", "--camera", camera.string()}).status, 0);
+    const auto again = readPng(png);
+    ASSERT_TRUE(again);
+
+    write(camera, "{\"position\": [0, 0, 5]}");
+    const fs::path none = *folder_ / "none.png";
+    const Ran wrong = run({"render", dataset().string(), "-o", none.string(), "--camera", camera.string()});
+    expectFailure(wrong, 1, camera.string());
+    expectFailure(run({"render", dataset().string(), "-o", none.string(), "--camera", "sideways"}), 1, "sideways");
+    EXPECT_FALSE(fs::exists(none));
+}
+
+TEST_F(CommandLine, RenderRefusesBrokenPagesWithoutAPicture) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const Json info = Json::parse(run({"info", dataset().string(), "--json"}).out);
+    std::string bytes = contentOf(dataset());
+    for (size_t at = bytes.size() / 3; at + 200 < bytes.size(); at += 97) bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
+    const fs::path file = *folder_ / "broken_pages.vcp", png = *folder_ / "broken_pages.png";
+    write(file, bytes);
+    expectFailure(run({"render", file.string(), "-o", png.string(), "--size", "64x64"}), 1, file.string());
+    EXPECT_FALSE(fs::exists(png));
+}
+
+TEST_F(CommandLine, Devices) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const Ran ran = run({"devices", "--json"});
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json json = Json::parse(ran.out);
+    int chosen = 0;
+    for (const Json& device : json["devices"]) {
+        for (const char* field : {"name", "type", "driver"}) EXPECT_TRUE(device[field].is_string()) << field;
+        for (const char* field : {"software", "chosen"}) EXPECT_TRUE(device[field].is_boolean()) << field;
+        EXPECT_EQ(device["type"] == "cpu", device["software"].get<bool>());
+        chosen += device["chosen"].get<bool>();
+    }
+    EXPECT_EQ(chosen, 1);
+    const std::string text = run({"devices"}).out;
+    EXPECT_EQ(text.find("software") != std::string::npos, ran.out.find("\"software\": true") != std::string::npos);
+    expectFailure(run({"devices", "--device", "no such device"}), 1, "no such device");
+    expectFailure(run({"render", dataset().string(), "-o", "x.png", "--device", "no such device"}), 1, "no such device");
+}
+
+TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {
+    expectFailure(run({"view", dataset().string()}), 1, "vcp render");
+}
+
+TEST_F(CommandLine, UnwritableOutputs) {
+    const fs::path nowhere = *folder_ / "no" / "such" / "folder";
+    expectFailure(run({"build", ball().string(), "-o", (nowhere / "x.vcp").string()}), 1, (nowhere / "x.vcp").string());
+    const std::string under = (ball() / "x.vcp").string();
+    expectFailure(run({"build", ball().string(), "-o", under}), 1, under);
+    if (!hasDevice()) return;
+    expectFailure(run({"render", dataset().string(), "-o", (nowhere / "x.png").string(), "--size", "64x64"}), 1, (nowhere / "x.png").string());
+}
+
+TEST_F(CommandLine, FullDiskLeavesNothingHalfWritten) {
+    dataset();
+    const fs::path file = *folder_ / "full.vcp", png = *folder_ / "full.png";
+    expectFailure(wait(start({"build", ball().string(), "-o", file.string()}, "out", true)), 1, "full.vcp");
+    EXPECT_FALSE(fs::exists(file));
+    EXPECT_FALSE(fs::exists(file.string() + ".partial"));
+    if (!hasDevice()) return;
+    const fs::path depth = *folder_ / "full.pfm";
+    expectFailure(wait(start({"render", dataset().string(), "-o", png.string(), "--depth", depth.string(), "--size", "300x200"}, "out", true)), 1, "full.");
+    EXPECT_FALSE(fs::exists(png));
+    EXPECT_FALSE(fs::exists(depth));
+    EXPECT_FALSE(fs::exists(depth.string() + ".partial"));
+}
+
+TEST_F(CommandLine, FullStandardOutputIsAFailure) {
+    if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+    const Ran ran = wait(start({"info", dataset().string()}, "/dev/full"));
+    EXPECT_EQ(ran.status, 1);
+    EXPECT_NE(ran.err.find("standard output"), std::string::npos) << ran.err;
+}
+
+TEST_F(CommandLine, InterruptedBuildLeavesNothing) {
+    const fs::path big = *folder_ / "big.ply", file = *folder_ / "big.vcp";
+    writeBall(big, 500, 1000);
+    const pid_t child = start({"build", big.string(), "-o", file.string(), "--threads", "1"});
+    usleep(300'000);
+    kill(child, SIGINT);
+    const Ran ran = wait(child);
+    EXPECT_EQ(ran.status, 1) << "a build of a million triangles took less than the test waits";
+    EXPECT_FALSE(fs::exists(file));
+    EXPECT_FALSE(fs::exists(file.string() + ".partial"));
+    EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+    EXPECT_NE(ran.err.find("cancel"), std::string::npos) << ran.err;
+}
+
+TEST_F(CommandLine, DegenerateTrianglesAreCountedNotFatal) {
+    const fs::path mesh = *folder_ / "degenerate.ply", file = *folder_ / "degenerate.vcp";
+    write(mesh, "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
+                "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 1\n3 0 1 3\n");
+    const Ran ran = run({"build", mesh.string(), "-o", file.string(), "--json"});
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    EXPECT_EQ(Json::parse(ran.out)["triangles"], 3);
+    EXPECT_EQ(Json::parse(ran.out)["degenerate_triangles"], 1);
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,314 @@
+// The viewer driven as a window drives it, without one: real pages, real frames, a clock that tests set.
+#include "viewer/viewer.h"
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "builder/build.h"
+#include "test_folder.h"
+
+namespace vcp {
+namespace {
+
+constexpr glm::ivec2 kSize(320, 240);
+
+class ViewerTest : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        folder_ = std::make_unique<TestFolder>("vcp_viewer_test");
+        writeBall(*folder_ / "ball.ply", 60, 120);
+        BuildOptions options;
+        options.inputs = {*folder_ / "ball.ply"};
+        options.output = *folder_ / "ball.vcp";
+        const auto report = buildOctree(options);
+        ASSERT_TRUE(report) << report.error().line();
+    }
+    static void TearDownTestSuite() { folder_.reset(); }
+
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    }
+
+    void openViewer(double movingFrameMs = 0, const std::filesystem::path& file = *folder_ / "ball.vcp") {
+        ViewerOptions options;
+        options.renderer.budgetBytes = 64 << 20;
+        options.movingFrameMs = movingFrameMs;
+        auto viewer = Viewer::create(options);
+        ASSERT_TRUE(viewer) << viewer.error().line();
+        viewer_ = *std::move(viewer);
+        auto reader = openFile(file);
+        ASSERT_TRUE(reader) << reader.error().line();
+        auto dataset = readDataset(**reader);
+        ASSERT_TRUE(dataset) << dataset.error().line();
+        const auto shared = std::make_shared<const Dataset>(*dataset);
+        const FileHeader& h = shared->header;
+        OrbitCamera camera;
+        camera.look(View::Front, {{h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]}, {h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]}}, kSize);
+        ASSERT_TRUE(viewer_->open(shared, std::make_shared<FilePageSource>(*reader, shared), camera, "ball.ply"));
+        viewer_->resize(kSize);
+    }
+
+    /// One turn of a host's loop; true when something was drawn.
+    bool turn(double seconds) {
+        now_ += seconds;
+        const auto next = viewer_->update(now_);
+        EXPECT_TRUE(next) << next.error().line();
+        if (!next) return false;
+        next_ = *next;
+        if (next->draw) {
+            const auto drawn = viewer_->draw();
+            EXPECT_TRUE(drawn) << drawn.error().line();
+        }
+        return next->draw;
+    }
+
+    /// Turns until nothing is loading and nothing is to be drawn.
+    void settle() {
+        for (int i = 0; i < 3000; ++i) {
+            const bool drew = turn(0.5);
+            if (!drew && viewer_->status().update.settled) return;
+            if (!viewer_->status().update.settled) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        FAIL() << "does not settle";
+    }
+
+    [[nodiscard]] glm::dvec2 pixelOf(glm::dvec3 point) const { return viewer_->camera().pixelOf(point, kSize).value(); }
+
+    static std::unique_ptr<TestFolder> folder_;
+    std::unique_ptr<Viewer> viewer_;
+    NextStep next_;
+    double now_ = 0;
+};
+std::unique_ptr<TestFolder> ViewerTest::folder_;
+
+TEST_F(ViewerTest, DrawsOnlyWhenSomethingChanged) {
+    openViewer();
+    settle();
+    const uint64_t drawn = viewer_->framesDrawn();
+    EXPECT_GT(drawn, 0u);
+    for (int i = 0; i < 20; ++i) EXPECT_FALSE(turn(0.1));
+    EXPECT_TRUE(std::isinf(next_.waitSeconds)) << "a viewer at rest waits for events alone";
+    viewer_->move({10, 10});
+    EXPECT_FALSE(turn(0.1)) << "no button is held";
+    viewer_->act(ViewerAction::Fit);
+    viewer_->act(ViewerAction::Reset);
+    EXPECT_FALSE(turn(0.1)) << "the camera is where it was";
+    EXPECT_EQ(viewer_->framesDrawn(), drawn);
+
+    viewer_->act(ViewerAction::ToggleLight);
+    EXPECT_TRUE(turn(0.1));
+    EXPECT_FALSE(turn(0.1));
+    viewer_->press(MouseButton::Left, {160, 120}, false);
+    viewer_->move({170, 120});
+    EXPECT_TRUE(turn(0.1));
+    settle();
+    EXPECT_FALSE(turn(0.1));
+}
+
+TEST_F(ViewerTest, PictureShowsTheDatasetAndBackground) {
+    openViewer();
+    settle();
+    const double pixels = kSize.x * kSize.y;
+    EXPECT_GT(static_cast<double>(viewer_->status().frame.hitPixels), 0.2 * pixels);
+    EXPECT_LT(static_cast<double>(viewer_->status().frame.hitPixels), 0.7 * pixels);
+    const auto centre = viewer_->pointAt(glm::dvec2(kSize) / 2.0);
+    ASSERT_TRUE(centre);
+    EXPECT_NEAR(glm::length(*centre), 1, 0.06);
+    EXPECT_FALSE(viewer_->pointAt({1, 1}));
+    EXPECT_FALSE(viewer_->pointAt({-1, 5}));
+    EXPECT_FALSE(viewer_->pointAt({5, 1e9}));
+}
+
+// The three moves, seen through the pictures: what was under the cursor is still there in the next picture.
+TEST_F(ViewerTest, OrbitKeepsThePointUnderTheCursor) {
+    openViewer();
+    settle();
+    const glm::dvec2 cursor(190.5, 100.5);
+    const glm::dvec3 before = viewer_->pointAt(cursor).value();
+    viewer_->press(MouseButton::Left, cursor, false);
+    viewer_->move(cursor + glm::dvec2(9, 4));
+    viewer_->release(MouseButton::Left);
+    settle();
+    EXPECT_LT(glm::distance(pixelOf(before), cursor), 0.75);
+    EXPECT_LT(glm::distance(viewer_->pointAt(cursor).value(), before), 0.03);
+}
+
+TEST_F(ViewerTest, OrbitBesideTheSurfaceTurnsAboutTheMiddle) {
+    openViewer();
+    settle();
+    const double distance = glm::length(viewer_->camera().position);
+    viewer_->press(MouseButton::Left, {2, 2}, false);
+    viewer_->move({60, 30});
+    viewer_->release(MouseButton::Left);
+    EXPECT_NEAR(glm::length(viewer_->camera().position), distance, 0.05);
+    EXPECT_LT(glm::distance(pixelOf({0, 0, 0}), glm::dvec2(kSize) / 2.0), 3);
+}
+
+TEST_F(ViewerTest, PanMovesThePointWithTheCursor) {
+    for (const bool shifted : {false, true}) {
+        openViewer();
+        settle();
+        const glm::dvec2 from(150.5, 110.5), to(121.5, 160.5);
+        const glm::dvec3 point = viewer_->pointAt(from).value();
+        viewer_->press(shifted ? MouseButton::Left : MouseButton::Right, from, shifted);
+        viewer_->move((from + to) / 2.0);
+        viewer_->move(to);
+        viewer_->release(shifted ? MouseButton::Left : MouseButton::Right);
+        settle();
+        EXPECT_LT(glm::distance(pixelOf(point), to), 0.75);
+        EXPECT_LT(glm::distance(viewer_->pointAt(to).value(), point), 0.03);
+    }
+}
+
+TEST_F(ViewerTest, WheelZoomsToTheCursorInBothProjections) {
+    for (const bool orthographic : {false, true}) {
+        openViewer();
+        if (orthographic) viewer_->act(ViewerAction::ToggleProjection);
+        settle();
+        const glm::dvec2 cursor(200.5, 90.5);
+        const glm::dvec3 point = viewer_->pointAt(cursor).value();
+        const double height = viewer_->camera().viewHeight();
+        for (int i = 0; i < 6; ++i) viewer_->scroll(cursor, 1);
+        EXPECT_LT(viewer_->camera().viewHeight(), height);
+        settle();
+        EXPECT_LT(glm::distance(pixelOf(point), cursor), 1.5) << "orthographic " << orthographic;
+        EXPECT_LT(glm::distance(viewer_->pointAt(cursor).value(), point), 0.03);
+        for (int i = 0; i < 200; ++i) viewer_->scroll(cursor, -1);
+        EXPECT_TRUE(std::isfinite(viewer_->camera().focusDistance));
+        settle();
+        viewer_->act(ViewerAction::Fit);
+        settle();
+        EXPECT_TRUE(viewer_->pointAt(glm::dvec2(kSize) / 2.0));
+    }
+}
+
+TEST_F(ViewerTest, ResetGoesHome) {
+    openViewer();
+    settle();
+    const OrbitCamera home = viewer_->camera();
+    viewer_->scroll({100, 100}, 3);
+    viewer_->act(ViewerAction::ViewIsometric);
+    EXPECT_NE(viewer_->camera().position, home.position);
+    viewer_->act(ViewerAction::Reset);
+    EXPECT_EQ(viewer_->camera().position, home.position);
+    EXPECT_EQ(viewer_->camera().orientation, home.orientation);
+}
+
+// Switching what the light is tied to changes nothing until the camera moves.
+TEST_F(ViewerTest, LightStaysWhereItIsWhenItsTieChanges) {
+    openViewer();
+    viewer_->act(ViewerAction::ViewIsometric);
+    settle();
+    const Picture before = viewer_->renderer().readPicture().value();
+    viewer_->act(ViewerAction::ToggleLight);
+    settle();
+    const Picture after = viewer_->renderer().readPicture().value();
+    ASSERT_EQ(before.rgba.size(), after.rgba.size());
+    int largest = 0;
+    for (size_t i = 0; i < before.rgba.size(); ++i) largest = std::max(largest, std::abs(before.rgba[i] - after.rgba[i]));
+    EXPECT_LE(largest, 2);
+    viewer_->act(ViewerAction::ViewFront);
+    settle();
+    const Picture fixed = viewer_->renderer().readPicture().value();
+    viewer_->act(ViewerAction::ViewIsometric);
+    viewer_->act(ViewerAction::ToggleLight);
+    viewer_->act(ViewerAction::ViewFront);
+    settle();
+    EXPECT_NE(viewer_->renderer().readPicture().value(), fixed);
+}
+
+TEST_F(ViewerTest, ResizeAndMinimize) {
+    openViewer();
+    settle();
+    viewer_->resize({200, 300});
+    EXPECT_TRUE(turn(0.1));
+    settle();
+    EXPECT_EQ(viewer_->renderer().readPicture()->width, 200u);
+    EXPECT_EQ(viewer_->renderer().readPicture()->height, 300u);
+    viewer_->resize({0, 0});
+    EXPECT_FALSE(turn(0.1));
+    EXPECT_TRUE(std::isinf(next_.waitSeconds));
+    viewer_->press(MouseButton::Left, {0, 0}, false);
+    viewer_->move({10, 10});
+    viewer_->release(MouseButton::Left);
+    viewer_->scroll({0, 0}, 1);
+    viewer_->act(ViewerAction::Fit);
+    EXPECT_FALSE(turn(0.1));
+    viewer_->resize({200, 300});
+    settle();
+    EXPECT_FALSE(turn(0.1));
+    viewer_->resize({1, 1});
+    settle();
+    EXPECT_EQ(viewer_->renderer().readPicture()->rgba.size(), 4u);
+}
+
+TEST_F(ViewerTest, LowerResolutionWhileMovingThenFull) {
+    openViewer(1e-6);
+    settle();
+    viewer_->act(ViewerAction::ToggleLight);  // a second full frame: the first is not believed
+    settle();
+    viewer_->press(MouseButton::Left, {160, 120}, false);
+    viewer_->move({165, 120});
+    ASSERT_TRUE(turn(0.01));
+    EXPECT_EQ(viewer_->status().reduction, 4);
+    EXPECT_EQ(viewer_->renderer().readPicture()->width, 80u);
+    EXPECT_LE(next_.waitSeconds, 0.5) << "comes back by itself for the full picture";
+    EXPECT_TRUE(viewer_->pointAt({160, 120})) << "picking works in the smaller picture";
+    ASSERT_TRUE(turn(0.5));
+    EXPECT_EQ(viewer_->status().reduction, 1);
+    EXPECT_EQ(viewer_->renderer().readPicture()->width, 320u);
+    settle();
+    EXPECT_TRUE(std::isinf(next_.waitSeconds));
+}
+
+TEST_F(ViewerTest, BrokenPageIsSaidAndTheRestIsShown) {
+    const auto file = *folder_ / "broken.vcp";
+    std::filesystem::copy_file(*folder_ / "ball.vcp", file, std::filesystem::copy_options::overwrite_existing);
+    {
+        auto dataset = readDataset(**openFile(file)).value();
+        ASSERT_GT(dataset.pages.size(), 1u) << "the ball has one page only";
+        std::FILE* bytes = std::fopen(file.c_str(), "r+b");
+        std::fseek(bytes, static_cast<long>(dataset.pages[1].offset + 20), SEEK_SET);
+        const int old = std::fgetc(bytes);
+        std::fseek(bytes, static_cast<long>(dataset.pages[1].offset + 20), SEEK_SET);
+        std::fputc(old ^ 1, bytes);
+        std::fclose(bytes);
+    }
+    openViewer(0, file);
+    settle();
+    EXPECT_NE(viewer_->status().problem.find("broken.vcp"), std::string::npos) << viewer_->status().problem;
+    EXPECT_NE(statusLine(viewer_->status()).find(viewer_->status().problem), std::string::npos);
+    EXPECT_GT(viewer_->status().frame.hitPixels, 0u);
+}
+
+TEST_F(ViewerTest, StatusLineSaysWhatMatters) {
+    openViewer();
+    settle();
+    const std::string line = statusLine(viewer_->status());
+    EXPECT_NE(line.find("ball.ply"), std::string::npos) << line;
+    EXPECT_NE(line.find(" triangles"), std::string::npos) << line;
+    EXPECT_NE(line.find("settled"), std::string::npos) << line;
+    EXPECT_NE(line.find(viewer_->status().device), std::string::npos) << line;
+    EXPECT_EQ(line.find("(software)") != std::string::npos, viewer_->renderer().device().software) << line;
+    EXPECT_EQ(line.find('\n'), std::string::npos);
+}
+
+TEST_F(ViewerTest, CallsBeforeADatasetDoNothing) {
+    auto viewer = Viewer::create({});
+    ASSERT_TRUE(viewer) << viewer.error().line();
+    (*viewer)->resize(kSize);
+    (*viewer)->press(MouseButton::Left, {1, 1}, false);
+    (*viewer)->move({5, 5});
+    (*viewer)->scroll({5, 5}, 1);
+    (*viewer)->act(ViewerAction::Fit);
+    const auto next = (*viewer)->update(0);
+    ASSERT_TRUE(next);
+    EXPECT_FALSE(next->draw);
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,76 @@
+#!/bin/bash
+# The real window under Xvfb, driven by xdotool as a person would. Usage: window_test.sh VCP FOLDER.
+# Ends with 77 (skipped) where Xvfb or xdotool is missing.
+set -euo pipefail
+vcp=$1 folder=$2
+for tool in Xvfb xdotool import convert; do
+    command -v $tool >/dev/null || { echo "skipped: no $tool"; exit 77; }
+done
+rm -rf "$folder"; mkdir -p "$folder"; cd "$folder"
+export XDG_CACHE_HOME=$folder/cache
+
+fail() { echo "window_test: $*" >&2; cat log 2>/dev/null >&2; exit 1; }
+
+# A bumpy ball, 9400 triangles.
+awk 'BEGIN { R=48; S=100; pi=atan2(0,-1)
+    print "ply\nformat ascii 1.0\nelement vertex " (R+1)*S "\nproperty float x\nproperty float y\nproperty float z"
+    print "element face " 2*R*S "\nproperty list uchar int vertex_indices\nend_header"
+    for (r=0; r<=R; r++) for (s=0; s<S; s++) { p=pi*r/R; a=2*pi*s/S; q=1+0.1*sin(3*p)*sin(4*a)
+        print q*sin(p)*cos(a), q*cos(p), q*sin(p)*sin(a) }
+    for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S
+        print 3, r*S+s, r*S+t, (r+1)*S+s; print 3, r*S+t, (r+1)*S+t, (r+1)*S+s } }' >ball.ply
+
+exec 3>display
+Xvfb -displayfd 3 -screen 0 1000x800x24 >xvfb.log 2>&1 &
+xvfb=$!
+trap 'kill $xvfb 2>/dev/null || true' EXIT
+for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
+[ -s display ] || fail "Xvfb does not start"
+export DISPLAY=:$(cat display)
+
+"$vcp" view ball.ply --size 640x480 --json >report.json 2>log &
+viewer=$!
+window=
+for _ in $(seq 200); do
+    window=$(xdotool search --name ball.ply 2>/dev/null | head -1) && [ -n "$window" ] && break
+    kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself"
+    sleep 0.1
+done
+[ -n "$window" ] || fail "no window"
+sleep 3
+
+shot() { import -silent -window "$window" "$1.png"; }
+differ() { [ "$(compare -metric AE "$1.png" "$2.png" null: 2>&1 || true)" != 0 ] || fail "$1 and $2 are the same picture"; }
+same() { [ "$(convert "$1.png" -crop 640x440+0+0 +repage rgba:- | md5sum)" = "$(convert "$2.png" -crop 640x440+0+0 +repage rgba:- | md5sum)" ] || fail "$1 and $2 differ"; }
+colours() { convert "$1.png" -unique-colors -format %w info:; }
+
+shot start
+[ "$(colours start)" -gt 50 ] || fail "the first picture is empty"
+xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 380 260 mousemove --window $window 440 280 mouseup 1
+sleep 1.5; shot orbit; differ start orbit
+xdotool key --window $window r
+sleep 1.5; shot reset; same start reset
+xdotool mousemove --window $window 320 240 click 4 click 4 click 4
+sleep 1.5; shot zoom; differ reset zoom
+xdotool mousedown 3 mousemove --window $window 250 200 mouseup 3
+sleep 1.5; shot pan; differ zoom pan
+xdotool key --window $window f
+sleep 1.5; shot fit; differ pan fit
+xdotool key --window $window l key --window $window 9
+sleep 1.5; shot light; differ fit light
+xdotool windowsize $window 500 300
+sleep 1.5; shot resized
+[ "$(convert resized.png -format %wx%h info:)" = 500x300 ] || fail "the window has not the size asked for"
+[ "$(colours resized)" -gt 50 ] || fail "the picture is empty after a resize"
+kill -0 $viewer || fail "vcp view ended by itself"
+# At rest nothing is drawn and next to no processor time is used: clock ticks over two seconds.
+ticks() { awk '{ print $14 + $15 }' /proc/$viewer/stat; }
+before=$(ticks); sleep 2; after=$(ticks)
+[ $((after - before)) -le 10 ] || fail "$((after - before)) ticks of processor time in two seconds of rest"
+xdotool key --window $window Escape
+for _ in $(seq 50); do kill -0 $viewer 2>/dev/null || break; sleep 0.1; done
+kill -0 $viewer 2>/dev/null && { kill $viewer; fail "Esc does not close the window"; }
+wait $viewer || fail "vcp view ended with $?"
+grep -q '"settled": true' report.json || fail "not settled at the end"
+grep -q '"first_picture_seconds": [0-9]' report.json || fail "no picture was ever shown"
+echo "window_test: passed, $(grep '"frames"' report.json)"

@@ -1,0 +1,84 @@
+#include "viewer/build_settings.h"
+
+#include <algorithm>
+
+#include "viewer/interrupt.h"
+#include "viewer/mesh_cache.h"
+#include "viewer/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+CLI::Validator lengthCheck() {
+    return {[](std::string& text) {
+                return parseLength(text) ? std::string() : "must be a length like 0.25 or 0.01%, not \"" + text + "\"";
+            },
+            ""};
+}
+
+CLI::Validator absoluteLengthCheck() {
+    return {[](std::string& text) {
+                const auto length = parseLength(text);
+                return length && !length->isRelative ? std::string()
+                                                     : "must be a length in world units like 0.25, not \"" + text + "\"";
+            },
+            ""};
+}
+
+ColourChoice colourNamed(const std::string& name) {
+    return name == "vertex" ? ColourChoice::Vertex : name == "none" ? ColourChoice::None : ColourChoice::Auto;
+}
+
+}  // namespace
+
+void addBuildSettings(CLI::App& app, BuildSettings& settings) {
+    app.add_option("--cell", settings.cell, "Edge of the finest cells, world units [chosen from the mesh]")
+        ->type_name("LENGTH")
+        ->check(absoluteLengthCheck());
+    app.add_option("--error", settings.error, "Tolerated distance to the mesh: world units, or a part of the bounding "
+                                              "box's diagonal like 0.01% [0.04 cells]")
+        ->type_name("LENGTH")
+        ->check(lengthCheck());
+    app.add_option("--colour,--color", settings.colour, "Colour to keep: auto, vertex or none")
+        ->type_name("WHICH")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"auto", "vertex", "none"}));
+    app.add_option("--threads", settings.threads, "Threads that build [one a processor]")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1024));
+}
+
+BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) const {
+    BuildOptions options;
+    options.inputs.assign(inputs.begin(), inputs.end());
+    if (const auto length = parseLength(cell)) options.cell = length->value;
+    if (const auto length = parseLength(error)) {
+        options.error = length->value;
+        options.errorIsRelative = length->isRelative;
+    }
+    options.colour = colourNamed(colour);
+    options.threads = threads;
+    return options;
+}
+
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         ProgressStyle progress) {
+    const auto isDataset = [](const std::string& input) { return looksLikeDataset(input); };
+    if (inputs.size() == 1 && isDataset(inputs.front())) return std::filesystem::path(inputs.front());
+    if (std::any_of(inputs.begin(), inputs.end(), isDataset))
+        return Error{ErrorCode::Usage, "several inputs must all be meshes; one .vcp at a time"};
+
+    auto folder = defaultCacheFolder();
+    if (!folder) return folder;
+    BuildOptions options = settings.optionsFor(inputs);
+    ProgressDisplay display(progress, stderr);
+    const InterruptScope catching;
+    options.progress = [&](const BuildProgress& at) {
+        display.update(at.stage, at.fraction);
+        return !interrupted();
+    };
+    return MeshCache(*folder).dataset(std::move(options), buildOctree);
+}
+
+}  // namespace vcp

@@ -1,0 +1,31 @@
+// The options that say how a mesh is built: those of `vcp build`, and of the commands that build a mesh into
+// the cache first.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "builder/build.h"
+#include "viewer/commands.h"
+
+namespace vcp {
+
+struct BuildSettings {
+    std::string cell;
+    std::string error;
+    std::string colour = "auto";
+    unsigned threads = 0;
+
+    /// What the builder is to do with `inputs`, without output and progress. The values have been checked
+    /// while parsing.
+    [[nodiscard]] BuildOptions optionsFor(const std::vector<std::string>& inputs) const;
+};
+
+void addBuildSettings(CLI::App& app, BuildSettings& settings);
+
+/// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache, with
+/// progress. Errors: Usage (a .vcp among several inputs); those of MeshCache.
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         ProgressStyle progress);
+
+}  // namespace vcp

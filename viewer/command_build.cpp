@@ -1,0 +1,85 @@
+// vcp build: meshes in, one .vcp out.
+#include <fmt/format.h>
+
+#include "builder/build.h"
+#include "viewer/build_settings.h"
+#include "viewer/commands.h"
+#include "viewer/interrupt.h"
+#include "viewer/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+struct BuildCommand {
+    std::vector<std::string> inputs;
+    std::string output;
+    BuildSettings settings;
+    ReportOptions report;
+};
+
+Json toJson(const BuildReport& report) {
+    return {{"triangles", report.triangles},
+            {"degenerate_triangles", report.degenerateTriangles},
+            {"vertices", report.vertices},
+            {"seconds", report.seconds},
+            {"peak_rss_bytes", report.peakRssBytes},
+            {"temp_bytes", report.tempBytes},
+            {"file_bytes", report.fileBytes},
+            {"levels", report.levels},
+            {"subvolumes", report.subvolumes},
+            {"leaves", report.leaves},
+            {"hard_leaves", report.hardLeaves},
+            {"cell", report.cell},
+            {"error_target", report.errorTarget},
+            {"certified_error_max", report.certifiedErrorMax}};
+}
+
+std::string summary(const std::string& output, const BuildReport& report) {
+    const double triangles = static_cast<double>(std::max<uint64_t>(report.triangles, 1));
+    std::string text = fmt::format("{}: {} triangles in {} ({:.2f} M/s), peak memory {}\n", output,
+                                   formatCount(report.triangles), formatSeconds(report.seconds),
+                                   1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
+    if (report.degenerateTriangles > 0)
+        text += fmt::format("  {} triangles without area were left out\n", formatCount(report.degenerateTriangles));
+    text += fmt::format("  {} ({:.1f} bytes a triangle), {} levels, {} subvolumes, {} leaves, {} of them hard\n",
+                        formatBytes(report.fileBytes), static_cast<double>(report.fileBytes) / triangles, report.levels,
+                        formatCount(report.subvolumes), formatCount(report.leaves), formatCount(report.hardLeaves));
+    text += fmt::format("  cell {}, certified error {} ({:.3f} cells)", formatLength(report.cell),
+                        formatLength(report.certifiedErrorMax), report.certifiedErrorMax / report.cell);
+    return text;
+}
+
+Result<int> run(const BuildCommand& command) {
+    BuildOptions options = command.settings.optionsFor(command.inputs);
+    options.output = command.output;
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    const InterruptScope catching;
+    options.progress = [&](const BuildProgress& at) {
+        display.update(at.stage, at.fraction);
+        return !interrupted();
+    };
+    const auto report = buildOctree(options);
+    display.finish();
+    if (!report) return report.error();
+    if (command.report.json)
+        VCP_TRY(printJson(toJson(*report)));
+    else
+        VCP_TRY(printLine(summary(command.output, *report)));
+    return 0;
+}
+
+}  // namespace
+
+Command addBuild(CLI::App& vcp) {
+    auto command = std::make_shared<BuildCommand>();
+    CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
+    app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL; several are joined")->type_name("")->required();
+    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->required();
+    addBuildSettings(*app, command->settings);
+    addProgressOption(*app, command->report);
+    addJsonOption(*app, command->report);
+    return {app, [command] { return run(*command); }};
+}
+
+}  // namespace vcp

@@ -1,0 +1,54 @@
+// The commands of `vcp`: each adds its subcommand and options to the command line and hands back what runs it.
+//
+// A command prints its result on stdout (a summary, or with --json one object) and its progress on stderr.
+// An Error goes back to main, which prints its one line and ends with status 1, or 2 for Usage.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "octree/result.h"
+#include "viewer/progress_display.h"
+
+namespace vcp {
+
+using Json = nlohmann::ordered_json;
+
+/// Runs a command whose options have been parsed. The value is the exit status: 0, or 1 when the command
+/// worked and its finding is bad (`vcp verify`).
+using RunCommand = std::function<Result<int>()>;
+
+struct Command {
+    CLI::App* app = nullptr;
+    RunCommand run;
+};
+
+Command addBuild(CLI::App& vcp);
+Command addInfo(CLI::App& vcp);
+Command addVerify(CLI::App& vcp);
+Command addRender(CLI::App& vcp);
+Command addView(CLI::App& vcp);
+Command addBench(CLI::App& vcp);
+Command addDevices(CLI::App& vcp);
+
+/// Options that many commands have.
+struct ReportOptions {
+    bool json = false;
+    std::string progress;  ///< empty: a bar when stderr is a terminal
+
+    [[nodiscard]] ProgressStyle progressStyle() const {
+        return progressStyleNamed(progress).value_or(defaultProgressStyle());
+    }
+};
+void addJsonOption(CLI::App& app, ReportOptions& options);
+void addProgressOption(CLI::App& app, ReportOptions& options);
+
+/// Writes to stdout with a newline behind. Errors: Io (stdout is closed or full).
+Result<void> printLine(const std::string& text);
+Result<void> printJson(const Json& json);
+
+}  // namespace vcp

@@ -1,0 +1,33 @@
+#include "viewer/interrupt.h"
+
+#include <atomic>
+
+namespace vcp {
+
+namespace {
+
+// A signal handler can reach nothing but a global.
+std::atomic<bool> came{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void onInterrupt(int) { came.store(true); }
+
+}  // namespace
+
+InterruptScope::InterruptScope() {
+    struct sigaction action {};
+    action.sa_handler = onInterrupt;
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, &interrupt_);
+    sigaction(SIGTERM, &action, &terminate_);
+}
+
+InterruptScope::~InterruptScope() {
+    sigaction(SIGINT, &interrupt_, nullptr);
+    sigaction(SIGTERM, &terminate_, nullptr);
+}
+
+bool interrupted() { return came.load(); }
+
+}  // namespace vcp

@@ -1,0 +1,24 @@
+// Ctrl-C during a long task: the first one asks it to stop and clean up, the second one ends the process.
+#pragma once
+
+#include <csignal>
+
+namespace vcp {
+
+/// Takes SIGINT and SIGTERM while it lives, then gives them back. One at a time.
+class InterruptScope {
+public:
+    InterruptScope();
+    ~InterruptScope();
+    InterruptScope(const InterruptScope&) = delete;
+    InterruptScope& operator=(const InterruptScope&) = delete;
+
+private:
+    struct sigaction interrupt_ {};
+    struct sigaction terminate_ {};
+};
+
+/// True once a signal came within a scope. Any thread.
+bool interrupted();
+
+}  // namespace vcp

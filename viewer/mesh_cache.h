@@ -1,0 +1,52 @@
+// The folder where `vcp view MESH` and `vcp render MESH` keep the octrees they build.
+//
+// A dataset is named by a hash of what it was built from: each mesh's absolute path, size and time of last
+// change, and the options that shape the output. A mesh that changes gets a new name; the old one ages and
+// goes. The folder is held under a size by removing what was used least recently. Several processes may
+// use it at once: a dataset appears by a rename, whole or not at all.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "builder/build.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+/// $XDG_CACHE_HOME/vcp, else $HOME/.cache/vcp. Errors: Io when neither is set.
+Result<std::filesystem::path> defaultCacheFolder();
+
+/// True when the file starts like a .vcp, or has that extension. False also when it cannot be read.
+bool looksLikeDataset(const std::filesystem::path& path);
+
+class MeshCache {
+public:
+    static constexpr uint64_t kDefaultLimitBytes = uint64_t(16) << 30;
+
+    explicit MeshCache(std::filesystem::path folder, uint64_t limitBytes = kDefaultLimitBytes)
+        : folder_(std::move(folder)), limitBytes_(limitBytes) {}
+
+    using Builder = std::function<Result<BuildReport>(const BuildOptions&)>;
+
+    /// The dataset for `options.inputs`: from the folder when it is there and whole, else built by `build`
+    /// (normally buildOctree); `options.output` is ignored. Errors: Io (folder cannot be made, input
+    /// missing); what the builder reports.
+    Result<std::filesystem::path> dataset(BuildOptions options, const Builder& build);
+
+    /// Where the dataset for `options` is or would be. Errors: Io (input missing).
+    [[nodiscard]] Result<std::filesystem::path> pathFor(const BuildOptions& options) const;
+
+    /// Removes the datasets used least recently until the folder is within its limit, and leftovers of builds
+    /// that died; never `keep`.
+    void trim(const std::filesystem::path& keep) const;
+
+private:
+    std::filesystem::path folder_;
+    uint64_t limitBytes_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,92 @@
+#include "viewer/option_values.h"
+
+#include <charconv>
+#include <cmath>
+
+#include <fast_float/fast_float.h>
+#include <fmt/format.h>
+
+namespace vcp {
+
+namespace {
+
+/// Parses a number at the start of `text` and removes it.
+template <class Number>
+bool takeNumber(std::string_view& text, Number& number) {
+    const char* end = text.data() + text.size();
+    const char* stop = nullptr;
+    if constexpr (std::is_floating_point_v<Number>) {
+        const auto parsed = fast_float::from_chars(text.data(), end, number);
+        if (parsed.ec != std::errc()) return false;
+        stop = parsed.ptr;
+    } else {
+        const auto parsed = std::from_chars(text.data(), end, number);
+        if (parsed.ec != std::errc()) return false;
+        stop = parsed.ptr;
+    }
+    text.remove_prefix(static_cast<size_t>(stop - text.data()));
+    return true;
+}
+
+}  // namespace
+
+std::optional<Length> parseLength(std::string_view text) {
+    Length length;
+    if (!takeNumber(text, length.value)) return std::nullopt;
+    length.isRelative = text == "%";
+    if (!length.isRelative && !text.empty()) return std::nullopt;
+    if (length.isRelative) length.value /= 100;
+    if (!(length.value > 0) || !std::isfinite(length.value)) return std::nullopt;
+    return length;
+}
+
+std::optional<uint64_t> parseBytes(std::string_view text) {
+    double number = 0;
+    if (!takeNumber(text, number) || !(number > 0) || !std::isfinite(number)) return std::nullopt;
+    if (!text.empty()) {
+        constexpr std::string_view kPrefixes = "KMGT";
+        const size_t power = kPrefixes.find(text.front() & ~0x20);
+        if (power != std::string_view::npos) {
+            number = std::ldexp(number, static_cast<int>(10 * (power + 1)));
+            text.remove_prefix(1);
+            if (text == "iB") text = {};
+        }
+        if (text == "B") text = {};
+    }
+    if (!text.empty() || number > 0x1p60 || number < 1) return std::nullopt;
+    return static_cast<uint64_t>(number);
+}
+
+std::optional<glm::ivec2> parseSize(std::string_view text) {
+    constexpr int kLargest = 16384;
+    glm::ivec2 size(0);
+    if (!takeNumber(text, size.x) || text.empty() || (text.front() != 'x' && text.front() != 'X')) return std::nullopt;
+    text.remove_prefix(1);
+    if (!takeNumber(text, size.y) || !text.empty()) return std::nullopt;
+    if (size.x < 1 || size.y < 1 || size.x > kLargest || size.y > kLargest) return std::nullopt;
+    return size;
+}
+
+std::string formatCount(uint64_t count) {
+    if (count < 1000) return std::to_string(count);
+    return formatCount(count / 1000) + fmt::format(" {:03}", count % 1000);
+}
+
+std::string formatBytes(uint64_t bytes) {
+    constexpr const char* kUnits[] = {"B", "kB", "MB", "GB", "TB", "PB", "EB"};
+    double value = static_cast<double>(bytes);
+    size_t unit = 0;
+    while (value >= 999.95 && unit + 1 < std::size(kUnits)) value /= 1000, ++unit;
+    return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, kUnits[unit]);
+}
+
+std::string formatLength(double length) { return fmt::format("{:.4g}", length); }
+
+std::string formatSeconds(double seconds) {
+    if (seconds < 60) return fmt::format("{:.2f} s", seconds);
+    const auto whole = static_cast<int64_t>(seconds);
+    if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace vcp

@@ -1,0 +1,41 @@
+// Values of command-line options, and numbers as a person reads them. Pure text; no I/O.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <glm/vec2.hpp>
+
+namespace vcp {
+
+/// A length: world units ("0.25", "1e-3"), or a part of the bounding box's diagonal ("0.01%").
+struct Length {
+    double value = 0;         ///< world units, or a fraction (0.01% is 1e-4)
+    bool isRelative = false;  ///< of the diagonal
+};
+
+/// Nothing when the text is not a positive, finite length.
+std::optional<Length> parseLength(std::string_view text);
+
+/// "4096", "512K", "512M", "4G", "1T", also with "iB" or "B" behind; factors of 1024. Nothing when malformed,
+/// zero, or beyond 2^60.
+std::optional<uint64_t> parseBytes(std::string_view text);
+
+/// "1920x1200": each from 1 to 16384.
+std::optional<glm::ivec2> parseSize(std::string_view text);
+
+/// "1 087 716".
+std::string formatCount(uint64_t count);
+
+/// "13.2 MB", in powers of 1000 as file managers show it.
+std::string formatBytes(uint64_t bytes);
+
+/// Up to 4 significant digits: "0.01234", "1.5e-07".
+std::string formatLength(double length);
+
+/// "0.82 s", "3 min 05 s".
+std::string formatSeconds(double seconds);
+
+}  // namespace vcp

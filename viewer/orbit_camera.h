@@ -1,0 +1,108 @@
+// OrbitCamera: the eye as a person moves it, in world space and double precision. The renderer gets the
+// plain Camera (render/camera.h) of the moment.
+//
+// Camera axes: x to the right, y up, -z into the picture. Pixels have their origin at the top left
+// corner of the picture, y down; pixel (i, j) covers [i, i+1) x [j, j+1).
+//
+// All moves keep a promise that a person can see, and the tests check:
+//   orbit      the pivot stays where it is in the picture
+//   pan        the point that was under the cursor stays under it
+//   zoomAbout  the point under the cursor stays under it
+//
+// Plain data; pure functions; no threads, no GPU.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "octree/result.h"
+#include "render/camera.h"
+
+namespace vcp {
+
+/// Axis-aligned box, world units.
+struct Box {
+    glm::dvec3 low{0};
+    glm::dvec3 high{0};
+
+    [[nodiscard]] glm::dvec3 centre() const { return 0.5 * (low + high); }
+    [[nodiscard]] double diagonal() const;
+};
+
+enum class UpAxis { Y, Z };
+
+/// Standard views of a box. `Fit` is the view a dataset opens with: the front.
+enum class View { Fit, Front, Back, Left, Right, Top, Bottom, Isometric };
+
+struct OrbitCamera {
+    glm::dvec3 position{0};
+    glm::dquat orientation{1, 0, 0, 0};  ///< world from camera, unit
+    double focusDistance = 1;            ///< of the point of interest along the view axis, world units, > 0
+    double fovY = 0.7853981633974483;    ///< full vertical angle, radians, in (0, pi)
+    Projection projection = Projection::Perspective;
+    UpAxis up = UpAxis::Y;
+
+    [[nodiscard]] glm::dvec3 rightVector() const { return orientation * glm::dvec3(1, 0, 0); }
+    [[nodiscard]] glm::dvec3 upVector() const { return orientation * glm::dvec3(0, 1, 0); }
+    [[nodiscard]] glm::dvec3 forwardVector() const { return orientation * glm::dvec3(0, 0, -1); }
+    [[nodiscard]] glm::dvec3 focus() const { return position + forwardVector() * focusDistance; }
+
+    /// Height of what the picture shows at the focus, world units; everywhere in orthographic projection.
+    [[nodiscard]] double viewHeight() const;
+
+    /// Distance of a point from the eye's plane along the view axis; negative behind the eye.
+    [[nodiscard]] double depthOf(glm::dvec3 point) const;
+
+    /// What the renderer needs.
+    [[nodiscard]] Camera current() const;
+
+    /// The ray through a point of a picture of `size` pixels.
+    [[nodiscard]] CameraRay rayThrough(glm::dvec2 pixel, glm::ivec2 size) const;
+
+    /// Where a point is in the picture; nothing when it is behind the eye.
+    [[nodiscard]] std::optional<glm::dvec2> pixelOf(glm::dvec3 point, glm::ivec2 size) const;
+
+    /// Turns about `pivot`: by `yaw` radians about the up axis, then by `pitch` about the camera's x axis.
+    /// The pitch stops short of the poles, so the picture never turns upside down.
+    void orbit(glm::dvec3 pivot, double yaw, double pitch);
+
+    /// Moves sideways so that what is at `depth` under pixel `from` comes under pixel `to`.
+    void pan(glm::dvec2 from, glm::dvec2 to, double depth, glm::ivec2 size);
+
+    /// Scales the distance to `point` by `factor` > 0, keeping it where it is in the picture. The focus
+    /// moves with it. Stops where doubles could no longer tell the eye from the point.
+    void zoomAbout(glm::dvec3 point, double factor);
+
+    /// Moves along the view axis and sideways so that the box just fits into the picture.
+    void fit(const Box& box, glm::ivec2 size);
+
+    /// Turns to a standard view and fits.
+    void look(View view, const Box& box, glm::ivec2 size);
+};
+
+/// A view's name on the command line ("fit", "front", "iso", ...).
+std::optional<View> viewNamed(std::string_view name);
+
+/// All names of views, comma-separated, for messages.
+std::string viewNames();
+
+/// One line of JSON:
+/// {"position":[x,y,z],"target":[x,y,z],"up":[x,y,z],"up_axis":"y","fov_degrees":45,"projection":"perspective"}.
+/// Doubles survive a round trip to within rounding.
+std::string cameraToJson(const OrbitCamera& camera);
+
+/// Reads what cameraToJson writes. "up", "up_axis", "fov_degrees" and "projection" may be absent. `name`
+/// stands for the file in errors. May be hostile. Errors: InvalidInput (not JSON, with the line; a field
+/// missing, of a wrong type, not finite; target at the eye; up along the view).
+Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& name);
+
+/// cameraFromJson of a file of at most 1 MiB. Errors: also Io.
+Result<OrbitCamera> readCamera(const std::filesystem::path& path);
+
+}  // namespace vcp

@@ -1,0 +1,81 @@
+#include "viewer/progress_display.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "viewer/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+int terminalColumns(std::FILE* out) {
+    winsize size{};
+    if (ioctl(fileno(out), TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+    return size.ws_col;
+}
+
+}  // namespace
+
+std::optional<ProgressStyle> progressStyleNamed(std::string_view name) {
+    if (name == "bar") return ProgressStyle::Bar;
+    if (name == "plain") return ProgressStyle::Plain;
+    if (name == "json") return ProgressStyle::Json;
+    if (name == "none") return ProgressStyle::None;
+    return std::nullopt;
+}
+
+ProgressStyle defaultProgressStyle() { return isatty(STDERR_FILENO) ? ProgressStyle::Bar : ProgressStyle::None; }
+
+void ProgressDisplay::update(std::string_view stage, double fraction) {
+    if (style_ == ProgressStyle::None) return;
+    fraction = std::clamp(fraction, 0.0, 1.0);
+    if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction);
+
+    const int steps = style_ == ProgressStyle::Json ? 100 : 10;
+    const int step = static_cast<int>(std::floor(fraction * steps));
+    if (stage == lastStage_ && step == lastStep_) return;
+    lastStage_ = stage;
+    lastStep_ = step;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    std::string line;
+    if (style_ == ProgressStyle::Json) {
+        const nlohmann::ordered_json json = {{"stage", stage}, {"fraction", fraction}, {"seconds", seconds}};
+        line = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    } else {
+        line = fmt::format("{:3.0f} % {} ({})", 100 * fraction, stage, formatSeconds(seconds));
+    }
+    std::fprintf(out_, "%s\n", line.c_str());
+    std::fflush(out_);
+}
+
+void ProgressDisplay::drawBar(std::string_view stage, double fraction) {
+    const int perMille = static_cast<int>(1000 * fraction);
+    if (stage == lastStage_ && perMille == lastPerMille_) return;
+    lastStage_ = stage;
+    lastPerMille_ = perMille;
+    const int columns = std::max(20, terminalColumns(out_) - 1);
+    const std::string head = fmt::format("{:3.0f} % ", 100 * fraction);
+    const std::string tail = fmt::format(" {}", stage);
+    const int room = std::clamp(columns - static_cast<int>(head.size() + tail.size()) - 2, 0, 40);
+    const int filled = static_cast<int>(std::lround(fraction * room));
+    const std::string bar = head + "[" + std::string(static_cast<size_t>(filled), '=') +
+                            std::string(static_cast<size_t>(room - filled), ' ') + "]" + tail;
+    lastBar_ = bar.substr(0, static_cast<size_t>(columns));
+    std::fprintf(out_, "\r%s\x1b[K", lastBar_.c_str());
+    std::fflush(out_);
+}
+
+void ProgressDisplay::finish() {
+    if (lastBar_.empty()) return;
+    std::fputs("\r\x1b[K", out_);
+    std::fflush(out_);
+    lastBar_.clear();
+}
+
+}  // namespace vcp

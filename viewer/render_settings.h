@@ -1,0 +1,43 @@
+// The options that say how a dataset is shown: of `vcp render` and `vcp view`.
+#pragma once
+
+#include <string>
+
+#include "octree/result.h"
+#include "render/renderer.h"
+#include "viewer/commands.h"
+#include "viewer/orbit_camera.h"
+
+namespace vcp {
+
+struct RenderSettings {
+    std::string device;
+    std::string budget = "512M";
+    double errorPixels = 0.5;
+    std::string camera = "fit";
+    std::string up = "y";
+    std::string light = "camera";
+    std::string shading = "lit";
+
+    [[nodiscard]] RendererOptions rendererOptions() const;
+    [[nodiscard]] Shading shadingChosen() const;
+    [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
+
+    /// The view or the camera file. Errors: those of readCamera.
+    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size) const;
+};
+
+void addRenderSettings(CLI::App& app, RenderSettings& settings);
+
+/// A file opened for showing.
+struct OpenDataset {
+    std::shared_ptr<const Dataset> dataset;
+    std::shared_ptr<const PageSource> source;
+
+    [[nodiscard]] Box bounds() const;
+};
+
+/// Errors: those of openFile and readDataset.
+Result<OpenDataset> openDataset(const std::filesystem::path& path);
+
+}  // namespace vcp
