@@ -26,7 +26,7 @@ namespace {
 
 // Soft leaves of coarser levels may err by this many of their cells; they are looked at where a cell is
 // about a pixel.
-constexpr double kCoarseErrorCells = 0.1;
+constexpr double kCoarseErrorCells = 0.2;
 
 // Reading is about this part of the whole; the rest is shared by the levels by their triangles.
 constexpr double kReadingShare = 0.15;

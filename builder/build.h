@@ -41,7 +41,7 @@ struct BuildOptions {
 };
 
 /// Default tolerance of the finest level, in its cells.
-inline constexpr double kDefaultErrorCells = 0.04;
+inline constexpr double kDefaultErrorCells = 0.08;
 
 struct BuildReport {
     uint64_t triangles = 0;            ///< read

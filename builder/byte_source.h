@@ -59,9 +59,6 @@ public:
     /// Moves the cursor forward by `count` <= remaining() bytes, past the window if need be.
     void advance(uint64_t count);
 
-    /// Moves the cursor back to the start.
-    void rewind() { offset_ = 0; }
-
     /// An error of this file.
     [[nodiscard]] Error error(ErrorCode code, std::string element, std::optional<uint64_t> byte,
                               std::string message) const;

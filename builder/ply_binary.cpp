@@ -261,7 +261,7 @@ private:
         const char* const end = begin + bytes->size();
         const char* p = begin;
         while (!done() && hasRoom(chunk)) {
-            if (step_ == 0 && takeTriangles_) takePlainTriangles(p, end, chunk);
+            if (step_ == 0 && !insideList_ && takeTriangles_) takePlainTriangles(p, end, chunk);
             if (done() || !hasRoom(chunk)) break;
             const char* const at = p;
             const size_t stepBefore = step_;

@@ -50,10 +50,10 @@ const uint kRecordInCut = 256u;
 const uint kTileListHeader = 4u;
 
 // Start distance of a tile in which no ray can hit.
-const float kTileEmpty = 3e38;
+const float kTileEmpty = 3e38f;
 
 // Depth of a pixel whose ray hits nothing.
-const float kNoHit = 3e38;
+const float kNoHit = 3e38f;
 
 struct FrameCounters {
     uint hitPixels;

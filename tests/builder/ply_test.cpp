@@ -145,6 +145,15 @@ TEST(Ply, CutsPolygonsIntoFansAndSkipsThoseWithoutArea) {
     }
 }
 
+TEST(Ply, TheItemsOfAPolygonAreNotTakenForTriangles) {
+    // Its items, read from one byte on, look like "3, then three vertex numbers".
+    for (const PlyEncoding encoding : kEncodings) {
+        const ReadMesh mesh = read(square(encoding, {3, 0, 0, 0, 0, 1}));
+        ASSERT_FALSE(mesh.error) << mesh.line();
+        EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{3, 0, 0}, {3, 0, 0}, {3, 0, 0}, {3, 0, 1}}));
+    }
+}
+
 TEST(Ply, CutsStripsAndRestartsAtMinusOne) {
     for (const PlyEncoding encoding : kEncodings) {
         PlyWriter ply(encoding);

@@ -1,0 +1,236 @@
+#include "viewer/bench_rays.h"
+
+#include <algorithm>
+#include <mutex>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "builder/build.h"
+#include "viewer/bench_cameras.h"
+#include "viewer/bench_tracer.h"
+
+namespace vcp {
+
+namespace {
+
+const std::vector<std::string> kMethods = {"certified", "reference", "embree", "embree-single"};
+
+/// A folder for what is built: the caller's, or one that goes with this object.
+class BenchFolder {
+public:
+    explicit BenchFolder(const std::filesystem::path& wanted)
+        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : wanted),
+          temporary_(wanted.empty()) {}
+    ~BenchFolder() {
+        std::error_code ignored;
+        if (temporary_) std::filesystem::remove_all(path_, ignored);
+    }
+    BenchFolder(const BenchFolder&) = delete;
+    BenchFolder& operator=(const BenchFolder&) = delete;
+
+    Result<void> make() const {
+        std::error_code failed;
+        std::filesystem::create_directories(path_, failed);
+        if (failed) return Error{.code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = path_.string()};
+        return {};
+    }
+    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+    bool temporary_;
+};
+
+/// The mesh of a model and its .vcp.
+struct ModelFiles {
+    std::filesystem::path mesh, vcp;
+    std::string name;
+};
+
+Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder) {
+    if (model.extension() != ".vcp") {
+        const std::string name = model.stem().string();
+        return ModelFiles{model, folder / (name + ".vcp"), name};
+    }
+    for (const char* extension : {".ply", ".obj", ".stl"}) {
+        std::filesystem::path mesh = model;
+        mesh.replace_extension(extension);
+        if (std::filesystem::exists(mesh)) return ModelFiles{mesh, model, model.stem().string()};
+    }
+    return Error{.code = ErrorCode::Usage, .message = "no mesh of the same name lies beside it (.ply, .obj, .stl)", .file = model.string()};
+}
+
+/// Everything about one model that the methods share.
+struct BenchModel {
+    ModelFiles files;
+    IndexedMesh mesh;
+    std::unique_ptr<MeshBvh> bvh;
+    std::unique_ptr<PageCache> cache;
+};
+
+class RaysBench {
+public:
+    explicit RaysBench(const BenchRaysOptions& options) : options_(options), folder_(options.out) {
+        if (options_.methods.empty())
+            for (const std::string& method : kMethods)
+                if (benchHasEmbree() || !method.starts_with("embree")) options_.methods.push_back(method);
+    }
+
+    Result<BenchRaysReport> run() {
+        VCP_TRY(checkNames());
+        VCP_TRY(folder_.make());
+        for (size_t i = 0; i < options_.models.size(); ++i) {
+            modelFrom_ = static_cast<double>(i) / static_cast<double>(options_.models.size());
+            modelShare_ = 1.0 / static_cast<double>(options_.models.size());
+            VCP_TRY(runModel(options_.models[i]));
+        }
+        return std::move(report_);
+    }
+
+private:
+    Result<void> checkNames() const {
+        for (const std::string& method : options_.methods)
+            if (std::find(kMethods.begin(), kMethods.end(), method) == kMethods.end())
+                return Error{.code = ErrorCode::Usage, .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(kMethods, ", "))};
+        const auto& cameras = benchCameraNames();
+        for (const std::string& camera : options_.cameras)
+            if (std::find(cameras.begin(), cameras.end(), camera) == cameras.end())
+                return Error{.code = ErrorCode::Usage, .message = fmt::format("unknown camera \"{}\"; there are {}", camera, fmt::join(cameras, ", "))};
+        if (options_.models.empty()) return Error{.code = ErrorCode::Usage, .message = "no model to measure"};
+        return {};
+    }
+
+    Result<void> report(const std::string& what, double fractionOfModel) const {
+        if (!options_.progress || options_.progress(what, modelFrom_ + modelShare_ * fractionOfModel)) return {};
+        return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+    }
+
+    Result<BenchModel> loadModel(const std::filesystem::path& path) const {
+        auto files = filesOf(path, folder_.path());
+        if (!files) return files.error();
+        BenchModel model;
+        model.files = *files;
+        VCP_TRY(report(fmt::format("{}: reading the mesh", files->name), 0));
+        auto mesh = loadMesh(files->mesh);
+        if (!mesh) return mesh.error();
+        model.mesh = std::move(*mesh);
+        if (!std::filesystem::exists(files->vcp)) {
+            VCP_TRY(report(fmt::format("{}: building", files->name), 0.02));
+            BuildOptions build;
+            build.inputs = {files->mesh};
+            build.output = files->vcp;
+            build.cell = options_.cell;
+            build.threads = options_.threads;
+            const auto built = buildOctree(build);
+            if (!built) return built.error();
+        }
+        auto cache = PageCache::open(files->vcp);
+        if (!cache) return cache.error();
+        model.cache = std::make_unique<PageCache>(std::move(*cache));
+        return model;
+    }
+
+    Result<void> runModel(const std::filesystem::path& path) {
+        auto model = loadModel(path);
+        if (!model) return model.error();
+        // Moved into its place: the tree points at it.
+        BenchModel& m = *model;
+        m.bvh = std::make_unique<MeshBvh>(m.mesh);
+        VCP_TRY(m.cache->loadLevel(m.cache->dataset().header.levels - 1));
+        std::unique_ptr<RayTracer> peer;
+        if (benchHasEmbree()) {
+            auto made = makeEmbreeTracer(m.mesh, true, options_.threads);
+            if (!made) return made.error();
+            peer = std::move(*made);
+        }
+        const double runs = static_cast<double>(options_.methods.size() * options_.cameras.size());
+        double done = 0;
+        for (const std::string& method : options_.methods) {
+            auto tracer = makeTracer(method, m);
+            if (!tracer) return tracer.error();
+            for (const std::string& camera : options_.cameras) {
+                VCP_TRY(report(fmt::format("{}: {}, {}", m.files.name, method, camera), 0.1 + 0.9 * done++ / runs));
+                VCP_TRY(runCamera(m, method, camera, **tracer, peer.get()));
+            }
+        }
+        return {};
+    }
+
+    Result<std::unique_ptr<RayTracer>> makeTracer(const std::string& method, const BenchModel& model) const {
+        if (method == "reference") return makeReferenceTracer(*model.cache, options_.threads);
+        if (method == "certified") return makeCertifiedTracer(model.files.vcp, options_.device);
+        return makeEmbreeTracer(model.mesh, method == "embree", options_.threads);
+    }
+
+    Result<void> runCamera(const BenchModel& model, const std::string& method, const std::string& name, RayTracer& tracer, RayTracer* peer) {
+        const FileHeader& header = model.cache->dataset().header;
+        BenchRaysRow row;
+        row.model = model.files.name;
+        row.camera = name;
+        row.method = method;
+        row.knob = tracer.knob();
+        row.device = tracer.device();
+        row.cell = header.cell;
+        double seconds = 0, peerSeconds = 0;
+        for (int view = 0; view < options_.views; ++view) {
+            const Camera camera = *benchCamera(name, *model.bvh, header.cell, options_.size, view, options_.views);
+            const auto traced = tracer.trace(camera, options_.size, options_.repetitions);
+            if (!traced) return traced.error();
+            seconds += traced->seconds;
+            row.rays += traced->hits.size();
+            row.stepsMean += traced->stepsMean / options_.views;
+            row.fetchesMean += traced->fetchesMean / options_.views;
+            if (peer) {
+                const auto ofPeer = peer->trace(camera, options_.size, options_.repetitions);
+                if (!ofPeer) return ofPeer.error();
+                peerSeconds += ofPeer->seconds;
+            }
+            judge(model, camera, *traced, row.classes);
+        }
+        row.nsPerRay = 1e9 * seconds / static_cast<double>(row.rays);
+        row.ratioToEmbree = peer ? peerSeconds / seconds : 0;
+        row.bytes = tracer.bytes();
+        report_.rows.push_back(std::move(row));
+        return {};
+    }
+
+    void judge(const BenchModel& model, const Camera& camera, const TracedPicture& traced, RayClassTable& classes) const {
+        // Of a picture with coarser pages, what is excused near silhouettes is the largest error allowed.
+        double error = model.cache->dataset().header.certifiedErrorMax;
+        for (const auto& hit : traced.hits)
+            if (hit) error = std::max(error, hit->certifiedError);
+        const RayJudge judge(*model.bvh, model.cache->dataset().header.cell, error);
+        std::mutex mutex;
+        const int every = std::max(options_.judgeEvery, 1);
+        forEachRow((options_.size.y + every - 1) / every, options_.threads, [&](int row) {
+            RayClassTable mine;
+            const int y = row * every;
+            for (int x = 0; x < options_.size.x; x += every) {
+                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(options_.size.x), static_cast<uint32_t>(options_.size.y), x + 0.5, y + 0.5);
+                mine.add(judge.judge(ray.origin, ray.direction, traced.hits[static_cast<size_t>(y) * options_.size.x + x]));
+            }
+            const std::lock_guard lock(mutex);
+            classes.merge(mine);
+        });
+    }
+
+    BenchRaysOptions options_;
+    BenchFolder folder_;
+    BenchRaysReport report_;
+    double modelFrom_ = 0, modelShare_ = 1;
+};
+
+}  // namespace
+
+bool benchHasEmbree() {
+#ifdef VCP_HAVE_EMBREE
+    return true;
+#else
+    return false;
+#endif
+}
+
+Result<BenchRaysReport> benchRays(const BenchRaysOptions& options) { return RaysBench(options).run(); }
+
+}  // namespace vcp

@@ -1,0 +1,161 @@
+// The methods of the ray benchmark that are ours: the renderer, and the reference ray-caster.
+#include "viewer/bench_tracer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <thread>
+
+#include "render/renderer.h"
+#include "streaming/page_source.h"
+
+namespace vcp {
+
+namespace {
+
+class ReferenceTracer final : public RayTracer {
+public:
+    ReferenceTracer(ReferenceCaster caster, unsigned threads) : caster_(std::move(caster)), threads_(threads) {}
+
+    [[nodiscard]] std::string device() const override { return "CPU, double precision"; }
+    [[nodiscard]] uint64_t bytes() const override { return caster_.cache().bytes(); }
+
+    Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int) override {
+        TracedPicture picture;
+        picture.hits.resize(static_cast<size_t>(size.x) * size.y);
+        CastCounters sum;
+        std::mutex mutex;
+        const auto start = std::chrono::steady_clock::now();
+        forEachRow(size.y, threads_, [&](int y) {
+            CastCounters counters;
+            for (int x = 0; x < size.x; ++x) {
+                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, y + 0.5);
+                const auto hit = caster_.cast({ray.origin, ray.direction}, &counters);
+                if (hit) picture.hits[static_cast<size_t>(y) * size.x + x] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
+            }
+            const std::lock_guard lock(mutex);
+            sum.nodes += counters.nodes;
+            sum.softLeaves += counters.softLeaves;
+            sum.triangles += counters.triangles;
+        });
+        picture.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        const auto rays = static_cast<double>(picture.hits.size());
+        picture.stepsMean = static_cast<double>(sum.nodes) / rays;
+        picture.fetchesMean = static_cast<double>(sum.softLeaves + sum.triangles) / rays;
+        return picture;
+    }
+
+private:
+    ReferenceCaster caster_;
+    unsigned threads_;
+};
+
+class CertifiedTracer final : public RayTracer {
+public:
+    CertifiedTracer(std::unique_ptr<Renderer> renderer, double certifiedError)
+        : renderer_(std::move(renderer)), certifiedError_(certifiedError) {}
+
+    [[nodiscard]] std::string device() const override { return renderer_->device().name; }
+    [[nodiscard]] std::string knob() const override { return "error-pixels 0.5"; }
+    [[nodiscard]] uint64_t bytes() const override { return residentBytes_; }
+
+    Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
+        FrameRequest request;
+        request.camera = camera;
+        request.width = static_cast<uint32_t>(size.x);
+        request.height = static_cast<uint32_t>(size.y);
+        const auto settled = renderer_->settle(request);
+        if (!settled) return settled.error();
+        residentBytes_ = settled->residentBytes;
+        TracedPicture picture;
+        std::vector<double> seconds;
+        for (int repetition = 0; repetition <= repetitions; ++repetition) {
+            const auto frame = renderer_->render(request);
+            if (!frame) return frame.error();
+            if (repetition > 0) seconds.push_back(frame->msFrame * 1e-3);
+        }
+        picture.seconds = medianOf(seconds);
+        VCP_TRY(readHits(camera, size, settled->errorPixels, picture));
+        VCP_TRY(countWork(request, picture));
+        return picture;
+    }
+
+private:
+    Result<void> readHits(const Camera& camera, glm::ivec2 size, double errorPixels, TracedPicture& picture) {
+        const auto depth = renderer_->readDepth();
+        if (!depth) return depth.error();
+        const auto normals = renderer_->readNormals();
+        if (!normals) return normals.error();
+        // A coarser page's error projects to at most errorPixels where the page is nearest: no more than this
+        // many world units at the hit.
+        const double perPixel = 2 * cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y)).halfHeight / size.y;
+        picture.hits.resize(depth->size());
+        for (size_t i = 0; i < depth->size(); ++i) {
+            const double t = (*depth)[i];
+            if (!std::isfinite(t)) continue;
+            const double allowed = std::max(certifiedError_, errorPixels * perPixel * t);
+            picture.hits[i] = SurfaceHit{t, glm::dvec3((*normals)[i]), allowed};
+        }
+        return {};
+    }
+
+    Result<void> countWork(FrameRequest request, TracedPicture& picture) {
+        request.countSteps = true;
+        const auto frame = renderer_->render(request);
+        if (!frame) return frame.error();
+        picture.stepsMean = static_cast<double>(frame->steps) / static_cast<double>(frame->rays);
+        picture.fetchesMean = static_cast<double>(frame->fetches) / static_cast<double>(frame->rays);
+        return {};
+    }
+
+    std::unique_ptr<Renderer> renderer_;
+    double certifiedError_;
+    uint64_t residentBytes_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, unsigned threads) {
+    const auto cut = cutAtLevel(cache.dataset(), cache.dataset().header.levels);
+    auto caster = ReferenceCaster::create(cache, cut);
+    if (!caster) return caster.error();
+    return std::unique_ptr<RayTracer>(std::make_unique<ReferenceTracer>(std::move(*caster), threads));
+}
+
+Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device) {
+    const auto reader = openFile(file);
+    if (!reader) return reader.error();
+    auto dataset = readDataset(**reader);
+    if (!dataset) return dataset.error();
+    const auto shared = std::make_shared<const Dataset>(std::move(*dataset));
+    RendererOptions options;
+    options.device = device;
+    options.budgetBytes = uint64_t{2} << 30;
+    auto renderer = Renderer::create(options);
+    if (!renderer) return renderer.error();
+    VCP_TRY((*renderer)->open(shared, std::make_shared<FilePageSource>(*reader, shared)));
+    return std::unique_ptr<RayTracer>(std::make_unique<CertifiedTracer>(std::move(*renderer), shared->header.certifiedErrorMax));
+}
+
+void forEachRow(int rows, unsigned threads, const std::function<void(int)>& work) {
+    const unsigned count = threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+    std::atomic<int> next{0};
+    const auto loop = [&] {
+        for (int row = next++; row < rows; row = next++) work(row);
+    };
+    std::vector<std::thread> others;
+    for (unsigned t = 1; t < count; ++t) others.emplace_back(loop);
+    loop();
+    for (std::thread& thread : others) thread.join();
+}
+
+double medianOf(std::vector<double> seconds) {
+    if (seconds.empty()) return 0;
+    const auto middle = seconds.begin() + static_cast<std::ptrdiff_t>(seconds.size() / 2);
+    std::nth_element(seconds.begin(), middle, seconds.end());
+    return *middle;
+}
+
+}  // namespace vcp
