@@ -63,7 +63,7 @@ Result<ByteSource> ByteSource::open(const std::filesystem::path& path, size_t wi
         if (errno == ENOENT) return refuse("no such file");
         return refuse("cannot be opened: " + systemMessage(errno));
     }
-    struct stat status{};
+    struct stat status {};
     if (::fstat(source.file_, &status) != 0) return refuse("cannot be examined: " + systemMessage(errno));
     if (S_ISDIR(status.st_mode)) return refuse("is a folder, not a mesh file");
     if (!S_ISREG(status.st_mode)) return refuse("is not a regular file; save the mesh to a file first");
@@ -145,8 +145,7 @@ void ByteSource::advance(uint64_t count) {
     offset_ += count;
 }
 
-Error ByteSource::error(ErrorCode code, std::string element, std::optional<uint64_t> byte,
-                        std::string message) const {
+Error ByteSource::error(ErrorCode code, std::string element, std::optional<uint64_t> byte, std::string message) const {
     return {code, std::move(message), name_, std::move(element), byte};
 }
 

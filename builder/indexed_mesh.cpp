@@ -18,7 +18,9 @@ Result<void> append(const std::filesystem::path& path, IndexedMesh& mesh) {
         if (!more) return more.error();
         if (!*more) return {};
         if (mesh.positions.size() + chunk.positions.size() > std::numeric_limits<uint32_t>::max())
-            return Error{.code = ErrorCode::Limit, .message = "more vertices than a mesh in memory can number", .file = path.string()};
+            return Error{.code = ErrorCode::Limit,
+                         .message = "more vertices than a mesh in memory can number",
+                         .file = path.string()};
         mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
         for (const auto& t : chunk.triangles)
             mesh.triangles.push_back({static_cast<uint32_t>(base + t[0]), static_cast<uint32_t>(base + t[1]),
@@ -32,7 +34,8 @@ Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths) {
     IndexedMesh mesh;
     for (const auto& path : paths) VCP_TRY(append(path, mesh));
     if (mesh.triangles.empty())
-        return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle",
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "the mesh has no triangle",
                      .file = paths.empty() ? std::string() : paths.front().string()};
     return mesh;
 }

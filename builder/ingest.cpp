@@ -23,6 +23,9 @@ constexpr double kTriangleAreaPerCellArea = 0.42;
 // Extent limit: positions are 31-bit lattice coordinates.
 constexpr double kMaxExtentCells = double(1u << 20) - 4;
 
+// Beyond this, areas overflow a double.
+constexpr double kMaxExtent = 1e150;
+
 constexpr uint32_t kLog2Cells = 5;
 
 /// All inputs, joined, as read.
@@ -144,8 +147,10 @@ Result<IngestedMesh> ingest(const BuildOptions& options, const std::function<boo
     out.vertices = raw.positions.size();
     const Measures m = measure(raw);
     out.degenerateTriangles = m.degenerate;
-    if (out.triangles == out.degenerateTriangles || !(m.area > 0))
+    if (out.triangles == out.degenerateTriangles || m.area == 0)
         return badInput(options, out.triangles == 0 ? "has no triangles" : fmt::format("none of its {} triangles has an area", out.triangles));
+    if (!std::isfinite(m.area) || !(glm::length(m.upper - m.lower) < kMaxExtent))
+        return badInput(options, "its coordinates are too large to measure lengths; scale the mesh down");
     out.boundsMin = m.lower;
     out.boundsMax = m.upper;
     if (options.colour == ColourChoice::None) raw.colours.clear();

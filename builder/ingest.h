@@ -29,7 +29,7 @@ struct IngestedMesh {
     uint64_t vertices = 0;             ///< read
 };
 
-/// Reads all inputs (in memory). `cell` 0 chooses kDefaultCellsPerTriangle from area and count.
+/// Reads all inputs (in memory). `cell` 0 chooses a cell from area and number of triangles.
 /// `progress` is given the fraction read; false cancels.
 Result<IngestedMesh> ingest(const BuildOptions& options, const std::function<bool(double fraction, uint64_t triangles)>& progress);
 

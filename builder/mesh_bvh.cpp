@@ -31,7 +31,8 @@ glm::dvec3 closestOfSegment(glm::dvec3 a, glm::dvec3 b) {
 /// Foot of the perpendicular from the coordinate origin, where it is inside the triangle.
 std::optional<glm::dvec3> footInside(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
     const glm::dvec3 n = glm::cross(b - a, c - a);
-    const double wa = glm::dot(n, glm::cross(b, c)), wb = glm::dot(n, glm::cross(c, a)), wc = glm::dot(n, glm::cross(a, b));
+    const double wa = glm::dot(n, glm::cross(b, c)), wb = glm::dot(n, glm::cross(c, a)),
+                 wc = glm::dot(n, glm::cross(a, b));
     if (!(wa >= 0 && wb >= 0 && wc >= 0)) return {};
     const double sum = wa + wb + wc;
     if (!(sum > 0)) return {};
@@ -71,7 +72,8 @@ struct Split {
 };
 
 /// The cheapest of 16 planes an axis by surface area; axis -1 where all centres agree.
-Split cheapestSplit(const IndexedMesh& mesh, const uint32_t* triangles, uint32_t count, const std::vector<glm::dvec3>& centres) {
+Split cheapestSplit(const IndexedMesh& mesh, const uint32_t* triangles, uint32_t count,
+                    const std::vector<glm::dvec3>& centres) {
     Bounds spread;
     for (uint32_t i = 0; i < count; ++i) spread.add(centres[triangles[i]]);
     Split best;
@@ -212,7 +214,9 @@ void MeshBvh::split(uint32_t root, std::vector<glm::dvec3>& centres) {
         uint32_t left = count / 2;
         if (plane.axis >= 0)
             left = static_cast<uint32_t>(
-                std::partition(begin, begin + count, [&](uint32_t t) { return centres[t][plane.axis] < plane.position; }) - begin);
+                std::partition(begin, begin + count,
+                               [&](uint32_t t) { return centres[t][plane.axis] < plane.position; }) -
+                begin);
         if (left == 0 || left == count) left = count / 2;
         const auto child = static_cast<uint32_t>(nodes_.size());
         nodes_[number].first = child;
@@ -239,8 +243,10 @@ std::optional<NearestPoint> MeshBvh::nearestPoint(glm::dvec3 p, double within) c
         if (distance2 * (1 - 8 * kEpsilon) > best2) continue;
         const Node& node = nodes_[number];
         if (node.count == 0) {
-            std::pair<double, uint32_t> near{boxDistance2(p, nodes_[node.first].low, nodes_[node.first].high), node.first};
-            std::pair<double, uint32_t> far{boxDistance2(p, nodes_[node.first + 1].low, nodes_[node.first + 1].high), node.first + 1};
+            std::pair<double, uint32_t> near{boxDistance2(p, nodes_[node.first].low, nodes_[node.first].high),
+                                             node.first};
+            std::pair<double, uint32_t> far{boxDistance2(p, nodes_[node.first + 1].low, nodes_[node.first + 1].high),
+                                            node.first + 1};
             if (far.first < near.first) std::swap(near, far);
             open.push_back(far);
             open.push_back(near);
@@ -272,9 +278,10 @@ void MeshBvh::walkRay(const WoopRay& ray, double tMin, double& tMax, const Visit
         if (entered == kInfinity || entered * (1 - 4 * kEpsilon) > tMax) continue;
         const Node& node = nodes_[number];
         if (node.count == 0) {
-            std::pair<double, uint32_t> near{ray.enter(nodes_[node.first].low, nodes_[node.first].high, tMin, tMax), node.first};
-            std::pair<double, uint32_t> far{ray.enter(nodes_[node.first + 1].low, nodes_[node.first + 1].high, tMin, tMax),
-                                            node.first + 1};
+            std::pair<double, uint32_t> near{ray.enter(nodes_[node.first].low, nodes_[node.first].high, tMin, tMax),
+                                             node.first};
+            std::pair<double, uint32_t> far{
+                ray.enter(nodes_[node.first + 1].low, nodes_[node.first + 1].high, tMin, tMax), node.first + 1};
             if (far.first < near.first) std::swap(near, far);
             open.push_back(far);
             open.push_back(near);
@@ -326,9 +333,8 @@ std::vector<MeshHit> MeshBvh::allHits(glm::dvec3 origin, glm::dvec3 direction, d
         hits.push_back(describe(*mesh_, t, triangle));
         return true;
     });
-    std::sort(hits.begin(), hits.end(), [](const MeshHit& a, const MeshHit& b) {
-        return a.t != b.t ? a.t < b.t : a.triangle < b.triangle;
-    });
+    std::sort(hits.begin(), hits.end(),
+              [](const MeshHit& a, const MeshHit& b) { return a.t != b.t ? a.t < b.t : a.triangle < b.triangle; });
     return hits;
 }
 

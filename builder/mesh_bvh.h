@@ -46,8 +46,8 @@ public:
     explicit MeshBvh(const IndexedMesh& mesh);
 
     /// Nearest point of the mesh within `within` of p; among equals any. Any thread.
-    [[nodiscard]] std::optional<NearestPoint> nearestPoint(glm::dvec3 p,
-                                                           double within = std::numeric_limits<double>::infinity()) const;
+    [[nodiscard]] std::optional<NearestPoint> nearestPoint(
+        glm::dvec3 p, double within = std::numeric_limits<double>::infinity()) const;
 
     /// First hit with tMin <= t <= tMax. Triangles seen exactly edge-on are not hit. Any thread.
     [[nodiscard]] std::optional<MeshHit> nearestHit(glm::dvec3 origin, glm::dvec3 direction, double tMin = 0,

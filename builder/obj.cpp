@@ -191,8 +191,9 @@ private:
             return wrong(p, fmt::format("a vertex needs 3 coordinates, this one has {}", numbers.count));
         const auto& [x, y, z, w, r, g, b] = numbers.values;
         if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z))
-            return source_.error(ErrorCode::InvalidInput, fmt::format("line {}, vertex {}", statementLine_, vertices_ + 1),
-                                 byteAt(statement_), "the position is not finite (NaN or infinite)");
+            return source_.error(ErrorCode::InvalidInput,
+                                 fmt::format("line {}, vertex {}", statementLine_, vertices_ + 1), byteAt(statement_),
+                                 "the position is not finite (NaN or infinite)");
         chunk.positions.emplace_back(x, y, z);
         if (info_.hasColour) chunk.colours.push_back(colourOf(numbers));
         ++vertices_;
@@ -232,7 +233,8 @@ private:
         if (!stop || !(endsWord(stop) || *stop == '/'))
             return wrong(p, shownWord(p, end_) + " is not a corner of a face (v, v/t, v//n or v/t/n)");
         const auto seen = static_cast<int64_t>(vertices_);
-        if (number == 0 || number < -seen || number > static_cast<int64_t>(mostVertices_)) return noSuchVertex(p, number);
+        if (number == 0 || number < -seen || number > static_cast<int64_t>(mostVertices_))
+            return noSuchVertex(p, number);
         vertex = static_cast<uint64_t>(number > 0 ? number - 1 : seen + number);
         if (vertex >= vertices_ && vertex >= promised_) {
             promised_ = vertex + 1;
@@ -283,7 +285,8 @@ private:
 }  // namespace
 
 bool looksLikeObj(std::string_view start) {
-    static constexpr std::array<std::string_view, 10> kKeywords{"v", "vt", "vn", "vp", "f", "g", "o", "s", "mtllib", "usemtl"};
+    static constexpr std::array<std::string_view, 10> kKeywords{"v", "vt", "vn", "vp",     "f",
+                                                                "g", "o",  "s",  "mtllib", "usemtl"};
     if (start.starts_with(kUtf8Mark)) start.remove_prefix(kUtf8Mark.size());
     const char* const end = start.data() + start.size();
     for (const char* p = start.data(); (p = skipSpaces(p, end)) != end;) {

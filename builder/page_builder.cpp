@@ -1,7 +1,10 @@
 #include "builder/page_builder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+
+#include <glm/common.hpp>
 
 #include "octree/leaf_math.h"
 
@@ -15,6 +18,9 @@ constexpr double kMaxRepetition = 3.5;
 
 // Leaves are merged only while their own error leaves this part of the tolerance unused.
 constexpr double kMergeTrial = 0.35;
+
+// Leaves are merged only while their colours stay so close to what the larger leaf blends, of 255.
+constexpr double kColourTolerance = 10;
 
 double errorOf(const SoftLeaf& leaf) {
     return (leaf.certificate.maxValue + wallOf(leaf.wall)) * leaf.box.edgeCells() / leaf.certificate.minSlope;
@@ -139,6 +145,7 @@ private:
             geometry_.trianglesOf(box, around, inside);
         }
         const std::optional<Certificate> certificate = soft > 0 && hard == 0 ? certify(box, around) : std::nullopt;
+        if (certificate && !colourFits(box, first)) return;
         const bool hardFits = hard > 0 && inside.size() <= kMergedHardTriangles;
         if (soft + hard > 0 && !certificate && !hardFits) return;
         // The children and their leaves are the last ones made.
@@ -148,6 +155,37 @@ private:
         tree_.nodes[index].kind = Kind::Empty;
         if (certificate) makeSoft(index, *certificate);
         if (hardFits) makeHard(index, inside);
+    }
+
+    /// Whether the colours at the corners of the children are those that the corners of the parent blend to.
+    bool colourFits(const NodeBox& box, uint32_t firstChild) {
+        if (!geometry_.hasColour()) return true;
+        uint32_t outer[8];
+        for (int i = 0; i < 8; ++i) outer[i] = geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)).colour;
+        for (int m = 0; m < 27; ++m) {
+            const glm::ivec3 g(m % 3, m / 3 % 3, m / 9);
+            if (!cornerOfLeaf(g, firstChild)) continue;
+            const uint32_t colour = geometry_.corner(box.lower + box.edge / 2 * g).colour;
+            for (int c = 0; c < 4; ++c) {
+                double blend = 0;
+                for (int i = 0; i < 8; ++i) {
+                    const glm::dvec3 w = glm::mix(1.0 - glm::dvec3(g) / 2.0, glm::dvec3(g) / 2.0, glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
+                    blend += w.x * w.y * w.z * double(outer[i] >> 8 * c & 255u);
+                }
+                if (std::abs(blend - double(colour >> 8 * c & 255u)) > kColourTolerance) return false;
+            }
+        }
+        return true;
+    }
+
+    /// Whether point g of a node's 3^3 grid is a corner of a child that is a leaf.
+    bool cornerOfLeaf(glm::ivec3 g, uint32_t firstChild) const {
+        for (int i = 0; i < 8; ++i) {
+            const glm::ivec3 o(i & 1, i >> 1 & 1, i >> 2);
+            const glm::ivec3 d = g - o;
+            if (d.x >= 0 && d.x <= 1 && d.y >= 0 && d.y <= 1 && d.z >= 0 && d.z <= 1 && tree_.nodes[firstChild + static_cast<uint32_t>(i)].kind != Kind::Empty) return true;
+        }
+        return false;
     }
 
     PageGeometry& geometry_;

@@ -53,6 +53,7 @@ public:
     /// (squared distance, triangle) winning. Exact for the whole mesh where it is within 2 cells.
     const CornerVector& corner(glm::ivec3 subcells);
 
+    [[nodiscard]] bool hasColour() const { return !mesh_.colours.empty(); }
     [[nodiscard]] const CertifiedTriangle& triangle(uint32_t local) const { return triangles_[local]; }
     /// Vertex numbers in the mesh.
     [[nodiscard]] const std::array<uint32_t, 3>& vertices(uint32_t local) const { return vertices_[local]; }

@@ -16,9 +16,12 @@ namespace {
 
 std::string_view formatName(PlyEncoding encoding) {
     switch (encoding) {
-        case PlyEncoding::Ascii: return "PLY ASCII";
-        case PlyEncoding::LittleEndian: return "PLY binary little endian";
-        case PlyEncoding::BigEndian: return "PLY binary big endian";
+        case PlyEncoding::Ascii:
+            return "PLY ASCII";
+        case PlyEncoding::LittleEndian:
+            return "PLY binary little endian";
+        case PlyEncoding::BigEndian:
+            return "PLY binary big endian";
     }
     return "PLY";
 }
@@ -39,11 +42,11 @@ Result<void> checkCounts(const ByteSource& source, const PlyHeader& header) {
         exact = exact && !element.hasLists();
         if (rowBytes > 0 && element.count > left / rowBytes) {
             const uint64_t whole = left / rowBytes;
-            std::string message =
-                fmt::format("the header declares {} rows of {} {} bytes, but the file ends after {} of them: "
-                            "it is truncated or the count is wrong",
-                            element.count, exact ? "exactly" : "at least", rowBytes,
-                            exact ? std::to_string(whole) : fmt::format("at most {}", whole));
+            std::string message = fmt::format(
+                "the header declares {} rows of {} {} bytes, but the file ends after {} of them: "
+                "it is truncated or the count is wrong",
+                element.count, exact ? "exactly" : "at least", rowBytes,
+                exact ? std::to_string(whole) : fmt::format("at most {}", whole));
             if (!exact) return elementError(source, element, std::move(message));
             return source.error(ErrorCode::InvalidInput, fmt::format("{} {}", element.name, whole),
                                 source.size() - left % rowBytes, std::move(message));

@@ -26,14 +26,22 @@ T load(const char* p) {
 template <bool kSwap>
 double loadReal(PlyType type, const char* p) {
     switch (type) {
-        case PlyType::Int8: return load<int8_t, kSwap>(p);
-        case PlyType::Uint8: return load<uint8_t, kSwap>(p);
-        case PlyType::Int16: return load<int16_t, kSwap>(p);
-        case PlyType::Uint16: return load<uint16_t, kSwap>(p);
-        case PlyType::Int32: return load<int32_t, kSwap>(p);
-        case PlyType::Uint32: return load<uint32_t, kSwap>(p);
-        case PlyType::Float32: return load<float, kSwap>(p);
-        case PlyType::Float64: return load<double, kSwap>(p);
+        case PlyType::Int8:
+            return load<int8_t, kSwap>(p);
+        case PlyType::Uint8:
+            return load<uint8_t, kSwap>(p);
+        case PlyType::Int16:
+            return load<int16_t, kSwap>(p);
+        case PlyType::Uint16:
+            return load<uint16_t, kSwap>(p);
+        case PlyType::Int32:
+            return load<int32_t, kSwap>(p);
+        case PlyType::Uint32:
+            return load<uint32_t, kSwap>(p);
+        case PlyType::Float32:
+            return load<float, kSwap>(p);
+        case PlyType::Float64:
+            return load<double, kSwap>(p);
     }
     return 0;
 }
@@ -41,14 +49,22 @@ double loadReal(PlyType type, const char* p) {
 template <bool kSwap>
 std::optional<int64_t> loadWhole(PlyType type, const char* p) {
     switch (type) {
-        case PlyType::Int8: return load<int8_t, kSwap>(p);
-        case PlyType::Uint8: return load<uint8_t, kSwap>(p);
-        case PlyType::Int16: return load<int16_t, kSwap>(p);
-        case PlyType::Uint16: return load<uint16_t, kSwap>(p);
-        case PlyType::Int32: return load<int32_t, kSwap>(p);
-        case PlyType::Uint32: return load<uint32_t, kSwap>(p);
-        case PlyType::Float32: return wholeNumber(load<float, kSwap>(p));
-        case PlyType::Float64: return wholeNumber(load<double, kSwap>(p));
+        case PlyType::Int8:
+            return load<int8_t, kSwap>(p);
+        case PlyType::Uint8:
+            return load<uint8_t, kSwap>(p);
+        case PlyType::Int16:
+            return load<int16_t, kSwap>(p);
+        case PlyType::Uint16:
+            return load<uint16_t, kSwap>(p);
+        case PlyType::Int32:
+            return load<int32_t, kSwap>(p);
+        case PlyType::Uint32:
+            return load<uint32_t, kSwap>(p);
+        case PlyType::Float32:
+            return wholeNumber(load<float, kSwap>(p));
+        case PlyType::Float64:
+            return wholeNumber(load<double, kSwap>(p));
     }
     return std::nullopt;
 }
@@ -56,9 +72,9 @@ std::optional<int64_t> loadWhole(PlyType type, const char* p) {
 // A row as stored: runs of scalars, and lists between them.
 struct Step {
     bool isList = false;
-    size_t column = 0;        // of a list
-    uint64_t bytes = 0;       // of a run
-    uint64_t rowOffset = 0;   // of a run: scalar bytes of the row before it
+    size_t column = 0;       // of a list
+    uint64_t bytes = 0;      // of a run
+    uint64_t rowOffset = 0;  // of a run: scalar bytes of the row before it
 };
 
 // Where a face row of the usual kind (one list) has its list.
@@ -175,8 +191,8 @@ private:
         const auto bytes = source_.window(rowBytes_);
         if (!bytes) return bytes.error();
         const uint64_t room = kChunkElements - chunk.positions.size();
-        const auto rows = static_cast<size_t>(
-            std::min({room, plan_.element->count - row_, uint64_t{bytes->size() / rowBytes_}}));
+        const auto rows =
+            static_cast<size_t>(std::min({room, plan_.element->count - row_, uint64_t{bytes->size() / rowBytes_}}));
         if (rows == 0) return truncated();
         VCP_TRY(decodeVertices(bytes->data(), rows, chunk));
         source_.advance(rows * rowBytes_);
@@ -190,9 +206,12 @@ private:
         chunk.positions.resize(before + rows);
         glm::dvec3* const positions = chunk.positions.data() + before;
         size_t finite = 0;
-        if (positionType_ == PlyType::Float32) finite = decodePositions<float>(p, rows, positions);
-        else if (positionType_ == PlyType::Float64) finite = decodePositions<double>(p, rows, positions);
-        else finite = decodeMixedPositions(p, rows, positions);
+        if (positionType_ == PlyType::Float32)
+            finite = decodePositions<float>(p, rows, positions);
+        else if (positionType_ == PlyType::Float64)
+            finite = decodePositions<double>(p, rows, positions);
+        else
+            finite = decodeMixedPositions(p, rows, positions);
         if (finite < rows) {
             row_ += finite;
             return notFinite(firstNonFiniteByte(positions[finite], finite));
@@ -325,8 +344,8 @@ private:
                            MeshChunk& chunk) {
         const size_t itemBytes = byteSize(list.type);
         const uint64_t here = std::min(listLeft_, static_cast<uint64_t>(end - p) / itemBytes);
-        const bool names = column == plan_.indexColumn &&
-                           (plan_.role == PlyRole::Faces || plan_.role == PlyRole::Strips);
+        const bool names =
+            column == plan_.indexColumn && (plan_.role == PlyRole::Faces || plan_.role == PlyRole::Strips);
         if (!names) {
             p += here * itemBytes;
             listLeft_ -= here;
@@ -335,8 +354,7 @@ private:
         const char* const begin = p;
         for (uint64_t i = 0; i < here && hasRoom(chunk); ++i, p += itemBytes, --listLeft_) {
             const auto number = loadWhole<kSwap>(list.type, p);
-            if (!cutter_.add(number, chunk.triangles))
-                return badIndex(number, byte + static_cast<uint64_t>(p - begin));
+            if (!cutter_.add(number, chunk.triangles)) return badIndex(number, byte + static_cast<uint64_t>(p - begin));
         }
         return {};
     }

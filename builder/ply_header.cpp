@@ -19,10 +19,22 @@ constexpr size_t kLongestFirstLine = 64;
 std::optional<PlyType> typeOf(std::string_view word) {
     using enum PlyType;
     static constexpr std::array<std::pair<std::string_view, PlyType>, 16> kSpellings{{
-        {"char", Int8}, {"int8", Int8}, {"uchar", Uint8}, {"uint8", Uint8},
-        {"short", Int16}, {"int16", Int16}, {"ushort", Uint16}, {"uint16", Uint16},
-        {"int", Int32}, {"int32", Int32}, {"uint", Uint32}, {"uint32", Uint32},
-        {"float", Float32}, {"float32", Float32}, {"double", Float64}, {"float64", Float64},
+        {"char", Int8},
+        {"int8", Int8},
+        {"uchar", Uint8},
+        {"uint8", Uint8},
+        {"short", Int16},
+        {"int16", Int16},
+        {"ushort", Uint16},
+        {"uint16", Uint16},
+        {"int", Int32},
+        {"int32", Int32},
+        {"uint", Uint32},
+        {"uint32", Uint32},
+        {"float", Float32},
+        {"float32", Float32},
+        {"double", Float64},
+        {"float64", Float64},
     }};
     for (const auto& [spelling, type] : kSpellings)
         if (spelling == word) return type;
@@ -75,8 +87,7 @@ private:
         const size_t blanks = std::min(text.find_first_not_of(" \t"), text.size());
         text.remove_prefix(blanks);
         const size_t breakBytes = text.starts_with("\r\n") ? 2 : 1;
-        if (!text.starts_with('\n') && !text.starts_with('\r'))
-            return wrong("'ply' must stand on a line of its own");
+        if (!text.starts_with('\n') && !text.starts_with('\r')) return wrong("'ply' must stand on a line of its own");
         lineBreak_ = text[breakBytes - 1];
         source_.advance(3 + blanks + breakBytes);
         return {};
@@ -114,10 +125,14 @@ private:
         using enum PlyEncoding;
         if (formatSeen_) return wrong("a second 'format' line");
         if (words_.size() < 3 || words_[2] != "1.0") return wrong("expected 'format ENCODING 1.0'");
-        if (words_[1] == "ascii") header_.encoding = Ascii;
-        else if (words_[1] == "binary_little_endian") header_.encoding = LittleEndian;
-        else if (words_[1] == "binary_big_endian") header_.encoding = BigEndian;
-        else return wrong(fmt::format("unknown encoding {}", shown(words_[1])));
+        if (words_[1] == "ascii")
+            header_.encoding = Ascii;
+        else if (words_[1] == "binary_little_endian")
+            header_.encoding = LittleEndian;
+        else if (words_[1] == "binary_big_endian")
+            header_.encoding = BigEndian;
+        else
+            return wrong(fmt::format("unknown encoding {}", shown(words_[1])));
         formatSeen_ = true;
         return {};
     }
@@ -134,8 +149,7 @@ private:
         const auto [stop, failure] = std::from_chars(words_[2].data(), end, element.count);
         if (failure != std::errc() || stop != end)
             return wrong(fmt::format("{} is not a count of elements", shown(words_[2])));
-        if (header_.find(element.name))
-            return wrong(fmt::format("a second element {}", shown(element.name)));
+        if (header_.find(element.name)) return wrong(fmt::format("a second element {}", shown(element.name)));
         header_.elements.push_back(std::move(element));
         return {};
     }
@@ -169,9 +183,7 @@ private:
 
 }  // namespace
 
-bool PlyElement::hasLists() const {
-    return std::ranges::any_of(properties, &PlyProperty::isList);
-}
+bool PlyElement::hasLists() const { return std::ranges::any_of(properties, &PlyProperty::isList); }
 
 uint64_t PlyElement::scalarBytes() const {
     uint64_t bytes = 0;

@@ -21,8 +21,8 @@ constexpr size_t byteSize(PlyType type) {
 
 struct PlyProperty {
     std::string name;
-    PlyType type = PlyType::Float32;    ///< of the scalar, or of the list's items
-    std::optional<PlyType> countType;   ///< of the list's length; absent for a scalar
+    PlyType type = PlyType::Float32;   ///< of the scalar, or of the list's items
+    std::optional<PlyType> countType;  ///< of the list's length; absent for a scalar
     [[nodiscard]] bool isList() const { return countType.has_value(); }
 };
 

@@ -28,8 +28,10 @@ bool PolygonCutter::add(std::optional<int64_t> number, std::vector<std::array<ui
     } else {
         const bool distinct = first_ != last_ && last_ != vertex && vertex != first_;
         if (before > 1 && distinct) {
-            if (before % 2 == 0) triangles.push_back({first_, last_, vertex});
-            else triangles.push_back({last_, first_, vertex});
+            if (before % 2 == 0)
+                triangles.push_back({first_, last_, vertex});
+            else
+                triangles.push_back({last_, first_, vertex});
         }
         if (before > 1) first_ = last_;
     }

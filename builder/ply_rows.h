@@ -49,7 +49,7 @@ public:
 private:
     PlyRole role_;
     uint64_t vertexCount_;
-    uint64_t seen_ = 0;  // numbers since the list, or the strip in it, began
+    uint64_t seen_ = 0;   // numbers since the list, or the strip in it, began
     uint64_t first_ = 0;  // of the fan; of a strip the last but one
     uint64_t last_ = 0;
 };

@@ -27,7 +27,8 @@ std::array<glm::dvec3, 2> perpendiculars(glm::dvec3 d) {
 RayJudge::RayJudge(const MeshBvh& mesh, double cell, double certifiedError)
     : mesh_(&mesh), cell_(cell), radius_(certifiedError * 1.01 + cell * 1e-6) {}
 
-RayJudgement RayJudge::judge(glm::dvec3 origin, glm::dvec3 direction, const std::optional<SurfaceHit>& hit, bool resolved) const {
+RayJudgement RayJudge::judge(glm::dvec3 origin, glm::dvec3 direction, const std::optional<SurfaceHit>& hit,
+                             bool resolved) const {
     RayJudgement j;
     if (!resolved || (hit && !std::isfinite(hit->t))) {
         j.rayClass = RayClass::Unresolved;
@@ -132,7 +133,9 @@ void RayClassTable::merge(const RayClassTable& other) {
     holes_ += other.holes_;
     tooFar_ += other.tooFar_;
     overCertifiedMax_ = std::max(overCertifiedMax_, other.overCertifiedMax_);
-    const auto append = [](std::vector<float>& to, const std::vector<float>& from) { to.insert(to.end(), from.begin(), from.end()); };
+    const auto append = [](std::vector<float>& to, const std::vector<float>& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
     append(distances_, other.distances_);
     append(depthErrors_, other.depthErrors_);
     append(normalDegrees_, other.normalDegrees_);

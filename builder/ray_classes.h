@@ -38,12 +38,13 @@ inline constexpr double kWrongSheetCells = 2;
 inline constexpr int kParallels = 32;
 
 enum class RayClass : uint8_t { Hit, Miss, Missed, False, WrongSheet, Unresolved };
-inline constexpr std::array<std::string_view, 6> kRayClassNames = {"hit", "miss", "missed", "false", "wrong_sheet", "unresolved"};
+inline constexpr std::array<std::string_view, 6> kRayClassNames = {"hit",   "miss",        "missed",
+                                                                   "false", "wrong_sheet", "unresolved"};
 
 /// What a method says about a ray.
 struct SurfaceHit {
-    double t = 0;           ///< world units; |direction| = 1
-    glm::dvec3 normal{0};   ///< unit, either side
+    double t = 0;               ///< world units; |direction| = 1
+    glm::dvec3 normal{0};       ///< unit, either side
     double certifiedError = 0;  ///< world units
 };
 

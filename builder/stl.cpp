@@ -34,9 +34,7 @@ bool sameWord(std::string_view word, std::string_view keyword) {
     return true;
 }
 
-std::string_view wordAt(const char* p, const char* end) {
-    return {p, static_cast<size_t>(wordEnd(p, end) - p)};
-}
+std::string_view wordAt(const char* p, const char* end) { return {p, static_cast<size_t>(wordEnd(p, end) - p)}; }
 
 uint32_t facetCount(std::string_view start) {
     uint32_t count = 0;
@@ -186,11 +184,16 @@ private:
     // Takes a keyword with what belongs to it on its line.
     Result<void> takeWord(const char*& p, MeshChunk& chunk) {
         switch (place_) {
-            case Place::OutsideSolid: return takeSolid(p);
-            case Place::InSolid: return takeFacet(p);
-            case Place::InFacet: return takeLoop(p);
-            case Place::InLoop: return takeVertex(p, chunk);
-            case Place::AfterLoop: return takeFacetEnd(p);
+            case Place::OutsideSolid:
+                return takeSolid(p);
+            case Place::InSolid:
+                return takeFacet(p);
+            case Place::InFacet:
+                return takeLoop(p);
+            case Place::InLoop:
+                return takeVertex(p, chunk);
+            case Place::AfterLoop:
+                return takeFacetEnd(p);
         }
         return {};
     }
@@ -318,7 +321,8 @@ Result<std::unique_ptr<MeshStream>> openStl(ByteSource source) {
     const uint64_t exactBytes =
         start.size() < kHeaderBytes ? 0 : kHeaderBytes + uint64_t{facetCount(start)} * kFacetBytes;
     // A short or garbled text still fails best as text.
-    const bool isText = start.size() < kHeaderBytes && sameWord(wordAt(start.data(), start.data() + start.size()), "solid");
+    const bool isText =
+        start.size() < kHeaderBytes && sameWord(wordAt(start.data(), start.data() + start.size()), "solid");
     if (source.size() != exactBytes && (isText || looksLikeAscii(start)))
         return std::unique_ptr<MeshStream>(std::make_unique<AsciiStl>(std::move(source)));
     auto stream = std::make_unique<BinaryStl>(std::move(source));

@@ -31,7 +31,9 @@ public:
         return z ^ z >> 31;
     }
     double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
-    uint64_t below(uint64_t count) { return std::min(static_cast<uint64_t>(unit() * static_cast<double>(count)), count - 1); }
+    uint64_t below(uint64_t count) {
+        return std::min(static_cast<uint64_t>(unit() * static_cast<double>(count)), count - 1);
+    }
     glm::dvec3 direction() {
         const double z = 2 * unit() - 1, phi = 2 * std::numbers::pi * unit();
         const double r = std::sqrt(std::max(1 - z * z, 0.0));
@@ -46,7 +48,8 @@ private:
 class BlockRunner {
 public:
     explicit BlockRunner(const SurfaceDistanceOptions& options)
-        : progress_(options.progress), threads_(options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency())) {}
+        : progress_(options.progress),
+          threads_(options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency())) {}
 
     template <class Work>
     bool run(uint64_t count, double from, double to, const Work& work) {
@@ -56,7 +59,8 @@ public:
         const auto loop = [&] {
             for (uint64_t block = next++; block < blocks && !cancelled; block = next++) {
                 for (uint64_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) work(i);
-                if (!report(from + (to - from) * static_cast<double>(block + 1) / static_cast<double>(blocks))) cancelled = true;
+                if (!report(from + (to - from) * static_cast<double>(block + 1) / static_cast<double>(blocks)))
+                    cancelled = true;
             }
         };
         std::vector<std::thread> threads;
@@ -109,7 +113,8 @@ double distanceToClipped(glm::dvec3 p, const std::array<glm::dvec3, 3>& triangle
     }
     double nearest = kInfinity;
     for (int i = 1; i + 1 < std::max(polygon.count, 2); ++i)
-        nearest = std::min(nearest, glm::distance(p, closestPointOfTriangle(p, polygon.corner[0], polygon.corner[i], polygon.corner[i + 1])));
+        nearest = std::min(nearest, glm::distance(p, closestPointOfTriangle(p, polygon.corner[0], polygon.corner[i],
+                                                                            polygon.corner[i + 1])));
     return nearest;
 }
 
@@ -129,7 +134,8 @@ struct LeafBox {
 /// The leaves of the finest cut: as a list, and nearest hard leaves by descent.
 class FinestLeaves {
 public:
-    FinestLeaves(const PageCache& cache, const std::vector<uint64_t>& cut) : cache_(cache), inCut_(cache.dataset().pages.size(), false) {
+    FinestLeaves(const PageCache& cache, const std::vector<uint64_t>& cut)
+        : cache_(cache), inCut_(cache.dataset().pages.size(), false) {
         for (const uint64_t page : cut) inCut_[page] = true;
     }
 
@@ -147,13 +153,16 @@ public:
     }
 
 private:
-    [[nodiscard]] double pageCells() const { return static_cast<double>(uint64_t{1} << cache_.dataset().header.log2Cells); }
+    [[nodiscard]] double pageCells() const {
+        return static_cast<double>(uint64_t{1} << cache_.dataset().header.log2Cells);
+    }
 
     void collect(uint64_t page, uint32_t node, glm::dvec3 lowest, double edge, std::vector<LeafBox>& leaves) const {
         if (nodeType(node) == kNodeSoft || nodeType(node) == kNodeHard) leaves.push_back({page, lowest, edge});
         if (nodeType(node) != kNodeInternal) return;
         for (uint32_t o = 0; o < 8; ++o)
-            collect(page, cache_.view(page)->nodes[8 * (node & kNodePayloadMask) + o], lowest + octantOffset(o) * (edge / 2), edge / 2, leaves);
+            collect(page, cache_.view(page)->nodes[8 * (node & kNodePayloadMask) + o],
+                    lowest + octantOffset(o) * (edge / 2), edge / 2, leaves);
     }
 
     void visitPage(uint64_t page, glm::dvec3 p, double& best) const {
@@ -168,20 +177,24 @@ private:
             best = std::min(best, cells * cell);
             return;
         }
-        for (int child = 0; child < std::popcount(entry.childMask); ++child) visitPage(entry.firstChild + child, p, best);
+        for (int child = 0; child < std::popcount(entry.childMask); ++child)
+            visitPage(entry.firstChild + child, p, best);
     }
 
-    void visitNode(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 lowest, double edge, double& best) const {
+    void visitNode(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 lowest, double edge,
+                   double& best) const {
         if (nodeType(node) == kNodeEmpty || nodeType(node) == kNodeSoft || boxDistance(p, lowest, edge) >= best) return;
         if (nodeType(node) == kNodeInternal) {
             for (uint32_t o = 0; o < 8; ++o)
-                visitNode(view, view.nodes[8 * (node & kNodePayloadMask) + o], p, lowest + octantOffset(o) * (edge / 2), edge / 2, best);
+                visitNode(view, view.nodes[8 * (node & kNodePayloadMask) + o], p, lowest + octantOffset(o) * (edge / 2),
+                          edge / 2, best);
             return;
         }
         const TriangleRange range = hardLeafTriangles(view, node);
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             const glm::u32vec2 r = view.triangles[t];
-            const std::array<uint32_t, 3> v = {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y), f64::decodeIndex2(r.y)};
+            const std::array<uint32_t, 3> v = {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y),
+                                               f64::decodeIndex2(r.y)};
             std::array<glm::dvec3, 3> triangle;
             for (int i = 0; i < 3; ++i) triangle[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
             best = std::min(best, distanceToClipped(p, triangle, lowest, edge));
@@ -192,16 +205,22 @@ private:
     std::vector<bool> inCut_;
 };
 
-/// Points of the mesh, by area, on edges and at vertices in the ratio 2 : 1 : 1.
+/// Points of the mesh, by area, on edges and at vertices in the ratio 2 : 1 : 1. Triangles without area are no
+/// part of the surface: scans have hairs of them that stick out.
 class MeshSampler {
 public:
-    explicit MeshSampler(const IndexedMesh& mesh) : mesh_(mesh), areaUpTo_(mesh.triangles.size()) {
+    explicit MeshSampler(const IndexedMesh& mesh) : mesh_(mesh) {
         double sum = 0;
-        for (uint64_t t = 0; t < areaUpTo_.size(); ++t) {
+        for (uint64_t t = 0; t < mesh.triangles.size(); ++t) {
             const auto v = mesh.corners(t);
-            areaUpTo_[t] = sum += glm::length(glm::cross(v[1] - v[0], v[2] - v[0]));
+            const double area = glm::length(glm::cross(v[1] - v[0], v[2] - v[0]));
+            if (!(area > 0)) continue;
+            triangles_.push_back(static_cast<uint32_t>(t));
+            areaUpTo_.push_back(sum += area);
         }
     }
+
+    [[nodiscard]] bool empty() const { return triangles_.empty(); }
 
     struct Sample {
         glm::dvec3 position, normal;
@@ -209,11 +228,11 @@ public:
 
     Sample sample(uint64_t number, SampleRandom& random) const {
         const uint64_t kind = number & 3;
-        const uint64_t triangle = kind < 2 ? byArea(random) : random.below(mesh_.triangles.size());
+        const uint64_t triangle = kind < 2 ? byArea(random) : triangles_[random.below(triangles_.size())];
         const auto v = mesh_.corners(triangle);
         glm::dvec3 n = glm::cross(v[1] - v[0], v[2] - v[0]);
         const double length = glm::length(n);
-        n = length > 0 ? n / length : random.direction();
+        n /= length;
         const uint64_t corner = random.below(3);
         if (kind == 3) return {v[corner], n};
         if (kind == 2) return {glm::mix(v[corner], v[(corner + 1) % 3], random.unit()), n};
@@ -226,16 +245,17 @@ private:
     uint64_t byArea(SampleRandom& random) const {
         const double at = random.unit() * areaUpTo_.back();
         const auto found = std::upper_bound(areaUpTo_.begin(), areaUpTo_.end(), at);
-        return std::min<uint64_t>(found - areaUpTo_.begin(), areaUpTo_.size() - 1);
+        return triangles_[std::min<size_t>(found - areaUpTo_.begin(), areaUpTo_.size() - 1)];
     }
 
     const IndexedMesh& mesh_;
-    std::vector<double> areaUpTo_;
+    std::vector<uint32_t> triangles_;  ///< with area
+    std::vector<double> areaUpTo_;     ///< of these, summed up
 };
 
 /// Upper bound on the distance of a world point to the rendered surface.
-double distanceToSurface(const ReferenceCaster& caster, const FinestLeaves& leaves, const MeshSampler::Sample& sample, double cell,
-                         double certifiedError) {
+double distanceToSurface(const ReferenceCaster& caster, const FinestLeaves& leaves, const MeshSampler::Sample& sample,
+                         double cell, double certifiedError) {
     double best = kInfinity;
     glm::dvec3 surfaceNormal{0};
     const auto tryAlong = [&](glm::dvec3 direction, double reach) {
@@ -252,15 +272,17 @@ double distanceToSurface(const ReferenceCaster& caster, const FinestLeaves& leav
     if (best <= 0.25 * certifiedError) return best;
     if (best == kInfinity) tryAlong(sample.normal, kInfinity);
     constexpr double d = 0.57735026918962573;
-    for (const glm::dvec3 direction : {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(d, d, d),
-                                       glm::dvec3(-d, d, d), glm::dvec3(d, -d, d), glm::dvec3(d, d, -d)})
+    for (const glm::dvec3 direction :
+         {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(d, d, d), glm::dvec3(-d, d, d),
+          glm::dvec3(d, -d, d), glm::dvec3(d, d, -d)})
         tryAlong(direction, best < kInfinity ? cell : kInfinity);
     if (best < kInfinity && surfaceNormal != glm::dvec3(0)) tryAlong(surfaceNormal, kInfinity);
     return best;
 }
 
 /// Hits of one random ray through a leaf that lie in the leaf.
-void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random, std::vector<glm::dvec3>& hits) {
+void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random,
+                std::vector<glm::dvec3>& hits) {
     const Dataset& dataset = caster.cache().dataset();
     const PageEntry& entry = dataset.pages[leaf.page];
     const double cell = dataset.cellOf(entry.level);
@@ -269,7 +291,8 @@ void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom
     const double reach = 2 * leaf.edge * cell;
     const glm::dvec3 middle = dataset.originOf(entry) + inLeaf * cell;
     for (const RayHit& hit : caster.castAll({middle - reach * direction, direction, 0, 2 * reach}))
-        if (hit.page == leaf.page && hit.leafMin == leaf.lowest && hit.leafEdge == leaf.edge) hits.push_back(hit.position);
+        if (hit.page == leaf.page && hit.leafMin == leaf.lowest && hit.leafEdge == leaf.edge)
+            hits.push_back(hit.position);
 }
 
 /// Keeps the largest of what threads report; ties go to the lowest sample.
@@ -289,14 +312,15 @@ struct Worst {
 
 }  // namespace
 
-Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh, const SurfaceDistanceOptions& options) {
-    if (mesh.mesh().triangles.empty()) return Error{.message = "the mesh has no triangle"};
+Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
+                                               const SurfaceDistanceOptions& options) {
     const Dataset& dataset = cache.dataset();
     const std::vector<uint64_t> cut = cutAtLevel(dataset, dataset.header.levels);
     const auto caster = ReferenceCaster::create(cache, cut);
     if (!caster) return caster.error();
     const FinestLeaves finest(cache, cut);
     const MeshSampler sampler(mesh.mesh());
+    if (sampler.empty()) return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle with area"};
     const double cell = dataset.header.cell, certified = dataset.header.certifiedErrorMax;
     SurfaceDistance result;
     result.cell = cell;

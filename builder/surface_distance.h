@@ -1,6 +1,7 @@
 // How far the surface of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify --against`).
 //
-//   mesh to surface   samples: vertices, points on edges, points inside triangles, by area. The distance to
+//   mesh to surface   samples: vertices, points on edges, points inside triangles, by area; of triangles that
+//                     have area, for the others show nothing. The distance to
 //                     the surface of the finest level is bounded from above: by short rays through the
 //                     sample in eight and more directions, which start with no wall tolerance, and by the
 //                     exact distance to the triangles of hard leaves, each cut off at its leaf's walls.
@@ -21,14 +22,14 @@ namespace vcp {
 struct SurfaceDistanceOptions {
     uint64_t samples = 200'000;  ///< points of the mesh, and visits of leaves
     uint64_t seed = 1;
-    unsigned threads = 0;        ///< 0: one a processor
+    unsigned threads = 0;  ///< 0: one a processor
     /// Called from one thread at a time with the fraction done; false cancels. May be empty.
     std::function<bool(double)> progress;
 };
 
 struct SurfaceDistance {
-    Quantiles meshToSurface;  ///< world units
-    Quantiles surfaceToMesh;  ///< world units
+    Quantiles meshToSurface;       ///< world units
+    Quantiles surfaceToMesh;       ///< world units
     glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
     glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
     uint64_t samples = 0;          ///< measured, both ways together
@@ -37,7 +38,8 @@ struct SurfaceDistance {
 };
 
 /// Measures the finest level of `cache`, all of whose pages it needs loaded. Errors: Usage (a page is not
-/// loaded), InvalidInput (the mesh has no triangle), Cancelled.
-Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh, const SurfaceDistanceOptions& options = {});
+/// loaded), InvalidInput (the mesh has no triangle with area), Cancelled.
+Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
+                                               const SurfaceDistanceOptions& options = {});
 
 }  // namespace vcp

@@ -96,10 +96,11 @@ std::array<uint32_t, 3> triangleVertices(const PageView& view, uint32_t triangle
 glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dvec3 q, glm::dvec3 d, bool single) {
     const glm::u32vec2 a = view.vertices[v[0]], b = view.vertices[v[1]], c = view.vertices[v[2]];
     if (single)
-        return f32::intersectTriangle(glm::vec3(q), glm::vec3(d), f32::decodeVertex(a.x, a.y), f32::decodeVertex(b.x, b.y),
-                                      f32::decodeVertex(c.x, c.y), static_cast<float>(kTriangleSlack));
-    return f64::intersectTriangle(q, d, f64::decodeVertex(a.x, a.y), f64::decodeVertex(b.x, b.y), f64::decodeVertex(c.x, c.y),
-                                  kTriangleSlack);
+        return f32::intersectTriangle(glm::vec3(q), glm::vec3(d), f32::decodeVertex(a.x, a.y),
+                                      f32::decodeVertex(b.x, b.y), f32::decodeVertex(c.x, c.y),
+                                      static_cast<float>(kTriangleSlack));
+    return f64::intersectTriangle(q, d, f64::decodeVertex(a.x, a.y), f64::decodeVertex(b.x, b.y),
+                                  f64::decodeVertex(c.x, c.y), kTriangleSlack);
 }
 
 /// Vertex normals blended; at a crease the triangle's own.
@@ -192,7 +193,8 @@ private:
         const double last = best_ && !all_ ? std::min(best_->t, ray_.tMax) : ray_.tMax;
         // A triangle's hit may lie outside of its leaf by kIntervalSlack.
         const double ahead = in.slack + (best_ ? kIntervalSlack : 0);
-        return t.first <= t.last + in.slack && t.last >= ray_.tMin / in.cell - in.slack && t.first <= last / in.cell + ahead;
+        return t.first <= t.last + in.slack && t.last >= ray_.tMin / in.cell - in.slack &&
+               t.first <= last / in.cell + ahead;
     }
 
     void castSoft(const PageRay& in, uint32_t node, glm::dvec3 lowest, double edge, Interval segment) {
@@ -237,8 +239,17 @@ private:
         glm::dvec3 normal = length > 0 ? hit.normal / length : -ray_.direction;
         if (glm::dot(normal, ray_.direction) > 0) normal = -normal;
         const PageEntry& entry = dataset_.pages[in.page];
-        const RayHit found{t,    ray_.origin + t * ray_.direction, normal, in.page, entry.level, node, hit.triangle, hit.onWall,
-                           lowest, edge, entry.certifiedError};
+        const RayHit found{t,
+                           ray_.origin + t * ray_.direction,
+                           normal,
+                           in.page,
+                           entry.level,
+                           node,
+                           hit.triangle,
+                           hit.onWall,
+                           lowest,
+                           edge,
+                           entry.certifiedError};
         if (all_) all_->push_back(found);
         if (!best_ || t < best_->t) best_ = found;
     }
@@ -327,13 +338,16 @@ std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level) {
     return cut;
 }
 
-Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::span<const uint64_t> cut, CastOptions options) {
+Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::span<const uint64_t> cut,
+                                                CastOptions options) {
     ReferenceCaster caster(cache, options);
     const std::vector<PageEntry>& pages = cache.dataset().pages;
     caster.marks_.assign(pages.size(), Mark::None);
     for (const uint64_t page : cut) {
         if (!cache.view(page))
-            return Error{.code = ErrorCode::Usage, .message = "a page of the cut is not loaded", .element = fmt::format("page {}", page)};
+            return Error{.code = ErrorCode::Usage,
+                         .message = "a page of the cut is not loaded",
+                         .element = fmt::format("page {}", page)};
         caster.marks_[page] = Mark::Chosen;
     }
     // Children come after their parents in the directory: backwards, every mark below a page is known.
@@ -342,7 +356,8 @@ Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::spa
         for (int i = 0; i < children; ++i) {
             if (caster.marks_[pages[page].firstChild + i] == Mark::None) continue;
             if (caster.marks_[page] == Mark::Chosen)
-                return Error{.code = ErrorCode::Usage, .message = "the cut names a page and one below it",
+                return Error{.code = ErrorCode::Usage,
+                             .message = "the cut names a page and one below it",
                              .element = fmt::format("page {}", page)};
             caster.marks_[page] = Mark::Above;
         }

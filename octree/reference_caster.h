@@ -66,24 +66,24 @@ private:
 std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level);
 
 struct Ray {
-    glm::dvec3 origin{0};        ///< world
-    glm::dvec3 direction{0};     ///< |direction| = 1
-    double tMin = 0;             ///< world units along the direction
+    glm::dvec3 origin{0};     ///< world
+    glm::dvec3 direction{0};  ///< |direction| = 1
+    double tMin = 0;          ///< world units along the direction
     double tMax = std::numeric_limits<double>::infinity();
 };
 
 struct RayHit {
-    double t = 0;                ///< distance along the ray, world units
-    glm::dvec3 position{0};      ///< world
-    glm::dvec3 normal{0};        ///< unit, world, facing the ray's origin
-    uint64_t page = 0;           ///< number in the directory
+    double t = 0;            ///< distance along the ray, world units
+    glm::dvec3 position{0};  ///< world
+    glm::dvec3 normal{0};    ///< unit, world, facing the ray's origin
+    uint64_t page = 0;       ///< number in the directory
     uint32_t level = 0;
-    uint32_t node = 0;           ///< the leaf's node word; nodeType(node) is kNodeSoft or kNodeHard
-    uint32_t triangle = 0;       ///< of a hard leaf: its record's number in the page
-    bool onWall = false;         ///< accepted by the wall tolerance, not by a crossing
-    glm::dvec3 leafMin{0};       ///< the leaf's lowest corner, in cells from the page's
-    double leafEdge = 0;         ///< in cells
-    double certifiedError = 0;   ///< of the page, world units
+    uint32_t node = 0;          ///< the leaf's node word; nodeType(node) is kNodeSoft or kNodeHard
+    uint32_t triangle = 0;      ///< of a hard leaf: its record's number in the page
+    bool onWall = false;        ///< accepted by the wall tolerance, not by a crossing
+    glm::dvec3 leafMin{0};      ///< the leaf's lowest corner, in cells from the page's
+    double leafEdge = 0;        ///< in cells
+    double certifiedError = 0;  ///< of the page, world units
 };
 
 /// Exact counts of the work of rays; add up over calls.

@@ -147,9 +147,10 @@ Result<std::vector<uint4>> readStored(const ByteReader& reader, std::string elem
     std::vector<std::byte> packed(stored);
     VCP_TRY(reader.read(offset, packed));
     if (hashBytes(packed) != hash) return broken(reader, element, offset, "hash does not match: the page was changed or damaged");
+    const auto wrongSize = [&] { return broken(reader, element, offset, "page does not decompress to its size"); };
+    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes) return wrongSize();
     std::vector<uint4> out(bytes / 16);
-    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes || ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes)
-        return broken(reader, element, offset, "page does not decompress to its size");
+    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes) return wrongSize();
     return out;
 }
 

@@ -13,6 +13,9 @@ namespace {
 
 glm::vec4 toVec4(glm::dvec3 v) { return glm::vec4(glm::vec3(v), 0); }
 
+/// For the screen: a plain power, as in shade.comp.
+glm::vec4 encoded(glm::vec3 linear) { return glm::vec4(glm::pow(glm::max(linear, 0.0f), glm::vec3(1 / 2.2f)), 0); }
+
 frame::uint shadingMode(ShadingMode mode) {
     switch (mode) {
         case ShadingMode::Lit: return frame::kShadeLit;
@@ -74,9 +77,9 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     const glm::dvec3 light = glm::normalize(glm::dvec3(s.lightDirection));
     c.lightDirection = toVec4(s.lightFollowsCamera ? basis.right * light.x + basis.up * light.y - basis.forward * light.z : light);
     c.upDirection = toVec4(s.lightFollowsCamera ? basis.up : glm::normalize(request.camera.up));
-    c.clay = glm::vec4(s.clay, 0);
-    c.backgroundTop = glm::vec4(s.backgroundTop, 0);
-    c.backgroundBottom = glm::vec4(s.backgroundBottom, 0);
+    c.clay = encoded(s.clay);
+    c.backgroundTop = encoded(s.backgroundTop);
+    c.backgroundBottom = encoded(s.backgroundBottom);
     return c;
 }
 

@@ -346,11 +346,11 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
     return std::optional<PixelHit>(hit);
 }
 
-Result<void> Renderer::present(uint32_t width, uint32_t height) {
+Result<void> Renderer::present(uint32_t width, uint32_t height, const Picture* overlay) {
     State& s = *state_;
     if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
     if (!s.drawn) return {};
-    return s.swapchain->show(s.resources->picture(), s.resources->size(), {width, height});
+    return s.swapchain->show(s.resources->picture(), s.resources->size(), {width, height}, overlay);
 }
 
 }  // namespace vcp

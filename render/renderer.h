@@ -108,6 +108,7 @@ struct UpdateResult {
     uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
+    uint32_t coarsestLevel = 0, finestLevel = 0;  ///< of the pages in the cut
     std::vector<Error> problems;  ///< pages that cannot be read; each is reported once
 };
 
@@ -165,8 +166,9 @@ public:
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.
-    /// Precondition: options.surface. Errors: Device.
-    Result<void> present(uint32_t width, uint32_t height);
+    /// `overlay`, opaque and in shades of grey, lies unscaled over the window's lower left corner; what
+    /// does not fit is cut off. Precondition: options.surface. Errors: Device.
+    Result<void> present(uint32_t width, uint32_t height, const Picture* overlay = nullptr);
 
     /// Validation messages (warnings and errors) since create(); always empty without options.validation.
     [[nodiscard]] std::vector<std::string> validationMessages() const;

@@ -81,6 +81,12 @@ Result<UpdateResult> Residency::update(const SelectionView& view) {
     result.bytesRead = loader_->bytesRead();
     result.pagesResident = static_cast<uint32_t>(slots_.size());
     result.pagesInCut = static_cast<uint32_t>(cut_.size());
+    if (!cut_.empty()) {
+        // Pages are numbered level by level, coarsest first.
+        const auto [first, last] = std::minmax_element(cut_.begin(), cut_.end());
+        result.coarsestLevel = dataset_->pages[*first].level;
+        result.finestLevel = dataset_->pages[*last].level;
+    }
     result.pagesWanted = static_cast<uint32_t>(selection.wanted.size());
     return result;
 }

@@ -1,6 +1,7 @@
 #include "render/swapchain.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "render/vulkan/check.h"
 
@@ -129,10 +130,35 @@ void Swapchain::record(VkCommandBuffer commands, const Buffer& picture, VkImage 
                            {{0, 0, 0}, farCorner(extent_.width, extent_.height)}};
     const bool same = pictureSize_.width == extent_.width && pictureSize_.height == extent_.height;
     vkCmdBlitImage(commands, pictureImage_, kFrom, target, kTo, 1, &blit, same ? VK_FILTER_NEAREST : VK_FILTER_LINEAR);
+    recordOverlay(commands, target);
     changeLayout(commands, target, kTo, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_ACCESS_TRANSFER_WRITE_BIT, 0);
 }
 
-Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window) {
+Result<void> Swapchain::takeOverlay(const Picture* overlay) {
+    overlaySize_ = {};
+    if (!overlay || overlay->rgba.empty()) return {};
+    const uint64_t bytes = overlay->rgba.size();
+    if (overlay_.bytes() < bytes) {
+        auto buffer = device_.createBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
+        if (!buffer) return buffer.error();
+        overlay_ = std::move(*buffer);
+    }
+    // Greys look the same whichever channel comes first in the window's format.
+    std::memcpy(overlay_.mapped(), overlay->rgba.data(), bytes);
+    overlaySize_ = {overlay->width, overlay->height};
+    return {};
+}
+
+void Swapchain::recordOverlay(VkCommandBuffer commands, VkImage target) const {
+    constexpr VkImageLayout kTo = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+    const uint32_t width = std::min(overlaySize_.width, extent_.width), height = std::min(overlaySize_.height, extent_.height);
+    if (width == 0 || height == 0) return;
+    changeLayout(commands, target, kTo, kTo, VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+    const VkBufferImageCopy copy{0, overlaySize_.width, overlaySize_.height, kLayer, {0, static_cast<int32_t>(extent_.height - height), 0}, {width, height, 1}};
+    vkCmdCopyBufferToImage(commands, overlay_.handle(), target, kTo, 1, &copy);
+}
+
+Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const Picture* overlay) {
     if (window.width == 0 || window.height == 0) return {};
     if (swapchain_ == VK_NULL_HANDLE || window != window_) VCP_TRY(recreate(window));
     uint32_t image = 0;
@@ -146,6 +172,7 @@ Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, Pic
     if (acquired == VK_ERROR_OUT_OF_DATE_KHR) return {};
     if (acquired != VK_SUCCESS && acquired != VK_SUBOPTIMAL_KHR) return vulkanError("vkAcquireNextImageKHR", acquired);
     VCP_TRY(makePictureImage(pictureSize));
+    VCP_TRY(takeOverlay(overlay));
     auto commands = device_.beginCommands();
     if (!commands) return commands.error();
     record(*commands, picture, images_[image]);

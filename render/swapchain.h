@@ -18,9 +18,10 @@ public:
     Swapchain(const Swapchain&) = delete;
     Swapchain& operator=(const Swapchain&) = delete;
 
-    /// Shows an RGBA8 picture, scaled to the window's framebuffer; waits until it is handed over. Does
-    /// nothing where the framebuffer has no area. Errors: Device.
-    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window);
+    /// Shows an RGBA8 picture, scaled to the window's framebuffer, and over its lower left corner, unscaled,
+    /// `overlay`, if there is one (see Renderer::present); waits until it is handed over. Does nothing where
+    /// the framebuffer has no area. Errors: Device.
+    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const Picture* overlay = nullptr);
 
 private:
     Result<void> recreate(PictureSize window);
@@ -28,7 +29,9 @@ private:
     void destroySwapchain();
     void destroyAfterResize();
     void destroyPictureImage();
+    Result<void> takeOverlay(const Picture* overlay);
     void record(VkCommandBuffer commands, const Buffer& picture, VkImage target) const;
+    void recordOverlay(VkCommandBuffer commands, VkImage target) const;
 
     VkInstance instance_;
     Device& device_;
@@ -42,6 +45,8 @@ private:
     VkImage pictureImage_ = VK_NULL_HANDLE;  // the picture, as something that can be scaled
     VkDeviceMemory pictureMemory_ = VK_NULL_HANDLE;
     PictureSize pictureSize_;
+    Buffer overlay_;
+    PictureSize overlaySize_;  // without area: there is none
 };
 
 }  // namespace vcp

@@ -14,7 +14,8 @@ namespace vcp {
 
 namespace {
 
-Result<BenchBuildRow> runModel(const BenchBuildOptions& options, const std::filesystem::path& model, const std::filesystem::path& folder,
+Result<BenchBuildRow> runModel(const BenchBuildOptions& options, const std::filesystem::path& model,
+                               const std::filesystem::path& folder,
                                const std::function<Result<void>(const std::string&, double)>& report) {
     BenchBuildRow row;
     row.model = model.stem().string();
@@ -55,15 +56,21 @@ Result<BenchBuildRow> runModel(const BenchBuildOptions& options, const std::file
 Result<BenchBuildReport> benchBuild(const BenchBuildOptions& options) {
     if (options.models.empty()) return Error{.code = ErrorCode::Usage, .message = "no model to measure"};
     const bool temporary = options.out.empty();
-    const auto folder = temporary ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : options.out;
+    const auto folder =
+        temporary ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : options.out;
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
-    if (failed) return Error{.code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = folder.string()};
+    if (failed)
+        return Error{.code = ErrorCode::Io,
+                     .message = "the folder cannot be made: " + failed.message(),
+                     .file = folder.string()};
     BenchBuildReport result;
     Result<void> outcome;
     for (size_t i = 0; i < options.models.size() && outcome; ++i) {
         const auto report = [&](const std::string& what, double fraction) -> Result<void> {
-            if (!options.progress || options.progress(what, (static_cast<double>(i) + fraction) / static_cast<double>(options.models.size()))) return {};
+            if (!options.progress || options.progress(what, (static_cast<double>(i) + fraction) /
+                                                                static_cast<double>(options.models.size())))
+                return {};
             return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         };
         auto row = runModel(options, options.models[i], folder, report);

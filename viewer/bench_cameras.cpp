@@ -22,7 +22,8 @@ glm::dvec3 viewDirection(int view, int views) {
 
 /// A point of the mesh about the middle of what is seen from that side.
 glm::dvec3 surfacePoint(const MeshBvh& mesh, glm::dvec3 centre, double radius, glm::dvec3 back, int view) {
-    const glm::dvec3 side = glm::normalize(glm::cross(back, std::abs(back.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0)));
+    const glm::dvec3 side =
+        glm::normalize(glm::cross(back, std::abs(back.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0)));
     const glm::dvec3 from = centre + 3 * radius * back + side * (0.1 * radius * (view % 3 - 1));
     const auto hit = mesh.nearestHit(from, -back);
     if (hit) return from - hit->t * back;
@@ -37,7 +38,8 @@ const std::vector<std::string>& benchCameraNames() {
     return names;
 }
 
-std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, double cell, glm::ivec2 size, int view, int views) {
+std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, double cell, glm::ivec2 size, int view,
+                                  int views) {
     const auto& names = benchCameraNames();
     if (std::find(names.begin(), names.end(), name) == names.end()) return {};
     const glm::dvec3 back = viewDirection(view, views);

@@ -26,6 +26,7 @@ const std::vector<std::string>& benchCameraNames();
 
 /// View `view` of `views`, from directions spread evenly over the sphere; view 0 looks along -z.
 /// Nothing for an unknown name.
-std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, double cell, glm::ivec2 size, int view, int views);
+std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, double cell, glm::ivec2 size, int view,
+                                  int views);
 
 }  // namespace vcp

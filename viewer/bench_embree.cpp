@@ -43,12 +43,12 @@ public:
         }
         middle_ = 0.5 * (low + high);
         RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* positions =
-            static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
+        auto* positions = static_cast<float*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
         for (const glm::dvec3& p : mesh.positions)
             for (int axis = 0; axis < 3; ++axis) *positions++ = static_cast<float>(p[axis] - middle_[axis]);
-        auto* indices =
-            static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
+        auto* indices = static_cast<uint32_t*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
         for (const auto& triangle : mesh.triangles)
             for (const uint32_t vertex : triangle) *indices++ = vertex;
         rtcCommitGeometry(geometry);
@@ -125,7 +125,8 @@ void traceTile(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x
         if (!valid[k]) continue;
         FloatHit& hit = out[static_cast<size_t>(y + k / kTileWidth) * size.x + x + k % kTileWidth];
         hit = {};
-        if (r.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID) hit = {r.ray.tfar[k], {r.hit.Ng_x[k], r.hit.Ng_y[k], r.hit.Ng_z[k]}};
+        if (r.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
+            hit = {r.ray.tfar[k], {r.hit.Ng_x[k], r.hit.Ng_y[k], r.hit.Ng_z[k]}};
     }
 }
 
@@ -147,7 +148,8 @@ void traceOne(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x,
 
 class EmbreeTracer final : public RayTracer {
 public:
-    EmbreeTracer(const IndexedMesh& mesh, bool packets, unsigned threads) : scene_(mesh, threads), packets_(packets), threads_(threads) {}
+    EmbreeTracer(const IndexedMesh& mesh, bool packets, unsigned threads)
+        : scene_(mesh, threads), packets_(packets), threads_(threads) {}
 
     [[nodiscard]] std::string device() const override { return "CPU, Embree " RTC_VERSION_STRING; }
     [[nodiscard]] uint64_t bytes() const override { return scene_.bytes(); }
@@ -180,7 +182,8 @@ private:
         const int height = packets_ ? kTileHeight : 1;
         forEachRow((size.y + height - 1) / height, threads_, [&](int row) {
             if (packets_)
-                for (int x = 0; x < size.x; x += kTileWidth) traceTile(scene_.scene(), rays, size, x, row * height, hits);
+                for (int x = 0; x < size.x; x += kTileWidth)
+                    traceTile(scene_.scene(), rays, size, x, row * height, hits);
             else
                 for (int x = 0; x < size.x; ++x) traceOne(scene_.scene(), rays, size, x, row, hits);
         });
@@ -195,7 +198,9 @@ private:
 
 Error noEmbree() {
     return {.code = ErrorCode::Usage,
-            .message = "this build has no Embree to measure against; install libembree-dev and configure again, or choose other --methods"};
+            .message =
+                "this build has no Embree to measure against; install libembree-dev and configure again, or choose "
+                "other --methods"};
 }
 
 #endif
@@ -208,7 +213,9 @@ Result<std::unique_ptr<RayTracer>> makeEmbreeTracer(const IndexedMesh& mesh, boo
     return std::unique_ptr<RayTracer>(std::make_unique<EmbreeTracer>(mesh, packets, threads));
 }
 
-Result<double> timeEmbreeBuild(const IndexedMesh& mesh, unsigned threads) { return EmbreeScene(mesh, threads).buildSeconds(); }
+Result<double> timeEmbreeBuild(const IndexedMesh& mesh, unsigned threads) {
+    return EmbreeScene(mesh, threads).buildSeconds();
+}
 
 #else
 

@@ -20,7 +20,8 @@ const std::vector<std::string> kMethods = {"certified", "reference", "embree", "
 class BenchFolder {
 public:
     explicit BenchFolder(const std::filesystem::path& wanted)
-        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : wanted),
+        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid())
+                               : wanted),
           temporary_(wanted.empty()) {}
     ~BenchFolder() {
         std::error_code ignored;
@@ -32,7 +33,10 @@ public:
     Result<void> make() const {
         std::error_code failed;
         std::filesystem::create_directories(path_, failed);
-        if (failed) return Error{.code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = path_.string()};
+        if (failed)
+            return Error{.code = ErrorCode::Io,
+                         .message = "the folder cannot be made: " + failed.message(),
+                         .file = path_.string()};
         return {};
     }
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -58,7 +62,9 @@ Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesy
         mesh.replace_extension(extension);
         if (std::filesystem::exists(mesh)) return ModelFiles{mesh, model, model.stem().string()};
     }
-    return Error{.code = ErrorCode::Usage, .message = "no mesh of the same name lies beside it (.ply, .obj, .stl)", .file = model.string()};
+    return Error{.code = ErrorCode::Usage,
+                 .message = "no mesh of the same name lies beside it (.ply, .obj, .stl)",
+                 .file = model.string()};
 }
 
 /// Everything about one model that the methods share.
@@ -92,11 +98,15 @@ private:
     Result<void> checkNames() const {
         for (const std::string& method : options_.methods)
             if (std::find(kMethods.begin(), kMethods.end(), method) == kMethods.end())
-                return Error{.code = ErrorCode::Usage, .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(kMethods, ", "))};
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(kMethods, ", "))};
         const auto& cameras = benchCameraNames();
         for (const std::string& camera : options_.cameras)
             if (std::find(cameras.begin(), cameras.end(), camera) == cameras.end())
-                return Error{.code = ErrorCode::Usage, .message = fmt::format("unknown camera \"{}\"; there are {}", camera, fmt::join(cameras, ", "))};
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = fmt::format("unknown camera \"{}\"; there are {}", camera, fmt::join(cameras, ", "))};
         if (options_.models.empty()) return Error{.code = ErrorCode::Usage, .message = "no model to measure"};
         return {};
     }
@@ -163,7 +173,8 @@ private:
         return makeEmbreeTracer(model.mesh, method == "embree", options_.threads);
     }
 
-    Result<void> runCamera(const BenchModel& model, const std::string& method, const std::string& name, RayTracer& tracer, RayTracer* peer) {
+    Result<void> runCamera(const BenchModel& model, const std::string& method, const std::string& name,
+                           RayTracer& tracer, RayTracer* peer) {
         const FileHeader& header = model.cache->dataset().header;
         BenchRaysRow row;
         row.model = model.files.name;
@@ -195,7 +206,8 @@ private:
         return {};
     }
 
-    void judge(const BenchModel& model, const Camera& camera, const TracedPicture& traced, RayClassTable& classes) const {
+    void judge(const BenchModel& model, const Camera& camera, const TracedPicture& traced,
+               RayClassTable& classes) const {
         // Of a picture with coarser pages, what is excused near silhouettes is the largest error allowed.
         double error = model.cache->dataset().header.certifiedErrorMax;
         for (const auto& hit : traced.hits)
@@ -207,8 +219,10 @@ private:
             RayClassTable mine;
             const int y = row * every;
             for (int x = 0; x < options_.size.x; x += every) {
-                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(options_.size.x), static_cast<uint32_t>(options_.size.y), x + 0.5, y + 0.5);
-                mine.add(judge.judge(ray.origin, ray.direction, traced.hits[static_cast<size_t>(y) * options_.size.x + x]));
+                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(options_.size.x),
+                                                static_cast<uint32_t>(options_.size.y), x + 0.5, y + 0.5);
+                mine.add(
+                    judge.judge(ray.origin, ray.direction, traced.hits[static_cast<size_t>(y) * options_.size.x + x]));
             }
             const std::lock_guard lock(mutex);
             classes.merge(mine);

@@ -24,13 +24,13 @@ struct BenchRaysOptions {
     std::vector<std::string> methods;           ///< empty: all that this build has
     std::vector<std::string> cameras = {"whole", "half", "close", "cells"};
     glm::ivec2 size{1920, 1200};
-    int views = 1;          ///< directions each camera looks from, spread over the sphere; 8 for a survey
+    int views = 1;  ///< directions each camera looks from, spread over the sphere; 8 for a survey
     int repetitions = 5;
-    unsigned threads = 0;   ///< of Embree and the measurement; 0: one a processor
-    std::string device;     ///< of `certified`, as for --device; empty: the best
+    unsigned threads = 0;       ///< of Embree and the measurement; 0: one a processor
+    std::string device;         ///< of `certified`, as for --device; empty: the best
     std::filesystem::path out;  ///< .vcp files are kept here and used again; empty: a temporary folder
-    double cell = 0;        ///< as for vcp build
-    int judgeEvery = 1;     ///< 1: every ray is compared with the mesh; n: every nth row and column
+    double cell = 0;            ///< as for vcp build
+    int judgeEvery = 1;         ///< 1: every ray is compared with the mesh; n: every nth row and column
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
 };

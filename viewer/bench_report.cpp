@@ -14,9 +14,12 @@ using Json = nlohmann::ordered_json;
 Json toJson(const BenchRaysRow& row) {
     const Quantiles distance = row.classes.distanceCells(row.cell), depth = row.classes.depthCells(row.cell);
     const Quantiles normal = row.classes.normalDegrees();
-    Json json = {{"model", row.model}, {"camera", row.camera}, {"method", row.method}, {"knob", row.knob}, {"device", row.device},
-                 {"rays", row.rays}, {"ns_per_ray", row.nsPerRay}, {"ratio_to_embree", row.ratioToEmbree}};
-    for (size_t i = 0; i < kRayClassNames.size(); ++i) json[std::string(kRayClassNames[i])] = row.classes.fraction(static_cast<RayClass>(i));
+    Json json = {{"model", row.model},         {"camera", row.camera},
+                 {"method", row.method},       {"knob", row.knob},
+                 {"device", row.device},       {"rays", row.rays},
+                 {"ns_per_ray", row.nsPerRay}, {"ratio_to_embree", row.ratioToEmbree}};
+    for (size_t i = 0; i < kRayClassNames.size(); ++i)
+        json[std::string(kRayClassNames[i])] = row.classes.fraction(static_cast<RayClass>(i));
     json["p50_cells"] = distance.p50;
     json["p95_cells"] = distance.p95;
     json["p99_cells"] = distance.p99;
@@ -69,12 +72,8 @@ std::string csvOf(const Json& rows) {
     std::string text;
     if (rows.empty()) return text;
     const auto line = [&](const Json& row, bool names) {
-        std::string separator;
-        for (const auto& [name, value] : row.items()) {
-            text += separator + (names ? name : quoted(value));
-            separator = ",";
-        }
-        text += '\n';
+        for (const auto& [name, value] : row.items()) text += (names ? name : quoted(value)) + ',';
+        text.back() = '\n';
     };
     line(rows.front(), true);
     for (const Json& row : rows) line(row, false);
@@ -90,27 +89,34 @@ std::string benchBuildCsv(const BenchBuildReport& report) { return csvOf(rowsOf(
 
 std::string benchRaysMarkdown(const BenchRaysReport& report) {
     std::string text =
-        "| model | camera | method | Mray/s | of Embree | hit % | missed % | false % | wrong sheet % | holes | beyond certified | p50 | p99 | max cells | normal p50 |\n"
+        "| model | camera | method | Mray/s | of Embree | hit % | missed % | false % | wrong sheet % | holes | beyond "
+        "certified | p50 | p99 | max cells | normal p50 |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for (const BenchRaysRow& row : report.rows) {
         const Quantiles distance = row.classes.distanceCells(row.cell);
         const auto percent = [&](RayClass rayClass) { return 100 * row.classes.fraction(rayClass); };
-        text += fmt::format("| {} | {} | {} | {:.2f} | {:.3f} | {:.2f} | {:.5f} | {:.5f} | {:.5f} | {} | {} | {:.5f} | {:.5f} | {:.4f} | {:.1f}\u00b0 |\n",
-                            row.model, row.camera, row.method, 1e3 / row.nsPerRay, row.ratioToEmbree, percent(RayClass::Hit),
-                            percent(RayClass::Missed), percent(RayClass::False), percent(RayClass::WrongSheet), row.classes.holes(),
-                            row.classes.tooFar(), distance.p50, distance.p99, distance.max, row.classes.normalDegrees().p50);
+        text += fmt::format(
+            "| {} | {} | {} | {:.2f} | {:.3f} | {:.2f} | {:.5f} | {:.5f} | {:.5f} | {} | {} | {:.5f} | {:.5f} | {:.4f} "
+            "| {:.1f}\u00b0 |\n",
+            row.model, row.camera, row.method, 1e3 / row.nsPerRay, row.ratioToEmbree, percent(RayClass::Hit),
+            percent(RayClass::Missed), percent(RayClass::False), percent(RayClass::WrongSheet), row.classes.holes(),
+            row.classes.tooFar(), distance.p50, distance.p99, distance.max, row.classes.normalDegrees().p50);
     }
     return text;
 }
 
 std::string benchBuildMarkdown(const BenchBuildReport& report) {
-    std::string text = "| model | triangles | seconds | M triangles/s | peak MB | file MB | bytes a triangle | Embree BVH s | of Embree |\n"
-                       "|---|---|---|---|---|---|---|---|---|\n";
+    std::string text =
+        "| model | triangles | seconds | M triangles/s | peak MB | file MB | bytes a triangle | Embree BVH s | of "
+        "Embree |\n"
+        "|---|---|---|---|---|---|---|---|---|\n";
     for (const BenchBuildRow& row : report.rows)
-        text += fmt::format("| {} | {} | {:.2f} | {:.3f} | {:.0f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} |\n", row.model, row.triangles, row.seconds,
-                            row.trianglesPerSecond * 1e-6, static_cast<double>(row.peakRssBytes) * 1e-6, static_cast<double>(row.fileBytes) * 1e-6,
-                            static_cast<double>(row.fileBytes) / static_cast<double>(std::max<uint64_t>(row.triangles, 1)), row.embreeBvhSeconds,
-                            row.ratioToEmbree);
+        text +=
+            fmt::format("| {} | {} | {:.2f} | {:.3f} | {:.0f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} |\n", row.model,
+                        row.triangles, row.seconds, row.trianglesPerSecond * 1e-6,
+                        static_cast<double>(row.peakRssBytes) * 1e-6, static_cast<double>(row.fileBytes) * 1e-6,
+                        static_cast<double>(row.fileBytes) / static_cast<double>(std::max<uint64_t>(row.triangles, 1)),
+                        row.embreeBvhSeconds, row.ratioToEmbree);
     return text;
 }
 

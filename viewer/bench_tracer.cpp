@@ -31,9 +31,12 @@ public:
         forEachRow(size.y, threads_, [&](int y) {
             CastCounters counters;
             for (int x = 0; x < size.x; ++x) {
-                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, y + 0.5);
+                const CameraRay ray =
+                    cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, y + 0.5);
                 const auto hit = caster_.cast({ray.origin, ray.direction}, &counters);
-                if (hit) picture.hits[static_cast<size_t>(y) * size.x + x] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
+                if (hit)
+                    picture.hits[static_cast<size_t>(y) * size.x + x] =
+                        SurfaceHit{hit->t, hit->normal, hit->certifiedError};
             }
             const std::lock_guard lock(mutex);
             sum.nodes += counters.nodes;
@@ -90,7 +93,8 @@ private:
         if (!normals) return normals.error();
         // A coarser page's error projects to at most errorPixels where the page is nearest: no more than this
         // many world units at the hit.
-        const double perPixel = 2 * cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y)).halfHeight / size.y;
+        const double perPixel =
+            2 * cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y)).halfHeight / size.y;
         picture.hits.resize(depth->size());
         for (size_t i = 0; i < depth->size(); ++i) {
             const double t = (*depth)[i];
@@ -136,7 +140,8 @@ Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::pa
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(shared, std::make_shared<FilePageSource>(*reader, shared)));
-    return std::unique_ptr<RayTracer>(std::make_unique<CertifiedTracer>(std::move(*renderer), shared->header.certifiedErrorMax));
+    return std::unique_ptr<RayTracer>(
+        std::make_unique<CertifiedTracer>(std::move(*renderer), shared->header.certifiedErrorMax));
 }
 
 void forEachRow(int rows, unsigned threads, const std::function<void(int)>& work) {

@@ -21,7 +21,7 @@ namespace vcp {
 /// One camera's picture by one method. Pixel (x, y) is ray y * width + x, through the pixel's centre.
 struct TracedPicture {
     std::vector<std::optional<SurfaceHit>> hits;
-    double seconds = 0;  ///< median of the repetitions
+    double seconds = 0;                     ///< median of the repetitions
     double stepsMean = 0, fetchesMean = 0;  ///< a ray; 0 where the method does not count
 };
 

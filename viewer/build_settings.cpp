@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include "viewer/build_settings.h"
 
 #include <algorithm>
@@ -36,8 +37,9 @@ void addBuildSettings(CLI::App& app, BuildSettings& settings) {
     app.add_option("--cell", settings.cell, "Edge of the finest cells, world units [chosen from the mesh]")
         ->type_name("LENGTH")
         ->check(absoluteLengthCheck());
-    app.add_option("--error", settings.error, "Tolerated distance to the mesh: world units, or a part of the bounding "
-                                              "box's diagonal like 0.01% [0.04 cells]")
+    app.add_option("--error", settings.error,
+                   fmt::format("Tolerated distance to the mesh: world units, or a part of the bounding box's diagonal like "
+                               "0.01% [{:g} cells]", kDefaultErrorCells))
         ->type_name("LENGTH")
         ->check(lengthCheck());
     app.add_option("--colour,--color", settings.colour, "Colour to keep: auto, vertex or none")

@@ -14,7 +14,7 @@ void addProgressOption(CLI::App& app, ReportOptions& options) {
     app.add_option("--progress", options.progress, "Progress on stderr: bar, plain, json or none [a bar on a terminal]")
         ->type_name("STYLE")
         ->check([](const std::string& name) {
-            return progressStyleNamed(name) ? std::string() : "must be bar, plain, json or none";
+            return progressStyleNamed(name) ? std::string() : "must be bar, plain, json or none, not \"" + name + "\"";
         });
 }
 

@@ -67,7 +67,7 @@ int runParsed(const CLI::App& vcp, const std::vector<Command>& commands) {
 int runCommandLine(int argc, char** argv) {
     CLI::App vcp("Views massive scans: builds meshes into octrees of vectors to the closest point, and ray-casts them.",
                  "vcp");
-    vcp.require_subcommand(1);
+    vcp.require_subcommand(0, 1);
     vcp.set_version_flag("--version", "vcp " VCP_VERSION);
     vcp.get_formatter()->column_width(28);
     vcp.footer("`vcp help CMD` says how a command is used.");
@@ -82,6 +82,7 @@ int runCommandLine(int argc, char** argv) {
     } catch (const CLI::ParseError& wrong) {
         return complainOfUsage(vcp, wrong.what());
     }
+    if (vcp.get_subcommands().empty()) return complainOfUsage(vcp, "a command is needed");
     return runParsed(vcp, commands);
 }
 

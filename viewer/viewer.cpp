@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -38,10 +39,12 @@ std::string statusLine(const ViewerStatus& status) {
     std::string line;
     if (!status.problem.empty()) line += "! " + status.problem + " | ";
     line += fmt::format("{} | {} triangles | ", status.name, formatCount(status.triangles));
-    if (status.update.drawable)
-        line += fmt::format("{} subvolumes, error {:.2g} px | {} of {}", status.update.pagesInCut,
-                            status.update.errorPixels, formatBytes(status.update.residentBytes),
-                            formatBytes(status.budgetBytes));
+    if (status.update.drawable) {
+        const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
+        line += coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
+        line += fmt::format(" (finest {}) | error {:.2g} px | {} of {}", status.levels - 1, status.update.errorPixels,
+                            formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes));
+    }
     if (status.reduction > 1) line += fmt::format(" | 1/{} size", status.reduction);
     line += fmt::format(" | {:.0f} ms | {}{} | {}", status.frame.msFrame, status.device,
                         status.software ? " (software)" : "", status.update.settled ? "settled" : "loading");
@@ -73,6 +76,7 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
     drag_ = Drag::None;
     status_.name = std::move(name);
     status_.triangles = header.triangles;
+    status_.levels = header.levels;
     status_.update = {};
     status_.problem.clear();
     return {};

@@ -63,6 +63,7 @@ struct NextStep {
 struct ViewerStatus {
     std::string name;
     uint64_t triangles = 0;
+    uint32_t levels = 0;
     UpdateResult update;
     FrameStats frame;      ///< of the last draw()
     int reduction = 1;     ///< the last picture has 1/reduction of the width and height

@@ -18,6 +18,7 @@ layout(constant_id = 4) const uint kCountSteps = 0u;
 layout(set = 0, binding = 0, std140) uniform FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1) uniform utextureBuffer poolTexels[kMaxPoolChunks];
 layout(set = 0, binding = 2, std430) readonly buffer PoolBlock { uvec4 texels[]; } poolBlock[kMaxPoolChunks];
+layout(set = 0, binding = 2, std430) readonly buffer PoolWordBlock { uint words[]; } poolWordBlock[kMaxPoolChunks];
 layout(set = 0, binding = 3) uniform utextureBuffer colourTexels[kMaxPoolChunks];
 layout(set = 0, binding = 4, std430) readonly buffer ColourBlock { uvec4 texels[]; } colourBlock[kMaxPoolChunks];
 layout(set = 0, binding = 5) uniform utextureBuffer tableTexels;
@@ -80,6 +81,21 @@ uint texelWord(uvec4 texel, uint i) {
     uint lo = (i & 1u) == 0u ? texel.x : texel.y;
     uint hi = (i & 1u) == 0u ? texel.z : texel.w;
     return (i & 2u) == 0u ? lo : hi;
+}
+
+// One word of the pool: word `i` of the texels from `texel` on. Storage buffers need not read the other three.
+uint fetchWord(uint texel, uint i) {
+    if (kTexelAccess == 1u) return texelWord(fetchTexel(texel + (i >> 2)), i & 3u);
+    uint offset = ((texel & ((1u << kChunkShift) - 1u)) << 2) + i;
+    uint chunk = texel >> kChunkShift;
+    if (kPoolChunks == 1u || chunk == 0u) return poolWordBlock[0].words[offset];
+    if (chunk == 1u) return poolWordBlock[1].words[offset];
+    if (chunk == 2u) return poolWordBlock[2].words[offset];
+    if (chunk == 3u) return poolWordBlock[3].words[offset];
+    if (chunk == 4u) return poolWordBlock[4].words[offset];
+    if (chunk == 5u) return poolWordBlock[5].words[offset];
+    if (chunk == 6u) return poolWordBlock[6].words[offset];
+    return poolWordBlock[7].words[offset];
 }
 
 // The two words of a record of 8 bytes.

@@ -36,17 +36,20 @@ uint octantAt(ivec3 place, int bit) {
 }
 
 // Follows internal nodes down to the leaf or empty node at `subcell`. `steps` counts fetches.
+// What is loaded must reach the code after a loop by way of the loop's condition: devices that run rays in
+// lock step may load 0 for a ray that has left the loop (seen with storage buffers, Mesa 22.3).
 void descend(inout Descent at, uint nodesTexel, uint rootOnly, uint root, ivec3 subcell, inout uint steps) {
-    while (true) {
-        uint octant = octantAt(subcell, at.bits - 1);
-        uint node = texelWord(fetchTexel(at.group + (octant >> 2)), octant & 3u);
+    at.node = kNodeInternal << kNodeTypeShift;
+    while (at.node >> kNodeTypeShift == kNodeInternal) {
+        uint node = fetchWord(at.group, octantAt(subcell, at.bits - 1));
         at.node = rootOnly != 0u ? root : node;
         steps++;
-        if (at.node >> kNodeTypeShift != kNodeInternal) return;
-        at.grandparent = at.parent;
-        at.parent = at.group;
-        at.group = nodesTexel + 2u * (at.node & kNodePayloadMask);
-        at.bits--;
+        if (at.node >> kNodeTypeShift == kNodeInternal) {
+            at.grandparent = at.parent;
+            at.parent = at.group;
+            at.group = nodesTexel + 2u * (at.node & kNodePayloadMask);
+            at.bits--;
+        }
     }
 }
 

@@ -15,20 +15,15 @@ vec3 unpackHitNormal(uint code) {
     return n * inversesqrt(dot(n, n));
 }
 
-// The sRGB curve within 1/255, without a power.
-vec3 encodeSrgb(vec3 linear) {
-    vec3 c = clamp(linear, 0.0, 1.0);
-    vec3 s1 = sqrt(c), s2 = sqrt(s1), s3 = sqrt(s2);
-    return mix(0.585122381 * s1 + 0.783140355 * s2 - 0.368262736 * s3, 12.92 * c, lessThan(c, vec3(0.0031308)));
-}
-
 // Blue through green to red.
 vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
-vec3 lit(vec3 albedo, vec3 n) {
+// Light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
+// colours come encoded, so that one power a pixel is enough.
+float encodedLight(vec3 n) {
     float sun = max(dot(n, frame.lightDirection.xyz), 0.0);
     float sky = 0.5 + 0.5 * dot(n, frame.upDirection.xyz);
-    return albedo * (0.75 * sun + mix(0.12, 0.32, sky));
+    return pow(0.72 * sun + 0.10 + 0.18 * sky, 1.0 / 2.2);
 }
 
 void main() {
@@ -47,12 +42,8 @@ void main() {
     } else if (found) {
         vec3 n = unpackHitNormal(code);
         vec3 albedo = frame.clay.xyz;
-        if (kColour != 0u && frame.mode.w == kShadeLit) {
-            // Vertex colours are sRGB; their square is close enough to linear.
-            vec3 c = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
-            albedo = c * c;
-        }
-        colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5 : lit(albedo, n);
+        if (kColour != 0u && frame.mode.w == kShadeLit) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
+        colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5 : albedo * encodedLight(n);
     }
-    picturePixels[at] = packUnorm4x8(vec4(encodeSrgb(colour), 1.0));
+    picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

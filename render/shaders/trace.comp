@@ -54,20 +54,26 @@ bool outsideRoot(ivec3 p) { return ((p.x | p.y | p.z) >> kLatticeBits) != 0; }
 // leaves the root.
 bool findPage(Ray ray, inout ivec3 place, inout float s, out Page page, inout uint steps) {
     uint node = 0u;
-    uvec4 record;
-    page.bits = int(kLatticeBits);
+    uvec4 record = uvec4(0u);
     bool inside = true;
-    while (inside) {
-        record = fetchTable(node * kRecordTexels);
-        steps++;
-        if ((record.x & kRecordInCut) != 0u) break;
-        page.bits--;
-        uint octant = octantAt(place, page.bits);
-        node = record.y + bitCount(record.x & ((1u << octant) - 1u));
-        if ((record.x >> octant & 1u) == 0u) {
+    while (inside && (record.x & kRecordInCut) == 0u) {
+        // Down to a page of the cut or an octant without one.
+        node = 0u;
+        page.bits = int(kLatticeBits);
+        bool exists = true;
+        record.x = 0u;
+        while (exists && (record.x & kRecordInCut) == 0u) {
+            record = fetchTable(node * kRecordTexels);
+            steps++;
+            if ((record.x & kRecordInCut) == 0u) {
+                page.bits--;
+                uint octant = octantAt(place, page.bits);
+                exists = (record.x >> octant & 1u) != 0u;
+                node = record.y + bitCount(record.x & ((1u << octant) - 1u));
+            }
+        }
+        if (!exists) {
             place = stepAcross(ray, place >> page.bits << page.bits, page.bits, s);
-            node = 0u;
-            page.bits = int(kLatticeBits);
             inside = !outsideRoot(place);
         }
     }
@@ -166,7 +172,7 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
     vec3 normal = vec3(0.0);
     vec4 colour = vec4(0.0);
     for (int i = 0; i < 3; i++) {
-        uint code = texelWord(fetchTexel(page.sections.w + (corners[i] >> 2)), corners[i] & 3u);
+        uint code = fetchWord(page.sections.w, corners[i]);
         normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : decodeNormal(code));
         if (kColour != 0u)
             colour += w[i] * unpackUnorm4x8(texelWord(fetchColour(page.colours.y + (corners[i] >> 2)), corners[i] & 3u));
@@ -194,38 +200,40 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
     Descent descent = Descent(rootGroup, kNoGroup, kNoGroup, rootBits, page.root);
 
     float found = -1.0;
+    vec3 lo = vec3(0.0), boxLo = vec3(0.0), boxHi = vec3(0.0);  // of the node, and what is to be left of it
+    float edge = 0.0;
+    bool leave = false;
+    LeafSegment segment;
     while (at.inPage && found < 0.0) {
-        vec3 lo;
-        float edge;
-        LeafSegment segment;
-        // Empty nodes and soft leaves, until a hit or a hard leaf.
+        // Soft leaves, until a hit or a hard leaf.
         while (true) {
+            // Empty nodes, until a leaf.
             while (true) {
+                if (leave) {
+                    Place next = leaveBox(local, at, boxLo, boxHi);
+                    ascend(descent, at.subcell, next.subcell, rootGroup, rootBits);
+                    at = next;
+                    if (!at.inPage) break;
+                }
                 descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, steps);
-                lo = vec3(at.subcell >> (descent.bits - 1) << (descent.bits - 1)) / kSubcells;
-                edge = float(1 << (descent.bits - 1)) / kSubcells;
-                if (descent.node >> kNodeTypeShift != kNodeEmpty) break;
-                float clearance = float(descent.node & kNodePayloadMask) / kClearancePerCell;
-                Place next = leaveBox(local, at, max(lo - clearance, vec3(0.0)), min(lo + edge + clearance, vec3(local.cells)));
-                ascend(descent, at.subcell, next.subcell, rootGroup, rootBits);
-                at = next;
-                if (!at.inPage) break;
+                int bits = descent.bits - 1;
+                lo = vec3(at.subcell >> bits << bits) * (1.0 / kSubcells);
+                edge = float(1 << bits) * (1.0 / kSubcells);
+                bool isEmpty = descent.node >> kNodeTypeShift == kNodeEmpty;
+                float clearance = isEmpty ? float(descent.node & kNodePayloadMask) / kClearancePerCell : 0.0;
+                boxLo = max(lo - clearance, vec3(0.0));
+                boxHi = min(lo + (edge + clearance), vec3(local.cells));
+                leave = true;
+                if (!isEmpty) break;
             }
             if (!at.inPage) break;
             segment = segmentInLeaf(local, lo, edge);
             if (descent.node >> kNodeTypeShift == kNodeHard) break;
             found = castSoft(page, descent.node, lo, edge, segment, hit, fetches);
             if (found >= 0.0) break;
-            Place next = leaveBox(local, at, lo, lo + edge);
-            ascend(descent, at.subcell, next.subcell, rootGroup, rootBits);
-            at = next;
-            if (!at.inPage) break;
         }
         if (!at.inPage || found >= 0.0) break;
         found = castHard(page, descent.node, segment, local.direction, hit, fetches);
-        Place next = leaveBox(local, at, lo, lo + edge);
-        ascend(descent, at.subcell, next.subcell, rootGroup, rootBits);
-        at = next;
     }
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
 }

@@ -54,7 +54,8 @@ double searchedDistance(glm::dvec3 p, const std::array<glm::dvec3, 3>& v) {
         double bestA = centreA, bestB = centreB;
         for (int i = -4; i <= 4; ++i)
             for (int j = -4; j <= 4; ++j) {
-                double a = std::clamp(centreA + reach * i / 4, 0.0, 1.0), b = std::clamp(centreB + reach * j / 4, 0.0, 1.0);
+                double a = std::clamp(centreA + reach * i / 4, 0.0, 1.0),
+                       b = std::clamp(centreB + reach * j / 4, 0.0, 1.0);
                 if (a + b > 1) {
                     const double sum = a + b;
                     a /= sum;
@@ -120,7 +121,8 @@ TEST(MeshBvh, RaysAgainstEveryTriangleAlone) {
     for (int i = 0; i < 3000; ++i) {
         // At points of triangles, of which a half are thin.
         const auto v = mesh.corners(points.random() % mesh.triangles.size());
-        const glm::dvec3 o = points.inBox(-1, 2), d = glm::mix(v[0], glm::mix(v[1], v[2], 0.4), points.unit(points.random)) - o;
+        const glm::dvec3 o = points.inBox(-1, 2),
+                         d = glm::mix(v[0], glm::mix(v[1], v[2], 0.4), points.unit(points.random)) - o;
         const auto expected = bruteHit(mesh, o, d);
         const auto found = bvh.nearestHit(o, d);
         ASSERT_EQ(found.has_value(), expected.has_value()) << i;
@@ -207,8 +209,10 @@ public:
     /// Distance, or infinity.
     double cast(glm::dvec3 o, glm::dvec3 d) const {
         RTCRayHit r{};
-        r.ray.org_x = static_cast<float>(o.x), r.ray.org_y = static_cast<float>(o.y), r.ray.org_z = static_cast<float>(o.z);
-        r.ray.dir_x = static_cast<float>(d.x), r.ray.dir_y = static_cast<float>(d.y), r.ray.dir_z = static_cast<float>(d.z);
+        r.ray.org_x = static_cast<float>(o.x), r.ray.org_y = static_cast<float>(o.y),
+        r.ray.org_z = static_cast<float>(o.z);
+        r.ray.dir_x = static_cast<float>(d.x), r.ray.dir_y = static_cast<float>(d.y),
+        r.ray.dir_z = static_cast<float>(d.z);
         r.ray.tfar = std::numeric_limits<float>::infinity();
         r.ray.mask = ~0u;
         r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -231,7 +235,8 @@ bool changesNearby(const MeshBvh& bvh, glm::dvec3 o, glm::dvec3 d, double t, boo
     for (int i = 0; i < 64; ++i) {
         const double a = test::kTwoPi * i / 64;
         for (const double scale : {1.0, 0.3})
-            if (bvh.anyHit(o + scale * move * (std::cos(a) * u + std::sin(a) * v), d, t - slack, t + slack) != hits) return true;
+            if (bvh.anyHit(o + scale * move * (std::cos(a) * u + std::sin(a) * v), d, t - slack, t + slack) != hits)
+                return true;
     }
     return false;
 }

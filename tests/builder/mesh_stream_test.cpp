@@ -39,11 +39,13 @@ protected:
 };
 
 const std::string kObj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-const std::string kStl = "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
-                         "endloop\nendfacet\nendsolid s\n";
-const std::string kPly = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                         "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-                         "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+const std::string kStl =
+    "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    "endloop\nendfacet\nendsolid s\n";
+const std::string kPly =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
 TEST_F(OpenMesh, TellsTheFormatByContentWhateverTheName) {
     const std::map<std::string, std::string> meshes{{"OBJ", kObj}, {"STL ASCII", kStl}, {"PLY ASCII", kPly}};
@@ -93,7 +95,8 @@ std::vector<std::filesystem::path> suiteMeshes() {
     std::error_code absent;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(kData / "suites", absent)) {
         std::string extension = entry.path().extension().string();
-        std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        std::ranges::transform(extension, extension.begin(),
+                               [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
         if (extension == ".ply" || extension == ".obj" || extension == ".stl") meshes.push_back(entry.path());
     }
     std::ranges::sort(meshes);

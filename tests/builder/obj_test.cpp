@@ -13,9 +13,9 @@ ReadMesh read(std::string_view bytes) { return test::readEveryWindow(openObj, by
 const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
 TEST(Obj, ReadsEveryFormOfACorner) {
-    for (const char* face : {"f 1 2 3", "f 1/7 2/8 3/9", "f 1//7 2//8 3//9", "f 1/1/1 2/2/2 3/3/3", "f -4 -3 -2",
-                             "f\t1\t2\t3  ", "  f 1 2 3 # comment", "f 1 2/ 3//", "f +1 +2 +3", "f 1 \\\n 2 \\\r\n3",
-                             "f 1 2\\\n 3", "f 1 2 3\r"}) {
+    for (const char* face :
+         {"f 1 2 3", "f 1/7 2/8 3/9", "f 1//7 2//8 3//9", "f 1/1/1 2/2/2 3/3/3", "f -4 -3 -2", "f\t1\t2\t3  ",
+          "  f 1 2 3 # comment", "f 1 2/ 3//", "f +1 +2 +3", "f 1 \\\n 2 \\\r\n3", "f 1 2\\\n 3", "f 1 2 3\r"}) {
         const ReadMesh mesh = read(kSquare + face);
         ASSERT_FALSE(mesh.error) << face << ": " << mesh.line();
         EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}})) << face;
@@ -30,9 +30,10 @@ TEST(Obj, CutsPolygonsIntoFansAndSkipsThoseWithoutArea) {
 }
 
 TEST(Obj, IgnoresEveryOtherStatement) {
-    const ReadMesh mesh = read("\xEF\xBB\xBF# C:\\models\\\nmtllib a b.mtl\no name\ng f v\ns off\nvt 0 nan\nvn nan nan nan\n"
-                               "vp 1\nusemtl x\nfoo\n\n\n" +
-                               kSquare + "l 1 2 \\\n 3 4\np 1\nf 1 2 3\ncurv 0 1\n");
+    const ReadMesh mesh = read(
+        "\xEF\xBB\xBF# C:\\models\\\nmtllib a b.mtl\no name\ng f v\ns off\nvt 0 nan\nvn nan nan nan\n"
+        "vp 1\nusemtl x\nfoo\n\n\n" +
+        kSquare + "l 1 2 \\\n 3 4\np 1\nf 1 2 3\ncurv 0 1\n");
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.positions.size(), 4u);
     EXPECT_EQ(mesh.triangles.size(), 1u);

@@ -39,14 +39,22 @@ public:
     PlyWriter& value(PlyType type, double value) {
         using enum PlyType;
         switch (type) {
-            case Int8: return put<int8_t>(value);
-            case Uint8: return put<uint8_t>(value);
-            case Int16: return put<int16_t>(value);
-            case Uint16: return put<uint16_t>(value);
-            case Int32: return put<int32_t>(value);
-            case Uint32: return put<uint32_t>(value);
-            case Float32: return put<float>(value);
-            case Float64: return put<double>(value);
+            case Int8:
+                return put<int8_t>(value);
+            case Uint8:
+                return put<uint8_t>(value);
+            case Int16:
+                return put<int16_t>(value);
+            case Uint16:
+                return put<uint16_t>(value);
+            case Int32:
+                return put<int32_t>(value);
+            case Uint32:
+                return put<uint32_t>(value);
+            case Float32:
+                return put<float>(value);
+            case Float64:
+                return put<double>(value);
         }
         return *this;
     }
@@ -186,8 +194,10 @@ TEST(Ply, ReadsFacesBeforeVerticesAndSkipsWhatItDoesNotKnow) {
         ply.values(PlyType::Int32, {0, 1}).row().values(PlyType::Int32, {1, 2}).row();
         for (int v = 0; v < 3; ++v) {
             ply.value(PlyType::Float32, v + 0.5);
-            if (v == 1) ply.list(PlyType::Uint16, PlyType::Float64, {1, 2, 3, 4});
-            else ply.list(PlyType::Uint16, PlyType::Float64, {});
+            if (v == 1)
+                ply.list(PlyType::Uint16, PlyType::Float64, {1, 2, 3, 4});
+            else
+                ply.list(PlyType::Uint16, PlyType::Float64, {});
             ply.values(PlyType::Float32, {v + 1.5, 9, v + 2.5}).row();
         }
         ply.list(PlyType::Uint8, PlyType::Uint8, {65, 66}).row();
@@ -205,12 +215,10 @@ struct ColourCase {
 };
 
 TEST(Ply, ConvertsColoursOfEveryType) {
-    const ColourCase cases[] = {{PlyType::Uint8, {1, 2, 3, 4}, 0x04030201},
-                                {PlyType::Uint16, {0x1FF, 0x2FF, 0xFFFF, 0}, 0x00FF0201},
-                                {PlyType::Float32, {0, 0.5, 1, 2}, 0xFFFF8000},
-                                {PlyType::Float64, {-1, 1.0 / 255, 0.25, 1}, 0xFF400100},
-                                {PlyType::Int32, {-5, 255, 300, 7}, 0x07FFFF00},
-                                {PlyType::Int8, {-5, 127, 0, 1}, 0x01007F00}};
+    const ColourCase cases[] = {
+        {PlyType::Uint8, {1, 2, 3, 4}, 0x04030201},      {PlyType::Uint16, {0x1FF, 0x2FF, 0xFFFF, 0}, 0x00FF0201},
+        {PlyType::Float32, {0, 0.5, 1, 2}, 0xFFFF8000},  {PlyType::Float64, {-1, 1.0 / 255, 0.25, 1}, 0xFF400100},
+        {PlyType::Int32, {-5, 255, 300, 7}, 0x07FFFF00}, {PlyType::Int8, {-5, 127, 0, 1}, 0x01007F00}};
     for (const PlyEncoding encoding : kEncodings)
         for (const ColourCase& c : cases)
             for (const char* prefix : {"", "diffuse_"}) {

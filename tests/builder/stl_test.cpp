@@ -57,13 +57,15 @@ TEST(Stl, ReadsText) {
     const ReadMesh mesh = read(kText);
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.info.format, "STL ASCII");
-    EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{0, 0, 0}, {1, 0, 0}, {0, 1.5, -2}, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));
+    EXPECT_EQ(mesh.positions,
+              (std::vector<glm::dvec3>{{0, 0, 0}, {1, 0, 0}, {0, 1.5, -2}, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 4, 5}}));
 }
 
 TEST(Stl, ReadsTextInAnyCaseWithAnyLineEndAndManySolids) {
     std::string upper;
-    for (const char c : kText) upper += c == '\n' ? std::string("\r\n") : std::string(1, static_cast<char>(std::toupper(c)));
+    for (const char c : kText)
+        upper += c == '\n' ? std::string("\r\n") : std::string(1, static_cast<char>(std::toupper(c)));
     for (size_t at; (at = upper.find("NAN")) != std::string::npos;) upper.replace(at, 3, "nan");
     const ReadMesh mesh = read("\n  " + upper + "solid empty\nendsolid\n" + kText);
     ASSERT_FALSE(mesh.error) << mesh.line();
@@ -130,9 +132,14 @@ TEST(Stl, APositionThatIsNotFiniteNamesFacetVertexAndByte) {
 }
 
 TEST(Stl, WordsThatDoNotBelongAreNamed) {
-    for (const auto& [word, other] : {std::pair{"vertex 4", "vertices 4"}, {"outer loop vertex 1", "vertex 1"},
-                                      {"4 5 6", "4 5"}, {"4 5 6", "4 5 6 7"}, {"4 5 6", "4 5 b"},
-                                      {"endloop endfacet", "endfacet"}, {"endsolid", "end"}, {"solid a", "sold a"}}) {
+    for (const auto& [word, other] : {std::pair{"vertex 4", "vertices 4"},
+                                      {"outer loop vertex 1", "vertex 1"},
+                                      {"4 5 6", "4 5"},
+                                      {"4 5 6", "4 5 6 7"},
+                                      {"4 5 6", "4 5 b"},
+                                      {"endloop endfacet", "endfacet"},
+                                      {"endsolid", "end"},
+                                      {"solid a", "sold a"}}) {
         std::string text = kText;
         text.replace(text.find(word), std::strlen(word), other);
         const ReadMesh mesh = read(text);

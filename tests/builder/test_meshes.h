@@ -81,7 +81,8 @@ inline IndexedMesh boxMesh(glm::dvec3 low, glm::dvec3 high, uint32_t n) {
     IndexedMesh mesh;
     std::map<std::array<uint32_t, 3>, uint32_t> numbers;
     const auto vertex = [&](glm::uvec3 at) {
-        const auto [entry, isNew] = numbers.try_emplace({at.x, at.y, at.z}, static_cast<uint32_t>(mesh.positions.size()));
+        const auto [entry, isNew] =
+            numbers.try_emplace({at.x, at.y, at.z}, static_cast<uint32_t>(mesh.positions.size()));
         if (isNew) mesh.positions.push_back(low + (high - low) * glm::dvec3(at) / double(n));
         return entry->second;
     };
@@ -115,7 +116,8 @@ inline void rotate(IndexedMesh& mesh, glm::dvec3 centre, glm::dvec3 axis, double
     axis = glm::normalize(axis);
     for (glm::dvec3& p : mesh.positions) {
         const glm::dvec3 v = p - centre;
-        p = centre + v * std::cos(angle) + glm::cross(axis, v) * std::sin(angle) + axis * (glm::dot(axis, v) * (1 - std::cos(angle)));
+        p = centre + v * std::cos(angle) + glm::cross(axis, v) * std::sin(angle) +
+            axis * (glm::dot(axis, v) * (1 - std::cos(angle)));
     }
 }
 

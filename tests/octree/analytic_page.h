@@ -20,8 +20,8 @@ namespace vcp::test {
 
 /// A surface with a signed distance, in world space.
 struct SignedDistance {
-    double distance = 0;      ///< negative inside
-    glm::dvec3 outward{0};    ///< unit gradient of the distance
+    double distance = 0;    ///< negative inside
+    glm::dvec3 outward{0};  ///< unit gradient of the distance
 };
 using SignedDistanceField = std::function<SignedDistance(glm::dvec3)>;
 
@@ -56,8 +56,8 @@ struct AnalyticPage {
 // Builds one page; `axis` is the axis along which its leaves share faces.
 class AnalyticPageBuilder {
 public:
-    AnalyticPageBuilder(const SignedDistanceField& field, glm::dvec3 origin, double cell, uint32_t log2Cells, uint32_t axis,
-                        float certifiedErrorCells, uint32_t wallCode)
+    AnalyticPageBuilder(const SignedDistanceField& field, glm::dvec3 origin, double cell, uint32_t log2Cells,
+                        uint32_t axis, float certifiedErrorCells, uint32_t wallCode)
         : field_(field), origin_(origin), cell_(cell), axis_(axis), wallCode_(wallCode) {
         header_.log2Cells = log2Cells;
         header_.certifiedError = certifiedErrorCells;
@@ -95,7 +95,8 @@ private:
             leaves_[key] = 0;
             return;
         }
-        for (int o = 0; o < 8; ++o) collectLeaves(lowest + glm::ivec3(o & 1, o >> 1 & 1, o >> 2) * (edge / 2), edge / 2);
+        for (int o = 0; o < 8; ++o)
+            collectLeaves(lowest + glm::ivec3(o & 1, o >> 1 & 1, o >> 2) * (edge / 2), edge / 2);
     }
 
     /// Leaves in runs along the axis; a run of n leaves has n + 1 faces.
@@ -126,11 +127,12 @@ private:
 
     uint32_t node(glm::ivec3 lowest, int edge) {
         const double clear = clearance(lowest, edge);
-        // Clearance is from the box: the ball around the centre less the half diagonal, twice rounded down.
-        if (clear > 0) return emptyNode(std::max(0.0, clear - 0.01));
+        // The grown box must fit into the ball around the centre: its corners move by sqrt(3) times its faces.
+        if (clear > 0) return emptyNode(std::max(0.0, clear / std::sqrt(3.0) - 0.01));
         if (edge == 1) {
             const uint32_t face = leaves_.at({lowest[(axis_ + 2) % 3], lowest[(axis_ + 1) % 3], lowest[axis_]});
-            return kNodeSoft << kNodeTypeShift | face | axis_ << kSoftAxisShift | wallCode_ << kSoftWallShift | 3u << kSoftDipShift;
+            return kNodeSoft << kNodeTypeShift | face | axis_ << kSoftAxisShift | wallCode_ << kSoftWallShift |
+                   3u << kSoftDipShift;
         }
         const size_t group = nodes_.size() / 8;
         nodes_.resize(nodes_.size() + 8);
@@ -150,8 +152,8 @@ private:
 };
 
 struct AnalyticOptions {
-    glm::dvec3 origin{0};      ///< of the root page, world
-    double finestCell = 1;     ///< world
+    glm::dvec3 origin{0};   ///< of the root page, world
+    double finestCell = 1;  ///< world
     uint32_t levels = 1;
     uint32_t log2Cells = 4;
     uint32_t axis = 0;
@@ -176,7 +178,9 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
     const auto makePage = [&](uint32_t level, glm::u32vec3 at, AnalyticPage& page) {
         const double cell = o.finestCell * std::exp2(double(o.levels - 1 - level));
         const glm::dvec3 origin = o.origin + glm::dvec3(at) * cell * std::exp2(double(o.log2Cells));
-        page = AnalyticPageBuilder(field, origin, cell, o.log2Cells, o.axis, static_cast<float>(o.errorCells), o.wallCode).build();
+        page =
+            AnalyticPageBuilder(field, origin, cell, o.log2Cells, o.axis, static_cast<float>(o.errorCells), o.wallCode)
+                .build();
         return page.softLeaves > 0;
     };
     const auto add = [&](uint32_t level, glm::u32vec3 at, AnalyticPage page) {
@@ -185,7 +189,8 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
         entry.level = static_cast<uint8_t>(level);
         entry.leaves = page.softLeaves;
         entry.pageBytes = static_cast<uint32_t>(page.bytes.geometryBytes().size());
-        entry.certifiedError = static_cast<float>(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
+        entry.certifiedError =
+            static_cast<float>(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
         result.dataset.pages.push_back(entry);
         result.pages.push_back(std::move(page.bytes));
         ++h.level[level].pages;

@@ -68,7 +68,8 @@ std::array<uint4, 2> packFaces(const Corners& corners, uint32_t axis, bool flip 
         for (int c = 0; c < 4; ++c) {
             const Corner& corner = corners[faceCorner(axis, side, c)];
             const bool inside = corner.distance < 0;
-            const uint32_t code = packVector(std::abs(corner.distance), inside ? -corner.outward : corner.outward, inside);
+            const uint32_t code =
+                packVector(std::abs(corner.distance), inside ? -corner.outward : corner.outward, inside);
             faces[side][c] = flip ? flipSide(code) : code;
         }
     return faces;
@@ -167,11 +168,12 @@ TEST(LeafMath, ExactForQuadrics) {
         double q[10];
         for (double& c : q) c = r.normal(r.random);
         const auto value = [&](glm::dvec3 p) {
-            return q[0] * p.x * p.x + q[1] * p.y * p.y + q[2] * p.z * p.z + q[3] * p.x * p.y + q[4] * p.y * p.z + q[5] * p.z * p.x +
-                   q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
+            return q[0] * p.x * p.x + q[1] * p.y * p.y + q[2] * p.z * p.z + q[3] * p.x * p.y + q[4] * p.y * p.z +
+                   q[5] * p.z * p.x + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
         };
         const auto gradient = [&](glm::dvec3 p) {
-            return glm::dvec3(2 * q[0] * p.x + q[3] * p.y + q[5] * p.z + q[6], 2 * q[1] * p.y + q[3] * p.x + q[4] * p.z + q[7],
+            return glm::dvec3(2 * q[0] * p.x + q[3] * p.y + q[5] * p.z + q[6],
+                              2 * q[1] * p.y + q[3] * p.x + q[4] * p.z + q[7],
                               2 * q[2] * p.z + q[4] * p.y + q[5] * p.x + q[8]);
         };
         Corners corners;
@@ -200,7 +202,8 @@ TEST(LeafMath, ErrorIsOfThirdOrder) {
         for (int i = 0; i < 4000; ++i) {
             // A leaf about a point of the surface.
             const double a = r.unit(r.random) * 6.283185307179586, b = r.unit(r.random) * 6.283185307179586;
-            const glm::dvec3 at{(1 + 0.4 * std::cos(b)) * std::cos(a), (1 + 0.4 * std::cos(b)) * std::sin(a), 0.4 * std::sin(b)};
+            const glm::dvec3 at{(1 + 0.4 * std::cos(b)) * std::cos(a), (1 + 0.4 * std::cos(b)) * std::sin(a),
+                                0.4 * std::sin(b)};
             const glm::dvec3 x = r.inside(), lowest = at - h * x;
             Corners corners;
             for (int c = 0; c < 8; ++c) {
@@ -211,7 +214,8 @@ TEST(LeafMath, ErrorIsOfThirdOrder) {
         }
         worst.push_back(error);
     }
-    for (size_t i = 1; i < worst.size(); ++i) EXPECT_GT(worst[i - 1] / worst[i], 7.0) << "halving " << i << ": " << worst[i];
+    for (size_t i = 1; i < worst.size(); ++i)
+        EXPECT_GT(worst[i - 1] / worst[i], 7.0) << "halving " << i << ": " << worst[i];
 }
 
 TEST(LeafMath, ContinuousOverFacesOfAllAxes) {
@@ -245,7 +249,8 @@ TEST(LeafMath, ContinuousOverFacesOfAllAxes) {
             y[across] = 0;
             ASSERT_NEAR(f64::leafValue(leafA, x), f64::leafValue(leafB, y), 1e-13);
             ASSERT_LT(glm::distance(f64::leafNormal(leafA, x), f64::leafNormal(leafB, y)), 1e-13);
-            ASSERT_NEAR(f32::leafValue(singleA, glm::vec3(x)), f32::leafValue(singleB, glm::vec3(y)), float(kWallRounding));
+            ASSERT_NEAR(f32::leafValue(singleA, glm::vec3(x)), f32::leafValue(singleB, glm::vec3(y)),
+                        float(kWallRounding));
         }
     }
 }
@@ -279,7 +284,8 @@ TEST(LeafMath, FirstCrossingAgainstDenseSampling) {
         const double u = f64::firstCrossing(ray, 0, 0, 1e30, 64);
         int first = -1, changes = 0;
         for (int k = 0; k < kSamples; ++k) {
-            const bool change = (f64::rayValue(ray, double(k) / kSamples) < 0) != (f64::rayValue(ray, double(k + 1) / kSamples) < 0);
+            const bool change =
+                (f64::rayValue(ray, double(k) / kSamples) < 0) != (f64::rayValue(ray, double(k + 1) / kSamples) < 0);
             if (change && changes++ == 0) first = k;
         }
         if (first < 0) {
@@ -297,7 +303,8 @@ TEST(LeafMath, FirstCrossingAgainstDenseSampling) {
             // In float with few steps the crossing is nearly the same.
             const f32::LeafField single = f32::decodeLeaf(faces[0], faces[1], axis);
             if (i % 2 == 1) continue;
-            const float v = f32::firstCrossing(f32::restrictToRay(single, glm::vec3(p), glm::vec3(d)), 0.0f, 0.0f, 1e30f, 4);
+            const float v =
+                f32::firstCrossing(f32::restrictToRay(single, glm::vec3(p), glm::vec3(d)), 0.0f, 0.0f, 1e30f, 4);
             singleWorst = std::max(singleWorst, std::abs(f64::rayValue(ray, v)));
         } else {
             ++doubles;
@@ -316,7 +323,8 @@ TEST(LeafMath, WallsCountWithinTheirTolerance) {
     for (int i = 0; i < 8; ++i) corners[i] = {(cornerOf(i).z - 0.5) * 1.0, {0, 0, 1}};
     const f64::LeafField leaf = exactLeaf(corners, 0);
     const auto cross = [&](double from, double to, double wallIn, double wallOut) {
-        return f64::firstCrossing(f64::restrictToRay(leaf, {0.3, 0.3, from}, {0, 0, to - from}), wallIn, wallOut, 0.02, 32);
+        return f64::firstCrossing(f64::restrictToRay(leaf, {0.3, 0.3, from}, {0, 0, to - from}), wallIn, wallOut, 0.02,
+                                  32);
     };
     EXPECT_NEAR(cross(0.9, 0.1, 0, 0), 0.5, 1e-12);
     EXPECT_EQ(cross(0.9, 0.51, 0, 0.02), 1);
@@ -329,7 +337,8 @@ TEST(LeafMath, WallsCountWithinTheirTolerance) {
 TEST(LeafMath, WallAndDipCodes) {
     EXPECT_EQ(f64::wallTolerance(kNodeSoft << kNodeTypeShift), double(kWallRounding));
     for (uint32_t code = 1; code <= kSoftWallMask; ++code)
-        EXPECT_DOUBLE_EQ(f64::wallTolerance(kNodeSoft << kNodeTypeShift | code << kSoftWallShift), double(kWallUnit) * code * code);
+        EXPECT_DOUBLE_EQ(f64::wallTolerance(kNodeSoft << kNodeTypeShift | code << kSoftWallShift),
+                         double(kWallUnit) * code * code);
     double last = -1;
     for (uint32_t code = 0; code < 4; ++code) {
         const double dip = f64::dipBound(kNodeSoft << kNodeTypeShift | code << kSoftDipShift);
@@ -351,7 +360,8 @@ Exact exactTriangle(glm::dvec3 q, glm::dvec3 d, const std::array<glm::dvec3, 3>&
     const L n = glm::cross(b - a, c - a);
     const long double nd = glm::dot(n, dir);
     const long double flip = nd < 0 ? -1 : 1;
-    const long double w[3] = {flip * glm::dot(dir, glm::cross(b, c)) / glm::length(c - b), flip * glm::dot(dir, glm::cross(c, a)) / glm::length(a - c),
+    const long double w[3] = {flip * glm::dot(dir, glm::cross(b, c)) / glm::length(c - b),
+                              flip * glm::dot(dir, glm::cross(c, a)) / glm::length(a - c),
                               flip * glm::dot(dir, glm::cross(a, b)) / glm::length(b - a)};
     const long double margin = std::min({w[0], w[1], w[2]});
     return {margin >= 0, glm::dot(n, a) / nd, margin};
@@ -371,7 +381,8 @@ TEST(LeafMath, TriangleAgainstLongDouble) {
         if (std::abs(glm::dot(glm::normalize(glm::cross(v[1] - v[0], v[2] - v[0])), d)) < 0.05) continue;
         const Exact exact = exactTriangle(q, d, v);
         const glm::dvec3 found = f64::intersectTriangle(q, d, v[0], v[1], v[2], kSlack);
-        const glm::vec3 single = f32::intersectTriangle(glm::vec3(q), glm::vec3(d), glm::vec3(v[0]), glm::vec3(v[1]), glm::vec3(v[2]), float(kSlack));
+        const glm::vec3 single = f32::intersectTriangle(glm::vec3(q), glm::vec3(d), glm::vec3(v[0]), glm::vec3(v[1]),
+                                                        glm::vec3(v[2]), float(kSlack));
         if (exact.inside) {
             ++hits;
             ASSERT_NEAR(found.x, double(exact.s), 1e-9) << i;
@@ -398,7 +409,9 @@ TEST(LeafMath, NoRayBetweenTriangles) {
         for (int k = 0; k < sides; ++k) {
             const double a = 6.283185307179586 * k / sides;
             rim.push_back(glm::round((centre + (std::cos(a) * u + std::sin(a) * w) * (0.2 + 0.6 * r.unit(r.random)) +
-                                      n * 0.05 * r.unit(r.random)) * 2048.0) / 2048.0);
+                                      n * 0.05 * r.unit(r.random)) *
+                                     2048.0) /
+                          2048.0);
         }
         const double along = i % 2 == 0 ? 0 : 0.8 * r.unit(r.random);
         const glm::dvec3 target = glm::mix(centre, rim[i % sides], along);
@@ -407,8 +420,8 @@ TEST(LeafMath, NoRayBetweenTriangles) {
         const glm::dvec3 q = target - d;
         bool hit = false;
         for (int k = 0; k < sides; ++k) {
-            const glm::vec3 found = f32::intersectTriangle(glm::vec3(q), glm::vec3(d), glm::vec3(centre), glm::vec3(rim[k]),
-                                                           glm::vec3(rim[(k + 1) % sides]), 1e-4f);
+            const glm::vec3 found = f32::intersectTriangle(glm::vec3(q), glm::vec3(d), glm::vec3(centre),
+                                                           glm::vec3(rim[k]), glm::vec3(rim[(k + 1) % sides]), 1e-4f);
             hit = hit || (found.x < 1e29f && std::abs(found.x - 1) < 1e-3f);
         }
         ASSERT_TRUE(hit) << "fan " << i;
@@ -431,7 +444,8 @@ TEST(LeafMath, HitsStayOnTheirTriangle) {
         d = glm::normalize(d + glm::normalize(n) * 1e-4 * r.normal(r.random));
         const glm::dvec3 past = glm::mix(v[i % 3], v[(i + 1) % 3], r.unit(r.random)) + r.direction() * 2e-4;
         const glm::dvec3 q = past - d;
-        const glm::vec3 hit = f32::intersectTriangle(glm::vec3(q), glm::vec3(d), glm::vec3(v[0]), glm::vec3(v[1]), glm::vec3(v[2]), 1e-4f);
+        const glm::vec3 hit = f32::intersectTriangle(glm::vec3(q), glm::vec3(d), glm::vec3(v[0]), glm::vec3(v[1]),
+                                                     glm::vec3(v[2]), 1e-4f);
         if (hit.x > 1e29f) continue;
         const glm::dvec3 on = v[0] + double(hit.y) * (v[1] - v[0]) + double(hit.z) * (v[2] - v[0]);
         worst = std::max(worst, glm::distance(on, q + double(hit.x) * d));
@@ -443,7 +457,8 @@ TEST(LeafMath, DegenerateTrianglesAreMissed) {
     const glm::dvec3 a{0.5, 0.5, 0.5}, b{0.7, 0.5, 0.5};
     EXPECT_GT(f64::intersectTriangle({0.5, 0.5, 0}, {0, 0, 1}, a, a, a, 1e-4).x, 1e29);
     EXPECT_GT(f64::intersectTriangle({0.5, 0.5, 0}, {0, 0, 1}, a, b, a, 1e-4).x, 1e29);
-    EXPECT_GT(f32::intersectTriangle({0.5f, 0.5f, 0}, {0, 0, 1}, glm::vec3(a), glm::vec3(b), glm::vec3(a), 1e-4f).x, 1e29f);
+    EXPECT_GT(f32::intersectTriangle({0.5f, 0.5f, 0}, {0, 0, 1}, glm::vec3(a), glm::vec3(b), glm::vec3(a), 1e-4f).x,
+              1e29f);
 }
 
 }  // namespace

@@ -18,7 +18,9 @@ glm::dvec3 randomDirection(std::mt19937_64& random) {
     return glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
 }
 
-double angleDegrees(glm::dvec3 a, glm::dvec3 b) { return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * kDegrees; }
+double angleDegrees(glm::dvec3 a, glm::dvec3 b) {
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * kDegrees;
+}
 
 TEST(Packing, DefaultLosesLittle) {
     std::mt19937_64 random(1);
@@ -38,7 +40,8 @@ TEST(Packing, DefaultLosesLittle) {
     }
     RecordProperty("mean_degrees", std::to_string(angleSum / kCount));
     RecordProperty("max_degrees", std::to_string(angleMax));
-    std::printf("default packing: direction mean %.4f max %.4f degrees, distance max %.2e leaf edges\n", angleSum / kCount, angleMax, distanceMax);
+    std::printf("default packing: direction mean %.4f max %.4f degrees, distance max %.2e leaf edges\n",
+                angleSum / kCount, angleMax, distanceMax);
     EXPECT_LT(angleSum / kCount, 0.085);
     EXPECT_LT(angleMax, 0.24);
     EXPECT_LE(distanceMax, double(kPackedDistanceRange) / kPackedDistanceMax / 2 * 1.0001);
@@ -60,7 +63,8 @@ TEST(Packing, PapersLosesLittle) {
         // A step of the square root is 1/8191 of the root of the range.
         relativeMax = std::max(relativeMax, std::abs(glm::length(back) - d) / std::sqrt(d * range));
     }
-    std::printf("paper's packing: direction mean %.4f max %.4f degrees, distance max %.2e of the root\n", angleSum / kCount, angleMax, relativeMax);
+    std::printf("paper's packing: direction mean %.4f max %.4f degrees, distance max %.2e of the root\n",
+                angleSum / kCount, angleMax, relativeMax);
     EXPECT_LT(angleSum / kCount, 0.125);
     EXPECT_LT(angleMax, 0.25);
     EXPECT_LT(relativeMax, 1.05 / 8191);

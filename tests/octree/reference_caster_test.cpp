@@ -33,8 +33,8 @@ glm::dvec3 randomDirection(std::mt19937_64& random) {
 }
 
 /// Rays from around the sphere at points inside it: every one must hit, near the right distance.
-void castAtSphere(const PageCache& cache, const ReferenceCaster& caster, glm::dvec3 centre, double radius, double tolerance, int rays,
-                  uint64_t seed) {
+void castAtSphere(const PageCache& cache, const ReferenceCaster& caster, glm::dvec3 centre, double radius,
+                  double tolerance, int rays, uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
     for (int i = 0; i < rays; ++i) {
@@ -82,7 +82,8 @@ TEST(ReferenceCaster, CutOfMixedLevels) {
             cut.push_back(page);
             continue;
         }
-        for (int child = 0; child < std::popcount(pages[page].childMask); ++child) cut.push_back(pages[page].firstChild + child);
+        for (int child = 0; child < std::popcount(pages[page].childMask); ++child)
+            cut.push_back(pages[page].firstChild + child);
     }
     const auto caster = ReferenceCaster::create(cache, cut);
     ASSERT_TRUE(caster.ok()) << caster.error().line();
@@ -233,7 +234,8 @@ TEST(ReferenceCaster, HardLeafIsClosed) {
     dataset.header.log2Cells = 2;
     dataset.pages.resize(1);
     std::vector<PageBytes> pages;
-    const std::array<glm::dvec3, 4> corners = {glm::dvec3(0.5, 0.5, 0.5), {3.5, 0.5, 0.5}, {0.5, 3.5, 0.5}, {0.5, 0.5, 3.5}};
+    const std::array<glm::dvec3, 4> corners = {
+        glm::dvec3(0.5, 0.5, 0.5), {3.5, 0.5, 0.5}, {0.5, 3.5, 0.5}, {0.5, 0.5, 3.5}};
     pages.push_back(tetrahedronPage(corners));
     auto cache = PageCache::fromPages(dataset, std::move(pages));
     ASSERT_TRUE(cache.ok()) << cache.error().line();

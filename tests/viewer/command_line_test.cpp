@@ -132,7 +132,7 @@ TEST_F(CommandLine, Version) {
 TEST_F(CommandLine, WrongUsageEndsWith2) {
     const std::string mesh = ball().string();
     const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
-        {{}, "subcommand"},
+        {{}, "command is needed"},
         {{"fly"}, "fly"},
         {{"help", "fly"}, "fly"},
         {{"build"}, "vcp help build"},

@@ -117,7 +117,7 @@ TEST_P(CameraMoves, FitShowsTheWholeBoxAndNearlyFillsThePicture) {
 
 INSTANTIATE_TEST_SUITE_P(Projections, CameraMoves,
                          testing::Values(Projection::Perspective, Projection::Orthographic),
-                         [](const auto& info) { return info.param == Projection::Perspective ? "Perspective" : "Orthographic"; });
+                         [](const auto& projection) { return projection.param == Projection::Perspective ? "Perspective" : "Orthographic"; });
 
 TEST(OrbitCamera, StandardViewsLookWhereTheirNameSays) {
     const Box box{{-1, -1, -1}, {1, 1, 1}};

@@ -1,0 +1,627 @@
+// The .vcp file and its writer: golden bytes, every truncation, every bit flip, lies behind valid hashes, disks
+// that are full and folders that cannot be written.
+#include "octree/vcp_file.h"
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <csignal>
+#include <limits>
+#include <random>
+#include <thread>
+
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "octree/vcp_writer.h"
+#include "tests/octree/analytic_page.h"
+#include "tests/viewer/test_folder.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Bytes = std::vector<std::byte>;
+
+Bytes bytesOf(const fs::path& path) {
+    const std::string text = contentOf(path);
+    Bytes bytes(text.size());
+    std::memcpy(bytes.data(), text.data(), text.size());
+    return bytes;
+}
+
+/// A file in memory, of which one bit may be wrong.
+class MemoryFile final : public ByteReader {
+public:
+    static constexpr uint64_t kIntact = ~uint64_t{0};
+    explicit MemoryFile(std::span<const std::byte> bytes, uint64_t wrongBit = kIntact) : bytes_(bytes), wrongBit_(wrongBit) {}
+
+    Result<void> read(uint64_t offset, std::span<std::byte> out) const override {
+        if (offset > bytes_.size() || out.size() > bytes_.size() - offset) return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
+        if (!out.empty()) std::memcpy(out.data(), bytes_.data() + offset, out.size());
+        if (wrongBit_ / 8 >= offset && wrongBit_ / 8 - offset < out.size()) out[wrongBit_ / 8 - offset] ^= std::byte{1} << int(wrongBit_ % 8);
+        return {};
+    }
+    [[nodiscard]] uint64_t size() const override { return bytes_.size(); }
+    [[nodiscard]] const std::string& name() const override { return name_; }
+
+private:
+    std::span<const std::byte> bytes_;
+    uint64_t wrongBit_;
+    std::string name_ = "memory.vcp";
+};
+
+PageEntry entryOf(const Dataset& dataset, size_t page) {
+    PageEntry entry = dataset.pages[page];
+    entry.offset = entry.hash = 0;
+    return entry;
+}
+
+/// Writes a sphere of two levels with colour; 4 cells a page edge keep it small. By default it is in all octants.
+void writeSphere(const fs::path& path, glm::dvec3 centre = {3, 3.2, 2.9}, double radius = 1.4) {
+    const auto made = test::analyticDataset(test::sphere(centre, radius), {.origin = {-1, -1, -1}, .levels = 2, .log2Cells = 2});
+    auto writer = VcpWriter::create(path, made.pages.size());
+    ASSERT_TRUE(writer.ok()) << writer.error().line();
+    FileHeader header = made.dataset.header;
+    header.flags = kFlagColour;
+    for (size_t i = 0; i < made.pages.size(); ++i) {
+        PageHeader page;
+        std::memcpy(&page, made.pages[i].geometryBytes().data(), sizeof page);
+        const std::vector<uint4> colour(colourPageBytes(page) / 16, uint4(0xff336699u));
+        const StoredPage stored = compressPage(made.pages[i].geometryBytes(), std::as_bytes(std::span(colour)));
+        ASSERT_TRUE((*writer)->append(entryOf(made.dataset, i), stored).ok());
+    }
+    const auto bytes = (*writer)->commit(header);
+    ASSERT_TRUE(bytes.ok()) << bytes.error().line();
+    EXPECT_EQ(*bytes, fs::file_size(path));
+}
+
+/// A file that can be changed and given valid hashes again.
+struct Forgery {
+    Bytes bytes;
+
+    template <class T>
+    T& at(uint64_t offset) {
+        return *reinterpret_cast<T*>(bytes.data() + offset);
+    }
+    FileHeader& header() { return at<FileHeader>(0); }
+    PageEntry& entry(uint64_t i) { return at<PageEntry>(kDirectoryOffset + i / kEntriesPerBlock * kBlockBytes + i % kEntriesPerBlock * sizeof(PageEntry)); }
+    CommitRecord& commit() { return at<CommitRecord>(bytes.size() - sizeof(CommitRecord)); }
+
+    void seal(uint64_t blocks = 1) {
+        const std::span all(bytes);
+        for (uint64_t b = 0; b < blocks; ++b) {
+            const uint64_t begin = kDirectoryOffset + b * kBlockBytes;
+            at<uint64_t>(begin + kBlockBytes - 8) = hashBytes(all.subspan(begin, kBlockBytes - 8));
+        }
+        header().hash = 0;
+        header().hash = hashBytes(all.first(kDirectoryOffset));
+        commit().headerHash = header().hash;
+        commit().directoryHash = hashBytes(all.subspan(kDirectoryOffset, blocks * kBlockBytes));
+        commit().hash = hashBytes(all.subspan(bytes.size() - sizeof(CommitRecord), offsetof(CommitRecord, hash)));
+    }
+};
+
+class VcpFile : public ::testing::Test {
+protected:
+    void SetUp() override {
+        writeSphere(path());
+        if (!HasFatalFailure()) bytes_ = bytesOf(path());
+    }
+    fs::path path() const { return folder_ / "sphere.vcp"; }
+
+    /// Changes a copy, seals it, and expects the reader to refuse it with `words`.
+    template <class Change>
+    void expectRefused(const std::string& words, const Change& change) const {
+        Forgery forgery{bytes_};
+        change(forgery);
+        forgery.seal();
+        const auto dataset = readDataset(MemoryFile(forgery.bytes));
+        ASSERT_FALSE(dataset.ok()) << "accepted, but should say: " << words;
+        EXPECT_NE(dataset.error().line().find(words), std::string::npos) << dataset.error().line();
+        EXPECT_NE(dataset.error().line().find("memory.vcp"), std::string::npos);
+        EXPECT_TRUE(dataset.error().byte.has_value());
+        EXPECT_EQ(dataset.error().code, ErrorCode::InvalidInput);
+    }
+
+    TestFolder folder_{"vcp_file_test"};
+    Bytes bytes_;
+};
+
+/// Peak resident bytes since the process began.
+uint64_t peakBytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+TEST_F(VcpFile, IsReadBack) {
+    auto file = openFile(path());
+    ASSERT_TRUE(file.ok());
+    EXPECT_EQ((*file)->size(), bytes_.size());
+    const auto dataset = readDataset(**file);
+    ASSERT_TRUE(dataset.ok()) << dataset.error().line();
+    ASSERT_EQ(dataset->header.levels, 2u);
+    ASSERT_EQ(dataset->pages.size(), 9u);
+    EXPECT_EQ(dataset->pages[0].childMask, 0xff);
+    EXPECT_TRUE(dataset->hasColour());
+    for (uint64_t i = 0; i < dataset->pages.size(); ++i) {
+        const auto page = readPage(**file, *dataset, i, true);
+        ASSERT_TRUE(page.ok()) << page.error().line();
+        EXPECT_EQ(page->geometryBytes().size(), dataset->pages[i].pageBytes);
+        EXPECT_EQ(page->colourBytes().size(), dataset->pages[i].colourBytes);
+        const auto plain = readPage(**file, *dataset, i, false);
+        ASSERT_TRUE(plain.ok());
+        EXPECT_TRUE(plain->colour.empty());
+        EXPECT_EQ(plain->geometry, page->geometry);
+        const auto view = parsePage(page->geometryBytes(), page->colourBytes());
+        ASSERT_TRUE(view.ok());
+        EXPECT_EQ(view->header.softLeaves, dataset->pages[i].leaves);
+    }
+    EXPECT_TRUE(verifyFile(**file).ok());
+}
+
+TEST_F(VcpFile, PagesAreAlignedAndInOrder) {
+    const auto dataset = readDataset(MemoryFile(bytes_));
+    ASSERT_TRUE(dataset.ok());
+    uint64_t end = kDirectoryOffset + kBlockBytes;
+    for (const PageEntry& e : dataset->pages) {
+        EXPECT_EQ(e.offset % kPageAlignment, 0u);
+        EXPECT_GE(e.offset, end);
+        EXPECT_GE(e.colourOffset, e.offset + e.storedBytes);
+        end = e.colourOffset + e.colourStoredBytes;
+    }
+    EXPECT_LE(end, bytes_.size() - sizeof(CommitRecord));
+}
+
+TEST_F(VcpFile, OriginsAndEdges) {
+    const auto dataset = readDataset(MemoryFile(bytes_));
+    ASSERT_TRUE(dataset.ok());
+    EXPECT_EQ(dataset->cellOf(0), 2);
+    EXPECT_EQ(dataset->cellOf(1), 1);
+    EXPECT_EQ(dataset->edgeOf(dataset->pages[0]), 8);
+    EXPECT_EQ(dataset->originOf(dataset->pages[0]), glm::dvec3(-1));
+    for (size_t i = 1; i < 9; ++i) {
+        const int octant = static_cast<int>(i - 1);
+        EXPECT_EQ(dataset->edgeOf(dataset->pages[i]), 4);
+        EXPECT_EQ(dataset->originOf(dataset->pages[i]), glm::dvec3(-1) + 4.0 * glm::dvec3(octant & 1, octant >> 1 & 1, octant >> 2));
+    }
+}
+
+// The layout, byte by byte, of a file whose pages need no compressor. A failure here means that files written
+// before can no longer be read: raise kFileVersion.
+TEST(VcpFileLayout, GoldenBytes) {
+    const TestFolder folder("vcp_golden_test");
+    {
+        auto writer = VcpWriter::create(folder / "golden.vcp", 2);
+        ASSERT_TRUE(writer.ok());
+        StoredPage page;
+        page.geometry.resize(300);
+        page.colour.resize(5);
+        for (size_t i = 0; i < page.geometry.size(); ++i) page.geometry[i] = std::byte(i * 7);
+        for (size_t i = 0; i < page.colour.size(); ++i) page.colour[i] = std::byte(200 + i);
+        page.geometryBytes = 1024;
+        page.colourBytes = 64;
+        ASSERT_TRUE((*writer)->append({.firstChild = 1, .leaves = 3, .hardLeaves = 1, .certifiedError = 0.5f, .childMask = 0x20}, page).ok());
+        ASSERT_TRUE((*writer)->append({.morton = 5, .leaves = 2, .hardLeaves = 2, .certifiedError = 0.25f, .level = 1}, page).ok());
+        FileHeader h;
+        h.origin[0] = -3;
+        h.origin[1] = 450000.25;
+        h.cell = 0.125;
+        h.errorTarget = 0.01;
+        h.certifiedErrorMax = 0.25;
+        h.boundsMax[2] = 7;
+        h.levels = 2;
+        h.log2Cells = 5;
+        h.flags = kFlagColour;
+        h.triangles = 123456789012;
+        h.level[0] = {0, 1, 0.5};
+        h.level[1] = {1, 1, 0.25};
+        ASSERT_TRUE((*writer)->commit(h).ok());
+    }
+    const Bytes bytes = bytesOf(folder / "golden.vcp");
+    const auto u32 = [&](size_t at) { uint32_t v; std::memcpy(&v, &bytes[at], 4); return v; };
+    const auto u64 = [&](size_t at) { uint64_t v; std::memcpy(&v, &bytes[at], 8); return v; };
+    ASSERT_EQ(bytes.size(), 9792u);
+    EXPECT_EQ(std::memcmp(bytes.data(), "VCP\r\n\x1a\n\0", 8), 0);
+    EXPECT_EQ(u32(8), 1u);
+    EXPECT_EQ(u32(12), 4096u);
+    EXPECT_EQ(u64(16), 9792u);
+    EXPECT_EQ(u64(24), 2u);
+    EXPECT_EQ(u64(32), 0xc008000000000000u);  // -3
+    EXPECT_EQ(u32(128), 2u);
+    EXPECT_EQ(u64(144), 123456789012u);
+    EXPECT_EQ(u64(184 + 24), 1u);             // first entry of level 1
+    EXPECT_EQ(u64(4096 + 8), 8192u);          // the first page
+    EXPECT_EQ(u64(4096 + 24), 8704u);         // its colour: 300 bytes end on the second 256
+    EXPECT_EQ(u32(4096 + 40), 300u);
+    EXPECT_EQ(u64(4096 + 80), 5u);            // Morton code of the second
+    EXPECT_EQ(u64(4096 + 80 + 8), 8960u);
+    EXPECT_EQ(std::memcmp(&bytes[9728], "VCPcommt", 8), 0);
+    EXPECT_EQ(fmt::format("{:016x}", hashBytes(bytes)), "6929e640f477c9a1");
+    EXPECT_TRUE(readDataset(MemoryFile(bytes)).ok());
+}
+
+TEST_F(VcpFile, EveryTruncationIsFound) {
+    for (size_t size = 0; size < bytes_.size(); ++size) {
+        const auto result = verifyFile(MemoryFile(std::span(bytes_).first(size)));
+        ASSERT_FALSE(result.ok()) << size;
+        ASSERT_EQ(result.error().file, "memory.vcp");
+        ASSERT_TRUE(result.error().byte.has_value());
+    }
+}
+
+TEST_F(VcpFile, TruncatedFileOnDiskIsFound) {
+    fs::resize_file(path(), bytes_.size() - 1);
+    auto file = openFile(path());
+    ASSERT_TRUE(file.ok());
+    const auto dataset = readDataset(**file);
+    ASSERT_FALSE(dataset.ok());
+    EXPECT_NE(dataset.error().line().find("truncated"), std::string::npos) << dataset.error().line();
+    EXPECT_NE(dataset.error().line().find(path().string()), std::string::npos);
+}
+
+TEST_F(VcpFile, EveryBitFlipIsFound) {
+    // Two pages are enough: root and one child.
+    writeSphere(path(), {1, 1, 1}, 0.9);
+    bytes_ = bytesOf(path());
+    ASSERT_EQ(readDataset(MemoryFile(bytes_))->pages.size(), 2u);
+    std::atomic<uint64_t> next = 0;
+    std::atomic<uint64_t> missed = MemoryFile::kIntact;
+    const uint64_t bits = bytes_.size() * 8;
+    const auto work = [&] {
+        for (uint64_t byte; (byte = next++) * 8 < bits;)
+            for (uint64_t bit = byte * 8; bit < byte * 8 + 8; ++bit)
+                if (verifyFile(MemoryFile(bytes_, bit)).ok()) missed = bit;
+    };
+    std::vector<std::thread> threads;
+    for (unsigned i = 1; i < std::min(4u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
+    work();
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(missed.load(), MemoryFile::kIntact) << "a flip of this bit was not found";
+    EXPECT_TRUE(verifyFile(MemoryFile(bytes_)).ok());
+}
+
+TEST_F(VcpFile, DamagedPageIsNamed) {
+    const auto dataset = readDataset(MemoryFile(bytes_));
+    ASSERT_TRUE(dataset.ok());
+    const MemoryFile damaged(bytes_, (dataset->pages[3].offset + 7) * 8);
+    EXPECT_TRUE(readPage(damaged, *dataset, 2, true).ok());
+    const auto page = readPage(damaged, *dataset, 3, true);
+    ASSERT_FALSE(page.ok());
+    EXPECT_NE(page.error().line().find(fmt::format("memory.vcp: page 3: byte {}: hash", dataset->pages[3].offset)), std::string::npos) << page.error().line();
+}
+
+TEST_F(VcpFile, AppendedBytesAreFound) {
+    for (const size_t more : {1, 64, 256}) {
+        Bytes longer = bytes_;
+        longer.resize(longer.size() + more);
+        const auto result = verifyFile(MemoryFile(longer));
+        ASSERT_FALSE(result.ok());
+        EXPECT_NE(result.error().line().find("appended"), std::string::npos) << result.error().line();
+    }
+}
+
+TEST_F(VcpFile, WrongMagicAndVersion) {
+    Bytes magic = bytes_;
+    magic[0] = std::byte{'X'};
+    const auto notVcp = readDataset(MemoryFile(magic));
+    ASSERT_FALSE(notVcp.ok());
+    EXPECT_EQ(notVcp.error().line(), "memory.vcp: header: byte 0: not a .vcp file");
+
+    Bytes version = bytes_;
+    version[8] = std::byte{17};
+    const auto future = readDataset(MemoryFile(version));
+    ASSERT_FALSE(future.ok());
+    EXPECT_EQ(future.error().code, ErrorCode::Unsupported);
+    EXPECT_NE(future.error().line().find("17"), std::string::npos) << future.error().line();
+    EXPECT_NE(future.error().line().find(fmt::format("version {}", kFileVersion)), std::string::npos);
+}
+
+TEST_F(VcpFile, HeaderLiesAreFound) {
+    using F = Forgery;
+    const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+    expectRefused("truncated", [](F& f) { f.header().fileBytes += 256; });
+    expectRefused("header size", [](F& f) { f.header().headerBytes = 8192; });
+    expectRefused("levels or page size", [](F& f) { f.header().levels = 0; });
+    expectRefused("levels or page size", [](F& f) { f.header().levels = kMaxLevels + 1; });
+    expectRefused("levels or page size", [](F& f) { f.header().log2Cells = 0; });
+    expectRefused("levels or page size", [](F& f) { f.header().log2Cells = 8; });
+    for (const double cell : {0.0, -1.0, nan, infinity}) expectRefused("not finite", [&](F& f) { f.header().cell = cell; });
+    expectRefused("not finite", [&](F& f) { f.header().origin[1] = nan; });
+    expectRefused("not finite", [&](F& f) { f.header().boundsMax[2] = infinity; });
+    expectRefused("page count", [](F& f) { f.header().pages = 0; });
+    expectRefused("level table", [](F& f) { f.header().pages = 10; });
+    expectRefused("level table", [](F& f) { f.header().level[1].pages = 0; });
+    expectRefused("level table", [](F& f) { f.header().level[1].pages = ~uint64_t{0}; });
+    expectRefused("level table", [](F& f) { f.header().level[1].firstEntry = 2; });
+    expectRefused("level table", [](F& f) { f.header().levels = 1; });
+    expectRefused("level table", [](F& f) {
+        f.header().level[0].pages = 2;
+        f.header().level[1] = {2, 7, 0};
+    });
+    expectRefused("certified error", [&](F& f) { f.header().level[1].certifiedError = nan; });
+}
+
+TEST_F(VcpFile, HugeCountsAllocateNothing) {
+    const uint64_t before = peakBytes();
+    for (const uint64_t pages : {uint64_t{1} << 20, uint64_t{1} << 31, uint64_t{1} << 40, ~uint64_t{0}})
+        expectRefused("page count", [&](Forgery& f) { f.header().pages = f.header().level[1].pages = pages; });
+    // The largest count that the file's size allows: the directory does not fit.
+    expectRefused("directory does not fit", [&](Forgery& f) {
+        f.header().pages = f.bytes.size() / sizeof(PageEntry);
+        f.header().level[1].pages = f.header().pages - 1;
+    });
+    EXPECT_LT(peakBytes() - before, 16u << 20);
+}
+
+TEST_F(VcpFile, DirectoryLiesAreFound) {
+    using F = Forgery;
+    expectRefused("overlaps", [](F& f) { f.entry(1).offset = f.entry(0).offset; });
+    expectRefused("overlaps", [](F& f) { f.entry(2).colourOffset = f.entry(2).offset; });
+    expectRefused("overlaps", [](F& f) { std::swap(f.entry(2).offset, f.entry(3).offset); });
+    expectRefused("overlaps", [](F& f) { f.entry(0).offset = 0; });
+    expectRefused("overlaps", [](F& f) { f.entry(0).offset = kDirectoryOffset; });
+    expectRefused("outside", [](F& f) { f.entry(8).offset = (f.bytes.size() + 256) / 256 * 256; });
+    expectRefused("outside", [](F& f) { f.entry(8).offset = ~uint64_t{255}; });
+    expectRefused("outside", [](F& f) { f.entry(8).offset += 1; });
+    expectRefused("outside", [](F& f) { f.entry(8).storedBytes = 0; });
+    expectRefused("outside", [](F& f) { f.entry(8).storedBytes = 0xffffffff; });
+    expectRefused("outside", [](F& f) { f.entry(8).colourStoredBytes = 0xffffffff; });
+    expectRefused("page size", [](F& f) { f.entry(1).pageBytes = 0; });
+    expectRefused("page size", [](F& f) { f.entry(1).pageBytes += 8; });
+    expectRefused("page size", [](F& f) { f.entry(1).pageBytes = 0xfffffff0; });
+    expectRefused("page size", [](F& f) { f.entry(1).colourBytes = 0xfffffff0; });
+    expectRefused("colour is missing", [](F& f) { f.entry(1).colourStoredBytes = 0; });
+    expectRefused("child pages do not match", [](F& f) { f.entry(1).level = 0; });
+    expectRefused("wrong level", [](F& f) { f.entry(0).level = 1; });
+    expectRefused("root is not at the origin", [](F& f) { f.entry(0).morton = 1; });
+    expectRefused("certified error", [](F& f) { f.entry(1).certifiedError = -1; });
+    expectRefused("certified error", [](F& f) { f.entry(1).certifiedError = std::numeric_limits<float>::quiet_NaN(); });
+    expectRefused("counts", [](F& f) { f.entry(1).hardLeaves = f.entry(1).leaves + 1; });
+    expectRefused("wrong child pages", [](F& f) { f.entry(0).firstChild = 2; });
+    expectRefused("wrong child pages", [](F& f) { f.entry(0).firstChild = 0; });
+    expectRefused("wrong child pages", [](F& f) { f.entry(4).childMask = 1; });
+    expectRefused("child pages do not match", [](F& f) { std::swap(f.entry(1).morton, f.entry(2).morton); });
+    expectRefused("child pages do not match", [](F& f) { f.entry(8).morton = 8; });
+    expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0x7f; });
+    expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0; });
+}
+
+TEST_F(VcpFile, LyingPageSizesAllocateNothing) {
+    const uint64_t before = peakBytes();
+    Forgery forgery{bytes_};
+    forgery.entry(1).pageBytes = 1u << 28;
+    forgery.entry(2).colourBytes = 1u << 28;
+    forgery.seal();
+    const MemoryFile file(forgery.bytes);
+    const auto dataset = readDataset(file);
+    ASSERT_TRUE(dataset.ok()) << dataset.error().line();
+    for (const uint64_t page : {1u, 2u}) {
+        const auto read = readPage(file, *dataset, page, true);
+        ASSERT_FALSE(read.ok());
+        EXPECT_NE(read.error().line().find("does not decompress"), std::string::npos) << read.error().line();
+    }
+    EXPECT_LT(peakBytes() - before, 64u << 20);
+}
+
+/// Puts other content, rightly hashed, where a page was.
+void replacePage(Forgery& forgery, uint64_t page, std::span<const std::byte> stored, uint32_t pageBytes) {
+    PageEntry& e = forgery.entry(page);
+    ASSERT_LE(stored.size(), e.storedBytes);
+    std::memcpy(&forgery.bytes[e.offset], stored.data(), stored.size());
+    e.storedBytes = static_cast<uint32_t>(stored.size());
+    e.pageBytes = pageBytes;
+    e.hash = hashBytes(stored);
+    forgery.seal();
+}
+
+TEST_F(VcpFile, PagesBehindValidHashesAreChecked) {
+    PageHeader header;
+    header.log2Cells = 2;
+    header.root = emptyNode(0);
+    const auto expectPage = [&](const char* words, uint32_t pageBytes, bool compressed) {
+        Forgery forgery{bytes_};
+        const auto raw = std::as_bytes(std::span(&header, 1));
+        const StoredPage stored = compressPage(raw, {});
+        replacePage(forgery, 1, compressed ? std::span<const std::byte>(stored.geometry) : raw, pageBytes);
+        const MemoryFile file(forgery.bytes);
+        const auto dataset = readDataset(file);
+        ASSERT_TRUE(dataset.ok()) << dataset.error().line();
+        const auto page = readPage(file, *dataset, 1, false);
+        ASSERT_FALSE(page.ok()) << words;
+        EXPECT_NE(page.error().line().find(words), std::string::npos) << page.error().line();
+        EXPECT_NE(page.error().line().find("page 1"), std::string::npos) << page.error().line();
+    };
+    expectPage("does not decompress", 128, true);
+    expectPage("does not decompress", 48, true);
+    expectPage("does not decompress", 64, false);
+    header.groups = 1;
+    expectPage("page counts", 64, true);
+    header.groups = 0;
+    header.log2Cells = 3;
+    expectPage("page size differs", 64, true);
+}
+
+TEST_F(VcpFile, VerifyReportsAndStops) {
+    uint64_t last = 0;
+    const auto grow = [](void* user, uint64_t done) {
+        EXPECT_GE(done, *static_cast<uint64_t*>(user));
+        *static_cast<uint64_t*>(user) = done;
+        return true;
+    };
+    ASSERT_TRUE(verifyFile(MemoryFile(bytes_), grow, &last).ok());
+    EXPECT_GT(last, bytes_.size() - 512);
+    EXPECT_LE(last, bytes_.size());
+    const auto stopped = verifyFile(MemoryFile(bytes_), [](void*, uint64_t) { return false; });
+    ASSERT_FALSE(stopped.ok());
+    EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+}
+
+TEST_F(VcpFile, OpenNamesWhatIsWrong) {
+    const auto missing = openFile(folder_ / "none.vcp");
+    ASSERT_FALSE(missing.ok());
+    EXPECT_EQ(missing.error().code, ErrorCode::Io);
+    EXPECT_NE(missing.error().line().find("none.vcp"), std::string::npos);
+    const auto folder = openFile(folder_.path());
+    ASSERT_FALSE(folder.ok());
+    EXPECT_NE(folder.error().line().find("is a folder"), std::string::npos);
+    fs::resize_file(path(), 0);
+    auto empty = openFile(path());
+    ASSERT_TRUE(empty.ok());
+    const auto dataset = readDataset(**empty);
+    ASSERT_FALSE(dataset.ok());
+    EXPECT_NE(dataset.error().line().find("empty"), std::string::npos);
+}
+
+TEST(Morton, RoundTrip) {
+    std::mt19937 random(3);
+    for (int i = 0; i < 100000; ++i) {
+        const glm::u32vec3 cell(random() & 0x1fffff, random() & 0x1fffff, random() & 0x1fffff);
+        ASSERT_EQ(mortonDecode(mortonEncode(cell)), cell);
+    }
+    EXPECT_EQ(mortonEncode({1, 0, 0}), 1u);
+    EXPECT_EQ(mortonEncode({0, 1, 0}), 2u);
+    EXPECT_EQ(mortonEncode({0, 0, 1}), 4u);
+    EXPECT_EQ(mortonEncode({3, 5, 6}), 0b110'101'011u);
+    EXPECT_EQ(mortonEncode(glm::u32vec3(0x1fffff)), 0x7fffffffffffffffu);
+    EXPECT_EQ(mortonDecode(0x7fffffffffffffffu), glm::u32vec3(0x1fffff));
+}
+
+TEST(Morton, SlowReference) {
+    std::mt19937 random(4);
+    for (int i = 0; i < 1000; ++i) {
+        const glm::u32vec3 cell(random() & 0x1fffff, random() & 0x1fffff, random() & 0x1fffff);
+        uint64_t code = 0;
+        for (int bit = 0; bit < 21; ++bit)
+            for (int axis = 0; axis < 3; ++axis) code |= uint64_t{cell[axis] >> bit & 1} << (3 * bit + axis);
+        ASSERT_EQ(mortonEncode(cell), code);
+        // A child's code is its parent's with the octant behind it.
+        ASSERT_EQ(mortonEncode(cell / 2u), code >> 3);
+    }
+}
+
+TEST_F(VcpFile, SameInputSameBytes) {
+    writeSphere(folder_ / "again.vcp");
+    EXPECT_EQ(bytesOf(folder_ / "again.vcp"), bytes_);
+}
+
+TEST_F(VcpFile, AbandonedWriterLeavesNothing) {
+    {
+        auto writer = VcpWriter::create(path(), 1);
+        ASSERT_TRUE(writer.ok());
+        EXPECT_TRUE(fs::exists(folder_ / "sphere.vcp.partial"));
+        EXPECT_EQ(bytesOf(path()), bytes_) << "the old file stays whole until the new one is";
+    }
+    EXPECT_FALSE(fs::exists(folder_ / "sphere.vcp.partial"));
+    EXPECT_EQ(bytesOf(path()), bytes_);
+}
+
+TEST_F(VcpFile, CommitReplacesTheOldFile) {
+    writeSphere(path(), {3, 3.2, 2.9}, 1.2);
+    EXPECT_NE(bytesOf(path()), bytes_);
+    EXPECT_TRUE(verifyFile(MemoryFile(bytesOf(path()))).ok());
+    EXPECT_FALSE(fs::exists(folder_ / "sphere.vcp.partial"));
+}
+
+TEST_F(VcpFile, WriterRefusesWrongPlaces) {
+    const auto inFolder = VcpWriter::create(folder_.path(), 1);
+    ASSERT_FALSE(inFolder.ok());
+    EXPECT_EQ(inFolder.error().code, ErrorCode::Io);
+    EXPECT_NE(inFolder.error().line().find("is a folder"), std::string::npos);
+    const auto noFolder = VcpWriter::create(folder_ / "none" / "out.vcp", 1);
+    ASSERT_FALSE(noFolder.ok());
+    EXPECT_NE(noFolder.error().line().find("No such file"), std::string::npos) << noFolder.error().line();
+    const auto underFile = VcpWriter::create(path() / "out.vcp", 1);
+    ASSERT_FALSE(underFile.ok());
+    EXPECT_NE(underFile.error().line().find("sphere.vcp"), std::string::npos);
+}
+
+TEST_F(VcpFile, UnwritableFolder) {
+    fs::create_directory(folder_ / "locked");
+    fs::permissions(folder_ / "locked", fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_exec | fs::perms::others_read);
+    fs::permissions(folder_.path(), fs::perms::others_exec, fs::perm_options::add);
+    // Root may write anywhere, so a child that is nobody tries.
+    const pid_t child = fork();
+    if (child == 0) {
+        if (geteuid() == 0 && seteuid(65534) != 0) _exit(3);
+        const auto writer = VcpWriter::create(folder_ / "locked" / "out.vcp", 1);
+        const bool said = !writer.ok() && writer.error().code == ErrorCode::Io && writer.error().line().find("Permission denied") != std::string::npos &&
+                          writer.error().line().find("out.vcp") != std::string::npos;
+        _exit(said ? 0 : 1);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    if (WEXITSTATUS(status) == 3) GTEST_SKIP() << "cannot become another user here";
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+    EXPECT_TRUE(fs::is_empty(folder_ / "locked"));
+}
+
+/// A place for few bytes: a 64 KiB file system where one may be mounted, else a limit on the size of files.
+class SmallDisk {
+public:
+    explicit SmallDisk(const fs::path& folder) : folder_(folder) {
+        fs::create_directory(folder);
+        mounted_ = mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=64k") == 0;
+        if (mounted_) return;
+        getrlimit(RLIMIT_FSIZE, &before_);
+        handler_ = std::signal(SIGXFSZ, SIG_IGN);
+        const rlimit small{64 << 10, before_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &small);
+    }
+    ~SmallDisk() {
+        if (mounted_) {
+            umount(folder_.c_str());
+        } else {
+            setrlimit(RLIMIT_FSIZE, &before_);
+            std::signal(SIGXFSZ, handler_);
+        }
+    }
+    SmallDisk(const SmallDisk&) = delete;
+    SmallDisk& operator=(const SmallDisk&) = delete;
+    [[nodiscard]] bool mounted() const { return mounted_; }
+
+private:
+    fs::path folder_;
+    bool mounted_ = false;
+    rlimit before_{};
+    void (*handler_)(int) = nullptr;
+};
+
+TEST_F(VcpFile, FullDisk) {
+    const fs::path out = folder_ / "small" / "out.vcp";
+    const SmallDisk disk(folder_ / "small");
+    // A first file fits and must survive the second, which does not.
+    writeSphere(out);
+    const Bytes before = bytesOf(out);
+    {
+        auto writer = VcpWriter::create(out, 100);
+        ASSERT_TRUE(writer.ok()) << writer.error().line();
+        std::mt19937 random(1);
+        StoredPage page;
+        page.geometry.resize(4000);
+        for (std::byte& b : page.geometry) b = std::byte(random());
+        page.geometryBytes = 4000;
+        Result<void> result;
+        for (int i = 0; i < 100 && result.ok(); ++i) result = (*writer)->append({}, page);
+        ASSERT_FALSE(result.ok());
+        EXPECT_EQ(result.error().code, ErrorCode::Io);
+        EXPECT_NE(result.error().line().find("out.vcp: write failed"), std::string::npos) << result.error().line();
+        if (disk.mounted()) {
+            EXPECT_NE(result.error().line().find("free some space"), std::string::npos) << result.error().line();
+        }
+    }
+    EXPECT_FALSE(fs::exists(out.string() + ".partial"));
+    EXPECT_EQ(bytesOf(out), before);
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,66 @@
+// The frame's page tree.
+#include "render/page_table.h"
+
+#include <bit>
+
+#include <gtest/gtest.h>
+
+#include "render/frame.h"
+#include "tests/octree/analytic_page.h"
+
+namespace vcp {
+namespace {
+
+test::AnalyticDataset sphereDataset() {
+    test::AnalyticOptions o;
+    o.levels = 3;
+    return test::analyticDataset(test::sphere(glm::dvec3(32.1, 31.9, 32.2), 25), o);
+}
+
+TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
+    const test::AnalyticDataset made = sphereDataset();
+    const Dataset& dataset = made.dataset;
+    // Level 1, but page 1 replaced by its children.
+    std::vector<uint64_t> cut;
+    for (uint64_t page = 0; page < dataset.pages.size(); ++page) {
+        if (dataset.pages[page].level == 1 && page != 1) cut.push_back(page);
+        if (page >= dataset.pages[1].firstChild && page < dataset.pages[1].firstChild + uint64_t(std::popcount(dataset.pages[1].childMask))) cut.push_back(page);
+    }
+    std::vector<ResidentPage> resident(dataset.pages.size());
+    for (uint64_t page = 0; page < resident.size(); ++page) {
+        std::memcpy(&resident[page].header, made.pages[page].geometryBytes().data(), sizeof(PageHeader));
+        resident[page].texel = static_cast<uint32_t>(1000 * page);
+    }
+    const auto table = pageTable(dataset, cut, [&](uint64_t page) -> const ResidentPage& { return resident[page]; });
+
+    std::vector<uint64_t> found;
+    const std::function<void(uint32_t, uint64_t)> walk = [&](uint32_t node, uint64_t page) {
+        const glm::uvec4 r0 = table[node * frame::kRecordTexels], r1 = table[node * frame::kRecordTexels + 1];
+        if ((r0.x & frame::kRecordInCut) != 0) {
+            const PageSections sections = pageSections(resident[page].header);
+            EXPECT_EQ(r0.z, resident[page].header.root);
+            EXPECT_EQ(r0.w, 1000 * page);
+            EXPECT_EQ(r1.x, 1000 * page + sections.faces / 16);
+            EXPECT_EQ(r1.w, 1000 * page + sections.normals / 16);
+            found.push_back(page);
+            return;
+        }
+        EXPECT_EQ(r0.x & 255u, dataset.pages[page].childMask);
+        uint32_t child = r0.y;
+        uint64_t childPage = dataset.pages[page].firstChild;
+        for (uint32_t octant = 0; octant < 8; ++octant)
+            if ((r0.x >> octant & 1) != 0) walk(child++, childPage++);
+    };
+    walk(0, 0);
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, cut);
+}
+
+TEST(PageTable, WithoutACutTheRootIsEmpty) {
+    const auto table = pageTable(sphereDataset().dataset, {}, [](uint64_t) -> const ResidentPage& { std::abort(); });
+    ASSERT_EQ(table.size(), frame::kRecordTexels);
+    EXPECT_EQ(table[0].x, 0u);
+}
+
+}  // namespace
+}  // namespace vcp

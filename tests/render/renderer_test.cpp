@@ -1,0 +1,411 @@
+// The whole renderer against the reference ray-caster, with validation layers on: every test ends with no
+// message.
+#include "render/renderer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "render/frame_setup.h"
+#include "tests/render/test_scene.h"
+
+namespace vcp {
+namespace {
+
+using test::Scene;
+
+class RendererTest : public testing::Test {
+protected:
+    void start(RendererOptions options = {}) {
+        options.validation = true;
+        auto made = Renderer::create(options);
+        ASSERT_TRUE(made) << made.error().line();
+        renderer_ = std::move(*made);
+    }
+    void show(const Scene& scene) {
+        const auto opened = renderer_->open(scene.dataset, scene.source);
+        ASSERT_TRUE(opened) << opened.error().line();
+    }
+    /// Settles and draws.
+    FrameStats draw(const FrameRequest& request) {
+        const auto update = renderer_->settle(request);
+        EXPECT_TRUE(update) << update.error().line();
+        const auto stats = renderer_->render(request);
+        EXPECT_TRUE(stats) << stats.error().line();
+        return *stats;
+    }
+    void TearDown() override {
+        if (!renderer_) return;
+        for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+    }
+    std::unique_ptr<Renderer> renderer_;
+};
+
+FrameRequest requestOf(const Camera& camera, uint32_t width = 160, uint32_t height = 120) {
+    FrameRequest request;
+    request.camera = camera;
+    request.width = width;
+    request.height = height;
+    request.errorPixels = 0.2;
+    return request;
+}
+
+struct NamedCamera {
+    const char* name;
+    Camera camera;
+};
+
+/// Around, along the axes, close, from inside the box and the body, with parallel rays.
+std::vector<NamedCamera> cameras(const Scene& scene) {
+    const glm::dvec3 lo = scene.boxMin, hi = scene.boxMax, middle = (lo + hi) * 0.5;
+    const double edge = hi.x - lo.x;
+    const auto fit = [&](glm::dvec3 forward) { return fitCamera(lo, hi, forward, {0.1, 1, 0.2}, 0.6, 4.0 / 3); };
+    std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})}, {"along -z", fit({0, 0, -1})}, {"along +x", fit({1, 0, 0})},
+                                     {"along -y", fit({0, -1, 0})}, {"diagonal", fit({1, 1, 1})}};
+    Camera parallel = fit({0.5, -0.3, 0.7});
+    parallel.projection = Projection::Orthographic;
+    list.push_back({"parallel", parallel});
+    Camera straight = fit({0, 0, 1});
+    straight.projection = Projection::Orthographic;
+    list.push_back({"parallel along +z", straight});
+    Camera close = fit({-0.3, -0.5, -1});
+    close.eye = middle + (close.eye - middle) * 0.45;
+    list.push_back({"close", close});
+    Camera inside = fit({0.7, 0.1, -0.3});
+    inside.eye = middle + glm::dvec3(0.013, 0.021, 0.017) * edge;
+    list.push_back({"from the middle", inside});
+    Camera corner = fit({1, 0.8, 0.9});
+    corner.eye = lo + 0.02 * edge;
+    list.push_back({"from a corner of the box", corner});
+    Camera far = fit({-0.2, -0.3, -1});
+    far.eye = middle - glm::normalize(far.forward) * (edge * 300);
+    far.verticalFov = 0.005;
+    list.push_back({"from far away", far});
+    return list;
+}
+
+struct Comparison {
+    uint64_t hit = 0, miss = 0, missed = 0, wrong = 0;
+    double depthMax = 0, depthSum = 0, normalMax = 0;  // cells, radians
+};
+
+/// Every pixel against the reference on the same cut. Hits that differ by more than two cells are `wrong`.
+Comparison compare(Renderer& renderer, const Scene& scene, const FrameRequest& request) {
+    const std::vector<uint64_t> ones(scene.dataset->pages.size(), 1);
+    const std::vector<uint8_t> all(ones.size(), 1), none(ones.size(), 0);
+    const Selection selection = selectPages(*scene.dataset, selectionView(request), UINT64_MAX, ones, all, none);
+    const auto caster = ReferenceCaster::create(*scene.cache, selection.cut);
+    EXPECT_TRUE(caster);
+    const auto depth = renderer.readDepth();
+    const auto normals = renderer.readNormals();
+    EXPECT_TRUE(depth && normals);
+    Comparison c;
+    for (uint32_t y = 0; y < request.height; ++y)
+        for (uint32_t x = 0; x < request.width; ++x) {
+            const CameraRay ray = cameraRay(request.camera, request.width, request.height, x + 0.5, y + 0.5);
+            const auto expected = caster->cast({ray.origin, ray.direction});
+            const size_t at = size_t{y} * request.width + x;
+            const bool found = std::isfinite((*depth)[at]);
+            if (!expected && !found) ++c.miss;
+            if (expected.has_value() != found) ++c.missed;
+            if (!expected || !found) continue;
+            const double error = std::abs(double((*depth)[at]) - expected->t) / scene.dataset->cellOf(expected->level);
+            if (error > 2) {
+                ++c.wrong;
+                continue;
+            }
+            ++c.hit;
+            c.depthSum += error;
+            c.depthMax = std::max(c.depthMax, error);
+            c.normalMax = std::max(c.normalMax, std::acos(std::min(1.0, glm::dot(glm::dvec3((*normals)[at]), expected->normal))));
+        }
+    return c;
+}
+
+class RendererAgainstReference : public RendererTest, public testing::WithParamInterface<PageAccess> {};
+
+TEST_P(RendererAgainstReference, EveryCamera) {
+    RendererOptions options;
+    options.access = GetParam();
+    start(options);
+    const Scene scenes[] = {test::sphereScene(), test::torusScene(), test::cubeScene(0), test::cubeScene(2),
+                            test::sphereScene(2, {483920.5, 3792000.25, 1200}, 1.0 / 1024, 1)};
+    for (const Scene& scene : scenes) {
+        show(scene);
+        uint64_t hits = 0;
+        for (const NamedCamera& named : cameras(scene)) {
+            SCOPED_TRACE(scene.name + ", " + named.name);
+            const FrameRequest request = requestOf(named.camera);
+            const FrameStats stats = draw(request);
+            const Comparison c = compare(*renderer_, scene, request);
+            hits += c.hit;
+            EXPECT_EQ(stats.rays, uint64_t{request.width} * request.height);
+            EXPECT_LE(c.missed + c.wrong, 2u) << "single precision may decide differently at an outline, no more";
+            EXPECT_LE(stats.hitPixels, c.hit + c.wrong + 2);
+            EXPECT_GE(stats.hitPixels + 2, c.hit + c.wrong);
+            // Far away, single precision along the ray is what limits depth.
+            const double reach = glm::length(named.camera.eye - (scene.boxMin + scene.boxMax) * 0.5) / scene.dataset->header.cell;
+            EXPECT_LT(c.depthSum / double(std::max<uint64_t>(c.hit, 1)), 2e-4 + 1e-7 * reach);
+            EXPECT_LT(c.depthMax, 0.3) << "grazing rays, a few steps of false position";
+        }
+        EXPECT_GT(hits, 10000u) << "the cameras must see something";
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Access, RendererAgainstReference, testing::Values(PageAccess::TexelBuffer, PageAccess::StorageBuffer),
+                         [](const auto& info) { return info.param == PageAccess::TexelBuffer ? "Texel" : "Storage"; });
+
+TEST_F(RendererTest, BeamChangesNoPixel) {
+    start();
+    for (const Scene& scene : {test::torusScene(), test::cubeScene(2)}) {
+        show(scene);
+        for (const NamedCamera& named : cameras(scene)) {
+            SCOPED_TRACE(scene.name + ", " + named.name);
+            FrameRequest request = requestOf(named.camera, 203, 117);  // tiles cut at both edges
+            const FrameStats with = draw(request);
+            const auto depthWith = renderer_->readDepth();
+            const auto pictureWith = renderer_->readPicture();
+            request.beam = false;
+            const FrameStats without = draw(request);
+            EXPECT_EQ(*renderer_->readDepth(), *depthWith);
+            EXPECT_EQ(*renderer_->readPicture(), *pictureWith);
+            EXPECT_EQ(with.hitPixels, without.hitPixels);
+            EXPECT_EQ(without.tracedRays, without.rays);
+            EXPECT_LE(with.tracedRays, with.rays);
+        }
+    }
+}
+
+TEST_F(RendererTest, EmptyTilesAreNotTraced) {
+    start();
+    const Scene scene = test::sphereScene();
+    show(scene);
+    Camera camera = fitCamera(scene.boxMin, scene.boxMax, {-0.3, -0.5, -1}, {0, 1, 0}, 0.6, 4.0 / 3);
+    const FrameStats stats = draw(requestOf(camera, 640, 480));
+    EXPECT_GT(stats.hitPixels, 10000u);
+    EXPECT_LT(stats.tracedRays, stats.hitPixels * 5 / 4);
+    camera.forward = -camera.forward;
+    const FrameStats away = draw(requestOf(camera, 640, 480));
+    EXPECT_EQ(away.hitPixels, 0u);
+    EXPECT_EQ(away.tracedRays, 0u);
+}
+
+TEST_F(RendererTest, SameInputSameBytes) {
+    start();
+    const Scene scene = test::torusScene();
+    show(scene);
+    const FrameRequest request = requestOf(cameras(scene)[0].camera, 320, 200);
+    draw(request);
+    const auto first = renderer_->readPicture();
+    draw(requestOf(cameras(scene)[3].camera, 100, 100));
+    draw(request);
+    EXPECT_EQ(*renderer_->readPicture(), *first);
+    start();
+    show(scene);
+    draw(request);
+    EXPECT_EQ(*renderer_->readPicture(), *first) << "another renderer";
+}
+
+TEST_F(RendererTest, BothWaysToReadPagesGiveTheSamePicture) {
+    const Scene scene = test::torusScene();
+    std::vector<Picture> pictures;
+    for (const PageAccess access : {PageAccess::TexelBuffer, PageAccess::StorageBuffer}) {
+        RendererOptions options;
+        options.access = access;
+        start(options);
+        EXPECT_EQ(renderer_->access(), access);
+        show(scene);
+        draw(requestOf(cameras(scene)[0].camera, 320, 200));
+        pictures.push_back(*renderer_->readPicture());
+    }
+    EXPECT_EQ(pictures[0], pictures[1]);
+}
+
+TEST_F(RendererTest, WithoutColourNothingIsAllocatedForIt) {
+    test::AnalyticOptions o;
+    o.levels = 2;
+    const auto made = test::analyticDataset(test::sphere(glm::dvec3(16), 12), o);
+    Scene painted;
+    test::paint(painted, made, 0xff2040e0);  // RGBA bytes e0 40 20 ff
+    const FrameRequest request = requestOf(cameras(painted)[0].camera);
+
+    start();
+    show(painted);
+    const FrameStats with = draw(request);
+    EXPECT_GT(with.colourBytes, 0u);
+    const auto middle = [&] {
+        const Picture picture = *renderer_->readPicture();
+        const uint8_t* p = &picture.rgba[4 * (size_t{60} * 160 + 80)];
+        return glm::ivec3(p[0], p[1], p[2]);
+    };
+    const glm::ivec3 red = middle();
+    EXPECT_NEAR(double(red.y) / red.x, double(0x40) / 0xe0, 0.03);
+    EXPECT_NEAR(double(red.z) / red.x, double(0x20) / 0xe0, 0.03);
+
+    RendererOptions off;
+    off.colour = false;
+    start(off);
+    show(painted);
+    const FrameStats without = draw(request);
+    EXPECT_EQ(without.colourBytes, 0u);
+    EXPECT_LT(without.poolBytes, with.poolBytes);
+    EXPECT_GT(double(middle().y) / middle().x, 0.8) << "clay";
+
+    start();
+    show(test::sphereScene());
+    EXPECT_EQ(draw(requestOf(cameras(test::sphereScene())[0].camera)).colourBytes, 0u) << "the dataset has none";
+}
+
+TEST_F(RendererTest, PipelinesAreMadeOnceAndOnlyWhenNeeded) {
+    start();
+    const Scene scene = test::sphereScene();
+    show(scene);
+    FrameRequest request = requestOf(cameras(scene)[0].camera);
+    EXPECT_EQ(draw(request).pipelines, 3u);
+    const FrameStats plain = draw(request);
+    EXPECT_EQ(plain.pipelines, 3u);
+    EXPECT_EQ(plain.steps, 0u);
+    request.countSteps = true;
+    const FrameStats counted = draw(request);
+    EXPECT_EQ(counted.pipelines, 4u);
+    EXPECT_GT(counted.steps, counted.hitPixels);
+    EXPECT_GT(counted.fetches, counted.steps);
+    EXPECT_LT(counted.steps, 60 * counted.tracedRays);
+    EXPECT_EQ(draw(request).steps, counted.steps) << "exact";
+}
+
+TEST_F(RendererTest, BudgetIsKeptAndEveryViewSettles) {
+    RendererOptions options;
+    options.budgetBytes = 1 << 20;
+    start(options);
+    const Scene scene = test::sphereScene(4);
+    uint64_t all = 0;
+    for (const PageEntry& page : scene.dataset->pages) all += page.pageBytes;
+    ASSERT_GT(all, options.budgetBytes * 2) << "the test needs a dataset larger than the budget";
+    show(scene);
+    for (int round = 0; round < 3; ++round)
+        for (const NamedCamera& named : cameras(scene)) {
+            FrameRequest request = requestOf(named.camera, 64, 48);
+            request.errorPixels = 0.001;
+            for (int i = 0; i < 5; ++i) {
+                const auto update = renderer_->update(request);
+                ASSERT_TRUE(update) << update.error().line();
+                EXPECT_LE(update->residentBytes, options.budgetBytes);
+            }
+            const auto settled = renderer_->settle(request);
+            ASSERT_TRUE(settled) << settled.error().line();
+            EXPECT_TRUE(settled->settled);
+            EXPECT_TRUE(settled->drawable);
+            EXPECT_LE(settled->residentBytes, options.budgetBytes);
+            const auto stats = renderer_->render(request);
+            ASSERT_TRUE(stats) << stats.error().line();
+            EXPECT_LE(stats->poolBytes, options.budgetBytes);
+            const auto again = renderer_->update(request);
+            EXPECT_TRUE(again->settled);
+            EXPECT_FALSE(again->changed) << "a settled view stays as it is";
+        }
+}
+
+TEST_F(RendererTest, ABrokenPageIsReportedOnceAndDrawnFromItsParent) {
+    start();
+    const Scene scene = test::sphereScene();
+    scene.source->broken = {5, 20};
+    show(scene);
+    FrameRequest request = requestOf(cameras(scene)[0].camera);
+    request.errorPixels = 0;
+    const auto update = renderer_->settle(request);
+    ASSERT_TRUE(update);
+    EXPECT_TRUE(update->settled);
+    ASSERT_GE(update->problems.size(), 1u);
+    EXPECT_EQ(update->problems[0].message, "broken");
+    for (int i = 0; i < 5; ++i) EXPECT_TRUE(renderer_->update(request)->problems.empty());
+    const auto stats = renderer_->render(request);
+    ASSERT_TRUE(stats);
+    EXPECT_GT(stats->hitPixels, 3000u);
+}
+
+TEST_F(RendererTest, ABrokenRootSettlesOnTheBackground) {
+    start();
+    const Scene scene = test::sphereScene();
+    scene.source->broken = {0};
+    show(scene);
+    const FrameRequest request = requestOf(cameras(scene)[0].camera);
+    const auto update = renderer_->settle(request);
+    ASSERT_TRUE(update);
+    EXPECT_EQ(update->problems.size(), 1u);
+    EXPECT_FALSE(update->drawable);
+    EXPECT_EQ(renderer_->render(request)->hitPixels, 0u);
+}
+
+TEST_F(RendererTest, NothingToShowIsBackground) {
+    start();
+    EXPECT_FALSE(renderer_->readPicture()) << "nothing was drawn yet";
+    EXPECT_FALSE(renderer_->readDepth());
+    const FrameRequest request = requestOf(Camera{}, 33, 17);
+    const FrameStats stats = draw(request);
+    EXPECT_EQ(stats.hitPixels, 0u);
+    EXPECT_EQ(stats.tracedRays, 0u);
+    const auto picture = renderer_->readPicture();
+    ASSERT_TRUE(picture);
+    EXPECT_EQ(picture->rgba.size(), 33u * 17 * 4);
+    for (size_t i = 3; i < picture->rgba.size(); i += 4) EXPECT_EQ(picture->rgba[i], 255);
+
+    // A page without any surface, and a dataset without pages.
+    test::AnalyticOptions o;
+    show(test::sceneOf("empty", test::analyticDataset(test::sphere(glm::dvec3(900), 1), o)));
+    Camera camera;
+    camera.eye = {8, 8, 40};
+    EXPECT_EQ(draw(requestOf(camera)).hitPixels, 0u);
+    auto none = std::make_shared<Dataset>();
+    none->header.levels = 1;
+    none->header.log2Cells = 4;
+    none->header.cell = 1;
+    ASSERT_TRUE(renderer_->open(none, std::make_shared<test::MemorySource>(std::vector<PageBytes>{})));
+    EXPECT_EQ(draw(requestOf(camera)).hitPixels, 0u);
+    renderer_->close();
+    EXPECT_EQ(draw(requestOf(camera)).hitPixels, 0u);
+}
+
+TEST_F(RendererTest, PickIsTheDepthOfThePixel) {
+    start();
+    const Scene scene = test::sphereScene();
+    show(scene);
+    const FrameRequest request = requestOf(cameras(scene)[0].camera);
+    draw(request);
+    const auto depth = renderer_->readDepth();
+    int hits = 0;
+    for (uint32_t y = 3; y < request.height; y += 11)
+        for (uint32_t x = 1; x < request.width; x += 13) {
+            const auto hit = renderer_->pick(x, y);
+            ASSERT_TRUE(hit);
+            const float expected = (*depth)[size_t{y} * request.width + x];
+            ASSERT_EQ(hit->has_value(), std::isfinite(expected));
+            if (!hit->has_value()) continue;
+            ++hits;
+            EXPECT_NEAR((*hit)->depth, expected, 1e-4);
+            const glm::dvec3 centre = scene.boxMin + glm::dvec3(0.503, 0.497, 0.501) * 64.0;
+            EXPECT_NEAR(glm::distance((*hit)->position, centre), 0.41 * 64, 0.02);
+            EXPECT_GT(glm::dot(glm::dvec3((*hit)->normal), glm::normalize((*hit)->position - centre)), 0.99);
+        }
+    EXPECT_GT(hits, 20);
+    EXPECT_FALSE(renderer_->pick(request.width, 0)->has_value());
+}
+
+TEST_F(RendererTest, WrongUseIsOneClearError) {
+    RendererOptions small;
+    small.budgetBytes = 100;
+    EXPECT_EQ(Renderer::create(small).error().code, ErrorCode::Usage);
+    RendererOptions elsewhere;
+    elsewhere.device = "no such device";
+    EXPECT_EQ(Renderer::create(elsewhere).error().code, ErrorCode::Device);
+    start();
+    FrameRequest request;
+    request.width = 0;
+    EXPECT_EQ(renderer_->render(request).error().code, ErrorCode::Usage);
+    EXPECT_EQ(renderer_->update(request).error().code, ErrorCode::Usage);
+    EXPECT_EQ(renderer_->present(10, 10).error().code, ErrorCode::Usage);
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,56 @@
+// Slots of the page pool against an obvious model.
+#include "render/slot_allocator.h"
+
+#include <map>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace vcp {
+namespace {
+
+TEST(SlotAllocator, NeverOverlapsNeverExceedsNeverCrossesAChunk) {
+    for (uint64_t seed = 0; seed < 50; ++seed) {
+        std::mt19937_64 random(seed);
+        const uint64_t units = 50 + random() % 200, chunk = 32;
+        SlotAllocator slots(units, chunk);
+        std::map<uint64_t, uint64_t> taken;  // first to units
+        uint64_t sum = 0;
+        for (int step = 0; step < 2000; ++step) {
+            if (random() % 3 != 0) {
+                const uint64_t size = 1 + random() % 12;
+                const auto first = slots.allocate(size);
+                if (!first) continue;
+                ASSERT_LE(*first + size, units) << seed;
+                ASSERT_EQ(*first / chunk, (*first + size - 1) / chunk) << seed;
+                const auto after = taken.lower_bound(*first);
+                if (after != taken.end()) ASSERT_LE(*first + size, after->first) << seed;
+                if (after != taken.begin()) ASSERT_LE(std::prev(after)->first + std::prev(after)->second, *first) << seed;
+                taken[*first] = size;
+                sum += size;
+            } else if (!taken.empty()) {
+                auto at = std::next(taken.begin(), static_cast<std::ptrdiff_t>(random() % taken.size()));
+                slots.release(at->first, at->second);
+                sum -= at->second;
+                taken.erase(at);
+            }
+            ASSERT_EQ(slots.unitsTaken(), sum);
+        }
+    }
+}
+
+TEST(SlotAllocator, FullIsFullAndReleasedIsReused) {
+    SlotAllocator slots(8, 8);
+    EXPECT_EQ(slots.allocate(5), 0u);
+    EXPECT_EQ(slots.allocate(4), std::nullopt);
+    EXPECT_EQ(slots.allocate(3), 5u);
+    EXPECT_EQ(slots.allocate(1), std::nullopt);
+    slots.release(0, 5);
+    EXPECT_EQ(slots.allocate(2), 0u);
+    EXPECT_EQ(slots.allocate(3), 2u);
+    EXPECT_EQ(slots.unitsTaken(), 8u);
+    EXPECT_EQ(SlotAllocator(100, 8).allocate(9), std::nullopt) << "more than a chunk";
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,157 @@
+// Loader threads with a fake source. Run under TSan as well.
+#include "streaming/page_loader.h"
+
+#include <atomic>
+#include <set>
+
+#include <gtest/gtest.h>
+
+namespace vcp {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr milliseconds kLong(20000);
+
+/// Pages whose first word is their number; can be held back, and fails where asked to.
+class FakeSource final : public PageSource {
+public:
+    explicit FakeSource(size_t wordsPerPage = 1) : words_(wordsPerPage) {}
+
+    Result<PageBytes> read(uint64_t page, bool withColour) const override {
+        {
+            std::unique_lock lock(mutex_);
+            begun_.push_back(page);
+            changed_.notify_all();
+            changed_.wait(lock, [&] { return !held_; });
+        }
+        if (page == failing) return Error{.code = ErrorCode::Io, .message = "broken", .element = "page 13"};
+        PageBytes bytes;
+        bytes.geometry.assign(words_, uint4(static_cast<uint32_t>(page)));
+        if (withColour) bytes.colour.assign(1, uint4(7));
+        return bytes;
+    }
+    void hold(bool held) {
+        const std::lock_guard lock(mutex_);
+        held_ = held;
+        changed_.notify_all();
+    }
+    void waitUntilBegun(size_t pages) const {
+        std::unique_lock lock(mutex_);
+        changed_.wait_for(lock, kLong, [&] { return begun_.size() >= pages; });
+    }
+    [[nodiscard]] std::vector<uint64_t> begun() const {
+        const std::lock_guard lock(mutex_);
+        return begun_;
+    }
+
+    uint64_t failing = UINT64_MAX;
+
+private:
+    size_t words_;
+    mutable std::mutex mutex_;
+    mutable std::condition_variable changed_;
+    mutable std::vector<uint64_t> begun_;
+    bool held_ = false;
+};
+
+std::vector<LoadedPage> collectAll(PageLoader& loader, size_t pages) {
+    std::vector<LoadedPage> all;
+    while (all.size() < pages && loader.waitForPage(kLong))
+        for (LoadedPage& page : loader.collect()) all.push_back(std::move(page));
+    return all;
+}
+
+TEST(PageLoader, DeliversEveryWishOnce) {
+    const auto source = std::make_shared<FakeSource>();
+    PageLoader loader(source, true, 3, 1 << 20);
+    std::vector<PageRequest> wishes;
+    for (uint64_t page = 0; page < 100; ++page) wishes.push_back({page, double(page % 7)});
+    loader.request(wishes);
+    std::set<uint64_t> seen;
+    for (const LoadedPage& page : collectAll(loader, 100)) {
+        ASSERT_TRUE(page.bytes) << page.bytes.error().line();
+        EXPECT_EQ(page.bytes->geometry[0].x, page.page);
+        EXPECT_EQ(page.bytes->colour.size(), 1u);
+        EXPECT_TRUE(seen.insert(page.page).second);
+    }
+    EXPECT_EQ(seen.size(), 100u);
+    EXPECT_EQ(loader.pending(), 0u);
+    EXPECT_EQ(loader.bytesRead(), 100u * 32);
+    EXPECT_FALSE(loader.waitForPage(kLong)) << "nothing is under way: it must not wait";
+}
+
+TEST(PageLoader, UrgentFirstOfEqualsInOrder) {
+    const auto source = std::make_shared<FakeSource>();
+    source->hold(true);
+    PageLoader loader(source, false, 1, 1 << 20);
+    loader.request({{50, 1}});
+    source->waitUntilBegun(1);
+    loader.request({{1, 1}, {2, 5}, {3, 5}, {4, 9}});
+    source->hold(false);
+    collectAll(loader, 5);
+    EXPECT_EQ(source->begun(), (std::vector<uint64_t>{50, 4, 2, 3, 1}));
+}
+
+TEST(PageLoader, StaleWishesAreNotRead) {
+    const auto source = std::make_shared<FakeSource>();
+    source->hold(true);
+    PageLoader loader(source, false, 1, 1 << 20);
+    loader.request({{1, 9}, {2, 8}, {3, 7}});
+    source->waitUntilBegun(1);
+    loader.request({{4, 1}});
+    source->hold(false);
+    EXPECT_EQ(collectAll(loader, 2).size(), 2u);
+    EXPECT_EQ(source->begun(), (std::vector<uint64_t>{1, 4}));
+}
+
+TEST(PageLoader, APageBeingReadOrHeldIsNotReadAgain) {
+    const auto source = std::make_shared<FakeSource>();
+    PageLoader loader(source, false, 2, 1 << 20);
+    for (int i = 0; i < 50; ++i) loader.request({{1, 1}, {2, 1}, {1, 2}});
+    ASSERT_TRUE(loader.waitForPage(kLong));
+    for (int i = 0; i < 50; ++i) loader.request({{1, 1}, {2, 1}});
+    EXPECT_EQ(collectAll(loader, 2).size(), 2u);
+    EXPECT_EQ(source->begun().size(), 2u);
+}
+
+TEST(PageLoader, AnErrorIsDeliveredLikeAPage) {
+    const auto source = std::make_shared<FakeSource>();
+    source->failing = 13;
+    PageLoader loader(source, false, 2, 1 << 20);
+    loader.request({{13, 1}});
+    const auto pages = collectAll(loader, 1);
+    ASSERT_EQ(pages.size(), 1u);
+    ASSERT_FALSE(pages[0].bytes);
+    EXPECT_EQ(pages[0].bytes.error().line(), "page 13: broken");
+    EXPECT_EQ(loader.bytesRead(), 0u);
+}
+
+TEST(PageLoader, RestsWhenTooMuchIsHeld) {
+    const auto source = std::make_shared<FakeSource>(64);  // 1 KiB a page
+    PageLoader loader(source, false, 2, 4096);
+    std::vector<PageRequest> wishes;
+    for (uint64_t page = 0; page < 64; ++page) wishes.push_back({page, 0});
+    loader.request(wishes);
+    size_t collected = 0;
+    while (collected < 64 && loader.waitForPage(kLong)) {
+        std::this_thread::sleep_for(milliseconds(2));
+        const auto pages = loader.collect();
+        EXPECT_LE(pages.size(), 4u + 2u);
+        collected += pages.size();
+    }
+    EXPECT_EQ(collected, 64u);
+}
+
+TEST(PageLoader, StopsAtAnyMoment) {
+    for (int i = 0; i < 200; ++i) {
+        const auto source = std::make_shared<FakeSource>();
+        PageLoader loader(source, false, 1 + i % 4, 1 << 20);
+        std::vector<PageRequest> wishes;
+        for (uint64_t page = 0; page < 20; ++page) wishes.push_back({page, 0});
+        loader.request(wishes);
+        if (i % 3 == 0) loader.collect();
+    }
+}
+
+}  // namespace
+}  // namespace vcp
