@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <sys/resource.h>
 
 #include <fmt/format.h>
@@ -130,6 +131,9 @@ private:
         };
         // Pages differ in weight, so they are taken one by one; each lands in its own slot, so the order of
         // the work cannot show in the file.
+        std::optional<tbb::global_control> more;  // without it TBB gives no more threads than processors, and says so
+        if (options_.threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))
+            more.emplace(tbb::global_control::max_allowed_parallelism, options_.threads);
         tbb::task_arena arena(options_.threads == 0 ? tbb::task_arena::automatic : static_cast<int>(options_.threads));
         arena.execute([&] { tbb::parallel_for(size_t{0}, pages.size(), buildOne, tbb::simple_partitioner()); });
         if (cancelled_) return Error{.code = ErrorCode::Cancelled, .message = "cancelled; nothing was written", .file = options_.output.string()};

@@ -24,7 +24,9 @@ using uint = uint32_t;
 using Real = float;
 using Real3 = glm::vec3;
 using Real4 = glm::vec4;
+#define ROOT_RESIDUAL 1e-5f
 #include "octree/shared/leaf_math.h"
+#undef ROOT_RESIDUAL
 }  // namespace f32
 
 namespace f64 {
@@ -33,7 +35,9 @@ using uint = uint32_t;
 using Real = double;
 using Real3 = glm::dvec3;
 using Real4 = glm::dvec4;
+#define ROOT_RESIDUAL 1e-14
 #include "octree/shared/leaf_math.h"
+#undef ROOT_RESIDUAL
 }  // namespace f64
 #undef INLINE
 

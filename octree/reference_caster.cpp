@@ -73,18 +73,22 @@ std::optional<LeafHit> castSoftF64(const PageView& view, uint32_t node, glm::dve
                                    double wallOut, int steps) {
     const uint32_t face = node & kLeafIndexMask;
     const f64::LeafField leaf = f64::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
-    const double u = f64::firstCrossing(f64::restrictToRay(leaf, p, d), wallIn, wallOut, f64::dipBound(node), steps);
+    const f64::RayField ray = f64::restrictToRay(leaf, p, d);
+    const double u = f64::firstCrossing(ray, wallIn, wallOut, f64::dipBound(node), steps);
     if (!(u >= 0)) return {};
-    return LeafHit{u, f64::leafNormal(leaf, p + u * d), 0, u == 0 || u == 1};
+    const glm::dvec3 normal = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, f64::rayValue(ray, 0));
+    return LeafHit{u, normal, 0, u == 0 || u == 1};
 }
 
 std::optional<LeafHit> castSoftF32(const PageView& view, uint32_t node, glm::vec3 p, glm::vec3 d, float wallIn,
                                    float wallOut, int steps) {
     const uint32_t face = node & kLeafIndexMask;
     const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
-    const float u = f32::firstCrossing(f32::restrictToRay(leaf, p, d), wallIn, wallOut, f32::dipBound(node), steps);
+    const f32::RayField ray = f32::restrictToRay(leaf, p, d);
+    const float u = f32::firstCrossing(ray, wallIn, wallOut, f32::dipBound(node), steps);
     if (!(u >= 0)) return {};
-    return LeafHit{u, f32::leafNormal(leaf, p + u * d), 0, u == 0 || u == 1};
+    const glm::vec3 normal = f32::facingNormal(f32::leafNormal(leaf, p + u * d), d, f32::rayValue(ray, 0));
+    return LeafHit{u, normal, 0, u == 0 || u == 1};
 }
 
 std::array<uint32_t, 3> triangleVertices(const PageView& view, uint32_t triangle) {
@@ -103,18 +107,20 @@ glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dv
                                   f64::decodeVertex(c.x, c.y), kTriangleSlack);
 }
 
-/// Vertex normals blended; at a crease the triangle's own.
-glm::dvec3 triangleNormal(const PageView& view, std::array<uint32_t, 3> v, double weight1, double weight2) {
+/// Vertex normals blended, each on the side of the triangle that the ray comes from; at a crease the
+/// triangle's own.
+glm::dvec3 triangleNormal(const PageView& view, std::array<uint32_t, 3> v, double weight1, double weight2, glm::dvec3 direction) {
     glm::dvec3 p[3];
     for (int i = 0; i < 3; ++i) p[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
     glm::dvec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);
     const double length = glm::length(flat);
     if (length > 0) flat /= length;
+    flat = f64::turnedTo(flat, -direction);
     const double weights[3] = {1 - weight1 - weight2, weight1, weight2};
     glm::dvec3 normal{0};
     for (int i = 0; i < 3; ++i) {
         const uint32_t code = view.normals[v[i]];
-        normal += weights[i] * ((code & kNormalCreaseBit) != 0 ? flat : f64::decodeNormal(code));
+        normal += weights[i] * ((code & kNormalCreaseBit) != 0 ? flat : f64::turnedTo(f64::decodeNormal(code), flat));
     }
     return normal;
 }
@@ -227,7 +233,7 @@ private:
             const double at = segment.first + hit.x;
             if (!(hit.x >= -kIntervalSlack && hit.x <= length) || (nearest && nearest->t <= at)) continue;
             if (at * in.cell < ray_.tMin || at * in.cell > ray_.tMax) continue;
-            nearest = LeafHit{at, triangleNormal(*in.view, vertices, hit.y, hit.z), t, false};
+            nearest = LeafHit{at, triangleNormal(*in.view, vertices, hit.y, hit.z, in.direction), t, false};
         }
         if (nearest) keep(in, node, lowest, edge, *nearest);
     }
@@ -237,7 +243,8 @@ private:
         if (!all_ && best_ && best_->t <= t) return;
         const double length = glm::length(hit.normal);
         glm::dvec3 normal = length > 0 ? hit.normal / length : -ray_.direction;
-        if (glm::dot(normal, ray_.direction) > 0) normal = -normal;
+        // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
+        normal = glm::normalize(normal - std::max(glm::dot(normal, ray_.direction), 0.0) * ray_.direction);
         const PageEntry& entry = dataset_.pages[in.page];
         const RayHit found{t,
                            ray_.origin + t * ray_.direction,

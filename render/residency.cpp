@@ -74,7 +74,7 @@ Result<UpdateResult> Residency::update(const SelectionView& view) {
     wish(selection);
     result.changed = selection.cut != cut_;
     cut_ = std::move(selection.cut);
-    result.settled = selection.complete && (!selection.wanted.empty() || dataset_->pages.empty() || unavailable_[0] != 0);
+    result.settled = selection.complete;
     result.drawable = !cut_.empty();
     result.errorPixels = selection.errorPixels;
     result.residentBytes = pool_->bytesTaken() + (colourPool_ ? colourPool_->bytesTaken() : 0);

@@ -65,6 +65,7 @@ Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_
                       std::span<const uint8_t> unavailable) {
     Selection selection;
     selection.errorPixels = kInfinity;
+    selection.complete = true;
     if (dataset.pages.empty() || unavailable[0] != 0 || pageBytes[0] > budgetBytes) return selection;
 
     const auto errorOf = [&](uint64_t page) {

@@ -43,7 +43,7 @@ struct Selection {
     std::vector<WantedPage> wanted;
     std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
     double errorPixels = 0;     ///< largest projected error in the cut, of pages in view; infinite without one
-    bool complete = false;      ///< all that is wanted is resident
+    bool complete = false;      ///< all that is wanted is resident; also where nothing can be
     bool relaxed = false;       ///< the budget kept a page from being refined
 };
 

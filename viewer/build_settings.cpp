@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "viewer/interrupt.h"
 #include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"

@@ -121,6 +121,19 @@ INLINE Real3 leafNormal(LeafField leaf, Real3 x) {
                  dot(w0, leaf.gz0) + dot(w1, leaf.gz1));
 }
 
+// n or -n, whichever is on the side of `reference`.
+INLINE Real3 turnedTo(Real3 n, Real3 reference) { return dot(n, reference) < Real(0.0) ? -n : n; }
+
+// A soft leaf's normal (leafNormal), turned to the side that a ray along d comes from. Where the ray grazes
+// the surface, the side is that of the ray's first point in the leaf, where f is `first`: a normal a little
+// past the silhouette must not turn over.
+INLINE Real3 facingNormal(Real3 n, Real3 d, Real first) {
+    Real along = dot(n, d);
+    bool grazing = along * along < Real(0.09) * dot(n, n) * dot(d, d);
+    bool away = grazing ? first < Real(0.0) : along > Real(0.0);
+    return away ? -n : n;
+}
+
 // f restricted to the segment p + u d, u in [0, 1]: sum w_i(p + u d) (A_i + u B_i). The members p and d
 // are rotated to the leaf's axis.
 struct RayField {
@@ -158,7 +171,8 @@ INLINE Real dipBound(uint node) {
 // First crossing of the segment with f = 0, as u in [0, 1], or -1.
 // wallIn, wallOut: |f| that counts as a hit at u = 0 and u = 1 (0 where that end is not a wall);
 // dip: how far f can swing between two ends on the same side (see page_layout.h).
-// The bracket is refined by the Illinois variant of false position, `steps` times.
+// The bracket is refined by the Illinois variant of false position, at most `steps` times, and until f is
+// within ROOT_RESIDUAL leaf edges of zero.
 INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int steps) {
     Real fa = rayValue(ray, Real(0.0));
     if (abs(fa) <= wallIn) return Real(0.0);
@@ -186,6 +200,7 @@ INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int
     for (int i = 0; i < steps; i++) {
         Real u = a + (b - a) * (fa / (fa - fb));
         Real fu = rayValue(ray, u);
+        if (abs(fu) <= Real(ROOT_RESIDUAL)) return u;
         if ((fu < Real(0.0)) == below) {
             a = u;
             fa = fu;

@@ -2,6 +2,7 @@
 // Read-only data is bound twice, as texel buffers (the fast path of software devices, whose storage
 // buffer loads are scalar loops) and as storage buffers; kTexelAccess chooses.
 #define INLINE
+#define ROOT_RESIDUAL 1e-5
 #define Real float
 #define Real3 vec3
 #define Real4 vec4

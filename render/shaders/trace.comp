@@ -14,7 +14,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-const int kIllinoisSteps = 3;
+const int kIllinoisSteps = 8;
 const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
 const float kIntervalSlack = 1e-4;
 
@@ -128,9 +128,10 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     vec3 p = (s.from - lo) * scale;
     vec3 d = (s.to - s.from) * scale;
     float wall = wallTolerance(node);
-    float u = firstCrossing(restrictToRay(leaf, p, d), s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
+    RayField ray = restrictToRay(leaf, p, d);
+    float u = firstCrossing(ray, s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
     vec3 x = p + u * d;
-    hit.normal = leafNormal(leaf, x);
+    hit.normal = facingNormal(leafNormal(leaf, x), d, rayValue(ray, 0.0));
     if (kColour != 0u) {
         uint colours = page.colours.x + (node & kLeafIndexMask);
         hit.colour = blendColours(fetchColour(colours), fetchColour(colours + 1u), rotateToAxis(x, axis));
@@ -168,12 +169,13 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
     vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
     vec3 flatNormal = cross(pb - pa, pc - pa);
     flatNormal *= inversesqrt(max(dot(flatNormal, flatNormal), 1e-30));
+    flatNormal = turnedTo(flatNormal, -direction);
     vec3 w = vec3(1.0 - weights.x - weights.y, weights);
     vec3 normal = vec3(0.0);
     vec4 colour = vec4(0.0);
     for (int i = 0; i < 3; i++) {
         uint code = fetchWord(page.sections.w, corners[i]);
-        normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : decodeNormal(code));
+        normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
         if (kColour != 0u)
             colour += w[i] * unpackUnorm4x8(texelWord(fetchColour(page.colours.y + (corners[i] >> 2)), corners[i] & 3u));
     }
@@ -274,7 +276,9 @@ void main() {
     }
 
     bool found = hit.depth < kNoHit;
-    if (dot(hit.normal, ray.direction) > 0.0) hit.normal = -hit.normal;
+    // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
+    hit.normal *= inversesqrt(max(dot(hit.normal, hit.normal), 1e-30));
+    hit.normal -= max(dot(hit.normal, ray.direction), 0.0) * ray.direction;
     uint at = pixel.y * frame.picture.x + pixel.x;
     uint plane = frame.picture.x * frame.picture.y;
     hits[at] = floatBitsToUint(hit.depth);

@@ -71,7 +71,7 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
             for (int z = 0; z < kCells; ++z)
                 for (int y = 0; y < kCells; ++y)
                     for (int x = 0; x < kCells; ++x) {
-                        if (!page.geometry->occupied({x, y, z}) || random() % 8 != 0) continue;
+                        if (!page.geometry->occupied({x, y, z}) || random() % 4 != 0) continue;
                         // Corners of the cell and points of its subcells.
                         const glm::ivec3 part = random() % 2 ? glm::ivec3(random() % 2, random() % 2, random() % 2) * kSubcells
                                                              : glm::ivec3(random() % 9, random() % 9, random() % 9);
@@ -93,7 +93,7 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
                     }
         }
     }
-    EXPECT_GT(compared, 1000u);
+    EXPECT_GT(compared, 800u);
 }
 
 // What two pages say of a corner that they share is the same: no crack between them.
@@ -197,8 +197,14 @@ void expectSound(Page& page, const PageTree& tree) {
             }
             continue;
         }
-        if (n.kind == Kind::Soft) ++soft, ASSERT_EQ(tree.soft[n.index].box.lower, n.box.lower);
-        if (n.kind == Kind::Hard) ++hard, ASSERT_EQ(tree.hard[n.index].box.lower, n.box.lower);
+        if (n.kind == Kind::Soft) {
+            ++soft;
+            ASSERT_EQ(tree.soft[n.index].box.lower, n.box.lower);
+        }
+        if (n.kind == Kind::Hard) {
+            ++hard;
+            ASSERT_EQ(tree.hard[n.index].box.lower, n.box.lower);
+        }
         if (n.kind == Kind::Empty) {
             // No triangle touches it.
             std::vector<uint32_t> around, inside, candidates;
@@ -398,7 +404,8 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
         records += leaf.triangles.size();
         centre = std::max(centre, leaf.triangles.size());
     }
-    EXPECT_LT(records, 60u * kNeedles);
+    // A needle crosses about 17 cells, and 5 leaves in each where they were split; without a stop it would be 500.
+    EXPECT_LT(records, 120u * kNeedles);
     EXPECT_EQ(centre, kNeedles) << "the leaf with the centre has all of them: the long form";
     const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
     std::vector<uint4> block(encoded.geometry.size() / 16);
@@ -412,7 +419,7 @@ TEST(PageBuilder, CrowdedCellsAreSplit) {
     // A crumpled sheet with far more triangles than cells.
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> unit(-1, 1);
-    IndexedMesh mesh = test::sphereMesh({16, 16, 16}, 3, 60);
+    IndexedMesh mesh = test::boxMesh(glm::dvec3(13), glm::dvec3(19), 30);
     for (glm::dvec3& p : mesh.positions) p += 0.04 * glm::dvec3(unit(random), unit(random), unit(random));
     Page page(test::onLattice(mesh), {0, 0, 0}, 0);
     PageTree tree = buildPageTree(*page.geometry, 0.002);

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "octree/reference_caster.h"
 #include "render/renderer.h"
 #include "tests/octree/analytic_page.h"
@@ -46,7 +48,9 @@ inline Scene sceneOf(std::string name, AnalyticDataset made) {
     scene.boxMax = scene.boxMin + made.dataset.edgeOf(made.dataset.pages[0]);
     scene.dataset = std::make_shared<Dataset>(made.dataset);
     scene.source = std::make_shared<MemorySource>(made.pages);
-    scene.cache = std::make_shared<PageCache>(std::move(*PageCache::fromPages(made.dataset, std::move(made.pages))));
+    auto cache = PageCache::fromPages(made.dataset, std::move(made.pages));
+    if (!cache) ADD_FAILURE() << cache.error().line();
+    scene.cache = std::make_shared<PageCache>(std::move(*cache));
     return scene;
 }
 

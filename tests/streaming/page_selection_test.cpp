@@ -79,7 +79,9 @@ TEST(PageSelection, CoarseFromFarFineFromNear) {
     EXPECT_TRUE(near.complete);
     EXPECT_FALSE(near.relaxed);
     for (const uint64_t page : near.cut)
-        if (in.dataset.pages[page].childMask != 0) EXPECT_LE(projectedError(in.dataset, in.dataset.pages[page], viewFrom({-0.5, 0.5, 0.5})), 0.5);
+        if (in.dataset.pages[page].childMask != 0) {
+            EXPECT_LE(projectedError(in.dataset, in.dataset.pages[page], viewFrom({-0.5, 0.5, 0.5})), 0.5);
+        }
 }
 
 TEST(PageSelection, NearerPagesAreFinerOrEqual) {
@@ -177,7 +179,9 @@ TEST(PageSelection, FrustumNeverLosesAPointInView) {
         const glm::dvec3 p = in.dataset.originOf(entry) + in.dataset.edgeOf(entry) * glm::dvec3(unit(random), unit(random), unit(random)) - view.eye;
         bool inside = true;
         for (const glm::dvec4& plane : view.planes) inside = inside && plane.x * p.x + plane.y * p.y + plane.z * p.z + plane.w >= 0;
-        if (inside) EXPECT_TRUE(inFrustum(in.dataset, entry, view)) << i;
+        if (inside) {
+            EXPECT_TRUE(inFrustum(in.dataset, entry, view)) << i;
+        }
     }
 }
 

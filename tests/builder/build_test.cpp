@@ -1,0 +1,487 @@
+// The whole build: the same bytes whatever the threads and formats, counts, errors, frames far from zero.
+#include "builder/build.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <numeric>
+#include <random>
+
+#include <sys/resource.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "octree/vcp_file.h"
+#include "tests/builder/test_meshes.h"
+#include "tests/viewer/test_folder.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Little endian binary PLY in doubles, so that nothing is rounded.
+void writePly(const IndexedMesh& mesh, const fs::path& path, const std::vector<uint32_t>& colours = {}) {
+    std::ofstream out(path, std::ios::binary);
+    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << mesh.positions.size() << "\nproperty double x\nproperty double y\nproperty double z\n";
+    if (!colours.empty()) out << "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
+    out << "element face " << mesh.triangles.size() << "\nproperty list uchar uint vertex_indices\nend_header\n";
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        out.write(reinterpret_cast<const char*>(&mesh.positions[v]), 24);
+        if (!colours.empty()) out.write(reinterpret_cast<const char*>(&colours[v]), 4);
+    }
+    for (const auto& t : mesh.triangles) {
+        out.put(3);
+        out.write(reinterpret_cast<const char*>(t.data()), 12);
+    }
+}
+
+/// Binary STL: a soup of floats.
+void writeStl(const IndexedMesh& mesh, const fs::path& path) {
+    std::ofstream out(path, std::ios::binary);
+    const std::string header(80, ' ');
+    out << header;
+    const auto count = static_cast<uint32_t>(mesh.triangles.size());
+    out.write(reinterpret_cast<const char*>(&count), 4);
+    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
+        float values[12] = {};
+        const auto t = mesh.corners(k);
+        for (int i = 0; i < 3; ++i)
+            for (int a = 0; a < 3; ++a) values[3 + 3 * i + a] = static_cast<float>(t[i][a]);
+        out.write(reinterpret_cast<const char*>(values), 48);
+        out.write("\0\0", 2);
+    }
+}
+
+/// Rounded to float: what a file of floats holds.
+void roundToFloat(IndexedMesh& mesh) {
+    for (glm::dvec3& p : mesh.positions)
+        for (int axis = 0; axis < 3; ++axis) {
+            // GCC 12 vectorizes double(float(x)) to x.
+            const volatile float rounded = static_cast<float>(p[axis]);
+            p[axis] = double(rounded);
+        }
+}
+
+/// A bumpy torus beside a box with sharp edges: soft and hard leaves, several levels.
+IndexedMesh scene() {
+    IndexedMesh mesh = test::torusMesh({0.3, 0.2, 0.1}, 2, 0.7, 150, 60);
+    for (glm::dvec3& p : mesh.positions) p *= 1 + 0.02 * std::sin(9 * p.x) * std::cos(7 * p.y);
+    test::append(mesh, test::boxMesh({3, -1, -1}, {4, 1, 1}, 12));
+    roundToFloat(mesh);
+    return mesh;
+}
+
+class Build : public ::testing::Test {
+protected:
+    BuildOptions options(std::vector<fs::path> inputs, const std::string& output = "out.vcp") const {
+        BuildOptions o;
+        o.inputs = std::move(inputs);
+        o.output = folder_ / output;
+        o.threads = 2;
+        return o;
+    }
+    fs::path ply(const IndexedMesh& mesh, const std::string& name = "mesh.ply") const {
+        writePly(mesh, folder_ / name);
+        return folder_ / name;
+    }
+    Dataset dataset(const std::string& name = "out.vcp") const {
+        auto file = openFile(folder_ / name);
+        EXPECT_TRUE(file.ok());
+        auto data = readDataset(**file);
+        EXPECT_TRUE(data.ok()) << data.error().line();
+        return data.ok() ? *data : Dataset{};
+    }
+    void expectIntact(const std::string& name = "out.vcp") const {
+        const auto file = openFile(folder_ / name);
+        ASSERT_TRUE(file.ok());
+        const auto result = verifyFile(**file);
+        EXPECT_TRUE(result.ok()) << result.error().line();
+    }
+    void expectNothingLeft(const std::string& name = "out.vcp") const {
+        EXPECT_FALSE(fs::exists(folder_ / name));
+        EXPECT_FALSE(fs::exists(folder_ / (name + ".partial")));
+    }
+    /// Fails with `code` and a line that has `words`; nothing is left.
+    void expectError(const BuildOptions& o, ErrorCode code, const std::string& words) const {
+        const auto report = buildOctree(o);
+        ASSERT_FALSE(report.ok()) << "should say: " << words;
+        EXPECT_EQ(report.error().code, code) << report.error().line();
+        EXPECT_NE(report.error().line().find(words), std::string::npos) << report.error().line();
+        EXPECT_EQ(report.error().line().find('\n'), std::string::npos);
+        expectNothingLeft();
+    }
+
+    TestFolder folder_{"vcp_build_test"};
+};
+
+TEST_F(Build, SameBytesForAnyThreads) {
+    const fs::path input = ply(scene());
+    std::string first;
+    for (const unsigned threads : {1u, 2u, 3u, 8u, 0u}) {
+        BuildOptions o = options({input});
+        o.threads = threads;
+        ASSERT_TRUE(buildOctree(o).ok());
+        const std::string bytes = contentOf(o.output);
+        if (first.empty()) first = bytes;
+        EXPECT_TRUE(bytes == first) << threads << " threads";
+    }
+    expectIntact();
+}
+
+TEST_F(Build, ReportMatchesTheFile) {
+    const IndexedMesh mesh = scene();
+    const auto report = buildOctree(options({ply(mesh)}));
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    const Dataset d = dataset();
+    EXPECT_EQ(report->triangles, mesh.triangles.size());
+    EXPECT_EQ(report->vertices, mesh.positions.size());
+    EXPECT_EQ(report->degenerateTriangles, 0u);
+    EXPECT_EQ(report->fileBytes, fs::file_size(folder_ / "out.vcp"));
+    EXPECT_EQ(report->levels, d.header.levels);
+    EXPECT_EQ(report->subvolumes, d.pages.size());
+    EXPECT_EQ(report->cell, d.header.cell);
+    EXPECT_EQ(report->certifiedErrorMax, d.header.certifiedErrorMax);
+    EXPECT_NEAR(report->errorTarget, kDefaultErrorCells * report->cell, 1e-12);
+    EXPECT_LE(report->certifiedErrorMax, report->errorTarget * 1.0001);
+    EXPECT_GT(report->peakRssBytes, 0u);
+    EXPECT_GT(report->hardLeaves, 0u);
+    EXPECT_GT(report->leaves, report->hardLeaves);
+    uint64_t leaves = 0;
+    for (const PageEntry& e : d.pages)
+        if (e.level + 1u == d.header.levels) leaves += e.leaves;
+    EXPECT_EQ(report->leaves, leaves);
+    EXPECT_FALSE(d.hasColour());
+    for (int axis = 0; axis < 3; ++axis) {
+        double low = 1e300, high = -1e300;
+        for (const glm::dvec3& p : mesh.positions) {
+            low = std::min(low, p[axis]);
+            high = std::max(high, p[axis]);
+        }
+        EXPECT_EQ(d.header.boundsMin[axis], low);
+        EXPECT_EQ(d.header.boundsMax[axis], high);
+        EXPECT_LT(d.header.origin[axis], low);
+        EXPECT_GT(d.header.origin[axis] + d.edgeOf(d.pages[0]), high);
+    }
+}
+
+TEST_F(Build, LevelsAreLinkedAndTheirErrorsGrow) {
+    const auto report = buildOctree(options({ply(scene())}));
+    ASSERT_TRUE(report.ok());
+    const Dataset d = dataset();
+    ASSERT_GE(d.header.levels, 3u);
+    for (uint32_t l = 0; l + 1 < d.header.levels; ++l) {
+        EXPECT_GT(d.header.level[l].certifiedError, d.header.level[l + 1].certifiedError) << "level " << l;
+        EXPECT_LE(d.header.level[l].pages, d.header.level[l + 1].pages);
+        EXPECT_LT(d.header.level[l].certifiedError, d.cellOf(l)) << "a coarse level is good for less than a cell";
+    }
+    for (const PageEntry& e : d.pages) {
+        EXPECT_LE(double(e.certifiedError), d.header.level[e.level].certifiedError);
+        EXPECT_EQ(e.childMask == 0, e.level + 1u == d.header.levels) << "all branches reach the finest level of a mesh that is dense";
+    }
+}
+
+TEST_F(Build, TwoInputsAreJoined) {
+    const IndexedMesh torus = test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30), box = test::boxMesh({3, -1, -1}, {4, 1, 1}, 6);
+    IndexedMesh both = torus;
+    test::append(both, box);
+    ASSERT_TRUE(buildOctree(options({ply(torus, "a.ply"), ply(box, "b.ply")}, "joined.vcp")).ok());
+    ASSERT_TRUE(buildOctree(options({ply(both)})).ok());
+    EXPECT_TRUE(contentOf(folder_ / "joined.vcp") == contentOf(folder_ / "out.vcp"));
+}
+
+TEST_F(Build, SoupEqualsIndexedMesh) {
+    IndexedMesh mesh = scene();
+    // A soup brings its vertices in the order of the triangles.
+    IndexedMesh ordered;
+    std::vector<uint32_t> names(mesh.positions.size(), ~0u);
+    for (const auto& t : mesh.triangles) {
+        std::array<uint32_t, 3> r{};
+        for (int i = 0; i < 3; ++i) {
+            if (names[t[i]] == ~0u) {
+                names[t[i]] = static_cast<uint32_t>(ordered.positions.size());
+                ordered.positions.push_back(mesh.positions[t[i]]);
+            }
+            r[i] = names[t[i]];
+        }
+        ordered.triangles.push_back(r);
+    }
+    writeStl(mesh, folder_ / "mesh.stl");
+    const auto soup = buildOctree(options({folder_ / "mesh.stl"}, "soup.vcp"));
+    const auto indexed = buildOctree(options({ply(ordered)}));
+    ASSERT_TRUE(soup.ok() && indexed.ok());
+    EXPECT_EQ(soup->vertices, 3 * mesh.triangles.size());
+    EXPECT_EQ(soup->leaves, indexed->leaves);
+    EXPECT_EQ(soup->hardLeaves, indexed->hardLeaves);
+    // But for the number of vertices read, the files are the same.
+    const Dataset a = dataset("soup.vcp"), b = dataset();
+    ASSERT_EQ(a.pages.size(), b.pages.size());
+    EXPECT_EQ(a.header.cell, b.header.cell);
+    EXPECT_EQ(std::memcmp(a.pages.data(), b.pages.data(), a.pages.size() * sizeof(PageEntry)), 0);
+}
+
+TEST_F(Build, DegenerateTrianglesAreCounted) {
+    IndexedMesh mesh = test::torusMesh(glm::dvec3(0), 2, 0.7, 40, 20);
+    const auto clean = buildOctree(options({ply(mesh)}, "clean.vcp"));
+    mesh.triangles.push_back({5, 5, 9});
+    mesh.triangles.push_back({7, 7, 7});
+    // Two vertices at one place, and three in a line.
+    const auto n = static_cast<uint32_t>(mesh.positions.size());
+    mesh.positions.push_back(mesh.positions[3]);
+    mesh.positions.push_back({1, 0, 0});
+    mesh.positions.push_back({1.25, 0, 0});
+    mesh.positions.push_back({1.5, 0, 0});
+    mesh.triangles.push_back({3, n, 11});
+    mesh.triangles.push_back({n + 1, n + 2, n + 3});
+    const auto report = buildOctree(options({ply(mesh)}));
+    ASSERT_TRUE(clean.ok() && report.ok());
+    EXPECT_EQ(clean->degenerateTriangles, 0u);
+    EXPECT_EQ(report->degenerateTriangles, 4u);
+    EXPECT_EQ(report->triangles, clean->triangles + 4);
+    EXPECT_EQ(report->leaves, clean->leaves);
+    EXPECT_EQ(report->cell, clean->cell);
+    expectIntact();
+}
+
+TEST_F(Build, MeshWithoutAreaIsAnError) {
+    IndexedMesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
+    mesh.triangles = {{0, 1, 2}, {0, 0, 1}};
+    expectError(options({ply(mesh)}), ErrorCode::InvalidInput, "none of its 2 triangles has an area");
+    mesh.triangles.clear();
+    expectError(options({ply(mesh)}), ErrorCode::InvalidInput, "no faces");
+}
+
+TEST_F(Build, SingleTriangle) {
+    IndexedMesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0.1, 0}, {0.2, 1, 0.3}};
+    mesh.triangles = {{0, 1, 2}};
+    const auto report = buildOctree(options({ply(mesh)}));
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    EXPECT_GT(report->leaves, 0u);
+    EXPECT_EQ(report->levels, 1u);
+    expectIntact();
+    // A fine cell: the same triangle is split and has many pages.
+    BuildOptions fine = options({folder_ / "mesh.ply"}, "fine.vcp");
+    fine.cell = 0.002;
+    const auto detailed = buildOctree(fine);
+    ASSERT_TRUE(detailed.ok()) << detailed.error().line();
+    EXPECT_GT(detailed->levels, 3u);
+    expectIntact("fine.vcp");
+}
+
+TEST_F(Build, CellLargerThanTheMesh) {
+    BuildOptions o = options({ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30))});
+    o.cell = 50;
+    const auto report = buildOctree(o);
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    EXPECT_EQ(report->levels, 1u);
+    EXPECT_EQ(report->cell, 50);
+    EXPECT_GT(report->leaves, 0u);
+    expectIntact();
+    // So large that nothing is left of the mesh.
+    o.cell = 1e7;
+    fs::remove(o.output);
+    expectError(o, ErrorCode::InvalidInput, "use a smaller --cell");
+}
+
+TEST_F(Build, CellTooSmall) {
+    BuildOptions o = options({ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30))});
+    o.cell = 1e-9;
+    expectError(o, ErrorCode::Limit, "use --cell");
+    // What the message advises, works in principle: it is within the limit. A cell a little below it is not.
+    const auto report = buildOctree(o);
+    ASSERT_FALSE(report.ok());
+    EXPECT_NE(report.error().line().find("mesh.ply"), std::string::npos) << report.error().line();
+}
+
+TEST_F(Build, ErrorTooSmall) {
+    BuildOptions o = options({ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30))});
+    o.error = 1e-9;
+    expectError(o, ErrorCode::Limit, "finer cell");
+}
+
+TEST_F(Build, ErrorOptionIsKept) {
+    const fs::path input = ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 120, 60));
+    const auto normal = buildOctree(options({input}));
+    ASSERT_TRUE(normal.ok());
+    for (const double factor : {0.3, 3.0}) {
+        BuildOptions o = options({input}, "other.vcp");
+        o.error = factor * normal->errorTarget;
+        const auto report = buildOctree(o);
+        ASSERT_TRUE(report.ok()) << report.error().line();
+        EXPECT_NEAR(report->errorTarget, o.error, 1e-12);
+        EXPECT_LE(report->certifiedErrorMax, o.error * 1.0001);
+    }
+    BuildOptions relative = options({input}, "relative.vcp");
+    relative.error = 0.001;
+    relative.errorIsRelative = true;
+    const auto report = buildOctree(relative);
+    ASSERT_TRUE(report.ok());
+    EXPECT_NEAR(report->errorTarget, 0.001 * std::hypot(5.4, 5.4, 1.4), 1e-3);
+}
+
+TEST_F(Build, FarOriginsLoseNothing) {
+    IndexedMesh mesh = scene();
+    // On a grid of 2^-20, so that the translation is exact.
+    for (glm::dvec3& p : mesh.positions) p = glm::round(p * 1048576.0) / 1048576.0;
+    IndexedMesh far = mesh;
+    for (glm::dvec3& p : far.positions) p += glm::dvec3(3.79e6, 5.2e6, -450000);
+    const auto here = buildOctree(options({ply(mesh)}));
+    const auto there = buildOctree(options({ply(far, "far.ply")}, "far.vcp"));
+    ASSERT_TRUE(here.ok() && there.ok());
+    EXPECT_EQ(there->leaves, here->leaves);
+    EXPECT_EQ(there->hardLeaves, here->hardLeaves);
+    EXPECT_EQ(there->subvolumes, here->subvolumes);
+    EXPECT_NEAR(there->cell, here->cell, 1e-9 * here->cell);
+    EXPECT_NEAR(there->certifiedErrorMax, here->certifiedErrorMax, 1e-3 * here->certifiedErrorMax);
+}
+
+TEST_F(Build, ScalesDoNotMatter) {
+    const IndexedMesh mesh = scene();
+    const auto plain = buildOctree(options({ply(mesh)}));
+    ASSERT_TRUE(plain.ok());
+    for (const int exponent : {-60, -20, 20, 60}) {
+        IndexedMesh scaled = mesh;
+        for (glm::dvec3& p : scaled.positions) p *= std::exp2(exponent);
+        const auto report = buildOctree(options({ply(scaled, "scaled.ply")}, "scaled.vcp"));
+        ASSERT_TRUE(report.ok()) << report.error().line();
+        EXPECT_EQ(report->leaves, plain->leaves) << exponent;
+        EXPECT_EQ(report->cell, std::ldexp(plain->cell, exponent)) << exponent;
+        EXPECT_EQ(report->degenerateTriangles, 0u) << exponent;
+    }
+}
+
+// Areas of such meshes are beyond the range of doubles: a clear line or a whole file, but never rubbish.
+TEST_F(Build, AbsurdScalesEndWell) {
+    for (const double scale : {1e-200, 1e-100, 1e100, 1e200, 1e307}) {
+        IndexedMesh mesh = test::torusMesh(glm::dvec3(0), 2, 0.7, 20, 10);
+        for (glm::dvec3& p : mesh.positions) p *= scale;
+        const auto report = buildOctree(options({ply(mesh)}));
+        if (report.ok()) {
+            EXPECT_TRUE(std::isfinite(report->cell)) << scale;
+            EXPECT_TRUE(std::isfinite(report->certifiedErrorMax)) << scale;
+            EXPECT_EQ(report->degenerateTriangles, 0u) << scale;
+            expectIntact();
+            fs::remove(folder_ / "out.vcp");
+        } else {
+            EXPECT_FALSE(report.error().message.empty());
+            expectNothingLeft();
+        }
+    }
+}
+
+TEST_F(Build, ColourFollowsTheOption) {
+    const IndexedMesh mesh = test::torusMesh(glm::dvec3(0), 2, 0.7, 40, 20);
+    std::vector<uint32_t> colours(mesh.positions.size());
+    for (size_t v = 0; v < colours.size(); ++v) colours[v] = static_cast<uint32_t>(0xff000000u | (v * 77 & 0xffffff));
+    writePly(mesh, folder_ / "colour.ply", colours);
+    BuildOptions o = options({folder_ / "colour.ply"});
+    ASSERT_TRUE(buildOctree(o).ok());
+    EXPECT_TRUE(dataset().hasColour());
+    expectIntact();
+    o.colour = ColourChoice::None;
+    ASSERT_TRUE(buildOctree(o).ok());
+    EXPECT_FALSE(dataset().hasColour());
+    // Asked for, but not there; and mixed with an input that has some.
+    BuildOptions plain = options({ply(mesh)}, "plain.vcp");
+    plain.colour = ColourChoice::Vertex;
+    const auto none = buildOctree(plain);
+    ASSERT_FALSE(none.ok());
+    EXPECT_NE(none.error().line().find("no vertex colours"), std::string::npos) << none.error().line();
+    plain.inputs = {folder_ / "mesh.ply", folder_ / "colour.ply"};
+    ASSERT_TRUE(buildOctree(plain).ok());
+    EXPECT_TRUE(dataset("plain.vcp").hasColour());
+}
+
+TEST_F(Build, ProgressNeverDecreases) {
+    BuildOptions o = options({ply(scene())});
+    double last = -1;
+    int calls = 0;
+    o.progress = [&](const BuildProgress& p) {
+        EXPECT_GE(p.fraction, last);
+        EXPECT_LE(p.fraction, 1);
+        EXPECT_NE(std::string(p.stage), "");
+        last = p.fraction;
+        ++calls;
+        return true;
+    };
+    ASSERT_TRUE(buildOctree(o).ok());
+    EXPECT_EQ(last, 1);
+    EXPECT_GE(calls, 2);
+}
+
+TEST_F(Build, CancellationLeavesNothing) {
+    BuildOptions o = options({ply(scene())});
+    for (const int after : {0, 1, 2, 3}) {
+        int calls = 0;
+        o.progress = [&](const BuildProgress& p) { return p.fraction >= 1 || calls++ < after; };
+        const auto report = buildOctree(o);
+        // The build may be done before it is asked so often.
+        if (report.ok()) {
+            fs::remove(o.output);
+            continue;
+        }
+        EXPECT_EQ(report.error().code, ErrorCode::Cancelled);
+        expectNothingLeft();
+    }
+    o.progress = [](const BuildProgress&) { return false; };
+    expectError(o, ErrorCode::Cancelled, "cancelled");
+}
+
+TEST_F(Build, FailureKeepsTheOldFile) {
+    const fs::path good = ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 40, 20));
+    ASSERT_TRUE(buildOctree(options({good})).ok());
+    const std::string before = contentOf(folder_ / "out.vcp");
+    std::ofstream(folder_ / "bad.ply") << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                                          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n";
+    BuildOptions cancelled = options({good});
+    cancelled.progress = [](const BuildProgress&) { return false; };
+    for (const BuildOptions& o : {options({folder_ / "bad.ply"}), options({folder_ / "none.ply"}), options({good, folder_ / "bad.ply"}), options({}), cancelled}) {
+        EXPECT_FALSE(buildOctree(o).ok());
+        EXPECT_TRUE(contentOf(folder_ / "out.vcp") == before);
+        EXPECT_FALSE(fs::exists(folder_ / "out.vcp.partial"));
+    }
+}
+
+TEST_F(Build, FullDisk) {
+    const fs::path input = ply(scene());
+    ASSERT_TRUE(buildOctree(options({input}, "whole.vcp")).ok());
+    const auto size = fs::file_size(folder_ / "whole.vcp");
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
+    // In the directory, among the pages, and just before the commit record.
+    for (const rlim_t limit : {rlim_t{4200}, rlim_t{size / 2}, rlim_t{size - 1}}) {
+        const rlimit small{limit, before.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &small);
+        const auto report = buildOctree(options({input}));
+        setrlimit(RLIMIT_FSIZE, &before);
+        ASSERT_FALSE(report.ok()) << limit;
+        EXPECT_EQ(report.error().code, ErrorCode::Io);
+        EXPECT_NE(report.error().line().find("out.vcp: write failed"), std::string::npos) << report.error().line();
+        expectNothingLeft();
+    }
+    std::signal(SIGXFSZ, handler);
+}
+
+TEST_F(Build, WrongOutputsAreFoundFirst) {
+    // Before the input, which is not there, is looked at.
+    BuildOptions o = options({folder_ / "none.ply"});
+    o.output = folder_.path();
+    const auto folder = buildOctree(o);
+    ASSERT_FALSE(folder.ok());
+    EXPECT_EQ(folder.error().code, ErrorCode::Io);
+    EXPECT_NE(folder.error().line().find("is a folder"), std::string::npos) << folder.error().line();
+    o.output = folder_ / "no" / "such" / "out.vcp";
+    const auto missing = buildOctree(o);
+    ASSERT_FALSE(missing.ok());
+    EXPECT_NE(missing.error().line().find("out.vcp"), std::string::npos) << missing.error().line();
+}
+
+}  // namespace
+}  // namespace vcp
