@@ -12,6 +12,8 @@ function(vcp_options target)
     endif()
     if(VCP_SANITIZE)
         target_compile_options(${target} PRIVATE -fsanitize=${VCP_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+        # GCC 12 sees uninitialized values in what sanitizers add.
+        target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
         target_link_options(${target} PUBLIC -fsanitize=${VCP_SANITIZE})
     endif()
 endfunction()

@@ -1,5 +1,6 @@
 #include "octree/page.h"
 
+#include <cmath>
 #include <cstring>
 
 #include <fmt/format.h>
@@ -19,7 +20,7 @@ Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     if (h.log2Cells < 1 || h.log2Cells > 7) return broken(4, "page size out of range");
     if (h.faces > kLeafIndexMask || h.triangles > kLeafIndexMask || h.vertices > kField21Mask || h.groups > (1u << 27))
         return broken(12, "page counts out of range");
-    if (!(h.certifiedError >= 0)) return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
+    if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError)) return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
     if (pageSections(h).end != bytes)
         return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", pageSections(h).end, bytes));
     return {};

@@ -84,7 +84,7 @@ Result<void> checkHeader(const ByteReader& reader, const FileHeader& h, std::spa
     for (uint32_t l = 0; l < h.levels; ++l) {
         const uint64_t byte = offsetof(FileHeader, level) + l * sizeof(LevelRow);
         if (h.level[l].firstEntry != next || h.level[l].pages < 1 || h.level[l].pages > h.pages - next) return fail(byte, "level table does not add up");
-        if (!(h.level[l].certifiedError >= 0)) return fail(byte + 16, "certified error is not a number");
+        if (!(h.level[l].certifiedError >= 0) || !std::isfinite(h.level[l].certifiedError)) return fail(byte + 16, "certified error is not a number");
         next += h.level[l].pages;
     }
     if (next != h.pages || h.level[0].pages != 1) return fail(184, "level table does not add up");
@@ -112,7 +112,7 @@ private:
         VCP_TRY(extent(index, e.offset, e.storedBytes, e.pageBytes));
         if (e.colourStoredBytes == 0 && (e.colourBytes != 0 || (d_.hasColour() && e.leaves != 0))) return fail(index, "colour is missing");
         if (e.colourStoredBytes != 0) VCP_TRY(extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes));
-        if (!(e.certifiedError >= 0) || e.hardLeaves > e.leaves) return fail(index, "certified error or counts out of range");
+        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError) || e.hardLeaves > e.leaves) return fail(index, "certified error or counts out of range");
         if (level == 0 && e.morton != 0) return fail(index, "the root is not at the origin");
         if (e.childMask == 0) return {};
         if (level + 1 >= d_.header.levels || e.firstChild != nextChild_) return fail(index, "wrong child pages");

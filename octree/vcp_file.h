@@ -30,7 +30,7 @@
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 1;
-inline constexpr uint32_t kMaxLevels = 24;
+inline constexpr uint32_t kMaxLevels = 22;  ///< Morton codes have 21 bits an axis
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
 inline constexpr uint32_t kEntriesPerBlock = 51;

@@ -78,9 +78,18 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.lightDirection = toVec4(s.lightFollowsCamera ? basis.right * light.x + basis.up * light.y - basis.forward * light.z : light);
     c.upDirection = toVec4(s.lightFollowsCamera ? basis.up : glm::normalize(request.camera.up));
     c.clay = encoded(s.clay);
-    c.backgroundTop = encoded(s.backgroundTop);
-    c.backgroundBottom = encoded(s.backgroundBottom);
     return c;
+}
+
+std::vector<uint32_t> backgroundRows(const Shading& shading, uint32_t height) {
+    const glm::vec4 top = encoded(shading.backgroundTop), bottom = encoded(shading.backgroundBottom);
+    std::vector<uint32_t> rows(height);
+    for (uint32_t y = 0; y < height; ++y) {
+        const glm::vec4 colour = glm::mix(top, bottom, (float(y) + 0.5f) / float(height));
+        rows[y] = 0xff000000u;
+        for (int i = 0; i < 3; ++i) rows[y] |= static_cast<uint32_t>(std::lround(glm::clamp(colour[i], 0.0f, 1.0f) * 255)) << 8 * i;
+    }
+    return rows;
 }
 
 SelectionView selectionView(const FrameRequest& request) {

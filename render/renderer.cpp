@@ -5,7 +5,8 @@
 #include <chrono>
 #include <cstring>
 #include <limits>
-#include <thread>
+
+#include <sys/sysinfo.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -125,7 +126,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     if (surface != VK_NULL_HANDLE) state->swapchain = std::make_unique<Swapchain>(state->instance->handle(), *state->device, surface);
     const bool software = state->device->info().software;
     state->access = options.access != PageAccess::Auto ? options.access : software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
-    state->stripes = software ? std::max(1u, std::thread::hardware_concurrency()) : 1;
+    state->stripes = software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
     VCP_TRY(state->timer.create(*state->device));
     auto resources = FrameResources::create(*state->device);
     if (!resources) return resources.error();
@@ -214,6 +215,7 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     }
     constants = wanted;
     VCP_TRY(resources->resize({request.width, request.height}, constants.colour));
+    resources->setBackground(backgroundRows(request.shading, request.height));
     if (tableStale && residency) VCP_TRY(resources->setTable(residency->table()));
     if (tableStale && !residency) VCP_TRY(resources->setTable(std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0))));
     tableStale = false;

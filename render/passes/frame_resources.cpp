@@ -106,8 +106,12 @@ Result<void> FrameResources::resize(PictureSize size, bool colour) {
     if (!list) return list.error();
     auto hits = wordBuffer(size.pixels() * (colour ? 3 : 2), VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
     if (!hits) return hits.error();
-    auto picture = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Local);
+    auto picture = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
     if (!picture) return picture.error();
+    auto background = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
+    if (!background) return background.error();
+    background_ = std::move(*background);
+    backgroundRows_.clear();
     tileStarts_ = std::move(*starts);
     tileList_ = std::move(*list);
     hits_ = std::move(*hits);
@@ -116,6 +120,13 @@ Result<void> FrameResources::resize(PictureSize size, bool colour) {
     colourPlane_ = colour;
     setStale_ = true;
     return {};
+}
+
+void FrameResources::setBackground(std::vector<uint32_t> rows) {
+    if (rows == backgroundRows_) return;
+    auto* words = reinterpret_cast<uint32_t*>(background_.mapped());
+    for (const uint32_t row : rows) words = std::fill_n(words, size_.width, row);
+    backgroundRows_ = std::move(rows);
 }
 
 Result<void> FrameResources::setTable(std::span<const glm::uvec4> table) {
@@ -190,6 +201,8 @@ void FrameResources::writeSet() {
 void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants& constants) {
     if (setStale_) writeSet();
     vkCmdUpdateBuffer(commands, constants_.handle(), 0, sizeof(constants), &constants);
+    const VkBufferCopy whole{0, 0, picture_.bytes()};
+    vkCmdCopyBuffer(commands, background_.handle(), picture_.handle(), 1, &whole);
     vkCmdFillBuffer(commands, counters_.handle(), 0, VK_WHOLE_SIZE, 0);
     const uint32_t list[frame::kTileListHeader] = {frame::kTileRow, 0, 1, 0};
     vkCmdUpdateBuffer(commands, tileList_.buffer.handle(), 0, sizeof(list), list);

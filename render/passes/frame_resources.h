@@ -8,12 +8,13 @@
 //  7, 8     tile starts                    beam              trace, shade
 //  9, 10    tile list, indirect dispatch   beam              trace
 // 11, 12    hits                           trace             shade, readback
-// 13        picture                        shade             readback, present
+// 13        picture                        begin, shade      readback, present
 // 14        counters                       trace             readback
 #pragma once
 
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "render/frame.h"
 #include "render/page_pool.h"
@@ -55,10 +56,12 @@ public:
     Result<void> resize(PictureSize size, bool colour);
     /// Writes the table for the next frame; grows its buffer. Errors: Device.
     Result<void> setTable(std::span<const glm::uvec4> table);
+    /// What the picture shows where nothing is hit: a word a row. Precondition: resize(), and a row each.
+    void setBackground(std::vector<uint32_t> rows);
     /// Null pools: nothing is shown.
     void setPools(const PagePool* pages, const PagePool* colours);
 
-    /// Copies the constants, clears counters and tile list, binds the set. Ends with barrierTransferToAll.
+    /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
 
     [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
@@ -88,6 +91,8 @@ private:
     PictureSize size_;
     bool colourPlane_ = false;
     Buffer constants_, picture_, counters_;
+    Buffer background_;  // as large as the picture, copied over it before each frame
+    std::vector<uint32_t> backgroundRows_;
     WordBuffer tileStarts_, tileList_, hits_, table_, none_;
     const PagePool* pages_ = nullptr;
     const PagePool* colours_ = nullptr;

@@ -19,7 +19,7 @@ Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& 
 
 void ShadePass::record(VkCommandBuffer commands, const FrameResources& resources) const {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, current_->handle());
-    vkCmdDispatch(commands, resources.size().tilesX(), resources.size().tilesY(), 1);
+    vkCmdDispatchIndirect(commands, resources.tileList().handle(), 0);
     barrierComputeToReadback(commands);
 }
 

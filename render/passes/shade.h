@@ -1,5 +1,5 @@
 // The picture from the hits (shaders/shade.comp).
-// Reads constants, tile starts, hits. Writes the picture. Before: the trace pass. After:
+// Reads constants, tile list, hits. Writes the picture's hit pixels. Before: the trace pass. After:
 // barrierComputeToReadback, recorded here.
 #pragma once
 

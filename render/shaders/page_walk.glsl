@@ -43,7 +43,7 @@ void descend(inout Descent at, uint nodesTexel, uint rootOnly, uint root, ivec3 
     while (at.node >> kNodeTypeShift == kNodeInternal) {
         uint node = fetchWord(at.group, octantAt(subcell, at.bits - 1));
         at.node = rootOnly != 0u ? root : node;
-        steps++;
+        if (kCountSteps != 0u) steps++;
         if (at.node >> kNodeTypeShift == kNodeInternal) {
             at.grandparent = at.parent;
             at.parent = at.group;

@@ -1,4 +1,5 @@
-// Colours of the picture from the pixels' records. Reads tile starts and hits; writes the picture.
+// Colours of hit pixels from their records. Reads the tile list and hits; writes those pixels of the picture,
+// which is the background before.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
@@ -27,23 +28,20 @@ float encodedLight(vec3 n) {
 }
 
 void main() {
-    uvec2 pixel = gl_WorkGroupID.xy * kTileSize + pixelInTile();
-    if (any(greaterThanEqual(pixel, frame.picture.xy))) return;
+    uvec2 pixel;
+    uint tile;
+    if (!listedPixel(tile, pixel)) return;
     uint at = pixel.y * frame.picture.x + pixel.x;
     uint plane = frame.picture.x * frame.picture.y;
-    uint tile = gl_WorkGroupID.y * frame.picture.z + gl_WorkGroupID.x;
-    bool traced = fetchTileStart(tile) < kTileEmpty;
-    bool found = traced && uintBitsToFloat(fetchHit(at)) < kNoHit;
-    float y = (float(pixel.y) + 0.5) / float(frame.picture.y);
-    vec3 colour = mix(frame.backgroundTop.xyz, frame.backgroundBottom.xyz, y);
     uint code = fetchHit(plane + at);
     if (frame.mode.w == kShadeSteps) {
-        if (traced) colour = heat(float(code) / 64.0);
-    } else if (found) {
-        vec3 n = unpackHitNormal(code);
-        vec3 albedo = frame.clay.xyz;
-        if (kColour != 0u && frame.mode.w == kShadeLit) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
-        colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5 : albedo * encodedLight(n);
+        picturePixels[at] = packUnorm4x8(vec4(heat(float(code) / 64.0), 1.0));
+        return;
     }
+    if (uintBitsToFloat(fetchHit(at)) >= kNoHit) return;
+    vec3 n = unpackHitNormal(code);
+    vec3 albedo = frame.clay.xyz;
+    if (kColour != 0u && frame.mode.w == kShadeLit) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
+    vec3 colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5 : albedo * encodedLight(n);
     picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

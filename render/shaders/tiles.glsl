@@ -13,3 +13,15 @@ uint stripedIndex(uint i, uint count) {
     uint run = count / stripes;
     return i < run * stripes ? (i % run) * stripes + i / run : i;
 }
+
+// The invocation's tile of the list and its pixel; false where there is none.
+bool listedPixel(out uint tile, out uvec2 pixel) {
+    uint index = gl_WorkGroupID.y * kTileRow + gl_WorkGroupID.x;
+    uint count = fetchTileList(3u);
+    tile = 0u;
+    pixel = uvec2(0u);
+    if (index >= count) return false;
+    tile = fetchTileList(kTileListHeader + stripedIndex(index, count));
+    pixel = uvec2(tile % frame.picture.z, tile / frame.picture.z) * kTileSize + pixelInTile();
+    return all(lessThan(pixel, frame.picture.xy));
+}

@@ -64,7 +64,7 @@ bool findPage(Ray ray, inout ivec3 place, inout float s, out Page page, inout ui
         record.x = 0u;
         while (exists && (record.x & kRecordInCut) == 0u) {
             record = fetchTable(node * kRecordTexels);
-            steps++;
+            if (kCountSteps != 0u) steps++;
             if ((record.x & kRecordInCut) == 0u) {
                 page.bits--;
                 uint octant = octantAt(place, page.bits);
@@ -123,7 +123,7 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     uint axis = node >> kSoftAxisShift & 3u;
     uint face = page.sections.x + (node & kLeafIndexMask);
     LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), axis);
-    fetches += 2u;
+    if (kCountSteps != 0u) fetches += 2u;
     float scale = 1.0 / edge;  // a power of two: exact
     vec3 p = (s.from - lo) * scale;
     vec3 d = (s.to - s.from) * scale;
@@ -156,7 +156,7 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
         uvec2 record = fetchPair(page.sections.y, first + i);
         uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
         uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y), c = fetchPair(page.sections.z, v.z);
-        fetches += 4u;
+        if (kCountSteps != 0u) fetches += 4u;
         vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y), decodeVertex(c.x, c.y), kTriangleSlack);
         if (t.x >= lowest && t.x <= best) {
             best = t.x;
@@ -248,12 +248,9 @@ uint packHitNormal(vec3 n) {
 }
 
 void main() {
-    uint index = gl_WorkGroupID.y * kTileRow + gl_WorkGroupID.x;
-    uint count = fetchTileList(3u);
-    if (index >= count) return;
-    uint tile = fetchTileList(kTileListHeader + stripedIndex(index, count));
-    uvec2 pixel = uvec2(tile % frame.picture.z, tile / frame.picture.z) * kTileSize + pixelInTile();
-    if (any(greaterThanEqual(pixel, frame.picture.xy))) return;
+    uvec2 pixel;
+    uint tile;
+    if (!listedPixel(tile, pixel)) return;
 
     Ray ray = rayAt(vec2(pixel) + 0.5);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));

@@ -34,8 +34,7 @@ struct FrameConstants {
     uvec4 mode;
     vec4 lightDirection;  // unit, world axes, towards the light
     vec4 upDirection;     // unit: where the hemisphere's light comes from
-    vec4 clay;  // this and the background: encoded for the screen
-    vec4 backgroundTop, backgroundBottom;
+    vec4 clay;            // encoded for the screen
 };
 
 // A node of the frame's page tree: three texels of the table.

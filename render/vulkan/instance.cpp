@@ -67,13 +67,18 @@ Error noDevice(const std::vector<DeviceInfo>& devices, const std::string& what) 
 }  // namespace
 
 void ValidationLog::add(std::string message) {
-    const std::lock_guard lock(mutex_);
+    while (busy_.test_and_set(std::memory_order_acquire)) busy_.wait(true);
     messages_.push_back(std::move(message));
+    busy_.clear(std::memory_order_release);
+    busy_.notify_one();
 }
 
 std::vector<std::string> ValidationLog::messages() const {
-    const std::lock_guard lock(mutex_);
-    return messages_;
+    while (busy_.test_and_set(std::memory_order_acquire)) busy_.wait(true);
+    std::vector<std::string> copy = messages_;
+    busy_.clear(std::memory_order_release);
+    busy_.notify_one();
+    return copy;
 }
 
 Result<std::unique_ptr<Instance>> Instance::create(bool validation, const std::vector<std::string>& extensions) {

@@ -1,8 +1,8 @@
 // The Vulkan instance, what its validation layers say, and the choice of a device.
 #pragma once
 
+#include <atomic>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -13,14 +13,14 @@
 
 namespace vcp {
 
-/// Warnings and errors of the validation layers. Any thread may add.
+/// Warnings and errors of the validation layers. Any thread may add; a spin lock, for there are few or none.
 class ValidationLog {
 public:
     void add(std::string message);
     [[nodiscard]] std::vector<std::string> messages() const;
 
 private:
-    mutable std::mutex mutex_;
+    mutable std::atomic_flag busy_;
     std::vector<std::string> messages_;
 };
 

@@ -41,7 +41,7 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
     EXPECT_EQ(offsets.at("FrameConstants"),
               (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX), OFFSET(directionY),
                                      OFFSET(originLattice), OFFSET(lattice), OFFSET(picture), OFFSET(mode), OFFSET(lightDirection),
-                                     OFFSET(upDirection), OFFSET(clay), OFFSET(backgroundTop), OFFSET(backgroundBottom)}));
+                                     OFFSET(upDirection), OFFSET(clay)}));
 }
 
 TEST(FrameLayout, Beam) { expectSameLayout(kBeamSpirv); }

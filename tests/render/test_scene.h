@@ -89,16 +89,23 @@ inline Scene cubeScene(uint32_t split) {
             triangles.push_back(pack21(a, a | u, a | v));
             triangles.push_back(pack21(a | u | v, a | v, a | u));
         }
-    const uint32_t leaf = kNodeHard << kNodeTypeShift | 12u << kHardCountShift;
+    // Every leaf has records of its own, as the format wants it.
+    const std::vector<glm::u32vec2> twelve = std::exchange(triangles, {});
+    const auto leaf = [&] {
+        const auto first = static_cast<uint32_t>(triangles.size());
+        triangles.insert(triangles.end(), twelve.begin(), twelve.end());
+        return kNodeHard << kNodeTypeShift | 12u << kHardCountShift | first;
+    };
     std::vector<uint32_t> nodes;
-    header.root = leaf;
     uint64_t leaves = 1;
-    if (split > 0) {
+    if (split == 0) {
+        header.root = leaf();
+    } else {
         // Groups breadth first: the last layer holds the leaves.
         header.root = 0;
         uint32_t groupsInLayer = 1, firstOfNext = 1;
         for (uint32_t layer = 0; layer < split; ++layer, groupsInLayer *= 8)
-            for (uint32_t node = 0; node < groupsInLayer * 8; ++node) nodes.push_back(layer + 1 < split ? firstOfNext++ : leaf);
+            for (uint32_t node = 0; node < groupsInLayer * 8; ++node) nodes.push_back(layer + 1 < split ? firstOfNext++ : leaf());
         leaves = groupsInLayer;
     }
     header.groups = static_cast<uint32_t>(nodes.size() / 8);
