@@ -230,7 +230,11 @@ INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real
     Real wb = flip * dot(d, cross(vc, va));
     Real wc = flip * dot(d, cross(va, vb));
     Real3 miss = Real3(Real(1e30), Real(0.0), Real(0.0));
-    if (wa < -slack * sqrt(dot(bc, bc)) || wb < -slack * sqrt(dot(ca, ca)) || wc < -slack * sqrt(dot(ab, ab))) return miss;
+    // wa < -slack |bc| and its like, without roots.
+    Real slack2 = slack * slack;
+    if ((wa < Real(0.0) && wa * wa > slack2 * dot(bc, bc)) || (wb < Real(0.0) && wb * wb > slack2 * dot(ca, ca)) ||
+        (wc < Real(0.0) && wc * wc > slack2 * dot(ab, ab)))
+        return miss;
     if (!(abs(nd) > Real(0.0))) return miss;
     // Weights below 0 are cut off and the hit is the triangle's point with the weights that are left. A ray in
     // the slack must pass near that point: along needles and for grazing rays the widened edges reach far.
