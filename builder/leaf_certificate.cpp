@@ -73,7 +73,8 @@ public:
         for (int p = 0; p < kPoints; ++p) {
             for (int q = 0; q < kPoints; ++q) {
                 const auto [i, j, k] = index_[q];
-                rows[p][q] = 24 / (factorial[i] * factorial[j] * factorial[k]) * std::pow(weight(p, 0), i) * std::pow(weight(p, 1), j) * std::pow(weight(p, 2), k);
+                const auto [u, v, w] = index_[p];
+                rows[p][q] = 24 / (factorial[i] * factorial[j] * factorial[k]) * std::pow(u / 4.0, i) * std::pow(v / 4.0, j) * std::pow(w / 4.0, k);
             }
             rows[p][kPoints + p] = 1;
         }
@@ -90,12 +91,22 @@ public:
         }
         for (int r = 0; r < kPoints; ++r)
             for (int m = 0; m < kPoints; ++m) coefficient_[m][r] = static_cast<float>(rows[r][kPoints + m] / rows[r][r]);
+        for (int p = 0; p < 16; ++p)
+            for (int c = 0; c < 3; ++c) weight_[c][p] = static_cast<float>(index_[p % kPoints][c]) / 4;
     }
 
-    /// Weight of corner `c` at point `p`.
-    [[nodiscard]] double weight(int p, int c) const { return index_[p][c] / 4.0; }
+    /// The 15 points of a triangle (and its first corner again).
+    void place(const Triangle3& t, LeafSurface::Batch& b) const {
+        const glm::vec3 t0(t[0]), t1(t[1]), t2(t[2]);
+        for (int p = 0; p < 16; ++p) {
+            b.x[p] = weight_[0][p] * t0.x + weight_[1][p] * t1.x + weight_[2][p] * t2.x;
+            b.y[p] = weight_[0][p] * t0.y + weight_[1][p] * t1.y + weight_[2][p] * t2.y;
+            b.z[p] = weight_[0][p] * t0.z + weight_[1][p] * t1.z + weight_[2][p] * t2.z;
+        }
+    }
 
-    [[nodiscard]] float bound(const float* values) const {
+    /// Largest coefficient, by magnitude, of the quartic with these values at the 15 points.
+    __attribute__((target_clones("avx2", "default"))) float bound(const float* values) const {
         alignas(64) float c[16] = {};
         for (int p = 0; p < kPoints; ++p)
             for (int q = 0; q < 16; ++q) c[q] += coefficient_[p][q] * values[p];
@@ -108,6 +119,7 @@ private:
     static constexpr std::array<std::array<int, 3>, kPoints> index_{{{4, 0, 0}, {0, 4, 0}, {0, 0, 4}, {3, 1, 0}, {2, 2, 0}, {1, 3, 0}, {0, 3, 1}, {0, 2, 2},
                                                                      {0, 1, 3}, {1, 0, 3}, {2, 0, 2}, {3, 0, 1}, {2, 1, 1}, {1, 2, 1}, {1, 1, 2}}};
     alignas(64) float coefficient_[kPoints][16] = {};  ///< [point][coefficient]
+    alignas(64) float weight_[3][16] = {};             ///< of the corners, at each point
 };
 
 /// Bound on |f| over a flat polygon: on a plane f is a quartic.
@@ -150,13 +162,7 @@ private:
     bool triangle(const Triangle3& t, int depth) {
         static const QuarticTriangle quartic;
         LeafSurface::Batch batch;
-        for (int p = 0; p < QuarticTriangle::kPoints; ++p) {
-            const glm::dvec3 x = quartic.weight(p, 0) * t[0] + quartic.weight(p, 1) * t[1] + quartic.weight(p, 2) * t[2];
-            batch.x[p] = static_cast<float>(x.x);
-            batch.y[p] = static_cast<float>(x.y);
-            batch.z[p] = static_cast<float>(x.z);
-        }
-        batch.x[15] = batch.y[15] = batch.z[15] = 0;
+        quartic.place(t, batch);
         surface_.evaluate(batch);
         for (int p = 0; p < QuarticTriangle::kPoints; ++p)
             if (std::abs(batch.value[p]) > limit_) return false;

@@ -16,8 +16,12 @@ namespace {
 // this: a fan's centre or long triangles gain nothing from smaller leaves.
 constexpr double kMaxRepetition = 3.5;
 
-// Leaves are merged only while their own error leaves this part of the tolerance unused.
-constexpr double kMergeTrial = 0.35;
+// A merged leaf must do with this part of the tolerance: where leaves of different sizes meet, their normals
+// differ by about their errors over a cell, and shading shows it sooner than the surface does.
+constexpr double kMergeTolerance = 0.5;
+
+// Merging is tried only while the leaves' own error is below this part of the tolerance.
+constexpr double kMergeTrial = 0.2;
 
 // Leaves are merged only while their colours stay so close to what the larger leaf blends, of 255.
 constexpr double kColourTolerance = 10;
@@ -82,7 +86,7 @@ private:
     void fillCell(uint32_t index, const NodeBox& box, const std::vector<uint32_t>& around, const std::vector<uint32_t>& inside, uint32_t depth) {
         tree_.nodes[index].box = box;
         if (inside.empty()) return;
-        if (const auto certificate = certify(box, around)) return makeSoft(index, *certificate);
+        if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
         if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth) return makeHard(index, inside);
         std::array<std::vector<uint32_t>, 8> childAround, childInside;
         size_t together = 0;
@@ -104,11 +108,11 @@ private:
         return first;
     }
 
-    std::optional<Certificate> certify(const NodeBox& box, const std::vector<uint32_t>& around) {
+    std::optional<Certificate> certify(const NodeBox& box, const std::vector<uint32_t>& around, double tolerance) {
         triangles_.clear();
         for (const uint32_t k : around) triangles_.push_back(&geometry_.triangle(k));
         const auto corner = [&](int i) -> const CornerVector& { return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)); };
-        const Certificate certificate = certifyLeaf(box.lowerCells(), box.edgeCells(), triangles_, tolerance_, corner, scratch_);
+        const Certificate certificate = certifyLeaf(box.lowerCells(), box.edgeCells(), triangles_, tolerance, corner, scratch_);
         if (!certificate.soft) return {};
         return certificate;
     }
@@ -144,7 +148,7 @@ private:
             if (hard == 0 && (box.edge > kMaxSoftCells * kSubcells || worst > kMergeTrial * tolerance_)) return;
             geometry_.trianglesOf(box, around, inside);
         }
-        const std::optional<Certificate> certificate = soft > 0 && hard == 0 ? certify(box, around) : std::nullopt;
+        const std::optional<Certificate> certificate = soft > 0 && hard == 0 ? certify(box, around, kMergeTolerance * tolerance_) : std::nullopt;
         if (certificate && !colourFits(box, first)) return;
         const bool hardFits = hard > 0 && inside.size() <= kMergedHardTriangles;
         if (soft + hard > 0 && !certificate && !hardFits) return;

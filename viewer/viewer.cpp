@@ -38,16 +38,17 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 std::string statusLine(const ViewerStatus& status) {
     std::string line;
     if (!status.problem.empty()) line += "! " + status.problem + " | ";
-    line += fmt::format("{} | {} triangles | ", status.name, formatCount(status.triangles));
+    line += fmt::format("{} | {} triangles | {}", status.name, formatCount(status.triangles), status.update.settled ? "settled" : "loading");
+    // What matters most comes first: a narrow window cuts the line off.
     if (status.update.drawable) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
-        line += coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
-        line += fmt::format(" (finest {}) | error {:.2g} px | {} of {}", status.levels - 1, status.update.errorPixels,
-                            formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes));
+        const std::string levels = coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
+        line += fmt::format(" | {} (finest {})", levels, status.levels - 1);
+        if (coarsest + 1 < status.levels) line += fmt::format(" | error {:.2g} px", status.update.errorPixels);
     }
     if (status.reduction > 1) line += fmt::format(" | 1/{} size", status.reduction);
-    line += fmt::format(" | {:.0f} ms | {}{} | {}", status.frame.msFrame, status.device,
-                        status.software ? " (software)" : "", status.update.settled ? "settled" : "loading");
+    line += fmt::format(" | {:.0f} ms | {}{}", status.frame.msFrame, status.device, status.software ? " (software)" : "");
+    if (status.update.drawable) line += fmt::format(" | {} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes));
     return line;
 }
 
