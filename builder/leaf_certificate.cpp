@@ -6,6 +6,14 @@
 #include "octree/leaf_math.h"
 #include "octree/packing.h"
 
+// Also compiled for wider vectors, chosen when the program starts. They round alike, since nothing is fused:
+// results do not depend on the processor.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define WIDER_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define WIDER_CLONES
+#endif
+
 namespace vcp {
 
 namespace {
@@ -106,7 +114,7 @@ public:
     }
 
     /// Largest coefficient, by magnitude, of the quartic with these values at the 15 points.
-    __attribute__((target_clones("avx2", "default"))) float bound(const float* values) const {
+    WIDER_CLONES float bound(const float* values) const {
         alignas(64) float c[16] = {};
         for (int p = 0; p < kPoints; ++p)
             for (int q = 0; q < 16; ++q) c[q] += coefficient_[p][q] * values[p];
@@ -196,8 +204,7 @@ double LeafSurface::value(glm::dvec3 x) const {
     return mix(mix(mix(along(0), along(1), x.x), mix(along(2), along(3), x.x), x.y), mix(mix(along(4), along(5), x.x), mix(along(6), along(7), x.x), x.y), x.z);
 }
 
-// The wider instructions round alike, since nothing is fused: the result does not depend on the processor.
-__attribute__((target_clones("avx2", "default"))) void LeafSurface::evaluate(Batch& b) const {
+WIDER_CLONES void LeafSurface::evaluate(Batch& b) const {
     float constant[8], slope[8][3];
     for (int c = 0; c < 8; ++c) {
         constant[c] = static_cast<float>(constant_[c]);
