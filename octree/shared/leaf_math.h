@@ -6,10 +6,8 @@
 // docs/surface.md: f(x) = sum w_i(x) [ D_i + 1/2 N_i . (x - p_i) ] with signed distances D_i, oriented
 // directions N_i and trilinear weights w_i; exact where the surface is a quadric's level set.
 
-// Octahedral direction, 10 + 10 bits (Meyer et al. 2010). Unit length.
-INLINE Real3 decodeDirection(uint code) {
-    Real x = Real(code & 1023u) * Real(2.0 / 1023.0) - Real(1.0);
-    Real y = Real((code >> 10) & 1023u) * Real(2.0 / 1023.0) - Real(1.0);
+// The unit vector at a point of [-1, 1]^2, the unfolded octahedron.
+INLINE Real3 unfoldOctahedron(Real x, Real y) {
     Real z = Real(1.0) - abs(x) - abs(y);
     Real fold = max(-z, Real(0.0));
     x += x >= Real(0.0) ? -fold : fold;
@@ -18,16 +16,18 @@ INLINE Real3 decodeDirection(uint code) {
     return Real3(x * scale, y * scale, z * scale);
 }
 
+// Octahedral direction, 10 + 10 bits (Meyer et al. 2010). Unit length.
+INLINE Real3 decodeDirection(uint code) {
+    Real x = Real(code & 1023u) * Real(2.0 / 1023.0) - Real(1.0);
+    Real y = Real((code >> 10) & 1023u) * Real(2.0 / 1023.0) - Real(1.0);
+    return unfoldOctahedron(x, y);
+}
+
 // Octahedral normal, 16 + 16 bits; the lowest bit is the crease flag and costs no visible accuracy.
 INLINE Real3 decodeNormal(uint code) {
     Real x = Real(code & 0xfffeu) * Real(2.0 / 65534.0) - Real(1.0);
     Real y = Real(code >> 16) * Real(2.0 / 65535.0) - Real(1.0);
-    Real z = Real(1.0) - abs(x) - abs(y);
-    Real fold = max(-z, Real(0.0));
-    x += x >= Real(0.0) ? -fold : fold;
-    y += y >= Real(0.0) ? -fold : fold;
-    Real scale = inversesqrt(x * x + y * y + z * z);
-    return Real3(x * scale, y * scale, z * scale);
+    return unfoldOctahedron(x, y);
 }
 
 // Distance of a packed vector, in leaf edges, and the side of the surface its corner is on.
