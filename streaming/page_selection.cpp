@@ -113,7 +113,10 @@ Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_
             continue;
         }
         selection.cut.push_back(page);
-        selection.errorPixels = std::max(selection.errorPixels, errorOf(page));
+        // Inside a page's box the error has no bound; it is reported as seen from a cell away.
+        const PageEntry& entry = dataset.pages[page];
+        const double fromACell = double(entry.certifiedError) * view.pixelsPerUnit / dataset.cellOf(entry.level);
+        selection.errorPixels = std::max(selection.errorPixels, view.orthographic ? errorOf(page) : std::min(errorOf(page), fromACell));
     }
     std::sort(selection.cut.begin(), selection.cut.end());
     return selection;

@@ -42,7 +42,7 @@ struct Selection {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
     std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
-    double errorPixels = 0;     ///< largest projected error in the cut, of pages in view; infinite without one
+    double errorPixels = 0;     ///< largest projected error in the cut, of pages in view, from no nearer than a cell; infinite without one
     bool complete = false;      ///< all that is wanted is resident; also where nothing can be
     bool relaxed = false;       ///< the budget kept a page from being refined
 };
