@@ -2,6 +2,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include "builder/ply_rows.h"
 
@@ -23,50 +24,41 @@ T load(const char* p) {
     return value;
 }
 
-template <bool kSwap>
-double loadReal(PlyType type, const char* p) {
+/// Calls `use` with the scalar at p, in its own type.
+template <bool kSwap, class Use>
+auto loadScalar(PlyType type, const char* p, Use use) {
     switch (type) {
         case PlyType::Int8:
-            return load<int8_t, kSwap>(p);
+            return use(load<int8_t, kSwap>(p));
         case PlyType::Uint8:
-            return load<uint8_t, kSwap>(p);
+            return use(load<uint8_t, kSwap>(p));
         case PlyType::Int16:
-            return load<int16_t, kSwap>(p);
+            return use(load<int16_t, kSwap>(p));
         case PlyType::Uint16:
-            return load<uint16_t, kSwap>(p);
+            return use(load<uint16_t, kSwap>(p));
         case PlyType::Int32:
-            return load<int32_t, kSwap>(p);
+            return use(load<int32_t, kSwap>(p));
         case PlyType::Uint32:
-            return load<uint32_t, kSwap>(p);
+            return use(load<uint32_t, kSwap>(p));
         case PlyType::Float32:
-            return load<float, kSwap>(p);
+            return use(load<float, kSwap>(p));
         case PlyType::Float64:
-            return load<double, kSwap>(p);
+            break;
     }
-    return 0;
+    return use(load<double, kSwap>(p));
+}
+
+template <bool kSwap>
+double loadReal(PlyType type, const char* p) {
+    return loadScalar<kSwap>(type, p, [](auto value) -> double { return value; });
 }
 
 template <bool kSwap>
 std::optional<int64_t> loadWhole(PlyType type, const char* p) {
-    switch (type) {
-        case PlyType::Int8:
-            return load<int8_t, kSwap>(p);
-        case PlyType::Uint8:
-            return load<uint8_t, kSwap>(p);
-        case PlyType::Int16:
-            return load<int16_t, kSwap>(p);
-        case PlyType::Uint16:
-            return load<uint16_t, kSwap>(p);
-        case PlyType::Int32:
-            return load<int32_t, kSwap>(p);
-        case PlyType::Uint32:
-            return load<uint32_t, kSwap>(p);
-        case PlyType::Float32:
-            return wholeNumber(load<float, kSwap>(p));
-        case PlyType::Float64:
-            return wholeNumber(load<double, kSwap>(p));
-    }
-    return std::nullopt;
+    return loadScalar<kSwap>(type, p, [](auto value) -> std::optional<int64_t> {
+        if constexpr (std::is_floating_point_v<decltype(value)>) return wholeNumber(value);
+        else return value;
+    });
 }
 
 // A row as stored: runs of scalars, and lists between them.

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 #include "viewer/build_settings.h"
 
 #include <algorithm>
