@@ -2,38 +2,35 @@
 
 #include <algorithm>
 
-#include <glm/common.hpp>
-
-#include "builder/triangle_geometry.h"
-#include "octree/leaf_math.h"
-#include "octree/vcp_file.h"
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
 
 namespace vcp {
 
-TriangleBins binTriangles(const LatticeMesh& mesh, uint32_t log2Cells, uint32_t level) {
+TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first, uint64_t end) {
     struct Entry {
         uint64_t page;
         uint32_t triangle;
     };
+    tbb::enumerable_thread_specific<std::vector<Entry>> parts;
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), 4096), [&](const auto& range) {
+        std::vector<Entry>& part = parts.local();
+        for (size_t k = range.begin(); k < range.end(); ++k) {
+            const auto& t = mesh.triangles[k];
+            const glm::i32vec3 corner[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+            grid.forPagesNear(corner, kBinMarginCells, [&](uint64_t page) {
+                if (page >= first && page < end) part.push_back({page, static_cast<uint32_t>(k)});
+            });
+        }
+    });
     std::vector<Entry> entries;
-    entries.reserve(mesh.triangles.size() * 5 / 4);
-    const double edge = double(1u << log2Cells);
-    const int lastPage = (1 << level) - 1;
-    const double half = edge / 2 + kBinMarginCells;
-    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
-        Triangle3 t;
-        for (int i = 0; i < 3; ++i) t[i] = glm::dvec3(mesh.positions[mesh.triangles[k][i]]) / double(kLatticePerCell);
-        const BoxOverlap overlap(t);
-        const glm::i32vec3 low = glm::i32vec3(glm::max(glm::floor((overlap.lower() - kBinMarginCells) / edge), 0.0));
-        const glm::i32vec3 high = glm::min(glm::i32vec3(glm::floor((overlap.upper() + kBinMarginCells) / edge)), lastPage);
-        const bool one = low == high;
-        for (int z = low.z; z <= high.z; ++z)
-            for (int y = low.y; y <= high.y; ++y)
-                for (int x = low.x; x <= high.x; ++x)
-                    if (one || overlap.test((glm::dvec3(x, y, z) + 0.5) * edge, half))
-                        entries.push_back({mortonEncode(glm::u32vec3(x, y, z)), static_cast<uint32_t>(k)});
+    for (auto& part : parts) {
+        entries.insert(entries.end(), part.begin(), part.end());
+        std::vector<Entry>().swap(part);
     }
-    std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.page != b.page ? a.page < b.page : a.triangle < b.triangle; });
+    tbb::parallel_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.page != b.page ? a.page < b.page : a.triangle < b.triangle; });
     TriangleBins bins;
     bins.triangles.reserve(entries.size());
     for (const Entry& e : entries) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "builder/lattice_mesh.h"
+#include "builder/page_partition.h"
 
 namespace vcp {
 
@@ -24,8 +25,8 @@ struct TriangleBins {
     }
 };
 
-/// A triangle is binned to every page whose cube, widened by the margin, it overlaps. The level has
-/// 2^level pages an axis.
-TriangleBins binTriangles(const LatticeMesh& mesh, uint32_t log2Cells, uint32_t level);
+/// A triangle is binned to every page from code `first` to before `end` whose cube, widened by the margin, it
+/// overlaps. Uses the calling arena's threads.
+TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first = 0, uint64_t end = ~uint64_t{0});
 
 }  // namespace vcp

@@ -1,12 +1,15 @@
 // buildOctree: triangle meshes in, one .vcp file out.
 //
-// The stages, each in a file of its own:
-//   ingest      meshes -> vertices on the finest level's integer lattice (mesh_lattice.h)
-//   levels      coarser meshes from finer ones, each with a bound on how far it strayed (coarsen.h)
-//   bin         triangles -> the subvolumes of a level that they touch (bin_triangles.h)
-//   page        the triangles of one subvolume -> one certified page (page_builder.h)
+// Nothing but bins that fit memory is ever held of the mesh. The stages, each in files of their own:
+//   ingest      meshes -> a soup of triangles in the world (mesh_stream.h, vertex_join.h, ingest.h)
+//   deal        soup -> the finest level's lattice (lattice_soup.h), dealt into bins (page_partition.h)
+//   step        a level's bins -> the next coarser level's bins (level_step.h); the first step finds normals
+//   pages       a bin -> its certified pages (bin_triangles.h, page_builder.h, page_encoder.h)
 //   write       pages, directory, hashes (octree/vcp_writer.h)
-// The output is the same bytes for any number of threads.
+// What passes between them lies on temporary files (temp_space.h, record_bins.h, page_spool.h), in memory while
+// there is room. A journal (journal.h) says how far things are: after an interruption the build goes on from there.
+// The output is the same bytes for any number of threads, any memory, any order of the triangles and however
+// often the build was interrupted.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +25,10 @@ namespace vcp {
 enum class ColourChoice { Auto, Vertex, None };
 
 struct BuildProgress {
-    const char* stage = "";  ///< "reading", "level 5 of 6", "writing"
+    const char* stage = "";  ///< "reading", "sorting", "level 5 of 6", "writing"
     double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing
     uint64_t triangles = 0;  ///< read so far
+    uint64_t tempBytes = 0;  ///< on the temporary disk now
     double seconds = 0;
 };
 
@@ -35,6 +39,10 @@ struct BuildOptions {
     double error = 0;            ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
     bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal
     unsigned threads = 0;        ///< 0: one a processor
+    uint64_t memoryBytes = 0;    ///< cap on what the build allocates; 0: defaultMemoryBytes()
+    std::filesystem::path temp;  ///< folder for temporary files; empty: beside the output
+    bool resume = false;         ///< go on where an interrupted build of the same output was
+    double checkpointSeconds = 5;  ///< what is done is made durable at most so often
     ColourChoice colour = ColourChoice::Auto;
     /// Called from one thread at a time, about ten times a second; false cancels. May be empty.
     std::function<bool(const BuildProgress&)> progress;
@@ -60,9 +68,14 @@ struct BuildReport {
     double certifiedErrorMax = 0;  ///< of the finest level, world units
 };
 
-/// Builds. Blocks; uses options.threads threads. On error or cancellation nothing is left of the output.
+/// Where a build keeps its temporary files.
+std::filesystem::path tempFolderOf(const BuildOptions& options);
+
+/// Builds. Blocks; uses options.threads threads. On error or cancellation nothing is left of the output, and
+/// nothing of the temporary files, unless they hold work that resume can use: then the message says so.
 /// Errors: what the readers report; InvalidInput (no triangle with area, nothing finite); Limit (cell too
-/// small for the mesh's extent, too many pages); Io (output not writable, disk full); Cancelled.
+/// small for the mesh's extent, too many pages, too little memory); Io (output not writable, disk full);
+/// Usage (what is there to resume is of other inputs or options); Cancelled.
 Result<BuildReport> buildOctree(const BuildOptions& options);
 
 }  // namespace vcp

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "octree/leaf_math.h"
+#include "octree/packing.h"
 
 namespace vcp {
 
@@ -35,44 +36,36 @@ int32_t halved(double fine) { return static_cast<int32_t>(std::llround(fine / 2)
 
 }  // namespace
 
-LatticeMesh coarsen(const LatticeMesh& fine) {
+Clusters clusterVertices(const LatticeMesh& fine) {
     const std::vector<Member> members = groupByCluster(fine);
-    LatticeMesh coarse;
-    std::vector<uint32_t> renamed(fine.positions.size());
+    Clusters clusters;
+    clusters.of.resize(fine.positions.size());
     for (size_t begin = 0, end = 0; begin < members.size(); begin = end) {
-        glm::dvec3 mean(0);
+        glm::dvec3 mean(0), normal(0);
         uint64_t channel[4] = {};
+        bool crease = false;
         for (end = begin; end < members.size() && members[end].cluster == members[begin].cluster; ++end) {
             const uint32_t v = members[end].vertex;
+            clusters.of[v] = static_cast<uint32_t>(clusters.position.size());
             mean += glm::dvec3(fine.positions[v]);
+            const glm::dvec3 n = f64::decodeNormal(fine.normals[v]);
+            normal += glm::dot(n, normal) < 0 ? -n : n;
+            crease |= (fine.normals[v] & kNormalCreaseBit) != 0;
             if (!fine.colours.empty())
                 for (int c = 0; c < 4; ++c) channel[c] += fine.colours[v] >> 8 * c & 255u;
         }
         const uint64_t count = end - begin;
         mean /= double(count);
-        const glm::i32vec3 p(halved(mean.x), halved(mean.y), halved(mean.z));
-        float stray = 0;
-        for (size_t i = begin; i < end; ++i) {
-            const uint32_t v = members[i].vertex;
-            renamed[v] = static_cast<uint32_t>(coarse.positions.size());
-            const double moved = glm::length(glm::dvec3(fine.positions[v]) / 2.0 - glm::dvec3(p)) / kLatticePerCell;
-            stray = std::max(stray, static_cast<float>(fine.stray[v] / 2 + moved));
-        }
-        coarse.positions.push_back(p);
-        coarse.stray.push_back(std::nextafter(stray, 1e9f));
+        clusters.position.emplace_back(halved(mean.x), halved(mean.y), halved(mean.z));
+        const double length = glm::length(normal);
+        clusters.normal.push_back(packNormal(length > 0 ? normal / length : glm::dvec3(0, 0, 1), crease));
         if (!fine.colours.empty()) {
             uint32_t colour = 0;
             for (int c = 0; c < 4; ++c) colour |= static_cast<uint32_t>((channel[c] + count / 2) / count) << 8 * c;
-            coarse.colours.push_back(colour);
+            clusters.colour.push_back(colour);
         }
     }
-    coarse.triangles.reserve(fine.triangles.size());
-    for (const auto& t : fine.triangles) {
-        const std::array<uint32_t, 3> r{renamed[t[0]], renamed[t[1]], renamed[t[2]]};
-        if (r[0] != r[1] && r[1] != r[2] && r[2] != r[0]) coarse.triangles.push_back(r);
-    }
-    weld(coarse);
-    return coarse;
+    return clusters;
 }
 
 }  // namespace vcp

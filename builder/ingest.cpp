@@ -8,9 +8,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "builder/exact_sum.h"
 #include "builder/mesh_stream.h"
+#include "builder/vertex_join.h"
 #include "octree/leaf_math.h"
-#include "octree/vcp_file.h"
 
 namespace vcp {
 
@@ -28,145 +29,143 @@ constexpr double kMaxExtent = 1e150;
 
 constexpr uint32_t kLog2Cells = 5;
 
-/// All inputs, joined, as read.
-struct RawMesh {
-    std::vector<glm::dvec3> positions;
-    std::vector<uint32_t> colours;
-    std::vector<std::array<uint32_t, 3>> triangles;
-    bool hasColour = false;
-};
+std::string nameOf(const BuildOptions& options) { return options.inputs.empty() ? "" : options.inputs.front().string(); }
 
 Error badInput(const BuildOptions& options, std::string message) {
-    return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = options.inputs.empty() ? "" : options.inputs.front().string()};
+    return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = nameOf(options)};
 }
 
-Result<void> readInput(const std::filesystem::path& path, RawMesh& mesh, const std::function<bool(uint64_t bytes)>& progress) {
-    auto stream = openMesh(path);
-    if (!stream) return stream.error();
-    const uint64_t first = mesh.positions.size();
-    MeshChunk chunk;
-    for (;;) {
-        auto more = (*stream)->next(chunk);
-        if (!more) return more.error();
-        if (!*more) break;
-        if (mesh.positions.size() + chunk.positions.size() > std::numeric_limits<uint32_t>::max())
-            return Error{.code = ErrorCode::Limit, .message = "more than 2^32 vertices", .file = path.string()};
-        if (!chunk.colours.empty() && !mesh.hasColour) {
-            mesh.hasColour = true;
-            mesh.colours.resize(mesh.positions.size(), 0xffffffffu);  // earlier inputs had none: white
-        }
-        mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
-        if (mesh.hasColour) {
-            mesh.colours.insert(mesh.colours.end(), chunk.colours.begin(), chunk.colours.end());
-            mesh.colours.resize(mesh.positions.size(), 0xffffffffu);
-        }
-        for (const auto& t : chunk.triangles)
-            mesh.triangles.push_back({static_cast<uint32_t>(first + t[0]), static_cast<uint32_t>(first + t[1]), static_cast<uint32_t>(first + t[2])});
-        if (!progress((*stream)->bytesRead())) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+/// Measures triangles and packs them into the soup.
+class SoupWriter {
+public:
+    explicit SoupWriter(Soup& soup) : soup_(soup) {
+        measures_.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
+        measures_.boundsMax = -measures_.boundsMin;
     }
-    for (const auto& t : mesh.triangles)
-        if (std::max({t[0], t[1], t[2]}) >= mesh.positions.size())
-            return Error{.code = ErrorCode::InvalidInput, .message = "a triangle names a vertex that the file does not have", .file = path.string()};
-    return {};
-}
 
-struct Measures {
-    glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
-    double area = 0;
-    uint64_t degenerate = 0;
-};
-
-/// Bounds of the vertices that triangles use, area, and triangles without any.
-Measures measure(const RawMesh& mesh) {
-    Measures m;
-    for (const auto& t : mesh.triangles) {
-        const glm::dvec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
-        m.lower = glm::min(m.lower, glm::min(a, glm::min(b, c)));
-        m.upper = glm::max(m.upper, glm::max(a, glm::max(b, c)));
+    Result<void> add(const WorldTriangle<double>& t) {
+        ++measures_.triangles;
+        const glm::dvec3 &a = t.corner[0], &b = t.corner[1], &c = t.corner[2];
+        measures_.boundsMin = glm::min(measures_.boundsMin, glm::min(a, glm::min(b, c)));
+        measures_.boundsMax = glm::max(measures_.boundsMax, glm::max(a, glm::max(b, c)));
         const double twice = glm::length(glm::cross(b - a, c - a));
-        m.area += twice / 2;
-        if (twice == 0) ++m.degenerate;
+        if (twice == 0) {
+            ++measures_.degenerateTriangles;
+            return {};
+        }
+        if (std::isfinite(twice)) area_.add(twice / 2);
+        else tooLarge_ = true;
+        return store(t);
     }
-    return m;
-}
 
-Result<GridFrame> chooseFrame(const BuildOptions& options, const RawMesh& mesh, const Measures& m) {
-    GridFrame frame;
-    frame.log2Cells = kLog2Cells;
-    const glm::dvec3 extent = m.upper - m.lower;
-    const double longest = std::max(extent.x, std::max(extent.y, extent.z));
-    const double useful = static_cast<double>(mesh.triangles.size() - m.degenerate);
-    frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
-    // Doubles far from zero have few digits left for the cell.
-    const double resolution = std::max(glm::length(m.lower), glm::length(m.upper)) * std::numeric_limits<double>::epsilon();
-    if (options.cell <= 0) frame.cell = std::max(frame.cell, std::max(longest / kMaxExtentCells, resolution * 1e4));
-    if (longest / frame.cell > kMaxExtentCells)
-        return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; use --cell {:g} or larger", frame.cell, longest,
-                                            longest / kMaxExtentCells)};
-    const double cellsAcross = longest / frame.cell + 2;
-    while (std::ldexp(1.0, static_cast<int>(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
-    frame.origin = m.lower - glm::dvec3(frame.cell);
-    return frame;
-}
-
-LatticeMesh snap(RawMesh&& raw, const GridFrame& frame) {
-    LatticeMesh mesh;
-    const double scale = double(kLatticePerCell) / frame.cell;
-    mesh.positions.reserve(raw.positions.size());
-    for (const glm::dvec3& p : raw.positions) {
-        // Vertices that no triangle uses may lie anywhere; they are dropped by the page builder.
-        const glm::dvec3 q = glm::clamp((p - frame.origin) * scale, glm::dvec3(0), glm::dvec3(2147483647.0));
-        mesh.positions.emplace_back(std::lround(q.x), std::lround(q.y), std::lround(q.z));
+    Result<void> flush() {
+        VCP_TRY(soup_.doubles.append(0, doubles_));
+        VCP_TRY(soup_.floats.append(0, floats_));
+        doubles_.clear();
+        floats_.clear();
+        return {};
     }
-    mesh.colours = std::move(raw.colours);
-    mesh.triangles = std::move(raw.triangles);
-    mesh.stray.assign(mesh.positions.size(), static_cast<float>(kLatticeRounding));
-    return mesh;
-}
+
+    [[nodiscard]] bool tooLarge() const { return tooLarge_; }
+    [[nodiscard]] uint64_t triangles() const { return measures_.triangles; }
+    [[nodiscard]] SoupMeasures measures() const {
+        SoupMeasures m = measures_;
+        m.area = area_.value();
+        return m;
+    }
+
+private:
+    Result<void> store(const WorldTriangle<double>& t) {
+        WorldTriangle<float> f;
+        bool exact = true;
+        for (int i = 0; i < 3; ++i) {
+            f.corner[i] = glm::vec3(t.corner[i]);
+            exact &= glm::dvec3(f.corner[i]) == t.corner[i];
+        }
+        if (exact) {
+            std::copy_n(t.colour, 3, f.colour);
+            std::copy_n(t.uv, 3, f.uv);
+            f.material = t.material;
+            floats_.push_back(f);
+        } else {
+            doubles_.push_back(t);
+        }
+        return floats_.size() + doubles_.size() >= kBatch ? flush() : Result<void>();
+    }
+
+    static constexpr size_t kBatch = 4096;
+
+    Soup& soup_;
+    SoupMeasures measures_;
+    ExactSum area_;
+    bool tooLarge_ = false;
+    std::vector<WorldTriangle<float>> floats_;
+    std::vector<WorldTriangle<double>> doubles_;
+};
 
 }  // namespace
 
-Result<IngestedMesh> ingest(const BuildOptions& options, const std::function<bool(double, uint64_t)>& progress) {
-    RawMesh raw;
-    uint64_t totalBytes = 0, doneBytes = 0;
+Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
+                                const std::function<bool(double, uint64_t)>& progress) {
+    uint64_t totalBytes = 0, doneBytes = 0, vertices = 0;
+    bool hasColour = false;
     for (const auto& path : options.inputs) {
         std::error_code ignored;
         if (const auto size = std::filesystem::file_size(path, ignored); !ignored) totalBytes += size;
     }
+    SoupWriter writer(soup);
+    MeshChunk chunk;
     for (const auto& path : options.inputs) {
-        uint64_t here = 0;
-        VCP_TRY(readInput(path, raw, [&](uint64_t bytes) {
-            here = bytes;
-            return progress(double(doneBytes + bytes) / double(std::max<uint64_t>(totalBytes, 1)), raw.triangles.size());
-        }));
-        doneBytes += here;
+        auto stream = openMesh(path);
+        if (!stream) return stream.error();
+        VertexJoin join(space, vertexBytes, [&](const WorldTriangle<double>& t) { return writer.add(t); });
+        for (;;) {
+            auto more = (*stream)->next(chunk);
+            if (!more) return more.error();
+            if (!*more) break;
+            hasColour |= !chunk.colours.empty();
+            VCP_TRY(join.add(chunk, 0));
+            const uint64_t bytes = doneBytes + (*stream)->bytesRead();
+            if (!progress(double(bytes) / double(std::max<uint64_t>(totalBytes, 1)), writer.triangles())) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        }
+        doneBytes += (*stream)->bytesRead();
+        VCP_TRY(join.finish(path.string()));
+        vertices += join.vertices();
     }
-    IngestedMesh out;
-    out.triangles = raw.triangles.size();
-    out.vertices = raw.positions.size();
-    const Measures m = measure(raw);
-    out.degenerateTriangles = m.degenerate;
-    if (out.triangles == out.degenerateTriangles || m.area == 0)
-        return badInput(options, out.triangles == 0 ? "has no triangles" : fmt::format("none of its {} triangles has an area", out.triangles));
-    if (!std::isfinite(m.area) || !(glm::length(m.upper - m.lower) < kMaxExtent))
+    VCP_TRY(writer.flush());
+    VCP_TRY(soup.floats.raw().flush());
+    VCP_TRY(soup.doubles.raw().flush());
+
+    SoupMeasures m = writer.measures();
+    m.vertices = vertices;
+    m.hasColour = hasColour && options.colour != ColourChoice::None;
+    if (m.triangles == 0) return badInput(options, "has no triangles");
+    if (writer.tooLarge() || !(glm::length(m.boundsMax - m.boundsMin) < kMaxExtent) || !std::isfinite(m.area))
         return badInput(options, "its coordinates are too large to measure lengths; scale the mesh down");
-    out.boundsMin = m.lower;
-    out.boundsMax = m.upper;
-    if (options.colour == ColourChoice::None) raw.colours.clear();
-    if (options.colour == ColourChoice::Vertex && !raw.hasColour) return badInput(options, "has no vertex colours; leave out --colour vertex");
-    auto frame = chooseFrame(options, raw, m);
-    if (!frame) {
-        Error error = frame.error();
-        error.file = options.inputs.front().string();
-        return error;
-    }
-    out.frame = *frame;
-    out.mesh = snap(std::move(raw), out.frame);
-    weld(out.mesh);
-    splitLongEdges(out.mesh);
-    if (out.mesh.triangles.empty()) return badInput(options, "all triangles are smaller than 1/2048 cell; use a smaller --cell");
-    return out;
+    if (m.triangles == m.degenerateTriangles || m.area == 0) return badInput(options, fmt::format("none of its {} triangles has an area", m.triangles));
+    if (options.colour == ColourChoice::Vertex && !hasColour) return badInput(options, "has no vertex colours; leave out --colour vertex");
+    return m;
+}
+
+Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m) {
+    GridFrame frame;
+    frame.log2Cells = kLog2Cells;
+    const glm::dvec3 extent = m.boundsMax - m.boundsMin;
+    const double longest = std::max(extent.x, std::max(extent.y, extent.z));
+    const double useful = static_cast<double>(m.triangles - m.degenerateTriangles);
+    frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
+    // Doubles far from zero have few digits left for the cell.
+    const double resolution = std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon();
+    if (options.cell <= 0) frame.cell = std::max(frame.cell, std::max(longest / kMaxExtentCells, resolution * 1e4));
+    if (longest / frame.cell > kMaxExtentCells)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; use --cell {:g} or larger", frame.cell, longest,
+                                            longest / kMaxExtentCells),
+                     .file = nameOf(options)};
+    const double cellsAcross = longest / frame.cell + 2;
+    while (std::ldexp(1.0, static_cast<int>(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
+    frame.origin = m.boundsMin - glm::dvec3(frame.cell);
+    return frame;
 }
 
 }  // namespace vcp

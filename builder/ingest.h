@@ -1,13 +1,14 @@
-// Ingest: mesh files -> one mesh on the finest level's lattice, and the frame that places it in the world.
+// Ingest: mesh files -> a soup of triangles in world space, measured; and the grid that will hold it.
 #pragma once
 
 #include <functional>
-#include <vector>
+#include <memory>
 
 #include <glm/vec3.hpp>
 
 #include "builder/build.h"
-#include "builder/lattice_mesh.h"
+#include "builder/record_bins.h"
+#include "builder/soup.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -20,17 +21,30 @@ struct GridFrame {
     uint32_t log2Cells = 5;  ///< cells an edge of a page
 };
 
-struct IngestedMesh {
-    LatticeMesh mesh;
-    GridFrame frame;
-    glm::dvec3 boundsMin{0}, boundsMax{0};
-    uint64_t triangles = 0;            ///< read
+/// What reading found out. Does not depend on the order of the triangles.
+struct SoupMeasures {
+    glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the vertices that triangles use
+    double area = 0;
+    uint64_t triangles = 0;
     uint64_t degenerateTriangles = 0;  ///< of them, without area in the file's own coordinates
-    uint64_t vertices = 0;             ///< read
+    uint64_t vertices = 0;
+    bool hasColour = false;
 };
 
-/// Reads all inputs (in memory). `cell` 0 chooses a cell from area and number of triangles.
-/// `progress` is given the fraction read; false cancels.
-Result<IngestedMesh> ingest(const BuildOptions& options, const std::function<bool(double fraction, uint64_t triangles)>& progress);
+/// The triangles of all inputs. Most files hold floats: those take half the room.
+struct Soup {
+    Soup(TempSpace& space, uint64_t bufferBytes) : floats(space, "floats", 1, bufferBytes / 2), doubles(space, "doubles", 1, bufferBytes / 2) {}
+
+    RecordBins<WorldTriangle<float>> floats;
+    RecordBins<WorldTriangle<double>> doubles;
+};
+
+/// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is
+/// given the fraction read; false cancels. Triangles without area are counted and left out.
+Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
+                                const std::function<bool(double fraction, uint64_t triangles)>& progress);
+
+/// `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
+Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures);
 
 }  // namespace vcp

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
 #include <glm/geometric.hpp>
+#include <oneapi/tbb/parallel_sort.h>
 
 #include "octree/leaf_math.h"
 #include "octree/packing.h"
+#include "octree/vcp_file.h"
 
 namespace vcp {
 
@@ -20,29 +21,6 @@ struct PositionHash {
     }
 };
 
-using Index3 = std::array<uint32_t, 3>;
-
-/// Order-free name of a triangle.
-Index3 sorted(Index3 t) {
-    std::sort(t.begin(), t.end());
-    return t;
-}
-
-struct Index3Hash {
-    size_t operator()(const Index3& t) const {
-        uint64_t h = t[0] * 0x9e3779b97f4a7c15u ^ t[1] * 0xc2b2ae3d27d4eb4fu ^ t[2] * 0x165667b19e3779f9u;
-        return h ^ h >> 29;
-    }
-};
-
-bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
-    // Coordinates may span 31 bits: the products need more than 64.
-    using Wide = __int128;
-    const int64_t ux = int64_t{b.x} - a.x, uy = int64_t{b.y} - a.y, uz = int64_t{b.z} - a.z;
-    const int64_t vx = int64_t{c.x} - a.x, vy = int64_t{c.y} - a.y, vz = int64_t{c.z} - a.z;
-    return Wide{uy} * vz != Wide{uz} * vy || Wide{uz} * vx != Wide{ux} * vz || Wide{ux} * vy != Wide{uy} * vx;
-}
-
 /// An open-addressing map from position to index; the vertex array itself holds the keys.
 class PositionIndex {
 public:
@@ -53,6 +31,7 @@ public:
     }
     /// Index of `p` in `positions`, or `next` after entering it.
     uint32_t findOrAdd(const std::vector<glm::i32vec3>& positions, glm::i32vec3 p, uint32_t next) {
+        if (next * 3ull >= slots_.size() * 2) grow(positions);
         const size_t mask = slots_.size() - 1;
         for (size_t i = PositionHash{}(p) & mask;; i = (i + 1) & mask) {
             if (slots_[i] == kEmpty) return slots_[i] = next;
@@ -61,145 +40,132 @@ public:
     }
 
 private:
+    void grow(const std::vector<glm::i32vec3>& positions) {
+        slots_.assign(slots_.size() * 2, kEmpty);
+        const size_t mask = slots_.size() - 1;
+        for (uint32_t v = 0; v < positions.size(); ++v) {
+            size_t i = PositionHash{}(positions[v]) & mask;
+            while (slots_[i] != kEmpty) i = (i + 1) & mask;
+            slots_[i] = v;
+        }
+    }
+
     static constexpr uint32_t kEmpty = 0xffffffff;
     std::vector<uint32_t> slots_;
 };
 
-/// The same for triangles whose corners are sorted.
-class TriangleSet {
-public:
-    explicit TriangleSet(size_t count) {
-        size_t size = 16;
-        while (size < count * 2) size *= 2;
-        slots_.assign(size, Index3{0xffffffff, 0, 0});
-    }
-    bool insert(const Index3& t) {
-        const size_t mask = slots_.size() - 1;
-        for (size_t i = Index3Hash{}(t) & mask;; i = (i + 1) & mask) {
-            if (slots_[i][0] == 0xffffffff) {
-                slots_[i] = t;
-                return true;
-            }
-            if (slots_[i] == t) return false;
-        }
-    }
+/// Vertex numbers of `corners` in the canonical order of the vertices, which are sorted into it.
+struct OrderedVertex {
+    uint64_t cell;
+    glm::i32vec3 position;
+    uint32_t number;
 
-private:
-    std::vector<Index3> slots_;
+    bool operator<(const OrderedVertex& b) const {
+        if (cell != b.cell) return cell < b.cell;
+        if (position.z != b.position.z) return position.z < b.position.z;
+        if (position.y != b.position.y) return position.y < b.position.y;
+        return position.x < b.position.x;
+    }
 };
 
-double edgeLengthSquared(const LatticeMesh& mesh, uint32_t a, uint32_t b) {
-    const glm::dvec3 d = glm::dvec3(mesh.positions[a]) - glm::dvec3(mesh.positions[b]);
-    return glm::dot(d, d);
+/// Sorts the vertices; returns the new number of each.
+std::vector<uint32_t> sortVertices(std::vector<glm::i32vec3>& positions) {
+    std::vector<OrderedVertex> order(positions.size());
+    for (uint32_t v = 0; v < order.size(); ++v) order[v] = {mortonEncode(glm::u32vec3(positions[v] >> 11)), positions[v], v};
+    tbb::parallel_sort(order.begin(), order.end());
+    std::vector<uint32_t> renamed(order.size());
+    for (uint32_t v = 0; v < order.size(); ++v) {
+        positions[v] = order[v].position;
+        renamed[order[v].number] = v;
+    }
+    return renamed;
 }
 
-/// Middle of two colours, channel by channel.
-uint32_t middleColour(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); }
+/// A triangle by its vertices, smallest first; `turned`: the other two were swapped to ascend.
+struct OrderedTriangle {
+    std::array<uint32_t, 3> vertices;
+    bool turned;
+    float stray;
 
-class EdgeSplitter {
-public:
-    explicit EdgeSplitter(LatticeMesh& mesh) : mesh_(mesh) {}
-
-    void run() {
-        std::vector<Index3> pending;
-        std::vector<Index3> done;
-        for (const Index3& t : mesh_.triangles) {
-            pending.push_back(t);
-            while (!pending.empty()) {
-                const Index3 next = pending.back();
-                pending.pop_back();
-                if (!split(next, pending)) done.push_back(next);
-            }
-        }
-        mesh_.triangles = std::move(done);
+    OrderedTriangle(std::array<uint32_t, 3> v, float strayed) : vertices(v), stray(strayed) {
+        std::rotate(vertices.begin(), std::min_element(vertices.begin(), vertices.end()), vertices.end());
+        turned = vertices[1] > vertices[2];
+        if (turned) std::swap(vertices[1], vertices[2]);
     }
-
-private:
-    bool tooLong(uint32_t a, uint32_t b) const {
-        constexpr double limit = double(kMaxEdgeCells) * kLatticePerCell;
-        return edgeLengthSquared(mesh_, a, b) > limit * limit;
-    }
-
-    uint32_t middle(uint32_t a, uint32_t b) {
-        const uint64_t key = uint64_t{std::min(a, b)} << 32 | std::max(a, b);
-        const auto [entry, isNew] = middles_.try_emplace(key, static_cast<uint32_t>(mesh_.positions.size()));
-        if (isNew) {
-            const glm::i32vec3 p = mesh_.positions[a], q = mesh_.positions[b];
-            mesh_.positions.emplace_back((int64_t{p.x} + q.x) >> 1, (int64_t{p.y} + q.y) >> 1, (int64_t{p.z} + q.z) >> 1);
-            mesh_.stray.push_back(std::max(mesh_.stray[a], mesh_.stray[b]) + static_cast<float>(kLatticeRounding));
-            if (!mesh_.colours.empty()) mesh_.colours.push_back(middleColour(mesh_.colours[a], mesh_.colours[b]));
-        }
-        return entry->second;
-    }
-
-    /// Cuts each edge that is too long; whether it is does not depend on the triangle.
-    bool split(const Index3& t, std::vector<Index3>& out) {
-        const bool ab = tooLong(t[0], t[1]), bc = tooLong(t[1], t[2]), ca = tooLong(t[2], t[0]);
-        const int cuts = ab + bc + ca;
-        if (cuts == 0) return false;
-        // Rotate so that the cut edges come first: (ab), (ab, bc) or all.
-        Index3 r = t;
-        if (cuts == 1) r = ab ? t : bc ? Index3{t[1], t[2], t[0]} : Index3{t[2], t[0], t[1]};
-        if (cuts == 2) r = !ca ? t : !ab ? Index3{t[1], t[2], t[0]} : Index3{t[2], t[0], t[1]};
-        const uint32_t m = middle(r[0], r[1]);
-        if (cuts == 1) {
-            out.insert(out.end(), {{r[0], m, r[2]}, {m, r[1], r[2]}});
-            return true;
-        }
-        const uint32_t n = middle(r[1], r[2]);
-        if (cuts == 2) {
-            out.insert(out.end(), {{m, r[1], n}, {r[0], m, n}, {r[0], n, r[2]}});
-            return true;
-        }
-        const uint32_t o = middle(r[2], r[0]);
-        out.insert(out.end(), {{r[0], m, o}, {m, r[1], n}, {o, n, r[2]}, {m, n, o}});
-        return true;
-    }
-
-    LatticeMesh& mesh_;
-    std::unordered_map<uint64_t, uint32_t> middles_;
+    bool operator<(const OrderedTriangle& b) const { return vertices != b.vertices ? vertices < b.vertices : turned < b.turned; }
 };
+
+/// Means of the colours that triangles give their vertices.
+std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, size_t vertices) {
+    std::vector<std::array<uint32_t, 5>> sums(vertices, {0, 0, 0, 0, 0});
+    for (size_t k = 0; k < corners.size(); ++k) {
+        const uint32_t colour = soup[k / 3].colour[k % 3];
+        auto& sum = sums[corners[k]];
+        for (int c = 0; c < 4; ++c) sum[c] += colour >> 8 * c & 255u;
+        ++sum[4];
+    }
+    std::vector<uint32_t> means(vertices, 0);
+    for (size_t v = 0; v < vertices; ++v)
+        for (int c = 0; c < 4; ++c) means[v] |= (sums[v][c] + sums[v][4] / 2) / sums[v][4] << 8 * c;
+    return means;
+}
 
 }  // namespace
 
-void weld(LatticeMesh& mesh) {
-    std::vector<glm::i32vec3> positions;
-    std::vector<uint32_t> colours;
-    std::vector<float> stray;
-    positions.reserve(mesh.positions.size());
-    PositionIndex index(mesh.positions.size());
-    std::vector<uint32_t> renamed(mesh.positions.size());
-    for (size_t i = 0; i < mesh.positions.size(); ++i) {
-        const uint32_t next = static_cast<uint32_t>(positions.size());
-        const uint32_t name = index.findOrAdd(positions, mesh.positions[i], next);
-        renamed[i] = name;
-        if (name == next) {
-            positions.push_back(mesh.positions[i]);
-            stray.push_back(mesh.stray[i]);
-            if (!mesh.colours.empty()) colours.push_back(mesh.colours[i]);
-        } else {
-            stray[name] = std::max(stray[name], mesh.stray[i]);
-        }
-    }
-    std::vector<Index3> triangles;
-    triangles.reserve(mesh.triangles.size());
-    TriangleSet seen(mesh.triangles.size());
-    for (const Index3& t : mesh.triangles) {
-        const Index3 r{renamed[t[0]], renamed[t[1]], renamed[t[2]]};
-        if (hasArea(positions[r[0]], positions[r[1]], positions[r[2]]) && seen.insert(sorted(r))) triangles.push_back(r);
-    }
-    mesh = {std::move(positions), std::move(colours), {}, std::move(stray), std::move(triangles)};
+bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
+    // Coordinates may span 31 bits: the products need more than 64.
+    using Wide = __int128;
+    const int64_t ux = int64_t{b.x} - a.x, uy = int64_t{b.y} - a.y, uz = int64_t{b.z} - a.z;
+    const int64_t vx = int64_t{c.x} - a.x, vy = int64_t{c.y} - a.y, vz = int64_t{c.z} - a.z;
+    return Wide{uy} * vz != Wide{uz} * vy || Wide{uz} * vx != Wide{ux} * vz || Wide{ux} * vy != Wide{uy} * vx;
 }
 
-void splitLongEdges(LatticeMesh& mesh) {
-    const double limit = double(kMaxEdgeCells) * kLatticePerCell;
-    const bool any = std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Index3& t) {
-        return edgeLengthSquared(mesh, t[0], t[1]) > limit * limit || edgeLengthSquared(mesh, t[1], t[2]) > limit * limit ||
-               edgeLengthSquared(mesh, t[2], t[0]) > limit * limit;
-    });
-    if (!any) return;
-    EdgeSplitter(mesh).run();
-    weld(mesh);
+LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
+    LatticeMesh mesh;
+    std::vector<uint32_t> corners(soup.size() * 3);
+    {
+        PositionIndex index(soup.size() * 6 / 10);
+        for (size_t k = 0; k < corners.size(); ++k) {
+            const glm::i32vec3 p = soup[k / 3].corner[k % 3];
+            const uint32_t next = static_cast<uint32_t>(mesh.positions.size());
+            corners[k] = index.findOrAdd(mesh.positions, p, next);
+            if (corners[k] == next) mesh.positions.push_back(p);
+        }
+    }
+    {
+        const std::vector<uint32_t> renamed = sortVertices(mesh.positions);
+        for (uint32_t& v : corners) v = renamed[v];
+    }
+    mesh.normals.resize(mesh.positions.size());
+    std::vector<OrderedTriangle> triangles;
+    triangles.reserve(soup.size());
+    for (size_t k = 0; k < soup.size(); ++k) {
+        const std::array<uint32_t, 3> v{corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]};
+        for (int i = 0; i < 3; ++i) mesh.normals[v[i]] = soup[k].normal[i];
+        triangles.emplace_back(v, soup[k].stray);
+    }
+    if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
+    std::vector<uint32_t>().swap(corners);
+    tbb::parallel_sort(triangles.begin(), triangles.end());
+    mesh.triangles.reserve(triangles.size());
+    mesh.stray.reserve(triangles.size());
+    for (size_t k = 0; k < triangles.size(); ++k) {
+        const OrderedTriangle& t = triangles[k];
+        if (k > 0 && t.vertices == triangles[k - 1].vertices) {
+            mesh.stray.back() = std::max(mesh.stray.back(), t.stray);
+            continue;
+        }
+        mesh.triangles.push_back(t.turned ? std::array<uint32_t, 3>{t.vertices[0], t.vertices[2], t.vertices[1]} : t.vertices);
+        mesh.stray.push_back(t.stray);
+    }
+    return mesh;
+}
+
+std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
+    const auto named = [](glm::i32vec3 q) { return OrderedVertex{mortonEncode(glm::u32vec3(q >> 11)), q, 0}; };
+    const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p), [&](glm::i32vec3 q, const OrderedVertex& wanted) { return named(q) < wanted; });
+    if (at == mesh.positions.end() || *at != p) return {};
+    return static_cast<uint32_t>(at - mesh.positions.begin());
 }
 
 void computeNormals(LatticeMesh& mesh) {
@@ -207,7 +173,7 @@ void computeNormals(LatticeMesh& mesh) {
     std::vector<glm::vec3> sum(mesh.positions.size(), glm::vec3(0));
     std::vector<glm::vec3> faces(mesh.triangles.size());
     for (size_t k = 0; k < mesh.triangles.size(); ++k) {
-        const Index3& t = mesh.triangles[k];
+        const std::array<uint32_t, 3>& t = mesh.triangles[k];
         glm::dvec3 p[3];
         for (int i = 0; i < 3; ++i) p[i] = glm::dvec3(mesh.positions[t[i]] - mesh.positions[t[0]]);
         const glm::vec3 n = glm::vec3(glm::normalize(glm::cross(p[1], p[2])));

@@ -5,9 +5,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include <glm/vec3.hpp>
+
+#include "builder/soup.h"
 
 namespace vcp {
 
@@ -15,8 +19,8 @@ struct LatticeMesh {
     std::vector<glm::i32vec3> positions;  ///< distinct
     std::vector<uint32_t> colours;        ///< RGBA8, as many as positions, or empty
     std::vector<uint32_t> normals;        ///< packNormal with crease flag, as many as positions
-    std::vector<float> stray;             ///< cells: how far a vertex may be from where the mesh had it
     std::vector<std::array<uint32_t, 3>> triangles;  ///< none without area, none twice
+    std::vector<float> stray;             ///< cells, as many as triangles: how far its points may be from the mesh's, both ways
 };
 
 /// Rounding a point to the lattice moves it at most so far, in cells.
@@ -25,13 +29,16 @@ inline constexpr double kLatticeRounding = 0.8660254037844387 / 2048;
 /// Longest triangle edge a page can hold, in cells; longer edges are halved first.
 inline constexpr int kMaxEdgeCells = 256;
 
-/// Merges vertices at equal positions (the first one's colour stays, the larger stray), drops triangles that
-/// lost their area and repeated triangles. Order of what remains: first appearance.
-void weld(LatticeMesh& mesh);
+/// Whether three lattice points span an area; exact.
+bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 
-/// Halves every edge longer than kMaxEdgeCells until none is left. An edge is cut at the same lattice point in
-/// every triangle that has it, so no crack opens; the rounding of that point is added to its stray.
-void splitLongEdges(LatticeMesh& mesh);
+/// The mesh of a bag of triangles, the same for any order of them: vertices by cell along the Morton curve,
+/// triangles by their vertices; of repeated triangles one stays, with the largest stray. Colours that differ
+/// at a vertex are averaged, triangle by triangle. Uses the calling arena's threads.
+LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
+
+/// Number of the vertex at `p` in a mesh from meshOf, or none.
+std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 
 /// Vertex normals: the mean of the incident triangles' normals by angle, taken without
 /// orientation (a mesh need not have one). A vertex where a triangle turns away by more than 40 degrees is

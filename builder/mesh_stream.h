@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "octree/result.h"
@@ -31,11 +32,15 @@ struct MeshChunk {
     std::vector<glm::dvec3> positions;               ///< the next vertices, in file order, world units
     std::vector<Rgba8> colours;                      ///< as many as positions, or empty when the mesh has none
     std::vector<std::array<uint64_t, 3>> triangles;  ///< vertex numbers, 0-based over the whole mesh
+    std::vector<std::array<glm::vec2, 3>> uvs;       ///< as many as triangles, or empty
+    std::vector<uint32_t> materials;                 ///< as many as triangles, or empty
 
     void clear() {
         positions.clear();
         colours.clear();
         triangles.clear();
+        uvs.clear();
+        materials.clear();
     }
 };
 

@@ -29,7 +29,7 @@ PageGeometry::PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> tr
     : mesh_(mesh), cells_(1 << log2Cells), origin_(glm::i32vec3(page) * (kLatticePerCell << log2Cells)) {
     loadTriangles(triangles);
     markBadEdges();
-    fillCells();
+    fillCells(triangles);
 }
 
 void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
@@ -71,7 +71,7 @@ void PageGeometry::markBadEdges() {
     }
 }
 
-void PageGeometry::fillCells() {
+void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
     const int side = cells_ + 2 * kBorder;
     const size_t cellCount = static_cast<size_t>(side) * side * side;
     occupied_.assign(cellCount, 0);
@@ -98,8 +98,7 @@ void PageGeometry::fillCells() {
                     if (touches) occupied_[cell] = 1;
                     touchesPage |= touches && std::min({x, y, z}) >= 0 && std::max({x, y, z}) < cells_;
                 }
-        if (touchesPage)
-            for (const uint32_t v : vertices_[k]) stray_ = std::max(stray_, double(mesh_.stray[v]));
+        if (touchesPage) stray_ = std::max(stray_, double(mesh_.stray[numbers[k]]));
     }
     cellBegin_.assign(cellCount + 1, 0);
     for (const Entry& e : entries) ++cellBegin_[e.cell + 1];

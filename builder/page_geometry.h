@@ -63,7 +63,7 @@ public:
 private:
     void loadTriangles(std::span<const uint32_t> triangles);
     void markBadEdges();
-    void fillCells();
+    void fillCells(std::span<const uint32_t> numbers);
     CornerVector searchCorner(glm::dvec3 p);
     [[nodiscard]] size_t cellIndex(glm::ivec3 cell) const {
         const int side = cells_ + 2 * kBorder;

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "builder/memory_plan.h"
 #include "viewer/interrupt.h"
 #include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"
@@ -24,6 +25,13 @@ CLI::Validator absoluteLengthCheck() {
                 const auto length = parseLength(text);
                 return length && !length->isRelative ? std::string()
                                                      : "must be a length in world units like 0.25, not \"" + text + "\"";
+            },
+            ""};
+}
+
+CLI::Validator memoryCheck() {
+    return {[](std::string& text) {
+                return parseMemory(text, 2 * defaultMemoryBytes()) ? std::string() : "must be like 512M, 4G or 50%, not \"" + text + "\"";
             },
             ""};
 }
@@ -50,6 +58,10 @@ void addBuildSettings(CLI::App& app, BuildSettings& settings) {
     app.add_option("--threads", settings.threads, "Threads that build [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
+    app.add_option("--memory", settings.memory, "Cap on the memory that the build allocates: 512M, 4G, 50% [half of the machine's]")
+        ->type_name("BYTES")
+        ->check(memoryCheck());
+    app.add_option("--temp", settings.temp, "Folder for temporary files [that of the output]")->type_name("DIR")->check(CLI::ExistingDirectory);
 }
 
 BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) const {
@@ -62,8 +74,12 @@ BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) c
     }
     options.colour = colourNamed(colour);
     options.threads = threads;
+    options.memoryBytes = parseMemory(memory, 2 * defaultMemoryBytes()).value_or(0);
+    options.temp = temp;
     return options;
 }
+
+ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.triangles, .tempBytes = at.tempBytes}; }
 
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          ProgressStyle progress) {
@@ -78,7 +94,7 @@ Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs,
     ProgressDisplay display(progress, stderr);
     const InterruptScope catching;
     options.progress = [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction);
+        display.update(at.stage, at.fraction, detailsOf(at));
         return !interrupted();
     };
     return MeshCache(*folder).dataset(std::move(options), buildOctree);

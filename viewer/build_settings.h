@@ -15,6 +15,8 @@ struct BuildSettings {
     std::string error;
     std::string colour = "auto";
     unsigned threads = 0;
+    std::string memory;
+    std::string temp;
 
     /// What the builder is to do with `inputs`, without output and progress. The values have been checked
     /// while parsing.
@@ -22,6 +24,9 @@ struct BuildSettings {
 };
 
 void addBuildSettings(CLI::App& app, BuildSettings& settings);
+
+/// What a display is told of a build.
+ProgressDetails detailsOf(const BuildProgress& at);
 
 /// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache, with
 /// progress. Errors: Usage (a .vcp among several inputs); those of MeshCache.

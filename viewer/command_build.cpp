@@ -14,6 +14,7 @@ namespace {
 struct BuildCommand {
     std::vector<std::string> inputs;
     std::string output;
+    bool resume = false;
     BuildSettings settings;
     ReportOptions report;
 };
@@ -53,10 +54,11 @@ std::string summary(const std::string& output, const BuildReport& report) {
 Result<int> run(const BuildCommand& command) {
     BuildOptions options = command.settings.optionsFor(command.inputs);
     options.output = command.output;
+    options.resume = command.resume;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     const InterruptScope catching;
     options.progress = [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction);
+        display.update(at.stage, at.fraction, detailsOf(at));
         return !interrupted();
     };
     const auto report = buildOctree(options);
@@ -77,6 +79,7 @@ Command addBuild(CLI::App& vcp) {
     app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL; several are joined")->type_name("")->required();
     app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->required();
     addBuildSettings(*app, command->settings);
+    app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

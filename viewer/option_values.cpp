@@ -57,6 +57,13 @@ std::optional<uint64_t> parseBytes(std::string_view text) {
     return static_cast<uint64_t>(number);
 }
 
+std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {
+    if (!text.ends_with('%')) return parseBytes(text);
+    double percent = 0;
+    if (!takeNumber(text, percent) || text != "%" || !(percent > 0) || percent > 100) return std::nullopt;
+    return static_cast<uint64_t>(percent / 100 * static_cast<double>(whole));
+}
+
 std::optional<glm::ivec2> parseSize(std::string_view text) {
     constexpr int kLargest = 16384;
     glm::ivec2 size(0);

@@ -23,6 +23,9 @@ std::optional<Length> parseLength(std::string_view text);
 /// zero, or beyond 2^60.
 std::optional<uint64_t> parseBytes(std::string_view text);
 
+/// As parseBytes, or a part of `whole`: "50%".
+std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole);
+
 /// "1920x1200": each from 1 to 16384.
 std::optional<glm::ivec2> parseSize(std::string_view text);
 

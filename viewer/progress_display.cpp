@@ -32,36 +32,49 @@ std::optional<ProgressStyle> progressStyleNamed(std::string_view name) {
 
 ProgressStyle defaultProgressStyle() { return isatty(STDERR_FILENO) ? ProgressStyle::Bar : ProgressStyle::None; }
 
-void ProgressDisplay::update(std::string_view stage, double fraction) {
+void ProgressDisplay::update(std::string_view stage, double fraction, const ProgressDetails& details) {
     if (style_ == ProgressStyle::None) return;
     fraction = std::clamp(fraction, 0.0, 1.0);
-    if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction);
+    const double elapsed = seconds();
+    // A moment's work says little about the rest.
+    const bool isKnown = elapsed > 1 && fraction > 0.01;
+    const double left = isKnown ? elapsed * (1 - fraction) / fraction : 0;
+    std::string facts;
+    if (details.triangles > 0) facts += fmt::format(", {} triangles", formatCount(details.triangles));
+    if (details.tempBytes > 0) facts += fmt::format(", {} temporary", formatBytes(details.tempBytes));
+    if (isKnown) facts += fmt::format(", {} left", formatSeconds(left));
+    if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction, facts);
 
     const int steps = style_ == ProgressStyle::Json ? 100 : 10;
     const int step = static_cast<int>(std::floor(fraction * steps));
     if (stage == lastStage_ && step == lastStep_) return;
     lastStage_ = stage;
     lastStep_ = step;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     std::string line;
     if (style_ == ProgressStyle::Json) {
-        const nlohmann::ordered_json json = {{"stage", stage}, {"fraction", fraction}, {"seconds", seconds}};
+        nlohmann::ordered_json json = {{"stage", stage}, {"fraction", fraction}, {"seconds", elapsed}};
+        if (isKnown) json["seconds_left"] = left;
+        if (details.triangles > 0) {
+            json["triangles"] = details.triangles;
+            json["triangles_per_second"] = fraction * static_cast<double>(details.triangles) / std::max(elapsed, 1e-9);
+            json["temp_bytes"] = details.tempBytes;
+        }
         line = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
     } else {
-        line = fmt::format("{:3.0f} % {} ({})", 100 * fraction, stage, formatSeconds(seconds));
+        line = fmt::format("{:3.0f} % {} ({}{})", 100 * fraction, stage, formatSeconds(elapsed), facts);
     }
     std::fprintf(out_, "%s\n", line.c_str());
     std::fflush(out_);
 }
 
-void ProgressDisplay::drawBar(std::string_view stage, double fraction) {
+void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std::string& facts) {
     const int perMille = static_cast<int>(1000 * fraction);
     if (stage == lastStage_ && perMille == lastPerMille_) return;
     lastStage_ = stage;
     lastPerMille_ = perMille;
     const int columns = std::max(20, terminalColumns(out_) - 1);
     const std::string head = fmt::format("{:3.0f} % ", 100 * fraction);
-    const std::string tail = fmt::format(" {}", stage);
+    const std::string tail = fmt::format(" {}{}", stage, facts);
     const int room = std::clamp(columns - static_cast<int>(head.size() + tail.size()) - 2, 0, 40);
     const int filled = static_cast<int>(std::lround(fraction * room));
     const std::string bar = head + "[" + std::string(static_cast<size_t>(filled), '=') +

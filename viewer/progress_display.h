@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -14,7 +15,8 @@ namespace vcp {
 enum class ProgressStyle {
     Bar,    ///< one line that is redrawn; for terminals
     Plain,  ///< a line for every stage and every tenth of the way; for logs
-    Json,   ///< one object a line: {"stage": ..., "fraction": ..., "seconds": ...}
+    Json,   ///< one object a line: stage, fraction, seconds, seconds_left and, while building, triangles,
+            ///< triangles_per_second, temp_bytes
     None,
 };
 
@@ -24,6 +26,12 @@ std::optional<ProgressStyle> progressStyleNamed(std::string_view name);
 /// A bar when stderr is a terminal, else nothing.
 ProgressStyle defaultProgressStyle();
 
+/// What a build adds to its progress.
+struct ProgressDetails {
+    uint64_t triangles = 0;  ///< read so far; 0: nothing to say
+    uint64_t tempBytes = 0;
+};
+
 class ProgressDisplay {
 public:
     ProgressDisplay(ProgressStyle style, std::FILE* out) : style_(style), out_(out) {}
@@ -32,12 +40,13 @@ public:
     ~ProgressDisplay() { finish(); }
 
     /// `fraction` of the whole, 0 to 1. Cheap; writes only what is new.
-    void update(std::string_view stage, double fraction);
+    void update(std::string_view stage, double fraction, const ProgressDetails& details = {});
 
     void finish();
 
 private:
-    void drawBar(std::string_view stage, double fraction);
+    void drawBar(std::string_view stage, double fraction, const std::string& facts);
+    [[nodiscard]] double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
     ProgressStyle style_;
     std::FILE* out_;

@@ -1,0 +1,33 @@
+// A sum of doubles that does not depend on their order.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+
+namespace vcp {
+
+/// Sums finite doubles that are not negative, up to 2^64 of them, exactly: integers by exponent. One thread.
+class ExactSum {
+public:
+    void add(double value) {
+        const uint64_t bits = std::bit_cast<uint64_t>(value);
+        const uint64_t exponent = bits >> 52 & 0x7ff;
+        const uint64_t fraction = bits & ((uint64_t{1} << 52) - 1);
+        parts_[exponent] += exponent == 0 ? fraction : fraction | uint64_t{1} << 52;
+    }
+    /// Rounded; the same for the same numbers in any order.
+    [[nodiscard]] double value() const {
+        double sum = 0;
+        for (size_t e = 0; e < parts_.size(); ++e)
+            if (parts_[e] != 0) sum += std::ldexp(static_cast<double>(parts_[e]), static_cast<int>(e == 0 ? 1 : e) - 1075);
+        return sum;
+    }
+
+private:
+    std::array<unsigned __int128, 2048> parts_{};
+};
+
+}  // namespace vcp

@@ -1,0 +1,120 @@
+#include "builder/level_pages.h"
+
+#include <atomic>
+#include <cmath>
+#include <condition_variable>
+#include <limits>
+#include <map>
+#include <mutex>
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include "builder/bin_triangles.h"
+#include "builder/memory_plan.h"
+#include "builder/page_builder.h"
+#include "builder/page_encoder.h"
+
+namespace vcp {
+
+namespace {
+
+struct BuiltPage {
+    PageEntry entry;
+    StoredPage stored;
+};
+
+BuiltPage buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
+    PageGeometry geometry(mesh, triangles, mortonDecode(code), settings.grid.log2Cells);
+    const double tolerance = settings.finest ? settings.tolerance - geometry.stray() : settings.tolerance;
+    PageTree tree = buildPageTree(geometry, tolerance);
+    const EncodedPage encoded = encodePage(tree, geometry, mesh);
+    BuiltPage page;
+    page.entry.morton = code;
+    page.entry.level = static_cast<uint8_t>(settings.grid.level);
+    page.entry.leaves = encoded.leaves;
+    page.entry.hardLeaves = encoded.hardLeaves;
+    page.entry.certifiedError = std::nextafter(static_cast<float>(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
+    if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
+    return page;
+}
+
+/// Lets pages be built while there is memory for them.
+class Admission {
+public:
+    explicit Admission(uint64_t bytes) : free_(bytes) {}
+    void enter(uint64_t bytes) {
+        std::unique_lock lock(mutex_);
+        freed_.wait(lock, [&] { return bytes <= free_; });
+        free_ -= bytes;
+    }
+    void leave(uint64_t bytes) {
+        {
+            const std::scoped_lock lock(mutex_);
+            free_ += bytes;
+        }
+        freed_.notify_all();
+    }
+
+private:
+    std::mutex mutex_;
+    std::condition_variable freed_;
+    uint64_t free_;
+};
+
+/// Appends pages in order, whatever the order they come in.
+class InOrder {
+public:
+    explicit InOrder(PageSpool& spool) : spool_(spool) {}
+    Result<void> put(size_t number, BuiltPage page) {
+        const std::scoped_lock lock(mutex_);
+        ready_.emplace(number, std::move(page));
+        for (auto at = ready_.begin(); at != ready_.end() && at->first == next_; at = ready_.erase(at), ++next_)
+            if (at->second.entry.leaves > 0) VCP_TRY(spool_.append(at->second.entry, at->second.stored));
+        return {};
+    }
+
+private:
+    PageSpool& spool_;
+    std::mutex mutex_;
+    std::map<size_t, BuiltPage> ready_;
+    size_t next_ = 0;
+};
+
+}  // namespace
+
+Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end, PageSpool& spool, const std::function<bool(double)>& progress) {
+    const TriangleBins bins = binTriangles(mesh, settings.grid, first, end);
+    for (size_t i = 0; i < bins.pages.size(); ++i)
+        if (pageWorkBytes(bins.of(i).size()) > settings.pageBytes)
+            return Error{.code = ErrorCode::Limit,
+                         .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a smaller --cell or a larger --memory", bins.of(i).size(),
+                                                (3 * (pageWorkBytes(bins.of(i).size()) - settings.pageBytes) >> 20) + 1)};
+    Admission admission(settings.pageBytes);
+    InOrder inOrder(spool);
+    std::atomic<size_t> next = 0, done = 0;
+    std::atomic<bool> stopped = false;
+    std::mutex mutex;
+    Result<void> result;
+    const auto buildOne = [&](size_t i) -> Result<void> {
+        const uint64_t bytes = pageWorkBytes(bins.of(i).size());
+        admission.enter(bytes);
+        auto put = inOrder.put(i, buildPage(settings, mesh, bins.pages[i], bins.of(i)));
+        admission.leave(bytes);
+        if (put && !progress(double(++done) / double(bins.pages.size()))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        return put;
+    };
+    // Pages differ in weight, so they are taken one by one, in order: few have to wait for one before them.
+    tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), [&](int) {
+        for (size_t i; !stopped && (i = next++) < bins.pages.size();) {
+            auto built = buildOne(i);
+            if (built) continue;
+            const std::scoped_lock lock(mutex);
+            if (!stopped.exchange(true)) result = built;
+        }
+    }, tbb::simple_partitioner());
+    return result;
+}
+
+}  // namespace vcp

@@ -1,0 +1,27 @@
+// The pages of one bin: built by all threads, handed on in Morton order.
+#pragma once
+
+#include <functional>
+
+#include "builder/ingest.h"
+#include "builder/lattice_mesh.h"
+#include "builder/page_partition.h"
+#include "builder/page_spool.h"
+
+namespace vcp {
+
+/// What all pages of a level share.
+struct LevelSettings {
+    PageGrid grid;
+    double cell = 0;       ///< world units
+    double tolerance = 0;  ///< cells, for soft leaves; the finest level's includes the stray
+    bool finest = false;
+    uint64_t pageBytes = 0;  ///< memory for pages under construction
+};
+
+/// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface
+/// to `spool`. `progress` is given the part done; false stops. Uses the calling arena's threads.
+/// Errors: Limit (a page alone needs more memory than pageBytes), Io, Cancelled.
+Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end, PageSpool& spool, const std::function<bool(double)>& progress);
+
+}  // namespace vcp

@@ -1,0 +1,86 @@
+// The step from one level's triangles to the next coarser one's, bin by bin.
+//
+// Each vertex has an image: where it goes, with which colour and normal. A bin knows the images of its own
+// vertices and of those nearby, because it has all triangles around them; and every bin that knows an image
+// knows the same. A triangle is stepped by the lowest bin that has one of its corners. When a corner is too far
+// away, the triangle waits for the bin that has it, taking the images along that are known: bins are worked on
+// in ascending order, so none is visited twice.
+//
+// The first step leads from the snapped triangles to the finest level: there a vertex stays where it is, and
+// gets its normal.
+#pragma once
+
+#include <atomic>
+
+#include "builder/lattice_mesh.h"
+#include "builder/page_partition.h"
+#include "builder/record_bins.h"
+#include "builder/soup.h"
+
+namespace vcp {
+
+/// A bin's surroundings, in cells, whose triangles it is given: what pages need, and what the images of all
+/// vertices near its pages depend on.
+inline constexpr double kStepMarginCells = 4;
+
+/// A triangle whose images are not all known yet.
+struct WaitingTriangle {
+    LatticeTriangle from;
+    glm::i32vec3 image[3];
+    uint32_t colour[3];
+    uint32_t normal[3];
+    uint32_t known;  ///< bit i: corner i's image is there
+};
+
+/// Where the next level's triangles go: into every bin that needs them.
+class LevelSink {
+public:
+    LevelSink(const PageGrid& grid, const PagePartition& partition, RecordBins<LatticeTriangle>& bins) : grid_(grid), partition_(partition), bins_(bins) {}
+
+    /// A batch of its own for each thread; flush when done.
+    class Batch {
+    public:
+        explicit Batch(LevelSink& sink) : sink_(sink), open_(sink.partition_.bins()) {}
+        Result<void> add(const LatticeTriangle& triangle);
+        Result<void> flush();
+
+    private:
+        LevelSink& sink_;
+        std::vector<std::vector<LatticeTriangle>> open_;
+        size_t held_ = 0;
+        std::vector<size_t> touched_;
+    };
+
+private:
+    const PageGrid& grid_;
+    const PagePartition& partition_;
+    RecordBins<LatticeTriangle>& bins_;
+};
+
+/// Steps one level. One thread calls, in ascending order of bins; the calling arena's threads work.
+class LevelStep {
+public:
+    /// `first`: the step from the snapped triangles to the finest level. `grid`, `partition`: of the level
+    /// stepped from.
+    LevelStep(bool first, const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting, LevelSink& sink)
+        : first_(first), grid_(grid), partition_(partition), waiting_(waiting), sink_(sink) {}
+
+    /// `mesh`: all triangles of the bin, with their normals.
+    Result<void> run(size_t bin, const LatticeMesh& mesh);
+
+private:
+    struct Images;
+    Images imagesOf(size_t bin, const LatticeMesh& mesh) const;
+    Result<void> stepWaiting(size_t bin, const LatticeMesh& mesh, const Images& images);
+    /// Emits a triangle whose images are all known, unless it collapsed; else lets it wait.
+    Result<void> pass(const WaitingTriangle& w, LevelSink::Batch& batch);
+    [[nodiscard]] float strayOf(const WaitingTriangle& w) const;
+
+    bool first_;
+    const PageGrid& grid_;
+    const PagePartition& partition_;
+    RecordBins<WaitingTriangle>& waiting_;
+    LevelSink& sink_;
+};
+
+}  // namespace vcp

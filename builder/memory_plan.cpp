@@ -1,0 +1,55 @@
+#include "builder/memory_plan.h"
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+namespace vcp {
+
+namespace {
+
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+// The program itself, readers' windows, and what each thread keeps for coding and compressing.
+constexpr uint64_t kBaseBytes = 40 * kMiB;
+constexpr uint64_t kThreadBytes = 6 * kMiB;
+
+// Below it, blocks and bins become so small that the disk does nothing but seek.
+constexpr uint64_t kLeastUsable = 48 * kMiB;
+
+// A bin's records, its mesh, and what the step to the coarser level needs, measured with room to spare.
+constexpr uint64_t kBinTriangleBytes = 260;
+
+/// Bytes that a control group allows, or the largest number.
+uint64_t groupLimit() {
+    std::ifstream file("/sys/fs/cgroup/memory.max");
+    uint64_t bytes = 0;
+    return file >> bytes ? bytes : std::numeric_limits<uint64_t>::max();
+}
+
+}  // namespace
+
+uint64_t defaultMemoryBytes() {
+    const uint64_t machine = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+    return std::min(machine, groupLimit()) / 2;
+}
+
+Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
+    const uint64_t fixed = kBaseBytes + threads * kThreadBytes;
+    if (memoryBytes < fixed + kLeastUsable)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("{} MiB of memory are too little for {} threads; give --memory {}M or more", memoryBytes / kMiB, threads, (fixed + kLeastUsable) / kMiB + 1)};
+    const uint64_t usable = memoryBytes - fixed;
+    MemoryPlan plan;
+    plan.vertexBytes = usable / 2;
+    plan.tempBytes = usable / 6;
+    plan.bufferBytes = usable / 16;
+    plan.pageBytes = usable / 3;
+    plan.binTriangles = usable / 3 / kBinTriangleBytes;
+    return plan;
+}
+
+}  // namespace vcp

@@ -1,0 +1,30 @@
+// How a build divides the memory it may use. Every stage stays within its shares, whatever the input's size.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "octree/result.h"
+
+namespace vcp {
+
+struct MemoryPlan {
+    uint64_t vertexBytes = 0;   ///< reading: vertices of one input that stay in memory
+    uint64_t tempBytes = 0;     ///< temporary files' bytes that have not gone to the disk
+    uint64_t bufferBytes = 0;   ///< open blocks of one set of bins
+    uint64_t binTriangles = 0;  ///< triangles of a bin
+    uint64_t pageBytes = 0;     ///< pages under construction, all threads together
+};
+
+/// Half of the machine's memory, or of the control group's limit when that is less.
+uint64_t defaultMemoryBytes();
+
+/// Errors: Limit (too little to work with; the message says how much is needed).
+Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads);
+
+inline constexpr uint64_t kPageBaseBytes = 4 << 20, kPageTriangleBytes = 500;
+
+/// What a page of so many triangles needs while it is built.
+inline uint64_t pageWorkBytes(uint64_t triangles) { return kPageBaseBytes + triangles * kPageTriangleBytes; }
+
+}  // namespace vcp

@@ -1,0 +1,32 @@
+// The records that pass between the stages of a build: triangles by themselves, without indices. A vertex is
+// its position; what belongs to it travels with every triangle that has it.
+#pragma once
+
+#include <cstdint>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+namespace vcp {
+
+/// A triangle as the mesh has it, world units. Real: float where that holds the file's numbers exactly.
+template <class Real>
+struct WorldTriangle {
+    glm::vec<3, Real> corner[3];
+    uint32_t colour[3];    ///< RGBA8; white where the mesh has none
+    glm::vec2 uv[3];
+    uint32_t material;     ///< among the build's materials, 1-based; 0: none
+    uint32_t reserved = 0;
+};
+static_assert(sizeof(WorldTriangle<float>) == 80 && sizeof(WorldTriangle<double>) == 120);
+
+/// A triangle on a level's lattice.
+struct LatticeTriangle {
+    glm::i32vec3 corner[3];
+    uint32_t colour[3];
+    uint32_t normal[3];  ///< packNormal with crease flag; not yet known before the vertices' pass
+    float stray;         ///< cells: how far its points may be from the mesh's, both ways
+};
+static_assert(sizeof(LatticeTriangle) == 64);
+
+}  // namespace vcp

@@ -1,0 +1,182 @@
+#include "builder/temp_space.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace vcp {
+
+namespace {
+
+Error systemError(const std::filesystem::path& file, const char* what, int code) {
+    std::string message = std::string(what) + ": " + std::generic_category().message(code);
+    if (code == ENOSPC || code == EDQUOT) message += "; free some space, or give --temp a folder with more";
+    return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()};
+}
+
+Result<void> syncFolder(const std::filesystem::path& folder) {
+    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return systemError(folder, "cannot open the folder", errno);
+    const bool ok = ::fsync(fd) == 0 || errno == EINVAL;  // some file systems have no fsync of folders
+    const int code = errno;
+    ::close(fd);
+    if (!ok) return systemError(folder, "cannot make the folder durable", code);
+    return {};
+}
+
+}  // namespace
+
+Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes, const std::filesystem::path& file) {
+    while (!bytes.empty()) {
+        const ssize_t n = ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return systemError(file, "write failed", n == 0 ? EIO : errno);
+        offset += static_cast<uint64_t>(n);
+        bytes = bytes.subspan(static_cast<size_t>(n));
+    }
+    return {};
+}
+
+Result<void> TempSpace::create() {
+    std::error_code failed;
+    std::filesystem::create_directories(folder_, failed);
+    if (failed) return systemError(folder_, "cannot make the temporary folder", failed.value());
+    return syncFolder(folder_.has_parent_path() ? folder_.parent_path() : ".");
+}
+
+Result<void> TempSpace::lock() {
+    if (lock_ >= 0) return {};
+    VCP_TRY(create());
+    lock_ = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (lock_ < 0) return systemError(folder_, "cannot open the temporary folder", errno);
+    if (::flock(lock_, LOCK_EX | LOCK_NB) == 0) return {};
+    const int code = errno;
+    ::close(lock_);
+    lock_ = -1;
+    if (code == EWOULDBLOCK) return Error{.code = ErrorCode::Io, .message = "another build of this output is running; wait for it or choose another output", .file = folder_.string()};
+    return {};  // a file system without locks
+}
+
+void TempSpace::remove() {
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_, ignored))
+        if (entry.path().extension() == ".spill" || entry.path().filename() == "journal") std::filesystem::remove(entry.path(), ignored);
+    std::filesystem::remove(folder_, ignored);  // only when empty
+}
+
+TempSpace::~TempSpace() {
+    if (lock_ >= 0) ::close(lock_);
+}
+
+void TempSpace::addDisk(int64_t bytes) {
+    const uint64_t now = disk_ += static_cast<uint64_t>(bytes);
+    uint64_t peak = peakDisk_;
+    while (now > peak && !peakDisk_.compare_exchange_weak(peak, now)) {}
+}
+
+TempFile::~TempFile() {
+    dropTail();
+    if (file_ >= 0) ::close(file_);
+}
+
+void TempFile::dropTail() {
+    space_.held_ -= tail_.size() * kPieceBytes;
+    tail_.clear();
+}
+
+Result<uint64_t> TempFile::append(std::span<const std::byte> bytes) {
+    const std::scoped_lock lock(mutex_);
+    const uint64_t offset = end_;
+    while (!bytes.empty()) {
+        const uint64_t inTail = end_ - flushed_;
+        const size_t at = inTail % kPieceBytes;
+        if (inTail / kPieceBytes == tail_.size()) {
+            tail_.push_back(std::make_unique_for_overwrite<std::byte[]>(kPieceBytes));
+            space_.held_ += kPieceBytes;
+        }
+        const size_t n = std::min(bytes.size(), kPieceBytes - at);
+        std::memcpy(tail_.back().get() + at, bytes.data(), n);
+        bytes = bytes.subspan(n);
+        end_ += n;
+    }
+    if (space_.held_ > space_.memoryBytes_) VCP_TRY(flush());
+    return offset;
+}
+
+Result<void> TempFile::flush() {
+    if (file_ < 0) {
+        VCP_TRY(space_.create());
+        file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+        if (file_ < 0) return systemError(path(), "cannot be created", errno);
+    }
+    uint64_t left = end_ - flushed_;
+    for (const auto& piece : tail_) {
+        const size_t n = static_cast<size_t>(std::min<uint64_t>(left, kPieceBytes));
+        VCP_TRY(writeAll(file_, flushed_, std::span(piece.get(), n), path()));
+        flushed_ += n;
+        left -= n;
+        space_.addDisk(static_cast<int64_t>(n));
+    }
+    dropTail();
+    return {};
+}
+
+Result<void> TempFile::read(uint64_t offset, std::span<std::byte> bytes) const {
+    while (!bytes.empty()) {
+        std::unique_lock lock(mutex_);
+        if (offset >= flushed_) {
+            const uint64_t inTail = offset - flushed_;
+            const size_t at = inTail % kPieceBytes;
+            const size_t n = std::min(bytes.size(), kPieceBytes - at);
+            std::memcpy(bytes.data(), tail_[inTail / kPieceBytes].get() + at, n);
+            offset += n;
+            bytes = bytes.subspan(n);
+            continue;
+        }
+        const size_t wanted = static_cast<size_t>(std::min<uint64_t>(bytes.size(), flushed_ - offset));
+        lock.unlock();
+        const ssize_t n = ::pread(file_, bytes.data(), wanted, static_cast<off_t>(offset));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return systemError(path(), "read failed", n == 0 ? EIO : errno);
+        offset += static_cast<uint64_t>(n);
+        bytes = bytes.subspan(static_cast<size_t>(n));
+    }
+    return {};
+}
+
+Result<void> TempFile::sync() {
+    const std::scoped_lock lock(mutex_);
+    VCP_TRY(flush());
+    if (::fdatasync(file_) != 0) return systemError(path(), "cannot be made durable", errno);
+    return {};
+}
+
+Result<void> TempFile::reopen(uint64_t bytes) {
+    file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (file_ < 0) return systemError(path(), "cannot be opened", errno);
+    const off_t size = ::lseek(file_, 0, SEEK_END);
+    if (size < 0 || static_cast<uint64_t>(size) < bytes)
+        return Error{.code = ErrorCode::Io, .message = "is shorter than the journal says; build again without --resume", .file = path().string()};
+    if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return systemError(path(), "cannot be cut", errno);
+    flushed_ = end_ = bytes;
+    space_.addDisk(static_cast<int64_t>(bytes));
+    return {};
+}
+
+void TempFile::remove() {
+    const std::scoped_lock lock(mutex_);
+    dropTail();
+    if (file_ >= 0) {
+        ::close(file_);
+        ::unlink(path().c_str());
+        space_.addDisk(-static_cast<int64_t>(flushed_));
+    }
+    file_ = -1;
+    flushed_ = end_ = 0;
+}
+
+}  // namespace vcp

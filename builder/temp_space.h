@@ -1,0 +1,91 @@
+// Temporary bytes of a build: append-only files in one folder, kept in memory while there is room for them.
+//
+// A small build never touches the disk. When the files together hold more than the memory they were given, the
+// file that is being appended to moves its bytes to the folder. A checkpoint moves all of them and makes them
+// durable, so that a journal may rely on their lengths (journal.h).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "octree/result.h"
+
+namespace vcp {
+
+/// The folder and its accounts. Outlives its files. Any thread.
+class TempSpace {
+public:
+    /// Nothing is created before it is needed. `memoryBytes`: what all files together may hold in memory.
+    TempSpace(std::filesystem::path folder, uint64_t memoryBytes) : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
+
+    [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+    /// Makes the folder, and its name durable. Errors: Io.
+    Result<void> create();
+    /// Takes the folder for this process until destroyed. Errors: Io (another build holds it).
+    Result<void> lock();
+    /// Removes the folder with all that a build puts there; what else lies in it stays.
+    void remove();
+    ~TempSpace();
+    TempSpace(const TempSpace&) = delete;
+    TempSpace& operator=(const TempSpace&) = delete;
+
+    /// Most bytes that lay in the folder at one time.
+    [[nodiscard]] uint64_t peakDiskBytes() const { return peakDisk_; }
+    [[nodiscard]] uint64_t diskBytes() const { return disk_; }
+
+private:
+    friend class TempFile;
+    void addDisk(int64_t bytes);
+
+    std::filesystem::path folder_;
+    uint64_t memoryBytes_;
+    std::atomic<uint64_t> held_ = 0, disk_ = 0, peakDisk_ = 0;
+    int lock_ = -1;
+};
+
+/// One append-only file. append and sync: one thread at a time; read: any thread, beside append.
+class TempFile {
+public:
+    TempFile(TempSpace& space, std::string name) : space_(space), name_(std::move(name)) {}
+    ~TempFile();
+    TempFile(const TempFile&) = delete;
+    TempFile& operator=(const TempFile&) = delete;
+
+    [[nodiscard]] uint64_t size() const { return end_; }
+    /// Appends; returns where. Errors: Io.
+    Result<uint64_t> append(std::span<const std::byte> bytes);
+    /// Reads bytes that were appended. Errors: Io.
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const;
+    /// Brings all bytes to the disk, durably. Errors: Io.
+    Result<void> sync();
+    /// Takes over what an interrupted build left, cut to `bytes`. Errors: Io (missing, shorter).
+    Result<void> reopen(uint64_t bytes);
+    /// Gives back memory and disk.
+    void remove();
+
+private:
+    static constexpr size_t kPieceBytes = size_t{1} << 18;
+
+    [[nodiscard]] std::filesystem::path path() const { return space_.folder() / name_; }
+    Result<void> flush();
+    void dropTail();
+
+    TempSpace& space_;
+    std::string name_;
+    int file_ = -1;
+    uint64_t flushed_ = 0;  ///< bytes on the disk; the rest is in tail_
+    std::atomic<uint64_t> end_ = 0;
+    std::vector<std::unique_ptr<std::byte[]>> tail_;
+    mutable std::mutex mutex_;
+};
+
+/// Writes all of `bytes` at `offset`. Errors: Io, naming `file`.
+Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes, const std::filesystem::path& file);
+
+}  // namespace vcp

@@ -1,0 +1,112 @@
+#include "builder/vertex_join.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace vcp {
+
+namespace {
+
+constexpr uint32_t kWhite = 0xffffffffu;
+
+// Beyond it a vertex number is a broken one; numbers below it make a bounded number of bins.
+constexpr uint64_t kMaxVertices = uint64_t{1} << 40;
+
+constexpr uint64_t kMinChunkVertices = uint64_t{1} << 16;
+constexpr size_t kExpectedChunks = 16;
+constexpr uint64_t kWaitingBufferBytes = 4 << 20;
+
+}  // namespace
+
+VertexJoin::VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit)
+    : space_(space), emit_(std::move(emit)), chunkVertices_(std::max(vertexBytes / sizeof(Vertex), kMinChunkVertices)), later_(space, "vertices.spill"),
+      waiting_(space, "waiting", kExpectedChunks, kWaitingBufferBytes) {}
+
+Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
+    std::vector<Vertex> rest;
+    for (size_t i = 0; i < chunk.positions.size(); ++i) {
+        const Vertex vertex{chunk.positions[i], chunk.colours.empty() ? kWhite : chunk.colours[i]};
+        if (resident_.size() < chunkVertices_) {
+            // Doubling would overshoot the memory by half.
+            if (resident_.size() == resident_.capacity()) resident_.reserve(std::min<uint64_t>(chunkVertices_, std::max<size_t>(resident_.capacity() * 3 / 2, 1 << 16)));
+            resident_.push_back(vertex);
+        } else {
+            rest.push_back(vertex);
+        }
+    }
+    vertices_ += chunk.positions.size();
+    if (rest.empty()) return {};
+    const auto at = later_.append(std::as_bytes(std::span(rest)));
+    if (!at) return at.error();
+    return {};
+}
+
+Result<void> VertexJoin::add(const MeshChunk& chunk, uint32_t materialBase) {
+    VCP_TRY(takeVertices(chunk));
+    for (size_t k = 0; k < chunk.triangles.size(); ++k) {
+        Waiting w{};
+        for (int i = 0; i < 3; ++i) w.vertex[i] = chunk.triangles[k][i];
+        if (std::max({w.vertex[0], w.vertex[1], w.vertex[2]}) >= kMaxVertices)
+            return Error{.code = ErrorCode::InvalidInput, .message = "a triangle names a vertex that the file does not have"};
+        if (!chunk.uvs.empty())
+            for (int i = 0; i < 3; ++i) w.triangle.uv[i] = chunk.uvs[k][i];
+        if (!chunk.materials.empty()) w.triangle.material = materialBase + chunk.materials[k];
+        VCP_TRY(resolve(w));
+    }
+    return {};
+}
+
+Result<void> VertexJoin::resolve(Waiting& w) {
+    uint64_t lowest = kDone;
+    for (int i = 0; i < 3; ++i) {
+        if (w.vertex[i] == kDone) continue;
+        const uint64_t at = w.vertex[i] - residentFirst_;
+        if (w.vertex[i] >= residentFirst_ && at < resident_.size()) {
+            w.triangle.corner[i] = resident_[at].position;
+            w.triangle.colour[i] = resident_[at].colour;
+            w.vertex[i] = kDone;
+        } else {
+            lowest = std::min(lowest, w.vertex[i]);
+        }
+    }
+    if (lowest == kDone) return emit_(w.triangle);
+    return waiting_.append(lowest / chunkVertices_, std::span(&w, 1));
+}
+
+Result<void> VertexJoin::process(uint64_t chunk) {
+    const std::span<const RawBins::Block> blocks = waiting_.raw().blocks(chunk);
+    for (const RawBins::Block& block : std::vector(blocks.begin(), blocks.end())) {
+        auto records = waiting_.read(block);
+        if (!records) return records.error();
+        for (Waiting& w : *records) VCP_TRY(resolve(w));
+    }
+    return {};
+}
+
+Result<void> VertexJoin::finish(const std::string& file) {
+    const uint64_t chunks = (vertices_ + chunkVertices_ - 1) / chunkVertices_;
+    VCP_TRY(waiting_.raw().flush());
+    for (uint64_t chunk = chunks; chunk < waiting_.raw().bins(); ++chunk)
+        if (waiting_.count(chunk) > 0)
+            return Error{.code = ErrorCode::InvalidInput, .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_), .file = file};
+    for (uint64_t chunk = 0; chunk < chunks; ++chunk) {
+        if (chunk > 0) {
+            residentFirst_ = chunk * chunkVertices_;
+            resident_.resize(std::min(chunkVertices_, vertices_ - residentFirst_));
+            VCP_TRY(later_.read((residentFirst_ - chunkVertices_) * sizeof(Vertex), std::as_writable_bytes(std::span(resident_))));
+        }
+        const uint64_t before = waiting_.count(chunk);
+        VCP_TRY(process(chunk));
+        VCP_TRY(waiting_.raw().flush());
+        // What waits for a vertex of this chunk that is not there was sent back to it.
+        if (waiting_.count(chunk) > before)
+            return Error{.code = ErrorCode::InvalidInput, .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_), .file = file};
+    }
+    later_.remove();
+    waiting_.raw().remove();
+    std::vector<Vertex>().swap(resident_);
+    return {};
+}
+
+}  // namespace vcp

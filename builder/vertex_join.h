@@ -1,0 +1,64 @@
+// Joins indexed triangles with their vertices, whatever the memory and the order in the file.
+//
+// The first vertices stay in memory, as many as fit; the rest go to temporary files, in chunks of as many.
+// A triangle whose corners are in memory is done at once. Another takes along the corners that are there and
+// waits with the chunk of the lowest of the others. After the last vertex the chunks are loaded one after the
+// other; each resolves the triangles that wait for it and sends the unfinished ones on to a higher chunk. So
+// every vertex is written and read at most once, every triangle at most three times.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "builder/mesh_stream.h"
+#include "builder/record_bins.h"
+#include "builder/soup.h"
+
+namespace vcp {
+
+/// One input file's join. One thread.
+class VertexJoin {
+public:
+    using Emit = std::function<Result<void>(const WorldTriangle<double>&)>;
+
+    /// `vertexBytes`: memory for vertices, with their colours.
+    VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit);
+
+    /// Takes a chunk of the stream, in order; `materialBase` is added to its triangles' materials.
+    Result<void> add(const MeshChunk& chunk, uint32_t materialBase);
+    /// After the last chunk. `file` for errors. Errors: InvalidInput (a triangle names a vertex that never
+    /// came), Io.
+    Result<void> finish(const std::string& file);
+
+    [[nodiscard]] uint64_t vertices() const { return vertices_; }
+
+private:
+    struct Vertex {
+        glm::dvec3 position;
+        uint32_t colour;
+        uint32_t reserved = 0;
+    };
+    struct Waiting {
+        WorldTriangle<double> triangle;
+        uint64_t vertex[3];  ///< kDone: resolved
+        uint64_t reserved = 0;
+    };
+    static constexpr uint64_t kDone = ~uint64_t{0};
+
+    Result<void> takeVertices(const MeshChunk& chunk);
+    Result<void> resolve(Waiting& waiting);
+    Result<void> process(uint64_t chunk);
+
+    TempSpace& space_;
+    Emit emit_;
+    uint64_t chunkVertices_;
+    std::vector<Vertex> resident_;
+    uint64_t residentFirst_ = 0;
+    uint64_t vertices_ = 0;
+    bool hasColour_ = false;
+    TempFile later_;  ///< the vertices from chunk 1 on
+    RecordBins<Waiting> waiting_;
+};
+
+}  // namespace vcp
