@@ -1,9 +1,13 @@
 #include "builder/lattice_mesh.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <numeric>
 
 #include <glm/geometric.hpp>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_sort.h>
 
 #include "octree/leaf_math.h"
@@ -81,19 +85,44 @@ std::vector<uint32_t> sortVertices(std::vector<glm::i32vec3>& positions) {
     return renamed;
 }
 
-/// A triangle by its vertices, smallest first; `turned`: the other two were swapped to ascend.
+/// A triangle whose smallest vertex is known: the other two ascending. `turned`: they were swapped to ascend.
 struct OrderedTriangle {
-    std::array<uint32_t, 3> vertices;
-    bool turned;
+    uint32_t second, third;
     float stray;
+    uint32_t turned;
 
-    OrderedTriangle(std::array<uint32_t, 3> v, float strayed) : vertices(v), stray(strayed) {
-        std::rotate(vertices.begin(), std::min_element(vertices.begin(), vertices.end()), vertices.end());
-        turned = vertices[1] > vertices[2];
-        if (turned) std::swap(vertices[1], vertices[2]);
-    }
-    bool operator<(const OrderedTriangle& b) const { return vertices != b.vertices ? vertices < b.vertices : turned < b.turned; }
+    [[nodiscard]] uint64_t key() const { return uint64_t{second} << 32 | third; }
+    bool operator<(const OrderedTriangle& b) const { return key() != b.key() ? key() < b.key() : turned < b.turned; }
 };
+
+/// Triangles by smallest vertex, then by the others; of the repeated ones the first, with the largest stray.
+void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, LatticeMesh& mesh) {
+    std::vector<uint32_t> begin(mesh.positions.size() + 1, 0);
+    for (size_t k = 0; k < soup.size(); ++k) ++begin[std::min({corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]}) + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<OrderedTriangle> ordered(soup.size());
+    std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
+    for (size_t k = 0; k < soup.size(); ++k) {
+        std::array<uint32_t, 3> v{corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]};
+        std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
+        const bool turned = v[1] > v[2];
+        ordered[next[v[0]]++] = {std::min(v[1], v[2]), std::max(v[1], v[2]), soup[k].stray, turned};
+    }
+    mesh.triangles.reserve(soup.size());
+    mesh.stray.reserve(soup.size());
+    for (uint32_t v = 0; v + 1 < begin.size(); ++v) {
+        const auto from = ordered.begin() + begin[v], to = ordered.begin() + begin[v + 1];
+        std::sort(from, to);
+        for (auto t = from; t != to; ++t) {
+            if (t != from && t->key() == (t - 1)->key()) {
+                mesh.stray.back() = std::max(mesh.stray.back(), t->stray);
+                continue;
+            }
+            mesh.triangles.push_back(t->turned ? std::array<uint32_t, 3>{v, t->third, t->second} : std::array<uint32_t, 3>{v, t->second, t->third});
+            mesh.stray.push_back(t->stray);
+        }
+    }
+}
 
 /// Means of the colours that triangles give their vertices.
 std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, size_t vertices) {
@@ -137,27 +166,9 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
         for (uint32_t& v : corners) v = renamed[v];
     }
     mesh.normals.resize(mesh.positions.size());
-    std::vector<OrderedTriangle> triangles;
-    triangles.reserve(soup.size());
-    for (size_t k = 0; k < soup.size(); ++k) {
-        const std::array<uint32_t, 3> v{corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]};
-        for (int i = 0; i < 3; ++i) mesh.normals[v[i]] = soup[k].normal[i];
-        triangles.emplace_back(v, soup[k].stray);
-    }
+    for (size_t k = 0; k < corners.size(); ++k) mesh.normals[corners[k]] = soup[k / 3].normal[k % 3];
     if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
-    std::vector<uint32_t>().swap(corners);
-    tbb::parallel_sort(triangles.begin(), triangles.end());
-    mesh.triangles.reserve(triangles.size());
-    mesh.stray.reserve(triangles.size());
-    for (size_t k = 0; k < triangles.size(); ++k) {
-        const OrderedTriangle& t = triangles[k];
-        if (k > 0 && t.vertices == triangles[k - 1].vertices) {
-            mesh.stray.back() = std::max(mesh.stray.back(), t.stray);
-            continue;
-        }
-        mesh.triangles.push_back(t.turned ? std::array<uint32_t, 3>{t.vertices[0], t.vertices[2], t.vertices[1]} : t.vertices);
-        mesh.stray.push_back(t.stray);
-    }
+    sortTriangles(soup, corners, mesh);
     return mesh;
 }
 
@@ -170,29 +181,41 @@ std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
 
 void computeNormals(LatticeMesh& mesh) {
     constexpr float kCreaseCosine = 0.766f;  // 40 degrees
+    struct Face {
+        glm::vec3 normal;
+        float angle[3];
+    };
+    std::vector<Face> faces(mesh.triangles.size());
+    const auto forTriangles = [&](auto&& visit) {
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), 4096), [&](const auto& range) {
+            for (size_t k = range.begin(); k < range.end(); ++k) visit(k);
+        });
+    };
+    forTriangles([&](size_t k) {
+        const auto& t = mesh.triangles[k];
+        // Edges of a page's triangles are exact in float, their products are not.
+        glm::dvec3 edge[3];
+        for (int i = 0; i < 3; ++i) edge[i] = glm::dvec3(mesh.positions[t[(i + 1) % 3]] - mesh.positions[t[i]]);
+        faces[k].normal = glm::vec3(glm::normalize(glm::cross(edge[0], -edge[2])));
+        glm::vec3 along[3];
+        for (int i = 0; i < 3; ++i) along[i] = glm::vec3(glm::normalize(edge[i]));
+        for (int i = 0; i < 3; ++i) faces[k].angle[i] = std::acos(std::clamp(-glm::dot(along[i], along[(i + 2) % 3]), -1.0f, 1.0f));
+    });
     std::vector<glm::vec3> sum(mesh.positions.size(), glm::vec3(0));
-    std::vector<glm::vec3> faces(mesh.triangles.size());
-    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
-        const std::array<uint32_t, 3>& t = mesh.triangles[k];
-        glm::dvec3 p[3];
-        for (int i = 0; i < 3; ++i) p[i] = glm::dvec3(mesh.positions[t[i]] - mesh.positions[t[0]]);
-        const glm::vec3 n = glm::vec3(glm::normalize(glm::cross(p[1], p[2])));
-        faces[k] = n;
+    for (size_t k = 0; k < mesh.triangles.size(); ++k)
         for (int i = 0; i < 3; ++i) {
-            const glm::vec3 u = glm::vec3(glm::normalize(p[(i + 1) % 3] - p[i])), v = glm::vec3(glm::normalize(p[(i + 2) % 3] - p[i]));
-            const float angle = std::acos(std::clamp(glm::dot(u, v), -1.0f, 1.0f));
-            glm::vec3& s = sum[t[i]];
-            s += glm::dot(s, n) < 0 ? -angle * n : angle * n;
+            glm::vec3& s = sum[mesh.triangles[k][i]];
+            s += (glm::dot(s, faces[k].normal) < 0 ? -faces[k].angle[i] : faces[k].angle[i]) * faces[k].normal;
         }
-    }
-    std::vector<uint8_t> crease(mesh.positions.size(), 0);
     for (glm::vec3& s : sum) {
         const float length = glm::length(s);
         s = length > 0 ? s / length : glm::vec3(0, 0, 1);
     }
-    for (size_t k = 0; k < mesh.triangles.size(); ++k)
+    std::vector<uint8_t> crease(mesh.positions.size(), 0);
+    forTriangles([&](size_t k) {
         for (const uint32_t v : mesh.triangles[k])
-            if (std::abs(glm::dot(faces[k], sum[v])) < kCreaseCosine) crease[v] = 1;
+            if (std::abs(glm::dot(faces[k].normal, sum[v])) < kCreaseCosine) std::atomic_ref(crease[v]).store(1, std::memory_order_relaxed);
+    });
     mesh.normals.resize(mesh.positions.size());
     for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packNormal(glm::dvec3(sum[v]), crease[v] != 0);
 }
