@@ -21,6 +21,7 @@
 #include <oneapi/tbb/task_arena.h>
 #include <xxhash.h>
 
+#include "builder/estimate.h"
 #include "builder/ingest.h"
 #include "builder/journal.h"
 #include "builder/lattice_soup.h"
@@ -236,7 +237,22 @@ private:
         if (!measures) return measures.error();
         measures_ = *measures;
         releaseMemory();
+        VCP_TRY(checkFreeSpace());
         return checkpoint("read", 0);
+    }
+
+    /// A disk that is too small is found now, not after hours.
+    Result<void> checkFreeSpace() const {
+        const auto check = [](const std::filesystem::path& at, uint64_t needed, const char* option) -> Result<void> {
+            const uint64_t free = freeBytesAt(at);
+            if (needed <= free) return {};
+            return Error{.code = ErrorCode::Limit,
+                         .message = fmt::format("about {} MB are needed here and {} MB are free; free some space or choose another folder{}", needed / 1000000, free / 1000000, option),
+                         .file = at.string()};
+        };
+        const uint64_t temp = expectedTempBytes(measures_.triangles, plan_.tempBytes), there = space_.diskBytes();
+        VCP_TRY(check(space_.folder(), temp > there ? temp - there : 0, " with --temp"));
+        return check(options_.output, expectedFileBytes(measures_.triangles), "");
     }
 
     Result<void> chooseError() {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "builder/build.h"
+#include "builder/estimate.h"
 #include "viewer/build_settings.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
@@ -15,6 +16,7 @@ struct BuildCommand {
     std::vector<std::string> inputs;
     std::string output;
     bool resume = false;
+    bool dryRun = false;
     BuildSettings settings;
     ReportOptions report;
 };
@@ -51,6 +53,47 @@ std::string summary(const std::string& output, const BuildReport& report) {
     return text;
 }
 
+Json toJson(const BuildEstimate& estimate) {
+    const SoupMeasures& m = estimate.measures;
+    return {{"triangles", m.triangles},
+            {"degenerate_triangles", m.degenerateTriangles},
+            {"vertices", m.vertices},
+            {"colour", m.hasColour},
+            {"bounds_min", {m.boundsMin.x, m.boundsMin.y, m.boundsMin.z}},
+            {"bounds_max", {m.boundsMax.x, m.boundsMax.y, m.boundsMax.z}},
+            {"cell", estimate.frame.cell},
+            {"levels", estimate.frame.levels},
+            {"memory_bytes", estimate.memoryBytes},
+            {"temp_bytes", estimate.tempBytes},
+            {"free_temp_bytes", estimate.freeTempBytes},
+            {"file_bytes", estimate.fileBytes},
+            {"free_output_bytes", estimate.freeOutputBytes},
+            {"seconds", estimate.seconds}};
+}
+
+std::string summary(const BuildEstimate& estimate) {
+    const SoupMeasures& m = estimate.measures;
+    std::string text = fmt::format("{} triangles ({} without area), {} vertices, {}\n", formatCount(m.triangles), formatCount(m.degenerateTriangles), formatCount(m.vertices),
+                                   m.hasColour ? "with colour" : "no colour");
+    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", m.boundsMin.x, m.boundsMin.y, m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
+    text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ", formatLength(estimate.frame.cell), estimate.frame.levels);
+    text += fmt::format("  memory      at most {}\n", formatBytes(estimate.memoryBytes));
+    text += estimate.tempBytes == 0 ? std::string("  temporary   nothing: it fits memory\n")
+                                    : fmt::format("  temporary   about {} of {} free\n", formatBytes(estimate.tempBytes), formatBytes(estimate.freeTempBytes));
+    text += fmt::format("  file        about {} of {} free\n", formatBytes(estimate.fileBytes), formatBytes(estimate.freeOutputBytes));
+    text += fmt::format("  time        about {}", formatSeconds(estimate.seconds));
+    return text;
+}
+
+/// What the build would need; nothing is written.
+Result<int> tell(const BuildOptions& options, bool asJson) {
+    const auto estimate = estimateBuild(options);
+    if (!estimate) return estimate.error();
+    if (asJson) VCP_TRY(printJson(toJson(*estimate)));
+    else VCP_TRY(printLine(summary(*estimate)));
+    return 0;
+}
+
 Result<int> run(const BuildCommand& command) {
     BuildOptions options = command.settings.optionsFor(command.inputs);
     options.output = command.output;
@@ -61,6 +104,7 @@ Result<int> run(const BuildCommand& command) {
         display.update(at.stage, at.fraction, detailsOf(at));
         return !interrupted();
     };
+    if (command.dryRun) return tell(options, command.report.json);
     const auto report = buildOctree(options);
     display.finish();
     if (!report) return report.error();
@@ -80,6 +124,7 @@ Command addBuild(CLI::App& vcp) {
     app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->required();
     addBuildSettings(*app, command->settings);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
+    app->add_flag("--dry-run", command->dryRun, "Say what is in the meshes and what the build would need; write nothing");
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

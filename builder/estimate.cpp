@@ -1,0 +1,114 @@
+#include "builder/estimate.h"
+
+#include <algorithm>
+#include <limits>
+#include <thread>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "builder/exact_sum.h"
+#include "builder/memory_plan.h"
+#include "builder/mesh_stream.h"
+
+namespace vcp {
+
+namespace {
+
+// A triangle on the temporary disk: the soup while it is dealt, then the finest level's bins with what has
+// been built of it. A triangle in the file, and the time for one on one thread.
+constexpr double kTempBytesPerTriangle = 75, kFileBytesPerTriangle = 30, kSecondsPerTriangle = 20e-6;
+
+/// Measures one input's triangles as far as their vertices fit memory.
+class Measurer {
+public:
+    Measurer(SoupMeasures& measures, uint64_t maxVertices) : measures_(measures), maxVertices_(maxVertices) {}
+
+    void add(const MeshChunk& chunk) {
+        const size_t room = static_cast<size_t>(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
+        positions_.insert(positions_.end(), chunk.positions.begin(), chunk.positions.begin() + static_cast<ptrdiff_t>(room));
+        for (const glm::dvec3& p : chunk.positions) {
+            measures_.boundsMin = glm::min(measures_.boundsMin, p);
+            measures_.boundsMax = glm::max(measures_.boundsMax, p);
+        }
+        measures_.vertices += chunk.positions.size();
+        measures_.hasColour |= !chunk.colours.empty();
+        measures_.triangles += chunk.triangles.size();
+        for (const auto& t : chunk.triangles) {
+            if (std::max({t[0], t[1], t[2]}) >= positions_.size()) continue;
+            const glm::dvec3 &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
+            const double twice = glm::length(glm::cross(b - a, c - a));
+            ++measured_;
+            if (twice > 0 && std::isfinite(twice)) area_.add(twice / 2);
+            else ++measures_.degenerateTriangles;
+        }
+    }
+    [[nodiscard]] double area() const { return area_.value(); }
+    [[nodiscard]] uint64_t measured() const { return measured_; }
+
+private:
+    SoupMeasures& measures_;
+    uint64_t maxVertices_;
+    uint64_t measured_ = 0;
+    std::vector<glm::dvec3> positions_;
+    ExactSum area_;
+};
+
+}  // namespace
+
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory) {
+    const auto bytes = static_cast<uint64_t>(kTempBytesPerTriangle * static_cast<double>(triangles));
+    return bytes > heldInMemory ? bytes : 0;
+}
+
+uint64_t expectedFileBytes(uint64_t triangles) { return static_cast<uint64_t>(kFileBytesPerTriangle * static_cast<double>(triangles)); }
+
+uint64_t freeBytesAt(const std::filesystem::path& path) {
+    std::error_code failed;
+    std::filesystem::path at = std::filesystem::absolute(path, failed);
+    while (!at.empty() && !std::filesystem::exists(at, failed) && at != at.parent_path()) at = at.parent_path();
+    const auto space = std::filesystem::space(at, failed);
+    return failed ? std::numeric_limits<uint64_t>::max() : space.available;
+}
+
+Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
+    BuildEstimate estimate;
+    const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+    estimate.memoryBytes = options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes();
+    auto plan = planMemory(estimate.memoryBytes, threads);
+    if (!plan) return plan.error();
+    SoupMeasures& m = estimate.measures;
+    m.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
+    m.boundsMax = -m.boundsMin;
+    uint64_t measured = 0;
+    MeshChunk chunk;
+    for (const auto& path : options.inputs) {
+        auto stream = openMesh(path);
+        if (!stream) return stream.error();
+        Measurer measurer(m, plan->vertexBytes / sizeof(glm::dvec3));
+        for (;;) {
+            auto more = (*stream)->next(chunk);
+            if (!more) return more.error();
+            if (!*more) break;
+            measurer.add(chunk);
+            if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles})) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        }
+        measured += measurer.measured();
+        m.area += measurer.area();
+    }
+    if (m.triangles == 0) return Error{.code = ErrorCode::InvalidInput, .message = "has no triangles", .file = options.inputs.front().string()};
+    estimate.isAreaComplete = measured == m.triangles;
+    if (m.area == 0) return Error{.code = ErrorCode::InvalidInput, .message = "its triangles have no area", .file = options.inputs.front().string()};
+    m.area *= static_cast<double>(m.triangles) / static_cast<double>(measured);
+    auto frame = chooseFrame(options, m);
+    if (!frame) return frame.error();
+    estimate.frame = *frame;
+    estimate.tempBytes = expectedTempBytes(m.triangles, plan->tempBytes);
+    estimate.fileBytes = expectedFileBytes(m.triangles);
+    estimate.seconds = kSecondsPerTriangle * static_cast<double>(m.triangles) / threads;
+    estimate.freeTempBytes = freeBytesAt(tempFolderOf(options));
+    estimate.freeOutputBytes = freeBytesAt(options.output);
+    return estimate;
+}
+
+}  // namespace vcp
