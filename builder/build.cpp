@@ -355,29 +355,17 @@ private:
         struct Visit {
             const PageGrid& grid;
             const PagePartition& partition;
-            RecordBins<LatticeTriangle>& bins;
-            std::vector<std::pair<size_t, LatticeTriangle>> held{};
+            BinBatch<LatticeTriangle> batch;
             Result<void> operator()(const LatticeTriangle& t) {
                 size_t bin[3];
                 for (int i = 0; i < 3; ++i) bin[i] = partition.binOf(grid.pageOf(t.corner[i]));
                 for (int i = 0; i < 3; ++i)
-                    if (std::find(bin, bin + i, bin[i]) == bin + i) held.emplace_back(bin[i], t);
-                return held.size() < 8192 ? Result<void>() : finish();
-            }
-            Result<void> finish() {
-                std::stable_sort(held.begin(), held.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-                std::vector<LatticeTriangle> run;
-                for (size_t i = 0; i < held.size();) {
-                    const size_t bin = held[i].first;
-                    run.clear();
-                    for (; i < held.size() && held[i].first == bin; ++i) run.push_back(held[i].second);
-                    VCP_TRY(bins.append(bin, run));
-                }
-                held.clear();
+                    if (std::find(bin, bin + i, bin[i]) == bin + i) VCP_TRY(batch.add(bin[i], t));
                 return {};
             }
+            Result<void> finish() { return batch.flush(); }
         };
-        VCP_TRY(forLatticeTriangles("sorting", kReadingShare + kDealingShare / 2, kDealingShare / 2, [&] { return Visit{grid, finest_, *current_}; }));
+        VCP_TRY(forLatticeTriangles("sorting", kReadingShare + kDealingShare / 2, kDealingShare / 2, [&] { return Visit{grid, finest_, BinBatch(*current_)}; }));
         VCP_TRY(current_->raw().flush());
         if (current_->raw().total() == 0)
             return Error{.code = ErrorCode::InvalidInput, .message = "all triangles are smaller than 1/2048 cell; use a smaller --cell", .file = options_.inputs.front().string()};

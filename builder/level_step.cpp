@@ -13,12 +13,6 @@
 
 namespace vcp {
 
-namespace {
-
-constexpr size_t kBatchRecords = 8192;
-
-}  // namespace
-
 Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
     // A triangle seldom spans more than two bins: the list of those seen is short.
     touched_.clear();
@@ -26,18 +20,7 @@ Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
         const size_t bin = sink_.partition_.binOf(page);
         if (std::find(touched_.begin(), touched_.end(), bin) == touched_.end()) touched_.push_back(bin);
     });
-    for (const size_t bin : touched_) open_[bin].push_back(t);
-    held_ += touched_.size();
-    return held_ < kBatchRecords ? Result<void>() : flush();
-}
-
-Result<void> LevelSink::Batch::flush() {
-    for (size_t bin = 0; bin < open_.size(); ++bin) {
-        if (open_[bin].empty()) continue;
-        VCP_TRY(sink_.bins_.append(bin, open_[bin]));
-        open_[bin].clear();
-    }
-    held_ = 0;
+    for (const size_t bin : touched_) VCP_TRY(batch_.add(bin, t));
     return {};
 }
 

@@ -40,14 +40,13 @@ public:
     /// A batch of its own for each thread; flush when done.
     class Batch {
     public:
-        explicit Batch(LevelSink& sink) : sink_(sink), open_(sink.partition_.bins()) {}
+        explicit Batch(LevelSink& sink) : sink_(sink), batch_(sink.bins_) {}
         Result<void> add(const LatticeTriangle& triangle);
-        Result<void> flush();
+        Result<void> flush() { return batch_.flush(); }
 
     private:
         LevelSink& sink_;
-        std::vector<std::vector<LatticeTriangle>> open_;
-        size_t held_ = 0;
+        BinBatch<LatticeTriangle> batch_;
         std::vector<size_t> touched_;
     };
 

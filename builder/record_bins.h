@@ -5,6 +5,7 @@
 // file after an interruption. Blocks carry a hash: a temporary disk that lies is noticed.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -95,6 +96,36 @@ public:
 
 private:
     RawBins raw_;
+};
+
+/// Records on their way into bins, collected so that each append has many. One thread; flush when done.
+template <class Record>
+class BinBatch {
+public:
+    explicit BinBatch(RecordBins<Record>& bins) : bins_(bins) {}
+
+    Result<void> add(size_t bin, const Record& record) {
+        held_.emplace_back(bin, record);
+        return held_.size() < kHeldRecords ? Result<void>() : flush();
+    }
+    Result<void> flush() {
+        std::stable_sort(held_.begin(), held_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+        for (size_t i = 0; i < held_.size();) {
+            const size_t bin = held_[i].first;
+            run_.clear();
+            for (; i < held_.size() && held_[i].first == bin; ++i) run_.push_back(held_[i].second);
+            VCP_TRY(bins_.append(bin, run_));
+        }
+        held_.clear();
+        return {};
+    }
+
+private:
+    static constexpr size_t kHeldRecords = 4096;
+
+    RecordBins<Record>& bins_;
+    std::vector<std::pair<size_t, Record>> held_;
+    std::vector<Record> run_;
 };
 
 }  // namespace vcp
