@@ -10,6 +10,7 @@
 #include "builder/byte_source.h"
 #include "builder/number_text.h"
 #include "builder/obj.h"
+#include "builder/off.h"
 #include "builder/ply.h"
 #include "builder/stl.h"
 
@@ -17,7 +18,7 @@ namespace vcp {
 namespace {
 
 constexpr size_t kStartBytes = 1024;
-constexpr std::array<std::string_view, 3> kFormats{"ply", "obj", "stl"};
+constexpr std::array<std::string_view, 4> kFormats{"ply", "obj", "stl", "off"};
 
 std::string lower(std::string text) {
     std::ranges::transform(text, text.begin(),
@@ -39,13 +40,14 @@ std::string formatByName(std::filesystem::path path) {
 std::string formatByContent(std::string_view start, const ByteSource& source) {
     if (start.starts_with("ply")) return "ply";
     if (looksLikeStl(start, source.sizeKnown() ? std::optional(source.size()) : std::nullopt)) return "stl";
+    if (looksLikeOff(start)) return "off";
     if (looksLikeObj(start)) return "obj";
     return "";
 }
 
 Error unknownFormat(const ByteSource& source) {
     return source.error(ErrorCode::Unsupported, "", std::nullopt,
-                        "unknown mesh format; known are PLY, OBJ and STL, also as .gz and .zst");
+                        "unknown mesh format; known are PLY, OBJ, STL and OFF, also as .gz and .zst");
 }
 
 }  // namespace
@@ -68,6 +70,7 @@ Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, 
 
     if (format == "ply") return openPly(*std::move(source));
     if (format == "stl") return openStl(*std::move(source));
+    if (format == "off") return openOff(*std::move(source));
     if (format == "obj") return openObj(*std::move(source));
     return unknownFormat(*source);
 }

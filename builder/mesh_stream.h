@@ -87,7 +87,7 @@ struct MeshOpenOptions {
     bool materials = true;  ///< false: MTL files are not looked for, chunks carry no uvs
     /// Where what must be read more than once is put (texture coordinates of a large OBJ, a piped GLB), as a
     /// file without a name. Empty: the system's folder for such files.
-    std::filesystem::path tempFolder;
+    std::filesystem::path tempFolder = {};
     uint64_t decoderBytes = uint64_t{1} << 30;  ///< limit on the memory of the process that decodes Draco
 };
 
