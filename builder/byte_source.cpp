@@ -67,7 +67,9 @@ Result<ByteSource> ByteSource::open(const std::filesystem::path& path, size_t wi
         error.file = name;
         return error;
     }
-    return fromInput(std::move(file->input), file->bytes, name, windowBytes);
+    auto source = fromInput(std::move(file->input), file->bytes, name, windowBytes);
+    if (source) source->plainFile_ = file->bytes && path != "-" && !source->compressed_;
+    return source;
 }
 
 ByteSource ByteSource::fromMemory(std::string_view bytes, std::string name, size_t windowBytes) {

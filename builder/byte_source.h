@@ -51,6 +51,9 @@ public:
     [[nodiscard]] uint64_t remaining() const { return size_ - offset_; }
     [[nodiscard]] bool atEnd() const { return offset_ == size_; }
 
+    /// A regular file that is not compressed: it may also be opened by its path and read at offset().
+    [[nodiscard]] bool isPlainFile() const { return plainFile_; }
+
     /// Of the file itself, as compressed as it is; for progress. 0: a pipe, which does not say.
     [[nodiscard]] uint64_t fileBytes() const { return fileBytes_; }
     [[nodiscard]] uint64_t fileBytesRead() const;
@@ -95,6 +98,7 @@ private:
     uint64_t fileBytes_ = 0;
     size_t windowBytes_ = kWindowBytes;
     bool compressed_ = false;
+    bool plainFile_ = false;
     const char* memory_ = nullptr;  // the whole input when it is in memory
     std::unique_ptr<ByteInput> input_;
     std::vector<char> buffer_;

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 
 #include "builder/byte_source.h"
+#include "builder/draco.h"
+#include "builder/gltf.h"
 #include "builder/number_text.h"
 #include "builder/obj.h"
 #include "builder/off.h"
@@ -18,7 +20,7 @@ namespace vcp {
 namespace {
 
 constexpr size_t kStartBytes = 1024;
-constexpr std::array<std::string_view, 4> kFormats{"ply", "obj", "stl", "off"};
+constexpr std::array<std::string_view, 7> kFormats{"ply", "obj", "stl", "off", "gltf", "glb", "drc"};
 
 std::string lower(std::string text) {
     std::ranges::transform(text, text.begin(),
@@ -40,6 +42,8 @@ std::string formatByName(std::filesystem::path path) {
 std::string formatByContent(std::string_view start, const ByteSource& source) {
     if (start.starts_with("ply")) return "ply";
     if (looksLikeStl(start, source.sizeKnown() ? std::optional(source.size()) : std::nullopt)) return "stl";
+    if (looksLikeDraco(start)) return "drc";
+    if (looksLikeGltf(start)) return "gltf";
     if (looksLikeOff(start)) return "off";
     if (looksLikeObj(start)) return "obj";
     return "";
@@ -47,7 +51,7 @@ std::string formatByContent(std::string_view start, const ByteSource& source) {
 
 Error unknownFormat(const ByteSource& source) {
     return source.error(ErrorCode::Unsupported, "", std::nullopt,
-                        "unknown mesh format; known are PLY, OBJ, STL and OFF, also as .gz and .zst");
+                        "unknown mesh format; known are PLY, OBJ, STL, OFF, glTF, GLB and Draco, also as .gz and .zst");
 }
 
 }  // namespace
@@ -70,6 +74,8 @@ Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, 
 
     if (format == "ply") return openPly(*std::move(source));
     if (format == "stl") return openStl(*std::move(source));
+    if (format == "drc") return openDraco(*std::move(source), options.decoderBytes);
+    if (format == "gltf" || format == "glb") return openGltf(*std::move(source), path, options);
     if (format == "off") return openOff(*std::move(source));
     if (format == "obj") return openObj(*std::move(source));
     return unknownFormat(*source);
