@@ -45,7 +45,7 @@ constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.
 
 /// What must be the same for a build to go on where another was.
 std::string fingerprint(const BuildOptions& options) {
-    std::string text = fmt::format("{} {:a} {:a} {} {}", kFileVersion, options.cell, options.error, options.errorIsRelative, static_cast<int>(options.colour));
+    std::string text = fmt::format("{} {:a} {:a} {} {} {}", kFileVersion, options.cell, options.error, options.errorIsRelative, static_cast<int>(options.colour), options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);
@@ -59,7 +59,7 @@ json toJson(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 glm::dvec3 vectorFrom(const json& j) { return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()}; }
 
 json toJson(const SoupMeasures& m) {
-    return {{"min", toJson(m.boundsMin)}, {"max", toJson(m.boundsMax)}, {"area", m.area}, {"triangles", m.triangles}, {"degenerate", m.degenerateTriangles}, {"vertices", m.vertices}, {"colour", m.hasColour}};
+    return {{"min", toJson(m.boundsMin)}, {"max", toJson(m.boundsMax)}, {"area", m.area}, {"triangles", m.triangles}, {"degenerate", m.degenerateTriangles}, {"vertices", m.vertices}, {"vertex colours", m.hasVertexColours}, {"materials", m.hasMaterials}};
 }
 
 SoupMeasures measuresFrom(const json& j) {
@@ -70,7 +70,8 @@ SoupMeasures measuresFrom(const json& j) {
     m.triangles = j.at("triangles").get<uint64_t>();
     m.degenerateTriangles = j.at("degenerate").get<uint64_t>();
     m.vertices = j.at("vertices").get<uint64_t>();
-    m.hasColour = j.at("colour").get<bool>();
+    m.hasVertexColours = j.at("vertex colours").get<bool>();
+    m.hasMaterials = j.at("materials").get<bool>();
     return m;
 }
 
@@ -233,12 +234,13 @@ private:
         auto measures = readInputs(options_, space_, plan_.vertexBytes, *soup_, [this](double fraction, uint64_t triangles) {
             measures_.triangles = triangles;
             return progress("reading", kReadingShare * fraction);
-        });
+        }, report_.warnings);
         if (!measures) return measures.error();
         measures_ = *measures;
         releaseMemory();
         VCP_TRY(checkFreeSpace());
-        return checkpoint("read", 0);
+        // Images are not kept: what has them is dealt before it is safe.
+        return soup_->materials.empty() ? checkpoint("read", 0) : Result<void>();
     }
 
     /// A disk that is too small is found now, not after hours.
@@ -268,6 +270,12 @@ private:
         return {};
     }
 
+    [[nodiscard]] bool hasColour() const {
+        const bool vertices = measures_.hasVertexColours && options_.colour != ColourChoice::Texture;
+        const bool materials = measures_.hasMaterials && options_.colour != ColourChoice::Vertex;
+        return options_.colour != ColourChoice::None && (vertices || materials);
+    }
+
     void describe() {
         report_.triangles = measures_.triangles;
         report_.degenerateTriangles = measures_.degenerateTriangles;
@@ -279,7 +287,7 @@ private:
             header_.boundsMin[i] = measures_.boundsMin[i];
             header_.boundsMax[i] = measures_.boundsMax[i];
         }
-        header_.flags = measures_.hasColour ? kFlagColour : 0;
+        header_.flags = hasColour() ? kFlagColour : 0;
     }
 
     void setUpLevels() {
@@ -458,7 +466,7 @@ private:
         if (soup->empty()) return {};
         Result<void> result;
         arena_.execute([&] {
-            LatticeMesh mesh = meshOf(*soup, measures_.hasColour);
+            LatticeMesh mesh = meshOf(*soup, hasColour());
             std::vector<LatticeTriangle>().swap(*soup);
             if (vertices) computeNormals(mesh);
             if (!vertices) result = buildPages(settingsOf(pass_), mesh, first, end, spools_[static_cast<size_t>(pass_)], [&](double part) { return progress(stage, at(part)); });
@@ -619,7 +627,11 @@ Result<BuildReport> buildOctree(const BuildOptions& options) {
     const unsigned threads = options.threads > 0 ? options.threads : static_cast<unsigned>(std::max(1, tbb::this_task_arena::max_concurrency()));
     auto plan = planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads);
     if (!plan) return plan.error();
-    return Builder(options, *plan, threads).run();
+    BuildOptions expanded = options;
+    auto inputs = expandInputs(options.inputs);
+    if (!inputs) return inputs.error();
+    expanded.inputs = std::move(*inputs);
+    return Builder(expanded, *plan, threads).run();
 }
 
 }  // namespace vcp

@@ -22,7 +22,8 @@
 
 namespace vcp {
 
-enum class ColourChoice { Auto, Vertex, None };
+/// Auto: all there is. Texture: materials and their images, not the vertices' colours.
+enum class ColourChoice { Auto, Vertex, Texture, None };
 
 struct BuildProgress {
     const char* stage = "";  ///< "reading", "sorting", "level 5 of 6", "writing"
@@ -33,7 +34,8 @@ struct BuildProgress {
 };
 
 struct BuildOptions {
-    std::vector<std::filesystem::path> inputs;  ///< joined into one dataset
+    std::vector<std::filesystem::path> inputs;  ///< files, folders of them, "-" for standard input; joined into one dataset
+    std::string format;          ///< of inputs whose content does not tell it (meshFormats())
     std::filesystem::path output;
     double cell = 0;             ///< finest cell edge, world units; 0: chosen from the mesh
     double error = 0;            ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
@@ -66,6 +68,7 @@ struct BuildReport {
     double cell = 0;          ///< finest cell edge, world units
     double errorTarget = 0;   ///< world units
     double certifiedErrorMax = 0;  ///< of the finest level, world units
+    std::vector<std::string> warnings;  ///< what was left out of the inputs, one line each
 };
 
 /// Where a build keeps its temporary files.

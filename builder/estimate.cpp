@@ -32,7 +32,8 @@ public:
             measures_.boundsMax = glm::max(measures_.boundsMax, p);
         }
         measures_.vertices += chunk.positions.size();
-        measures_.hasColour |= !chunk.colours.empty();
+        measures_.hasVertexColours |= !chunk.colours.empty();
+        measures_.hasMaterials |= !chunk.materials.empty();
         measures_.triangles += chunk.triangles.size();
         for (const auto& t : chunk.triangles) {
             if (std::max({t[0], t[1], t[2]}) >= positions_.size()) continue;
@@ -82,8 +83,10 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     m.boundsMax = -m.boundsMin;
     uint64_t measured = 0;
     MeshChunk chunk;
-    for (const auto& path : options.inputs) {
-        auto stream = openMesh(path);
+    auto inputs = expandInputs(options.inputs);
+    if (!inputs) return inputs.error();
+    for (const auto& path : *inputs) {
+        auto stream = openMesh(path, meshOptionsOf(options));
         if (!stream) return stream.error();
         Measurer measurer(m, plan->vertexBytes / sizeof(glm::dvec3));
         for (;;) {

@@ -106,9 +106,9 @@ private:
 }  // namespace
 
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double, uint64_t)>& progress) {
+                                const std::function<bool(double, uint64_t)>& progress, std::vector<std::string>& warnings) {
     uint64_t totalBytes = 0, doneBytes = 0, vertices = 0;
-    bool hasColour = false;
+    bool hasVertexColours = false;
     for (const auto& path : options.inputs) {
         std::error_code ignored;
         if (const auto size = std::filesystem::file_size(path, ignored); !ignored) totalBytes += size;
@@ -116,19 +116,22 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     SoupWriter writer(soup);
     MeshChunk chunk;
     for (const auto& path : options.inputs) {
-        auto stream = openMesh(path);
+        auto stream = openMesh(path, meshOptionsOf(options));
         if (!stream) return stream.error();
+        const auto materialBase = static_cast<uint32_t>(soup.materials.size());
         VertexJoin join(space, vertexBytes, [&](const WorldTriangle<double>& t) { return writer.add(t); });
         for (;;) {
             auto more = (*stream)->next(chunk);
             if (!more) return more.error();
             if (!*more) break;
-            hasColour |= !chunk.colours.empty();
-            VCP_TRY(join.add(chunk, 0));
+            hasVertexColours |= !chunk.colours.empty();
+            VCP_TRY(join.add(chunk, materialBase));
             const uint64_t bytes = doneBytes + (*stream)->bytesRead();
             if (!progress(double(bytes) / double(std::max<uint64_t>(totalBytes, 1)), writer.triangles())) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         }
         doneBytes += (*stream)->bytesRead();
+        soup.materials.insert(soup.materials.end(), (*stream)->materials().begin(), (*stream)->materials().end());
+        warnings.insert(warnings.end(), (*stream)->warnings().begin(), (*stream)->warnings().end());
         VCP_TRY(join.finish(path.string()));
         vertices += join.vertices();
     }
@@ -138,13 +141,22 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
 
     SoupMeasures m = writer.measures();
     m.vertices = vertices;
-    m.hasColour = hasColour && options.colour != ColourChoice::None;
+    m.hasVertexColours = hasVertexColours;
+    m.hasMaterials = std::any_of(soup.materials.begin(), soup.materials.end(), [](const Material& material) { return material.factor != kWhite || material.image.exists(); });
     if (m.triangles == 0) return badInput(options, "has no triangles");
     if (writer.tooLarge() || !(glm::length(m.boundsMax - m.boundsMin) < kMaxExtent) || !std::isfinite(m.area))
         return badInput(options, "its coordinates are too large to measure lengths; scale the mesh down");
     if (m.triangles == m.degenerateTriangles || m.area == 0) return badInput(options, fmt::format("none of its {} triangles has an area", m.triangles));
-    if (options.colour == ColourChoice::Vertex && !hasColour) return badInput(options, "has no vertex colours; leave out --colour vertex");
+    if (options.colour == ColourChoice::Vertex && !hasVertexColours) return badInput(options, "has no vertex colours; leave out --colour vertex");
+    if (options.colour == ColourChoice::Texture && !m.hasMaterials) return badInput(options, "has no materials with a colour or a texture; leave out --colour texture");
     return m;
+}
+
+MeshOpenOptions meshOptionsOf(const BuildOptions& options) {
+    MeshOpenOptions open;
+    open.format = options.format;
+    open.materials = options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture;
+    return open;
 }
 
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m) {

@@ -7,6 +7,8 @@
 #include <glm/vec3.hpp>
 
 #include "builder/build.h"
+#include "builder/material.h"
+#include "builder/mesh_stream.h"
 #include "builder/record_bins.h"
 #include "builder/soup.h"
 #include "octree/result.h"
@@ -28,7 +30,8 @@ struct SoupMeasures {
     uint64_t triangles = 0;
     uint64_t degenerateTriangles = 0;  ///< of them, without area in the file's own coordinates
     uint64_t vertices = 0;
-    bool hasColour = false;
+    bool hasVertexColours = false;
+    bool hasMaterials = false;  ///< of another colour than white, or with an image
 };
 
 /// The triangles of all inputs. Most files hold floats: those take half the room.
@@ -37,12 +40,17 @@ struct Soup {
 
     RecordBins<WorldTriangle<float>> floats;
     RecordBins<WorldTriangle<double>> doubles;
+    std::vector<Material> materials;  ///< of all inputs
 };
 
 /// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is
-/// given the fraction read; false cancels. Triangles without area are counted and left out.
+/// given the fraction read; false cancels. Triangles without area are counted and left out. `warnings`: what the
+/// readers left out.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double fraction, uint64_t triangles)>& progress);
+                                const std::function<bool(double fraction, uint64_t triangles)>& progress, std::vector<std::string>& warnings);
+
+/// How the inputs are opened.
+MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 
 /// `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures);

@@ -17,7 +17,6 @@ namespace {
 constexpr size_t kStatementLimit = 1024 * 1024;
 constexpr size_t kStartBytes = 256 * 1024;  // looked at for colours
 constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
-constexpr Rgba8 kWhite = 0xFFFFFFFF;
 
 // After the last line end that no backslash precedes.
 size_t afterLastStatement(std::string_view text) {
@@ -44,7 +43,7 @@ class ObjStream final : public MeshStream {
 public:
     explicit ObjStream(ByteSource source) : source_(std::move(source)) {
         info_.format = "OBJ";
-        info_.fileBytes = source_.size();
+        info_.fileBytes = source_.fileBytes();
         // The shortest vertex is "v 0 0 0\n".
         mostVertices_ = source_.size() / 8 + 1;
     }
@@ -60,7 +59,7 @@ public:
     }
 
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
-    [[nodiscard]] uint64_t bytesRead() const override { return source_.offset(); }
+    [[nodiscard]] uint64_t bytesRead() const override { return source_.fileBytesRead(); }
 
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();

@@ -41,6 +41,8 @@ Result<void> checkCounts(const ByteSource& source, const PlyHeader& header) {
         const uint64_t rowBytes = element.leastBytes(header.encoding);
         exact = exact && !element.hasLists();
         if (rowBytes > 0 && element.count > left / rowBytes) {
+            if (!source.sizeKnown())
+                return elementError(source, element, fmt::format("declares {} rows, more than any file can hold", element.count));
             const uint64_t whole = left / rowBytes;
             std::string message = fmt::format(
                 "the header declares {} rows of {} {} bytes, but the file ends after {} of them: "
@@ -126,14 +128,14 @@ public:
             plans_.push_back(*planned);
         }
         info_.format = formatName(header_.encoding);
-        info_.fileBytes = source_.size();
+        info_.fileBytes = source_.fileBytes();
         info_.vertices = vertices->count;
         if (!strips || strips->count == 0) info_.faces = faces->count;
         return {};
     }
 
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
-    [[nodiscard]] uint64_t bytesRead() const override { return source_.offset(); }
+    [[nodiscard]] uint64_t bytesRead() const override { return source_.fileBytesRead(); }
 
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();

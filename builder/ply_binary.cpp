@@ -170,13 +170,15 @@ private:
 
     Result<void> skipRows() {
         const uint64_t rows = plan_.element->count - row_;
-        if (rowBytes_ > 0 && source_.remaining() / rowBytes_ < rows) {
-            row_ += source_.remaining() / rowBytes_;
-            return truncated();
+        if (rowBytes_ == 0) {
+            row_ += rows;
+            return {};
         }
-        source_.advance(rows * rowBytes_);
-        row_ = plan_.element->count;
-        return {};
+        const uint64_t possible = std::min(rows, source_.remaining() / rowBytes_);
+        const auto skipped = source_.skip(possible * rowBytes_);
+        if (!skipped) return skipped.error();
+        row_ += *skipped / rowBytes_;
+        return done() ? Result<void>() : truncated();
     }
 
     Result<void> readVertices(MeshChunk& chunk) {

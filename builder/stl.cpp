@@ -57,6 +57,19 @@ bool looksLikeAscii(std::string_view start) {
     return false;
 }
 
+// Of binary STL whose length is not known: the whole facets at hand are finite, with normals of length 1 or 0.
+bool facetsArePlausible(std::string_view start) {
+    size_t facets = 0;
+    for (size_t at = kHeaderBytes; at + kFacetBytes <= start.size(); at += kFacetBytes, ++facets) {
+        float v[12];
+        std::memcpy(v, start.data() + at, sizeof v);
+        if (!std::all_of(v, v + 12, [](float value) { return std::isfinite(value); })) return false;
+        const double squared = double(v[0]) * v[0] + double(v[1]) * v[1] + double(v[2]) * v[2];
+        if (squared != 0 && std::abs(squared - 1) > 0.02) return false;
+    }
+    return facets > 0;
+}
+
 class BinaryStl final : public MeshStream {
 public:
     explicit BinaryStl(ByteSource source) : source_(std::move(source)) {}
@@ -72,21 +85,16 @@ public:
         if (facets_ == 0)
             return source_.error(ErrorCode::InvalidInput, "header", kHeaderBytes - sizeof(uint32_t), "has no facets");
         const uint64_t whole = source_.remaining() / kFacetBytes;
-        if (whole < facets_)
-            return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}", whole),
-                                 kHeaderBytes + whole * kFacetBytes,
-                                 fmt::format("the header declares {} facets, but the file ends after {}: it is "
-                                             "truncated, the count is wrong, or it is not STL",
-                                             facets_, whole));
+        if (whole < facets_) return endsAfter(whole);
         info_.format = "STL binary";
-        info_.fileBytes = source_.size();
+        info_.fileBytes = source_.fileBytes();
         info_.vertices = 3 * facets_;
         info_.faces = facets_;
         return {};
     }
 
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
-    [[nodiscard]] uint64_t bytesRead() const override { return source_.offset(); }
+    [[nodiscard]] uint64_t bytesRead() const override { return source_.fileBytesRead(); }
 
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();
@@ -96,6 +104,7 @@ public:
             const uint64_t room = (kChunkElements - chunk.positions.size() + 2) / 3;
             const auto facets =
                 static_cast<size_t>(std::min({room, facets_ - facet_, uint64_t{bytes->size() / kFacetBytes}}));
+            if (facets == 0) return endsAfter(facet_);
             VCP_TRY(decode(bytes->data(), facets, chunk));
             source_.advance(facets * kFacetBytes);
         }
@@ -103,6 +112,13 @@ public:
     }
 
 private:
+    Error endsAfter(uint64_t facet) const {
+        return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}", facet), kHeaderBytes + facet * kFacetBytes,
+                             fmt::format("the header declares {} facets, but the file ends after {}: it is "
+                                         "truncated, the count is wrong, or it is not STL",
+                                         facets_, facet));
+    }
+
     Result<void> decode(const char* p, size_t facets, MeshChunk& chunk) {
         const size_t before = chunk.positions.size();
         chunk.positions.resize(before + 3 * facets);
@@ -141,11 +157,11 @@ class AsciiStl final : public MeshStream {
 public:
     explicit AsciiStl(ByteSource source) : source_(std::move(source)) {
         info_.format = "STL ASCII";
-        info_.fileBytes = source_.size();
+        info_.fileBytes = source_.fileBytes();
     }
 
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
-    [[nodiscard]] uint64_t bytesRead() const override { return source_.offset(); }
+    [[nodiscard]] uint64_t bytesRead() const override { return source_.fileBytesRead(); }
 
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();
@@ -308,10 +324,11 @@ private:
 
 }  // namespace
 
-bool looksLikeStl(std::string_view start, uint64_t fileBytes) {
-    const bool exact = start.size() >= kHeaderBytes && facetCount(start) > 0 &&
-                       fileBytes == kHeaderBytes + uint64_t{facetCount(start)} * kFacetBytes;
-    return exact || looksLikeAscii(start);
+bool looksLikeStl(std::string_view start, std::optional<uint64_t> fileBytes) {
+    if (looksLikeAscii(start)) return true;
+    if (start.size() < kHeaderBytes || facetCount(start) == 0) return false;
+    if (fileBytes) return *fileBytes == kHeaderBytes + uint64_t{facetCount(start)} * kFacetBytes;
+    return facetsArePlausible(start);
 }
 
 Result<std::unique_ptr<MeshStream>> openStl(ByteSource source) {

@@ -8,8 +8,6 @@ namespace vcp {
 
 namespace {
 
-constexpr uint32_t kWhite = 0xffffffffu;
-
 // Beyond it a vertex number is a broken one; numbers below it make a bounded number of bins.
 constexpr uint64_t kMaxVertices = uint64_t{1} << 40;
 
@@ -51,7 +49,7 @@ Result<void> VertexJoin::add(const MeshChunk& chunk, uint32_t materialBase) {
             return Error{.code = ErrorCode::InvalidInput, .message = "a triangle names a vertex that the file does not have"};
         if (!chunk.uvs.empty())
             for (int i = 0; i < 3; ++i) w.triangle.uv[i] = chunk.uvs[k][i];
-        if (!chunk.materials.empty()) w.triangle.material = materialBase + chunk.materials[k];
+        if (!chunk.materials.empty() && chunk.materials[k] != kNoMaterial) w.triangle.material = materialBase + chunk.materials[k] + 1;
         VCP_TRY(resolve(w));
     }
     return {};

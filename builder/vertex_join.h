@@ -25,7 +25,7 @@ public:
     /// `vertexBytes`: memory for vertices, with their colours.
     VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit);
 
-    /// Takes a chunk of the stream, in order; `materialBase` is added to its triangles' materials.
+    /// Takes a chunk of the stream, in order. `materialBase`: materials of the inputs before this one.
     Result<void> add(const MeshChunk& chunk, uint32_t materialBase);
     /// After the last chunk. `file` for errors. Errors: InvalidInput (a triangle names a vertex that never
     /// came), Io.

@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "builder/memory_plan.h"
+#include "builder/mesh_stream.h"
 #include "viewer/interrupt.h"
 #include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"
@@ -37,7 +39,7 @@ CLI::Validator memoryCheck() {
 }
 
 ColourChoice colourNamed(const std::string& name) {
-    return name == "vertex" ? ColourChoice::Vertex : name == "none" ? ColourChoice::None : ColourChoice::Auto;
+    return name == "vertex" ? ColourChoice::Vertex : name == "texture" ? ColourChoice::Texture : name == "none" ? ColourChoice::None : ColourChoice::Auto;
 }
 
 }  // namespace
@@ -51,13 +53,16 @@ void addBuildSettings(CLI::App& app, BuildSettings& settings) {
                                "0.01% [{:g} cells]", kDefaultErrorCells))
         ->type_name("LENGTH")
         ->check(lengthCheck());
-    app.add_option("--colour,--color", settings.colour, "Colour to keep: auto, vertex or none")
+    app.add_option("--colour,--color", settings.colour, "Colour to keep: auto (all there is), vertex, texture or none")
         ->type_name("WHICH")
         ->capture_default_str()
-        ->check(CLI::IsMember({"auto", "vertex", "none"}));
+        ->check(CLI::IsMember({"auto", "vertex", "texture", "none"}));
     app.add_option("--threads", settings.threads, "Threads that build [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
+    app.add_option("--format", settings.format, fmt::format("Format of meshes whose content does not tell it: {}", fmt::join(meshFormats(), ", ")))
+        ->type_name("NAME")
+        ->check(CLI::IsMember(std::vector<std::string>(meshFormats().begin(), meshFormats().end()), CLI::ignore_case));
     app.add_option("--memory", settings.memory, "Cap on the memory that the build allocates: 512M, 4G, 50% [half of the machine's]")
         ->type_name("BYTES")
         ->check(memoryCheck());
@@ -74,6 +79,7 @@ BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) c
     }
     options.colour = colourNamed(colour);
     options.threads = threads;
+    options.format = format;
     options.memoryBytes = parseMemory(memory, 2 * defaultMemoryBytes()).value_or(0);
     options.temp = temp;
     return options;

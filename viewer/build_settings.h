@@ -15,6 +15,7 @@ struct BuildSettings {
     std::string error;
     std::string colour = "auto";
     unsigned threads = 0;
+    std::string format;
     std::string memory;
     std::string temp;
 

@@ -35,7 +35,8 @@ Json toJson(const BuildReport& report) {
             {"hard_leaves", report.hardLeaves},
             {"cell", report.cell},
             {"error_target", report.errorTarget},
-            {"certified_error_max", report.certifiedErrorMax}};
+            {"certified_error_max", report.certifiedErrorMax},
+            {"warnings", report.warnings}};
 }
 
 std::string summary(const std::string& output, const BuildReport& report) {
@@ -45,6 +46,7 @@ std::string summary(const std::string& output, const BuildReport& report) {
                                    1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
     if (report.degenerateTriangles > 0)
         text += fmt::format("  {} triangles without area were left out\n", formatCount(report.degenerateTriangles));
+    for (const std::string& warning : report.warnings) text += fmt::format("  {}\n", warning);
     text += fmt::format("  {} ({:.1f} bytes a triangle), {} levels, {} subvolumes, {} leaves, {} of them hard\n",
                         formatBytes(report.fileBytes), static_cast<double>(report.fileBytes) / triangles, report.levels,
                         formatCount(report.subvolumes), formatCount(report.leaves), formatCount(report.hardLeaves));
@@ -58,7 +60,8 @@ Json toJson(const BuildEstimate& estimate) {
     return {{"triangles", m.triangles},
             {"degenerate_triangles", m.degenerateTriangles},
             {"vertices", m.vertices},
-            {"colour", m.hasColour},
+            {"vertex_colours", m.hasVertexColours},
+            {"materials", m.hasMaterials},
             {"bounds_min", {m.boundsMin.x, m.boundsMin.y, m.boundsMin.z}},
             {"bounds_max", {m.boundsMax.x, m.boundsMax.y, m.boundsMax.z}},
             {"cell", estimate.frame.cell},
@@ -74,7 +77,7 @@ Json toJson(const BuildEstimate& estimate) {
 std::string summary(const BuildEstimate& estimate) {
     const SoupMeasures& m = estimate.measures;
     std::string text = fmt::format("{} triangles ({} without area), {} vertices, {}\n", formatCount(m.triangles), formatCount(m.degenerateTriangles), formatCount(m.vertices),
-                                   m.hasColour ? "with colour" : "no colour");
+                                   m.hasVertexColours ? "with colours" : m.hasMaterials ? "with materials" : "no colour");
     text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", m.boundsMin.x, m.boundsMin.y, m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
     text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ", formatLength(estimate.frame.cell), estimate.frame.levels);
     text += fmt::format("  memory      at most {}\n", formatBytes(estimate.memoryBytes));
@@ -120,7 +123,7 @@ Result<int> run(const BuildCommand& command) {
 Command addBuild(CLI::App& vcp) {
     auto command = std::make_shared<BuildCommand>();
     CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
-    app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL; several are joined")->type_name("")->required();
+    app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder stands for those in it, - for standard input")->type_name("")->required();
     app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->required();
     addBuildSettings(*app, command->settings);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");

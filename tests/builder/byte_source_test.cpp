@@ -5,8 +5,11 @@
 
 #include <fstream>
 #include <numeric>
+#include <thread>
 
 #include <gtest/gtest.h>
+
+#include "tests/builder/piped_bytes.h"
 
 namespace vcp {
 namespace {
@@ -54,7 +57,7 @@ TEST(ByteSource, AdvancesPastTheWindow) {
     auto source = ByteSource::open(path, 16);
     ASSERT_TRUE(source.ok());
     ASSERT_TRUE(source->window().ok());
-    source->advance(4000);
+    EXPECT_EQ(*source->skip(4000), 4000u);
     EXPECT_EQ(source->window(4)->substr(0, 4), bytes.substr(4000, 4));
     std::filesystem::remove(path);
 }
@@ -96,13 +99,43 @@ TEST(ByteSource, AFileThatShrinksIsAnError) {
     std::filesystem::remove(path);
 }
 
-TEST(ByteSource, ANamedPipeIsRefusedAtOnce) {
+TEST(ByteSource, ReadsANamedPipe) {
     const auto path = std::filesystem::temp_directory_path() / ("vcp_pipe_" + std::to_string(::getpid()));
     ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
-    const auto source = ByteSource::open(path);
-    ASSERT_FALSE(source.ok());
-    EXPECT_EQ(source.error().code, ErrorCode::Io);
+    const std::string bytes = countedBytes(5000);
+    std::thread writer([&] { std::ofstream(path, std::ios::binary) << bytes; });
+    auto source = ByteSource::open(path, 64);
+    EXPECT_TRUE(source.ok());
+    if (source.ok()) {
+        EXPECT_FALSE(source->sizeKnown());
+        EXPECT_EQ(source->fileBytes(), 0u);
+        expectReadsForward(std::move(*source), bytes, 64);
+    }
+    writer.join();
     std::filesystem::remove(path);
+}
+
+TEST(ByteSource, APipeReadsTheSameInAnyWindowAndStep) {
+    const std::string bytes = countedBytes(5000);
+    for (const size_t window : {1, 2, 13, 100, 4096, 100000})
+        for (const size_t step : {1, 7, 100000}) {
+            auto source = test::piped(bytes, step, window);
+            ASSERT_TRUE(source.ok());
+            expectReadsForward(std::move(*source), bytes, window);
+            auto skipped = test::piped(bytes, step, window);
+            EXPECT_EQ(*skipped->skip(4000), 4000u);
+            EXPECT_EQ(skipped->window(4)->substr(0, 4), bytes.substr(4000, 4));
+            EXPECT_EQ(*skipped->skip(4000), 1000u);
+            EXPECT_TRUE(skipped->atEnd());
+        }
+}
+
+TEST(ByteSource, AHugeRequestOnAShortPipeAllocatesOnlyWhatArrives) {
+    auto source = test::piped("short", 5, 16);
+    const auto view = source->window(size_t{1} << 50);
+    ASSERT_TRUE(view.ok());
+    EXPECT_EQ(*view, "short");
+    EXPECT_TRUE(source->sizeKnown());
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "builder/byte_source.h"
 #include "builder/mesh_stream.h"
+#include "tests/builder/piped_bytes.h"
 
 namespace vcp::test {
 
@@ -48,7 +49,9 @@ inline ReadMesh readAll(Result<std::unique_ptr<MeshStream>> stream) {
         EXPECT_EQ(*more, !chunk.positions.empty() || !chunk.triangles.empty());
         EXPECT_TRUE(chunk.colours.empty() || chunk.colours.size() == chunk.positions.size());
         EXPECT_GE((*stream)->bytesRead(), bytesBefore);
-        EXPECT_LE((*stream)->bytesRead(), mesh.info.fileBytes);
+        if (mesh.info.fileBytes > 0) {
+            EXPECT_LE((*stream)->bytesRead(), mesh.info.fileBytes);
+        }
         if (!*more) break;
         bytesBefore = (*stream)->bytesRead();
         mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
@@ -73,6 +76,10 @@ inline ReadMesh readEveryWindow(Opener open, std::string_view bytes) {
         const ReadMesh cut = readAll(open(ByteSource::fromMemory(bytes, "mesh", window)));
         EXPECT_EQ(cut.line(), whole.line()) << "window " << window;
         EXPECT_TRUE(cut.error || cut == whole) << "window " << window;
+        // Through a pipe a wrong count is found later, at the end instead of in the header.
+        const ReadMesh piped = readAll(open(*test::piped(bytes, window, window)));
+        EXPECT_EQ(piped.error.has_value(), whole.error.has_value()) << "piped " << window << ": " << piped.line() << whole.line();
+        EXPECT_TRUE(piped.error || piped == whole) << "piped " << window;
     }
     return whole;
 }

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -7,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "tests/builder/compression.h"
 #include "tests/builder/mesh_reading.h"
 
 namespace vcp {
@@ -65,6 +67,72 @@ TEST_F(OpenMesh, TellsTheFormatByExtensionWhereContentDoesNot) {
     EXPECT_FALSE(mesh.error) << mesh.line();
     EXPECT_NE(errorOf(write("odd.ply", "cstype")).message.find("not a PLY file"), std::string::npos);
     EXPECT_EQ(errorOf(write("odd.stl", "cstype")).element, "header");
+}
+
+TEST_F(OpenMesh, ReadsCompressedFilesWhateverTheName) {
+    for (const std::string& bytes : {kObj, kStl, kPly}) {
+        const ReadMesh plain = readAll(openMesh(write("plain", bytes)));
+        for (const std::string& packed : {test::gzipped(bytes), test::zstandard(bytes)})
+            for (const char* name : {"a.dat", "a.ply.gz", "a.stl"}) {
+                const ReadMesh mesh = readAll(openMesh(write(name, packed)));
+                ASSERT_FALSE(mesh.error) << mesh.line();
+                EXPECT_TRUE(mesh == plain);
+                EXPECT_EQ(mesh.info.fileBytes, packed.size());
+            }
+    }
+    EXPECT_EQ(errorOf(write("empty.ply.gz", test::gzipped(""))).code, ErrorCode::InvalidInput);
+    EXPECT_NE(errorOf(write("b.ply.gz", test::gzipped("cstype"))).message.find("not a PLY file"), std::string::npos);
+    EXPECT_NE(errorOf(write("b.ply", test::gzipped(kPly.substr(0, kPly.size() - 4)))).message.find("after decompression"), std::string::npos);
+}
+
+TEST_F(OpenMesh, TheFormatOfTheOptionsCountsWhereContentDoesNotTell) {
+    const auto odd = write("odd", "cstype bezier\n" + kObj);
+    EXPECT_EQ(errorOf(odd).code, ErrorCode::Unsupported);
+    EXPECT_EQ(readAll(openMesh(odd, {.format = "OBJ"})).info.format, "OBJ");
+    EXPECT_EQ(readAll(openMesh(write("sure", kPly), {.format = "obj"})).info.format, "PLY ASCII");
+    const auto unknown = openMesh(odd, {.format = "3ds"});
+    ASSERT_FALSE(unknown.ok());
+    EXPECT_EQ(unknown.error().code, ErrorCode::Usage);
+}
+
+TEST_F(OpenMesh, ReadsStandardInput) {
+    const auto path = write("input", kStl);
+    const int before = ::dup(STDIN_FILENO);
+    const int file = ::open(path.c_str(), O_RDONLY);
+    ::dup2(file, STDIN_FILENO);
+    const ReadMesh mesh = readAll(openMesh("-"));
+    ::dup2(before, STDIN_FILENO);
+    ::close(file);
+    ::close(before);
+    EXPECT_FALSE(mesh.error) << mesh.line();
+    EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST_F(OpenMesh, BinaryStlIsToldFromAPipe) {
+    std::string bytes(80, 'x');
+    bytes += std::string("\x70\x17\0\0", 4);  // too many for one window
+    for (int facet = 0; facet < 6000; ++facet) {
+        const float v[12] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0};
+        bytes.append(reinterpret_cast<const char*>(v), sizeof v).append(2, '\0');
+    }
+    EXPECT_EQ(readAll(openMesh(write("b.dat", test::gzipped(bytes)))).triangles.size(), 6000u);
+    bytes[84] = 77;  // a normal of no length
+    bytes[87] = 77;
+    EXPECT_EQ(errorOf(write("b.dat", test::gzipped(bytes))).code, ErrorCode::Unsupported);
+    EXPECT_EQ(readAll(openMesh(write("b.stl.gz", test::gzipped(bytes)))).triangles.size(), 6000u);
+}
+
+TEST_F(OpenMesh, AFolderStandsForItsMeshFilesInOrder) {
+    for (const char* name : {"b.PLY", "a.stl.gz", "c.obj", "c.mtl", "readme.txt", "d.zst"}) write(name, kPly);
+    std::filesystem::create_directories(folder_ / "inner.ply");
+    const std::filesystem::path inputs[] = {"first.ply", folder_, "-"};
+    const auto expanded = expandInputs(inputs);
+    ASSERT_TRUE(expanded.ok()) << expanded.error().line();
+    const std::vector<std::filesystem::path> expected{"first.ply", folder_ / "a.stl.gz", folder_ / "b.PLY", folder_ / "c.obj", "-"};
+    EXPECT_EQ(*expanded, expected);
+    const std::filesystem::path empty[] = {folder_ / "inner.ply"};
+    ASSERT_FALSE(expandInputs(empty).ok());
+    EXPECT_EQ(expandInputs(empty).error().code, ErrorCode::InvalidInput);
 }
 
 TEST_F(OpenMesh, WhatCannotBeReadIsOneClearError) {

@@ -1,0 +1,19 @@
+// One primitive of a glTF mesh as a MeshStream, in the coordinates of its mesh.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "builder/gltf_accessor.h"
+#include "builder/mesh_stream.h"
+
+namespace vcp {
+
+/// Vertices first, then triangles. Colours where the primitive has COLOR_0, as stored colours (sRGB); texture
+/// coordinates, as stored, where the primitive names an accessor for them. Not for
+/// primitives that Draco compressed. `document` and `buffers` must outlive the stream, which does not fill its
+/// info(). Errors: InvalidInput (index out of range, not finite), Io; without file where `buffers` cannot know it.
+std::unique_ptr<MeshStream> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers,
+                                              const GltfPrimitive& primitive, const std::filesystem::path& tempFolder);
+}  // namespace vcp
