@@ -270,11 +270,9 @@ private:
         return {};
     }
 
-    [[nodiscard]] bool hasColour() const {
-        const bool vertices = measures_.hasVertexColours && options_.colour != ColourChoice::Texture;
-        const bool materials = measures_.hasMaterials && options_.colour != ColourChoice::Vertex;
-        return options_.colour != ColourChoice::None && (vertices || materials);
-    }
+    [[nodiscard]] bool usesVertexColours() const { return measures_.hasVertexColours && (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Vertex); }
+    [[nodiscard]] bool usesMaterials() const { return measures_.hasMaterials && (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Texture); }
+    [[nodiscard]] bool hasColour() const { return usesVertexColours() || usesMaterials(); }
 
     void describe() {
         report_.triangles = measures_.triangles;
@@ -298,8 +296,8 @@ private:
 
     /// Calls visit(piece) for every triangle of the soup on the lattice, from many threads.
     template <class MakeVisit>
-    Result<void> forLatticeTriangles(const char* stage, double before, double share, MakeVisit&& makeVisit) {
-        const LatticeSnapper snapper(frame_);
+    Result<void> forLatticeTriangles(double before, bool painted, MakeVisit&& makeVisit) {
+        const LatticeSnapper snapper(frame_, colours_ ? &*colours_ : nullptr, usesVertexColours());
         const uint64_t total = soup_->floats.raw().total() + soup_->doubles.raw().total();
         std::atomic<uint64_t> done = 0;
         std::mutex mutex;
@@ -312,9 +310,9 @@ private:
                 auto records = bins.read(blocks[i]);
                 Result<void> here = records ? Result<void>() : Result<void>(records.error());
                 if (records)
-                    for (const auto& t : *records) snapper.add(t, [&](const LatticeTriangle& piece) { if (here) here = visit(piece); });
+                    for (const auto& t : *records) snapper.add(t, [&](const LatticeTriangle& piece) { if (here) here = visit(piece); }, painted);
                 if (here) here = visit.finish();
-                progress(stage, before + share * double(done += blocks[i].records) / double(total));
+                progress("sorting", before + kDealingShare / 2 * double(done += blocks[i].records) / double(total));
                 const std::scoped_lock lock(mutex);
                 if (!here && result) result = here;
             });
@@ -343,7 +341,7 @@ private:
             }
             static Result<void> finish() { return {}; }
         };
-        VCP_TRY(forLatticeTriangles("sorting", kReadingShare, kDealingShare / 2, [&] { return Visit{grid, parts.local()}; }));
+        VCP_TRY(forLatticeTriangles(kReadingShare, false, [&] { return Visit{grid, parts.local()}; }));
         std::map<uint64_t, uint64_t> counts;
         for (Counts& part : parts) {
             for (const auto& [page, count] : part) counts[page] += count;
@@ -355,6 +353,7 @@ private:
 
     Result<void> deal() {
         setUpLevels();
+        if (usesMaterials()) colours_.emplace(soup_->materials, plan_.vertexBytes);
         VCP_TRY(choosePartition());
         pass_ = static_cast<int>(frame_.levels);
         openPass();
@@ -373,10 +372,12 @@ private:
             }
             Result<void> finish() { return batch.flush(); }
         };
-        VCP_TRY(forLatticeTriangles("sorting", kReadingShare + kDealingShare / 2, kDealingShare / 2, [&] { return Visit{grid, finest_, BinBatch(*current_)}; }));
+        VCP_TRY(forLatticeTriangles(kReadingShare + kDealingShare / 2, true, [&] { return Visit{grid, finest_, BinBatch(*current_)}; }));
         VCP_TRY(current_->raw().flush());
         if (current_->raw().total() == 0)
             return Error{.code = ErrorCode::InvalidInput, .message = "all triangles are smaller than 1/2048 cell; use a smaller --cell", .file = options_.inputs.front().string()};
+        if (colours_) report_.warnings.insert(report_.warnings.end(), colours_->warnings().begin(), colours_->warnings().end());
+        colours_.reset();
         auto soup = std::move(soup_);
         VCP_TRY(checkpoint("levels", 0, journal_.active()));
         soup->floats.raw().remove();
@@ -603,6 +604,7 @@ private:
     PagePartition finest_;
     bool partitionRecorded_ = false;
     std::unique_ptr<Soup> soup_;
+    std::optional<MaterialColours> colours_;
     int pass_ = 0;
     size_t firstBin_ = 0;  ///< of the pass that is resumed
     std::unique_ptr<RecordBins<LatticeTriangle>> current_, next_;

@@ -5,48 +5,60 @@
 
 #include "builder/ingest.h"
 #include "builder/lattice_mesh.h"
+#include "builder/material_colours.h"
 #include "builder/soup.h"
 #include "octree/leaf_math.h"
 
 namespace vcp {
 
+/// Where images give the colour, vertices are at most so far apart, in cells: they carry it.
+inline constexpr double kPaintedEdgeCells = 1.5;
+
 /// Snaps triangles to a frame's lattice. Any thread.
 class LatticeSnapper {
 public:
-    explicit LatticeSnapper(const GridFrame& frame) : origin_(frame.origin), scale_(double(kLatticePerCell) / frame.cell) {}
+    /// `colours`: of the soup's materials; null: vertices keep their own. `vertexColours`: whether these count.
+    explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true);
 
     /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; nothing when it has no area on the
     /// lattice. An edge is cut at the same lattice point in every triangle that has it, so no crack opens.
+    /// `painted`: with the materials' colours.
     template <class Real, class Sink>
-    void add(const WorldTriangle<Real>& triangle, Sink&& sink) const {
-        const LatticeTriangle t = snap(triangle);
-        if (isShort(t)) {
-            if (hasArea(t.corner[0], t.corner[1], t.corner[2])) sink(t);
-            return;
-        }
-        LatticeTriangle pieces[4];
-        cutInto(t, pieces, sink);
+    void add(const WorldTriangle<Real>& triangle, Sink&& sink, bool painted = true) const {
+        cutInto(snap(triangle), sink, painted && colours_);
     }
 
 private:
+    /// A triangle on the way, with what its colours are found by.
+    struct Piece {
+        LatticeTriangle triangle;
+        glm::vec2 uv[3];
+        uint32_t material;
+        float footprint;  ///< edge of a cell in texture coordinates
+    };
+
     template <class Real>
-    LatticeTriangle snap(const WorldTriangle<Real>& triangle) const;
-    static bool isShort(const LatticeTriangle& t);
-    /// Cuts each edge that is too long in its middle; returns the number of pieces.
-    static int cut(const LatticeTriangle& t, LatticeTriangle (&pieces)[4]);
+    Piece snap(const WorldTriangle<Real>& triangle) const;
+    [[nodiscard]] bool tooLong(glm::i32vec3 a, glm::i32vec3 b) const;
+    /// Cuts each edge that is too long in its middle; returns the number of pieces, 0 when there is none to cut.
+    int cut(const Piece& piece, Piece (&pieces)[4]) const;
+    void paint(Piece& piece) const;
 
     template <class Sink>
-    static void cutInto(const LatticeTriangle& t, LatticeTriangle (&pieces)[4], Sink& sink) {
-        const int count = cut(t, pieces);
-        if (count == 0 && hasArea(t.corner[0], t.corner[1], t.corner[2])) sink(t);
-        for (int i = 0; i < count; ++i) {
-            LatticeTriangle finer[4];
-            cutInto(pieces[i], finer, sink);
-        }
+    void cutInto(Piece piece, Sink& sink, bool painted) const {
+        Piece pieces[4];
+        const int count = cut(piece, pieces);
+        for (int i = 0; i < count; ++i) cutInto(pieces[i], sink, painted);
+        const LatticeTriangle& t = piece.triangle;
+        if (count > 0 || !hasArea(t.corner[0], t.corner[1], t.corner[2])) return;
+        if (painted) paint(piece);
+        sink(t);
     }
 
     glm::dvec3 origin_;
-    double scale_;
+    double scale_, longest_;
+    MaterialColours* colours_;
+    bool vertexColours_;
 };
 
 }  // namespace vcp
