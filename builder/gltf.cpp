@@ -42,12 +42,14 @@ public:
           folder_(folder),
           options_(options),
           document_(std::move(document)),
-          buffers_(document_, name_, std::move(folder), std::move(binary)),
-          placements_(placementsOf(document_)) {}
+          buffers_(document_, name_, std::move(folder), std::move(binary)) {}
 
     Result<void> begin(std::string format, uint64_t fileBytes) {
         info_.format = std::move(format);
         info_.fileBytes = fileBytes;
+        auto placements = placementsOf(document_);
+        if (!placements) return named(placements.error());
+        placements_ = *std::move(placements);
         for (const std::string& warning : document_.warnings) warnings_.push_back(name_ + ": " + warning);
         planColours();
         VCP_TRY(planMaterials());
@@ -176,12 +178,12 @@ private:
             vertices += here * times;
             faces += (primitive.mode == GltfMode::Triangles ? corners / 3 : std::max<uint64_t>(corners, 2) - 2) * times;
             tooMany = vertices > kMost || faces > kMost;
-            known = known && !primitive.draco;
-            facesKnown = facesKnown && primitive.mode != GltfMode::Strip;
+            known = known && !primitive.draco && !isRange(document_, primitive);
+            facesKnown = facesKnown && !primitive.draco && primitive.mode != GltfMode::Strip;
         });
         if (tooMany) return Error{.code = ErrorCode::Limit, .message = "its instances make more than 2^48 vertices or triangles", .file = name_};
         if (known) info_.vertices = vertices;
-        if (known && facesKnown) info_.faces = faces;
+        if (facesKnown) info_.faces = faces;
         return {};
     }
 
@@ -219,7 +221,9 @@ private:
             GltfPrimitive wanted = primitive;
             if (!hasImage(primitive)) wanted.uv.reset();
             if (!info_.hasColour) wanted.colour.reset();
-            part_ = openGltfPrimitive(document_, buffers_, wanted, options_.tempFolder);
+            auto part = openGltfPrimitive(document_, buffers_, wanted, options_.tempFolder);
+            if (!part) return named(part.error());
+            part_ = *std::move(part);
             return {};
         }
         DracoSelection selection{.byIdentifier = true, .position = *primitive.draco->position, .colour = primitive.draco->colour, .uv = std::nullopt, .linearColour = true};

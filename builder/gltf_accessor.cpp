@@ -62,7 +62,7 @@ Result<RandomBytes*> GltfBuffers::open(uint32_t number) {
             return wrong(folder_.empty() ? "lies in another file, but standard input has no folder; use a GLB"
                                          : "its URI names no file in the folder of the glTF file");
         auto bytes = openRandomBytes(*path);
-        if (!bytes) return bytes.error();
+        if (!bytes) return wrong(fmt::format("its file {}: {}", path->string(), bytes.error().message));
         opened = *std::move(bytes);
         file = path->string();
     }
@@ -130,6 +130,10 @@ Result<void> GltfAccessorReader::applySparse(size_t count, std::vector<double>& 
         if (index >= next_ + count) return {};
         if (lastSparse_ && index <= *lastSparse_) return sparseError("its sparse indices are not in increasing order");
         lastSparse_ = index;
+        if (index < next_) {  // of what was skipped
+            ++sparseUsed_;
+            continue;
+        }
         const uint64_t number = sparseRead_ - sparseIndices_.size() + sparseUsed_;
         VCP_TRY(buffers_.read(sparse.valueView, sparse.valueOffset + number * value.size(), value.data(), value.size(), element_));
         decode(value.data(), value.size(), 1, out.data() + (index - next_) * accessor_.components);

@@ -39,6 +39,9 @@ public:
     [[nodiscard]] uint64_t left() const { return accessor_.count - next_; }
     [[nodiscard]] uint32_t components() const { return accessor_.components; }
 
+    /// Goes on at a later element; precondition: `count` <= left().
+    void skip(uint64_t count) { next_ += count; }
+
     /// Replaces `out` by the next values, component by component: at most `most` elements, at least one unless none
     /// are left. Integers are exact; normalized ones are scaled to 0..1 or -1..1. Errors: as GltfBuffers::read();
     /// InvalidInput where sparse indices are not in order.

@@ -293,8 +293,6 @@ private:
             const bool right = child.is_number_unsigned() && child.get<uint64_t>() < nodeCount_;
             if (!right) return f.fail("names a child that does not exist");
             const auto number = child.get<uint32_t>();
-            if (hasParent_[number] || number == document_.nodes.size())
-                return f.fail(fmt::format("node {} has two parents, or is its own; nodes must form trees", number));
             hasParent_[number] = true;
             node.children.push_back(number);
         }
@@ -344,8 +342,6 @@ private:
         node.instancing = instancing;
     }
 
-    // Every node has one parent at most; a ring of nodes has no root, so no scene can reach it except by naming a
-    // node in it, which is refused here.
     void readRoots() {
         const std::string top = "glTF";
         const JsonFields f(json_, top, check_);
@@ -359,13 +355,10 @@ private:
         const size_t number = f.index("scene", scenes->size()).value_or(0);
         const JsonFields scene((*scenes)[number], where_, check_);
         const Json* const roots = scene.array("nodes");
-        std::vector<bool> named(nodeCount_, false);
         for (size_t i = 0; roots && i < roots->size(); ++i) {
             const Json& root = (*roots)[i];
             if (!root.is_number_unsigned() || root.get<uint64_t>() >= nodeCount_) return scene.fail("names a node that does not exist");
             const auto node = root.get<uint32_t>();
-            if (hasParent_[node] || named[node]) return scene.fail(fmt::format("node {} is not a root, or is named twice", node));
-            named[node] = true;
             document_.roots.push_back(node);
         }
     }

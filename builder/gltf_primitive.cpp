@@ -28,7 +28,28 @@ public:
         if (primitive.colour) colours_.emplace(document, buffers, *primitive.colour);
         if (primitive.uv) uvValues_.emplace(document, buffers, *primitive.uv);
         if (primitive.indices) indices_.emplace(document, buffers, *primitive.indices);
+        vertexEnd_ = vertices_;
         corners_ = primitive.indices ? document.accessors[*primitive.indices].count : vertices_;
+    }
+
+    // Finds the range of the vertices that are named.
+    Result<void> narrow() {
+        uint64_t least = vertices_, most = 0;
+        GltfAccessorReader indices = *indices_;
+        while (indices.left() > 0) {
+            VCP_TRY(indices.read(kElements, values_));
+            for (const double value : values_) {
+                least = std::min(least, static_cast<uint64_t>(value));
+                most = std::max(most, static_cast<uint64_t>(value));
+            }
+        }
+        if (most >= vertices_ || least > most) return {};  // reported when they are read in earnest
+        firstVertex_ = least;
+        vertexEnd_ = most + 1;
+        positions_.skip(firstVertex_);
+        if (colours_) colours_->skip(firstVertex_);
+        if (uvValues_) uvValues_->skip(firstVertex_);
+        return {};
     }
 
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
@@ -37,7 +58,7 @@ public:
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();
         while (hasRoom(chunk)) {
-            if (positions_.left() > 0)
+            if (nextVertex() < vertexEnd_)
                 VCP_TRY(readVertices(chunk));
             else if (corner_ < corners_)
                 VCP_TRY(readCorners(chunk));
@@ -48,9 +69,11 @@ public:
     }
 
 private:
+    [[nodiscard]] uint64_t nextVertex() const { return vertices_ - positions_.left(); }
+
     Result<void> readVertices(MeshChunk& chunk) {
-        const uint64_t first = vertices_ - positions_.left();
-        VCP_TRY(positions_.read(kElements, values_));
+        const uint64_t first = nextVertex();
+        VCP_TRY(positions_.read(std::min<uint64_t>(kElements, vertexEnd_ - first), values_));
         const size_t count = values_.size() / 3;
         for (size_t i = 0; i < count; ++i) {
             const glm::dvec3 position(values_[3 * i], values_[3 * i + 1], values_[3 * i + 2]);
@@ -88,8 +111,9 @@ private:
     }
 
     Result<void> takeCorner(uint64_t vertex, MeshChunk& chunk) {
-        if (vertex >= vertices_)
+        if (vertex < firstVertex_ || vertex >= vertexEnd_)
             return wrong(*primitive_.indices, fmt::format("index {} names vertex {}, but there are only {}", corner_, vertex, vertices_));
+        vertex -= firstVertex_;
         switch (primitive_.mode) {
             case GltfMode::Triangles:
                 if (corner_ % 3 == 2) VCP_TRY(emit(first_, last_, vertex, chunk));
@@ -137,6 +161,8 @@ private:
     std::optional<GltfAccessorReader> colours_, uvValues_, indices_;
     UvArray uvs_;
     std::vector<double> values_;
+    uint64_t firstVertex_ = 0;  // of those that are read
+    uint64_t vertexEnd_ = 0;
     uint64_t corners_ = 0;
     uint64_t corner_ = 0;  // the next one
     uint64_t first_ = 0;   // the last corner but one; of a fan its first
@@ -145,9 +171,15 @@ private:
 
 }  // namespace
 
-std::unique_ptr<MeshStream> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers, const GltfPrimitive& primitive,
+bool isRange(const GltfDocument& document, const GltfPrimitive& primitive) {
+    return primitive.indices && document.accessors[*primitive.indices].count < document.accessors[primitive.position].count;
+}
+
+Result<std::unique_ptr<MeshStream>> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers, const GltfPrimitive& primitive,
                                               const std::filesystem::path& tempFolder) {
-    return std::make_unique<PrimitiveStream>(document, buffers, primitive, tempFolder);
+    auto stream = std::make_unique<PrimitiveStream>(document, buffers, primitive, tempFolder);
+    if (isRange(document, primitive)) VCP_TRY(stream->narrow());
+    return std::unique_ptr<MeshStream>(std::move(stream));
 }
 
 }  // namespace vcp

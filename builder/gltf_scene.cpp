@@ -3,27 +3,35 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
 namespace vcp {
 
-std::vector<GltfPlacement> placementsOf(const GltfDocument& document) {
+Result<std::vector<GltfPlacement>> placementsOf(const GltfDocument& document) {
     struct Visit {
         uint32_t node;
+        size_t depth;
         glm::dmat4 worldFromParent;
     };
+    constexpr size_t kMostNodes = size_t{1} << 21;
+    size_t visited = 0;
     std::vector<Visit> stack;
     const glm::dmat4 world = glm::translate(glm::dmat4(1), document.centre);
-    for (auto root = document.roots.rbegin(); root != document.roots.rend(); ++root) stack.push_back({*root, world});
+    for (auto root = document.roots.rbegin(); root != document.roots.rend(); ++root) stack.push_back({*root, 1, world});
     std::vector<GltfPlacement> placements;
     while (!stack.empty()) {
         const Visit visit = stack.back();
         stack.pop_back();
+        if (visit.depth > document.nodes.size())
+            return Error{.code = ErrorCode::InvalidInput, .message = "is its own ancestor", .element = fmt::format("node {}", visit.node)};
+        if (++visited + stack.size() > kMostNodes)
+            return Error{.code = ErrorCode::Limit, .message = fmt::format("its scene shows more than {} nodes", kMostNodes)};
         const GltfNode& node = document.nodes[visit.node];
         const glm::dmat4 worldFromNode = visit.worldFromParent * node.local;
         if (node.mesh && !document.meshes[*node.mesh].primitives.empty()) placements.push_back({*node.mesh, visit.node, worldFromNode});
-        for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) stack.push_back({*child, worldFromNode});
+        for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) stack.push_back({*child, visit.depth + 1, worldFromNode});
     }
     // Files without nodes show each mesh once.
     if (document.nodes.empty())

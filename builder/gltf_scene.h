@@ -16,8 +16,10 @@ struct GltfPlacement {
     glm::dmat4 worldFromNode{1};
 };
 
-/// The nodes with a mesh, depth first, in the order of the file.
-std::vector<GltfPlacement> placementsOf(const GltfDocument& document);
+/// The nodes with a mesh, depth first, in the order of the file. A node with several parents, which glTF does not
+/// allow but some exporters write, is shown once for each. Errors, without file: InvalidInput (a ring of nodes), Limit
+/// (more than 2^21 nodes so).
+Result<std::vector<GltfPlacement>> placementsOf(const GltfDocument& document);
 
 /// The transforms of EXT_mesh_gpu_instancing, one after another; a single identity without.
 class GltfInstances {

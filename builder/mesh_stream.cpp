@@ -77,7 +77,7 @@ Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, 
     if (format == "drc") return openDraco(*std::move(source), options.decoderBytes);
     if (format == "gltf" || format == "glb") return openGltf(*std::move(source), path, options);
     if (format == "off") return openOff(*std::move(source));
-    if (format == "obj") return openObj(*std::move(source));
+    if (format == "obj") return openObj(*std::move(source), path, options);
     return unknownFormat(*source);
 }
 

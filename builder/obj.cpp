@@ -10,6 +10,7 @@
 
 #include "builder/chunk_room.h"
 #include "builder/number_text.h"
+#include "builder/obj_materials.h"
 
 namespace vcp {
 namespace {
@@ -41,7 +42,8 @@ struct VertexNumbers {
 
 class ObjStream final : public MeshStream {
 public:
-    explicit ObjStream(ByteSource source) : source_(std::move(source)) {
+    ObjStream(ByteSource source, const std::filesystem::path& path, const MeshOpenOptions& options)
+        : source_(std::move(source)), materials_(path, options) {
         info_.format = "OBJ";
         info_.fileBytes = source_.fileBytes();
         // The shortest vertex is "v 0 0 0\n".
@@ -55,11 +57,17 @@ public:
         if (text->starts_with("\xFF\xFE") || text->starts_with("\xFE\xFF"))
             return source_.error(ErrorCode::Unsupported, "", 0, "is UTF-16 text; save it as UTF-8 or ASCII");
         if (text->starts_with(kUtf8Mark)) source_.advance(kUtf8Mark.size());
-        return lookForColours();
+        VCP_TRY(lookForColours());
+        materials_.begin();
+        info_.hasMaterials = materials_.active();
+        return {};
     }
 
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
     [[nodiscard]] uint64_t bytesRead() const override { return source_.fileBytesRead(); }
+
+    [[nodiscard]] std::span<const Material> materials() const override { return materials_.materials(); }
+    [[nodiscard]] std::span<const std::string> warnings() const override { return materials_.warnings(); }
 
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();
@@ -98,18 +106,20 @@ private:
         begin_ = start->data();
         end_ = begin_ + start->size();
         bool first = true;
+        bool done = false;  // with the vertices
         for (const char* p = begin_; p != end_;) {
             const char* const word = skipBlanks(p, end_);
-            if (end_ - word >= 2 && word[0] == 'v' && isBlank(word[1])) {
+            if (const char* const names = afterKeyword(word, "mtllib")) materials_.addLibrary({names, static_cast<size_t>(lineEnd(names) - names)});
+            if (!done && end_ - word >= 2 && word[0] == 'v' && isBlank(word[1])) {
                 VertexNumbers numbers;
                 const char* q = word + 1;
-                if (!readNumbers(q, numbers)) break;  // reported when it is read in earnest
-                if (first) info_.hasColour = numbers.hasColour();
+                done = !readNumbers(q, numbers);  // reported when it is read in earnest
+                if (first && !done) info_.hasColour = numbers.hasColour();
                 first = false;
-                if (!info_.hasColour) break;
-                if (numbers.hasColour() && std::any_of(numbers.colour(), numbers.colour() + 3, isAboveOne)) {
+                done = done || !info_.hasColour;
+                if (!done && numbers.hasColour() && std::any_of(numbers.colour(), numbers.colour() + 3, isAboveOne)) {
                     colourScale_ = 1.0;
-                    break;
+                    done = true;
                 }
                 p = q;
             }
@@ -117,6 +127,7 @@ private:
             if (p != end_) ++p;
         }
         line_ = 1;
+        lookedAtBytes_ = byteAt(end_);
         return {};
     }
 
@@ -142,11 +153,36 @@ private:
         } else if (end_ - p >= 2 && p[0] == 'f' && isBlank(p[1])) {
             ++p;
             VCP_TRY(readFace(p, chunk));
+        } else if (materials_.active()) {
+            VCP_TRY(readPaint(p));
         }
         p = lineEnd(p);
         if (p != end_) {
             ++p;
             ++line_;
+        }
+        return {};
+    }
+
+    // Where the word `keyword` ends, or nullptr when another stands at p.
+    const char* afterKeyword(const char* p, std::string_view keyword) const {
+        const auto left = static_cast<size_t>(end_ - p);
+        if (left <= keyword.size() || std::string_view(p, keyword.size()) != keyword || !isBlank(p[keyword.size()])) return nullptr;
+        return p + keyword.size();
+    }
+
+    // `vt`, `usemtl`, and an `mtllib` that comes too late to count.
+    Result<void> readPaint(const char*& p) {
+        const char* const end = lineEnd(p);
+        if (const char* const name = afterKeyword(p, "usemtl")) {
+            materials_.use({name, static_cast<size_t>(end - name)});
+        } else if (const char* const library = afterKeyword(p, "mtllib")) {
+            if (byteAt(p) >= lookedAtBytes_) materials_.addLibrary({library, static_cast<size_t>(end - library)});
+        } else if (const char* q = afterKeyword(p, "vt"); q && materials_.hasImages()) {
+            VertexNumbers numbers;
+            if (!readNumbers(q, numbers)) return wrong(q, shownWord(q, end_) + " is not a number");
+            p = q;
+            return materials_.addUv(numbers.values[0], numbers.values[1]);
         }
         return {};
     }
@@ -215,18 +251,22 @@ private:
         ++faces_;
         uint64_t first = 0;
         uint64_t last = 0;
+        std::array<std::optional<uint64_t>, 3> uvs;  // of the first corner, the last and this one
         for (size_t corner = 0; toWord(p); ++corner) {
             uint64_t vertex = 0;
-            VCP_TRY(readCorner(p, vertex));
+            VCP_TRY(readCorner(p, vertex, uvs[2]));
             if (corner == 0) first = vertex;
+            if (corner == 0) uvs[0] = uvs[2];
             if (corner > 1) chunk.triangles.push_back({first, last, vertex});
+            if (corner > 1 && materials_.active()) VCP_TRY(materials_.paint(uvs, chunk));
             last = vertex;
+            uvs[1] = uvs[2];
         }
         return {};
     }
 
-    // v, v/t, v//n or v/t/n; only v matters.
-    Result<void> readCorner(const char*& p, uint64_t& vertex) {
+    // v, v/t, v//n or v/t/n; n does not matter, and t only for images.
+    Result<void> readCorner(const char*& p, uint64_t& vertex, std::optional<uint64_t>& uv) {
         int64_t number = 0;
         const char* stop = parseInteger(p, end_, number);
         if (!stop || !(endsWord(stop) || *stop == '/'))
@@ -240,9 +280,19 @@ private:
             promisedLine_ = line_;
             promisedByte_ = byteAt(p);
         }
+        uv = materials_.hasImages() && stop != end_ && *stop == '/' ? uvNumber(stop + 1) : std::nullopt;
         while (!endsWord(stop)) ++stop;
         p = stop;
         return {};
+    }
+
+    // The number after the slash, from 0; nothing where there is none, or none yet.
+    std::optional<uint64_t> uvNumber(const char* p) const {
+        int64_t number = 0;
+        if (!parseInteger(p, end_, number)) return std::nullopt;
+        const auto seen = static_cast<int64_t>(materials_.uvCount());
+        if (number == 0 || number < -seen || number > seen) return std::nullopt;
+        return static_cast<uint64_t>(number > 0 ? number - 1 : seen + number);
     }
 
     Error noSuchVertex(const char* p, int64_t number) const {
@@ -265,6 +315,8 @@ private:
 
     ByteSource source_;
     MeshInfo info_;
+    ObjMaterials materials_;
+    uint64_t lookedAtBytes_ = 0;  // the start of the file, where colours and materials are decided
     double colourScale_ = 255.0;  // from the file's colours to 0..255
     uint64_t mostVertices_ = 0;
 
@@ -298,8 +350,10 @@ bool looksLikeObj(std::string_view start) {
     return false;
 }
 
-Result<std::unique_ptr<MeshStream>> openObj(ByteSource source) {
-    auto stream = std::make_unique<ObjStream>(std::move(source));
+Result<std::unique_ptr<MeshStream>> openObj(ByteSource source) { return openObj(std::move(source), {}, {}); }
+
+Result<std::unique_ptr<MeshStream>> openObj(ByteSource source, const std::filesystem::path& path, const MeshOpenOptions& options) {
+    auto stream = std::make_unique<ObjStream>(std::move(source), path, options);
     VCP_TRY(stream->begin());
     return std::unique_ptr<MeshStream>(std::move(stream));
 }

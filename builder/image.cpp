@@ -1,0 +1,138 @@
+#include "builder/image.h"
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <jpeglib.h>
+#include <png.h>
+
+#include "builder/random_bytes.h"
+
+namespace vcp {
+namespace {
+
+Error damaged(const char* format, std::string detail) {
+    for (char& c : detail)
+        if (c < ' ' || c > '~') c = '?';
+    return {.code = ErrorCode::InvalidInput, .message = fmt::format("the {} picture is damaged ({})", format, detail)};
+}
+
+Result<void> checkSize(uint64_t width, uint64_t height, const ImageLimits& limits) {
+    if (width > 0 && height > 0 && width <= limits.edge && height <= limits.edge && width * height * sizeof(Rgba8) <= limits.bytes) return {};
+    return Error{.code = ErrorCode::Limit,
+                 .message = fmt::format("a picture of {} by {} texels; at most {} an edge and {} MiB are read", width, height, limits.edge, limits.bytes >> 20)};
+}
+
+Result<Image> decodePng(std::string_view file, const ImageLimits& limits) {
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    const auto fail = [&]() {
+        Error error = damaged("PNG", png.message);
+        png_image_free(&png);
+        return error;
+    };
+    if (!png_image_begin_read_from_memory(&png, file.data(), file.size())) return fail();
+    if (const auto fits = checkSize(png.width, png.height, limits); !fits) {
+        png_image_free(&png);
+        return fits.error();
+    }
+    png.format = PNG_FORMAT_RGBA;
+    Image image{png.width, png.height, std::vector<Rgba8>(size_t{png.width} * png.height)};
+    if (!png_image_finish_read(&png, nullptr, image.texels.data(), 0, nullptr)) return fail();
+    return image;
+}
+
+// libjpeg reports an error by a call that must not return.
+struct JpegFailure {
+    jpeg_error_mgr base;
+    std::jmp_buf back;
+    char message[JMSG_LENGTH_MAX];
+};
+
+extern "C" {
+void vcpJpegFailed(j_common_ptr info) {
+    auto* const failure = reinterpret_cast<JpegFailure*>(info->err);
+    info->err->format_message(info, failure->message);
+    std::longjmp(failure->back, 1);
+}
+void vcpJpegSilent(j_common_ptr) {}
+// A warning (truncated or damaged data) counts as damage. Traces have levels of 0 and more.
+void vcpJpegWarned(j_common_ptr info, int level) {
+    if (level < 0) vcpJpegFailed(info);
+}
+}
+
+// No object with a destructor lives in this function, since errors jump out of libjpeg back into it. `image` is
+// allocated by `prepare`, which returns false to stop.
+template <class Prepare>
+bool runJpeg(std::string_view file, jpeg_decompress_struct& jpeg, JpegFailure& failure, Image& image, Prepare prepare) {
+    if (setjmp(failure.back)) return false;
+    jpeg_create_decompress(&jpeg);
+    jpeg.mem->max_memory_to_use = 256L << 20;
+    jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(file.data()), static_cast<unsigned long>(file.size()));
+    jpeg_read_header(&jpeg, TRUE);
+    if (!prepare()) return false;
+    jpeg.out_color_space = JCS_EXT_RGBA;
+    jpeg_start_decompress(&jpeg);
+    while (jpeg.output_scanline < jpeg.output_height) {
+        JSAMPROW row = reinterpret_cast<JSAMPROW>(image.texels.data() + size_t{jpeg.output_scanline} * image.width);
+        jpeg_read_scanlines(&jpeg, &row, 1);
+    }
+    jpeg_finish_decompress(&jpeg);
+    return true;
+}
+
+Result<Image> decodeJpeg(std::string_view file, const ImageLimits& limits) {
+    jpeg_decompress_struct jpeg{};
+    JpegFailure failure{};
+    jpeg.err = jpeg_std_error(&failure.base);
+    failure.base.error_exit = vcpJpegFailed;
+    failure.base.emit_message = vcpJpegWarned;
+    failure.base.output_message = vcpJpegSilent;
+    Image image;
+    std::optional<Error> refused;
+    const bool done = runJpeg(file, jpeg, failure, image, [&] {
+        if (const auto fits = checkSize(jpeg.image_width, jpeg.image_height, limits); !fits) refused = fits.error();
+        if (jpeg.jpeg_color_space == JCS_CMYK || jpeg.jpeg_color_space == JCS_YCCK)
+            refused = Error{.code = ErrorCode::Unsupported, .message = "a JPEG picture in CMYK; save it as RGB"};
+        if (refused) return false;
+        image = {jpeg.image_width, jpeg.image_height, std::vector<Rgba8>(size_t{jpeg.image_width} * jpeg.image_height)};
+        return true;
+    });
+    jpeg_destroy_decompress(&jpeg);
+    if (refused) return *refused;
+    if (!done) return damaged("JPEG", failure.message);
+    return image;
+}
+
+}  // namespace
+
+Result<Image> decodeImage(std::string_view file, const ImageLimits& limits) {
+    if (file.starts_with("\x89PNG")) return decodePng(file, limits);
+    if (file.starts_with("\xFF\xD8")) return decodeJpeg(file, limits);
+    return Error{.code = ErrorCode::Unsupported, .message = "the picture is neither PNG nor JPEG"};
+}
+
+Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits) {
+    if (source.bytes) return decodeImage(*source.bytes, limits);
+    auto bytes = openRandomBytes(source.path);
+    if (!bytes) return bytes.error();
+    const auto named = [&](Error error) {
+        error.file = source.path.string();
+        return error;
+    };
+    const uint64_t size = (*bytes)->size();
+    if (size > limits.fileBytes) return named({.code = ErrorCode::Limit, .message = fmt::format("a picture file of more than {} MiB", limits.fileBytes >> 20)});
+    std::string file(size, '\0');
+    if (const auto read = (*bytes)->read(0, file.data(), file.size()); !read) return named(read.error());
+    auto image = decodeImage(file, limits);
+    if (!image) return named(image.error());
+    return image;
+}
+
+}  // namespace vcp
