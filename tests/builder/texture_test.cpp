@@ -1,0 +1,190 @@
+#include "builder/texture.h"
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <jpeglib.h>
+#include <png.h>
+
+#include "builder/colour_encoding.h"
+#include "tests/viewer/test_folder.h"
+
+namespace vcp {
+namespace {
+
+Rgba8 rgba(unsigned r, unsigned g, unsigned b, unsigned a = 255) { return r | g << 8 | b << 16 | a << 24; }
+
+Image noise(uint32_t width, uint32_t height, unsigned seed) {
+    std::mt19937 random(seed);
+    Image image{width, height, {}};
+    for (uint32_t i = 0; i < width * height; ++i) image.texels.push_back(static_cast<Rgba8>(random()) | 0xFF000000);
+    return image;
+}
+
+std::string pngOf(const Image& image) {
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    png.width = image.width;
+    png.height = image.height;
+    png.format = PNG_FORMAT_RGBA;
+    png_alloc_size_t bytes = 0;
+    png_image_write_to_memory(&png, nullptr, &bytes, 0, image.texels.data(), 0, nullptr);
+    std::string file(bytes, '\0');
+    png_image_write_to_memory(&png, file.data(), &bytes, 0, image.texels.data(), 0, nullptr);
+    file.resize(bytes);
+    return file;
+}
+
+std::string jpegOf(const Image& image, bool progressive) {
+    jpeg_compress_struct jpeg{};
+    jpeg_error_mgr errors{};
+    jpeg.err = jpeg_std_error(&errors);
+    jpeg_create_compress(&jpeg);
+    unsigned char* data = nullptr;
+    unsigned long bytes = 0;
+    jpeg_mem_dest(&jpeg, &data, &bytes);
+    jpeg.image_width = image.width;
+    jpeg.image_height = image.height;
+    jpeg.input_components = 4;
+    jpeg.in_color_space = JCS_EXT_RGBA;
+    jpeg_set_defaults(&jpeg);
+    jpeg_set_quality(&jpeg, 95, TRUE);
+    if (progressive) jpeg_simple_progression(&jpeg);
+    jpeg_start_compress(&jpeg, TRUE);
+    while (jpeg.next_scanline < jpeg.image_height) {
+        auto* row = const_cast<JSAMPROW>(reinterpret_cast<const JSAMPLE*>(image.texels.data() + jpeg.next_scanline * image.width));
+        jpeg_write_scanlines(&jpeg, &row, 1);
+    }
+    jpeg_finish_compress(&jpeg);
+    std::string file(reinterpret_cast<const char*>(data), bytes);
+    jpeg_destroy_compress(&jpeg);
+    std::free(data);
+    return file;
+}
+
+TEST(Image, DecodesPngExactlyAndJpegNearly) {
+    const Image image = noise(37, 11, 1);
+    const auto png = decodeImage(pngOf(image));
+    ASSERT_TRUE(png.ok()) << png.error().line();
+    EXPECT_EQ(png->texels, image.texels);
+    Image flat{32, 8, std::vector<Rgba8>(256, rgba(200, 100, 50))};
+    for (const bool progressive : {false, true}) {
+        const auto jpeg = decodeImage(jpegOf(flat, progressive));
+        ASSERT_TRUE(jpeg.ok()) << jpeg.error().line();
+        ASSERT_EQ(jpeg->texels.size(), 256u);
+        EXPECT_NEAR(jpeg->texels[77] & 0xFF, 200, 3);
+        EXPECT_NEAR(jpeg->texels[77] >> 16 & 0xFF, 50, 3);
+        EXPECT_EQ(jpeg->texels[77] >> 24, 255u);
+    }
+}
+
+TEST(Image, EveryTruncationIsAnError) {
+    const Image image = noise(16, 16, 2);
+    for (const std::string& file : {pngOf(image), jpegOf(image, false), jpegOf(image, true)})
+        for (size_t kept = 0; kept + 12 < file.size(); ++kept) EXPECT_FALSE(decodeImage(file.substr(0, kept)).ok()) << kept << " of " << file.size();
+}
+
+TEST(Image, FlippedBytesAreReadOrRefused) {
+    const Image image = noise(16, 16, 3);
+    std::mt19937 random(4);
+    size_t refused = 0;
+    for (const std::string& file : {pngOf(image), jpegOf(image, false), jpegOf(image, true)})
+        for (int i = 0; i < 300; ++i) {
+            std::string broken = file;
+            broken[random() % broken.size()] ^= static_cast<char>(1 + random() % 255);
+            const auto decoded = decodeImage(broken, {.edge = 4096, .bytes = 1 << 24, .fileBytes = 1 << 24});
+            refused += !decoded.ok();
+            if (!decoded.ok()) {
+                EXPECT_EQ(decoded.error().line().find('\n'), std::string::npos);
+            }
+        }
+    EXPECT_GT(refused, 100u);
+}
+
+TEST(Image, LimitsHoldBeforeTexelsAreAllocated) {
+    const std::string file = pngOf(noise(100, 10, 5));
+    EXPECT_EQ(decodeImage(file, {.edge = 99, .bytes = 1 << 20, .fileBytes = 1 << 20}).error().code, ErrorCode::Limit);
+    EXPECT_EQ(decodeImage(file, {.edge = 100, .bytes = 3999, .fileBytes = 1 << 20}).error().code, ErrorCode::Limit);
+    EXPECT_TRUE(decodeImage(file, {.edge = 100, .bytes = 4000, .fileBytes = 1 << 20}).ok());
+    EXPECT_EQ(decodeImage("GIF89a").error().code, ErrorCode::Unsupported);
+}
+
+TEST(Texture, SamplesTexelCentresExactly) {
+    const Image image = noise(5, 3, 6);
+    const Texture texture(image);
+    for (uint32_t y = 0; y < 3; ++y)
+        for (uint32_t x = 0; x < 5; ++x) {
+            const glm::vec2 centre((float(x) + 0.5f) / 5, (float(y) + 0.5f) / 3);
+            const Rgba8 got = texture.sample(centre, 0), expected = image.texels[y * 5 + x];
+            for (int shift = 0; shift < 32; shift += 8) EXPECT_NEAR(got >> shift & 0xFF, expected >> shift & 0xFF, 1) << x << ' ' << y;
+        }
+}
+
+TEST(Texture, BlendsLightNotBytes) {
+    const Texture texture(Image{2, 1, {rgba(0, 0, 0), rgba(255, 255, 255)}}, Wrap::Clamp, Wrap::Clamp);
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, 0) & 0xFF, 188u);  // half the light
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, 10) & 0xFF, 188u) << "the coarsest level";
+}
+
+TEST(Texture, WrapModes) {
+    const Image image{2, 1, {rgba(255, 0, 0), rgba(0, 0, 255)}};
+    const auto at = [&](float u, Wrap wrap) { return Texture(image, wrap, wrap).sample({u, 0.5f}, 0); };
+    for (const float period : {-2.0f, 0.0f, 6.0f}) {
+        EXPECT_EQ(at(0.25f + period, Wrap::Repeat), rgba(255, 0, 0));
+        EXPECT_EQ(at(0.25f + period, Wrap::Mirror), rgba(255, 0, 0));
+        EXPECT_EQ(at(1.25f + period, Wrap::Repeat), rgba(255, 0, 0));
+        EXPECT_EQ(at(1.25f + period, Wrap::Mirror), rgba(0, 0, 255));
+    }
+    EXPECT_EQ(at(-7, Wrap::Clamp), rgba(255, 0, 0));
+    EXPECT_EQ(at(7, Wrap::Clamp), rgba(0, 0, 255));
+    for (const float far : {1e30f, -3e38f}) EXPECT_NE(at(far, Wrap::Repeat), 0u) << "finite, however far";
+}
+
+TEST(Texture, EveryLevelKeepsTheMeanLight) {
+    for (const auto& [width, height] : {std::pair{64u, 64u}, {37u, 5u}, {1u, 9u}, {255u, 3u}}) {
+        const Image image = noise(width, height, width);
+        double mean = 0;
+        for (const Rgba8 texel : image.texels) mean += srgbToLinear((texel & 0xFF) / 255.0) / double(image.texels.size());
+        const Rgba8 coarsest = Texture(image).sample({0.5f, 0.5f}, 1e9f);
+        EXPECT_NEAR(coarsest & 0xFF, linearToSrgb(mean) * 255, 2) << width << " by " << height;
+    }
+}
+
+TEST(Texture, WhatIsTransparentLendsNoColour) {
+    const Texture texture(Image{2, 1, {rgba(255, 0, 0, 255), rgba(0, 255, 0, 0)}}, Wrap::Clamp, Wrap::Clamp);
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, 0), rgba(255, 0, 0, 128));
+}
+
+TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
+    std::vector<Material> materials(4);
+    for (unsigned i = 0; i < 3; ++i) {
+        materials[i].name = std::to_string(i);
+        materials[i].image.bytes = std::make_shared<const std::string>(pngOf(Image{16, 16, std::vector<Rgba8>(256, rgba(i, i, i))}));
+    }
+    materials[3].name = "broken";
+    materials[3].image.path = "/nowhere/picture.png";
+    TextureCache cache(3000);  // two of 1364 bytes
+    for (const uint32_t number : {0, 1, 0, 2, 1, 0}) {
+        const Texture* const texture = cache.textureOf(materials, number);
+        ASSERT_NE(texture, nullptr);
+        EXPECT_EQ(texture->sample({0.5f, 0.5f}, 0) & 0xFF, number);
+        EXPECT_LE(cache.bytes(), 3000u);
+    }
+    EXPECT_EQ(cache.textureOf(materials, 3), nullptr);
+    EXPECT_EQ(cache.textureOf(materials, 3), nullptr);
+    EXPECT_EQ(cache.textureOf(materials, kNoMaterial), nullptr);
+    ASSERT_EQ(cache.warnings().size(), 1u);
+    EXPECT_NE(cache.warnings()[0].find("/nowhere/picture.png: no such file"), std::string::npos) << cache.warnings()[0];
+}
+
+TEST(ColourEncoding, RoundTripsAndModulates) {
+    for (unsigned i = 0; i < 256; ++i) EXPECT_EQ(toByte(linearToSrgb(srgbToLinear(i / 255.0))), i);
+    EXPECT_EQ(modulate(rgba(255, 128, 0, 255), rgba(128, 128, 200, 255)), rgba(128, 64, 0, 255));
+    EXPECT_EQ(toByte(std::nan("")), 0);
+}
+
+}  // namespace
+}  // namespace vcp
