@@ -3,16 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "builder/wider_clones.h"
 #include "octree/leaf_math.h"
 #include "octree/packing.h"
-
-// Also compiled for wider vectors, chosen when the program starts. They round alike, since nothing is fused:
-// results do not depend on the processor.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define WIDER_CLONES __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDER_CLONES
-#endif
 
 namespace vcp {
 
@@ -26,7 +19,7 @@ constexpr int kMaxSubdivision = 1;
 // Part of the tolerance that may be given away for not bounding a small polygon exactly.
 constexpr double kCheapSlack = 0.15;
 
-double clippedArea(std::span<const glm::dvec3> polygon, glm::dvec3 normal) {
+double clippedArea(const Polygon& polygon, glm::dvec3 normal) {
     glm::dvec3 sum(0);
     for (size_t i = 1; i + 1 < polygon.size(); ++i) sum += glm::cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
     return std::abs(glm::dot(sum, normal)) / 2;
@@ -36,23 +29,35 @@ double clippedArea(std::span<const glm::dvec3> polygon, glm::dvec3 normal) {
 bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles, CertificateScratch& s) {
     const double half = edge / 2 + kCertificateMarginCells;
     const glm::dvec3 centre = lower + edge / 2;
-    s.points.clear();
-    s.ends.clear();
-    s.normals.clear();
-    s.areas.clear();
     for (const CertifiedTriangle* t : triangles) {
+        if (t->badEdges == 0) continue;
         for (int i = 0; i < 3; ++i)
             if ((t->badEdges >> i & 1) && segmentMeetsBox(t->corners[i], t->corners[(i + 1) % 3], centre, half)) return false;
     }
+    // Edges are powers of two, so leaf space costs no rounding.
+    const double scale = 1 / edge, margin = kCertificateMarginCells * scale;
+    const size_t room = triangles.size() * Polygon::kMaxCorners + LeafSurface::kBatchStep;
+    if (s.x.size() < room)
+        for (auto* list : {&s.x, &s.y, &s.z, &s.value}) list->resize(room);
+    s.ends.clear();
+    s.normals.clear();
+    s.areas.clear();
+    s.count = 0;
+    Polygon polygon;
     for (const CertifiedTriangle* t : triangles) {
-        clipToBox(t->corners, centre - half, centre + half, s.polygon, s.clip);
-        if (s.polygon.size() < 3) continue;
-        const size_t begin = s.points.size();
-        for (const glm::dvec3& p : s.polygon) s.points.push_back((p - lower) / edge);
-        s.ends.push_back(static_cast<uint32_t>(s.points.size()));
+        clipToBox({(t->corners[0] - lower) * scale, (t->corners[1] - lower) * scale, (t->corners[2] - lower) * scale}, glm::dvec3(-margin), glm::dvec3(1 + margin), polygon);
+        if (polygon.empty()) continue;
+        for (const glm::dvec3& p : polygon) {
+            s.x[s.count] = static_cast<float>(p.x);
+            s.y[s.count] = static_cast<float>(p.y);
+            s.z[s.count++] = static_cast<float>(p.z);
+        }
+        s.ends.push_back(static_cast<uint32_t>(s.count));
         s.normals.push_back(t->normal);
-        s.areas.push_back(clippedArea(std::span(s.points).subspan(begin), t->normal));
+        s.areas.push_back(clippedArea(polygon, t->normal));
     }
+    // The last batch is filled up with the last point.
+    for (size_t i = s.count; i % LeafSurface::kBatchStep != 0; ++i) s.x[i] = s.x[i - 1], s.y[i] = s.y[i - 1], s.z[i] = s.z[i - 1];
     return !s.ends.empty();
 }
 
@@ -104,8 +109,7 @@ public:
     }
 
     /// The 15 points of a triangle (and its first corner again).
-    void place(const Triangle3& t, LeafSurface::Batch& b) const {
-        const glm::vec3 t0(t[0]), t1(t[1]), t2(t[2]);
+    void place(glm::vec3 t0, glm::vec3 t1, glm::vec3 t2, LeafSurface::Batch& b) const {
         for (int p = 0; p < 16; ++p) {
             b.x[p] = weight_[0][p] * t0.x + weight_[1][p] * t1.x + weight_[2][p] * t2.x;
             b.y[p] = weight_[0][p] * t0.y + weight_[1][p] * t1.y + weight_[2][p] * t2.y;
@@ -130,149 +134,114 @@ private:
     alignas(64) float weight_[3][16] = {};             ///< of the corners, at each point
 };
 
-/// Bound on |f| over a flat polygon: on a plane f is a quartic.
+/// Bound on |f| over flat polygons: on a plane f is a quartic. Values at points do where the curvature cannot
+/// add much between them: linear interpolation over a triangle within a ball of radius R errs by at most
+/// curvature R^2 / 2. First the polygon's corners are tried, then points half and a quarter of the way
+/// between them, then the quartic's coefficients.
 class PolygonBound {
 public:
-    PolygonBound(const LeafSurface& surface, double curvature, double limit) : surface_(surface), curvature_(curvature), limit_(limit) {}
+    PolygonBound(const LeafSurface& surface, double curvature, double limit, CertificateScratch& scratch)
+        : surface_(surface), s_(scratch), limit_(limit), halfCurvature_(curvature / 2 * (1 + 1e-5)) {}
 
-    /// False as soon as the bound exceeds the limit. Where the curvature cannot add much between the corners,
-    /// their values are enough: linear interpolation over a triangle of longest edge L errs by at most
-    /// curvature L^2 / 6.
-    bool add(std::span<const glm::dvec3> polygon) {
-        LeafSurface::Batch batch;
-        const size_t count = std::min<size_t>(polygon.size(), 16);
-        glm::dvec3 low = polygon[0], high = polygon[0];
-        for (size_t i = 0; i < 16; ++i) {
-            const glm::dvec3 p = polygon[std::min(i, count - 1)];
-            batch.x[i] = static_cast<float>(p.x);
-            batch.y[i] = static_cast<float>(p.y);
-            batch.z[i] = static_cast<float>(p.z);
-            low = glm::min(low, p);
-            high = glm::max(high, p);
-        }
-        surface_.evaluate(batch);
-        double corner = 0;
-        for (size_t i = 0; i < count; ++i) corner = std::max(corner, double(std::abs(batch.value[i])));
-        corner += LeafSurface::kBatchRounding;
-        if (corner > limit_) return false;
-        const double slack = curvature_ * glm::dot(high - low, high - low) / 6;
-        if (polygon.size() <= 16 && (corner + slack <= bound_ || (slack <= kCheapSlack * limit_ && corner + slack <= limit_))) {
-            bound_ = std::max(bound_, corner + slack);
-            return true;
-        }
-        for (size_t i = 1; i + 1 < polygon.size(); ++i)
-            if (!triangle({polygon[0], polygon[i], polygon[i + 1]}, 0)) return false;
+    /// All of the scratch memory's polygons. False as soon as the bound exceeds the limit.
+    bool addAll() {
+        float most = 0;
+        for (size_t i = 0; i < s_.count; ++i) most = std::max(most, std::abs(s_.value[i]));
+        bound_ = double(most) + LeafSurface::kBatchRounding;
+        if (bound_ > limit_) return false;
+        for (size_t i = 0, begin = 0; i < s_.ends.size(); begin = s_.ends[i++])
+            if (!add(begin, s_.ends[i])) return false;
         return true;
     }
     [[nodiscard]] double bound() const { return bound_; }
 
 private:
-    bool triangle(const Triangle3& t, int depth) {
+    /// Whether samples up to `value` that may miss `slack` are enough; then they are part of the bound.
+    bool accept(double value, double slack) {
+        const double total = value + slack + LeafSurface::kBatchRounding;
+        if (total > bound_ && (slack > kCheapSlack * limit_ || total > limit_)) return false;
+        bound_ = std::max(bound_, total);
+        return true;
+    }
+
+    [[nodiscard]] glm::vec3 point(size_t i) const { return {s_.x[i], s_.y[i], s_.z[i]}; }
+
+    bool add(size_t begin, size_t end) {
+        glm::vec3 low = point(begin), high = low;
+        float value = 0;
+        for (size_t i = begin; i < end; ++i) {
+            low = glm::min(low, point(i));
+            high = glm::max(high, point(i));
+            value = std::max(value, std::abs(s_.value[i]));
+        }
+        const glm::vec3 centre = 0.5f * (low + high);
+        float radius2 = 0;
+        for (size_t i = begin; i < end; ++i) radius2 = std::max(radius2, glm::dot(point(i) - centre, point(i) - centre));
+        const double slack = halfCurvature_ * double(radius2);
+        if (accept(double(value), slack)) return true;
+        if (slack / 4 <= kCheapSlack * limit_ || value + slack / 4 <= bound_) {
+            value = std::max(value, largestHalfway(begin, end));
+            if (double(value) > limit_) return false;
+            if (accept(double(value), slack / 4)) return true;
+        }
+        for (size_t i = begin + 1; i + 1 < end; ++i)
+            if (!triangle(point(begin), point(i), point(i + 1), slack / 16, 0)) return false;
+        return true;
+    }
+
+    /// Largest |f| halfway along the edges of the polygon's fan of triangles.
+    float largestHalfway(size_t begin, size_t end) const {
+        LeafSurface::Batch batch;
+        size_t count = 0;
+        const auto put = [&](size_t i, size_t j) {
+            batch.x[count] = 0.5f * (s_.x[i] + s_.x[j]);
+            batch.y[count] = 0.5f * (s_.y[i] + s_.y[j]);
+            batch.z[count++] = 0.5f * (s_.z[i] + s_.z[j]);
+        };
+        static_assert(2 * Polygon::kMaxCorners - 3 <= 16);
+        for (size_t i = begin; i + 1 < end; ++i) put(i, i + 1);
+        for (size_t i = begin + 2; i < end; ++i) put(begin, i);
+        const size_t points = count;
+        while (count % LeafSurface::kBatchStep != 0) put(begin, begin);
+        surface_.evaluate(batch.x, batch.y, batch.z, batch.value, count);
+        float most = 0;
+        for (size_t i = 0; i < points; ++i) most = std::max(most, std::abs(batch.value[i]));
+        return most;
+    }
+
+    bool triangle(glm::vec3 a, glm::vec3 b, glm::vec3 c, double slack, int depth) {
         static const QuarticTriangle quartic;
         LeafSurface::Batch batch;
-        quartic.place(t, batch);
+        quartic.place(a, b, c, batch);
         surface_.evaluate(batch);
-        for (int p = 0; p < QuarticTriangle::kPoints; ++p)
-            if (std::abs(batch.value[p]) > limit_) return false;
+        float most = 0;
+        for (const float v : batch.value) most = std::max(most, std::abs(v));
+        if (double(most) > limit_) return false;
+        if (accept(double(most), slack)) return true;
         // The coefficients' rounding: the matrix' rows have an absolute sum below 35.
         const double bound = quartic.bound(batch.value) + 35 * LeafSurface::kBatchRounding;
         if (bound <= limit_ || depth == kMaxSubdivision) {
             bound_ = std::max(bound_, bound);
             return bound <= limit_;
         }
-        const glm::dvec3 ab = (t[0] + t[1]) / 2.0, bc = (t[1] + t[2]) / 2.0, ca = (t[2] + t[0]) / 2.0;
-        return triangle({t[0], ab, ca}, depth + 1) && triangle({ab, t[1], bc}, depth + 1) && triangle({ca, bc, t[2]}, depth + 1) && triangle({ab, bc, ca}, depth + 1);
+        const glm::vec3 ab = 0.5f * (a + b), bc = 0.5f * (b + c), ca = 0.5f * (c + a);
+        const double part = slack / 4;
+        return triangle(a, ab, ca, part, depth + 1) && triangle(ab, b, bc, part, depth + 1) && triangle(ca, bc, c, part, depth + 1) && triangle(ab, bc, ca, part, depth + 1);
     }
 
     const LeafSurface& surface_;
-    double curvature_, limit_, bound_ = 0;
+    CertificateScratch& s_;
+    double limit_, halfCurvature_, bound_ = 0;
 };
 
+/// Largest F that, with the wall tolerance of its code, is at most `sum`.
+double largestWalled(double sum) {
+    double most = 0;
+    for (uint32_t code = 1; code <= kSoftWallMask; ++code) most = std::max(most, std::min(wallOf(code), sum - wallOf(code)));
+    return most;
+}
+
 }  // namespace
-
-LeafSurface::LeafSurface(const std::array<uint32_t, 8>& codes) {
-    for (int i = 0; i < 8; ++i) {
-        const double side = f64::decodeSide(codes[i]);
-        slope_[i] = 0.5 * side * f64::decodeDirection(codes[i] >> 11);
-        constant_[i] = side * f64::decodeDistance(codes[i]) - glm::dot(slope_[i], glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
-    }
-}
-
-double LeafSurface::value(glm::dvec3 x) const {
-    const auto along = [&](int i) { return constant_[i] + glm::dot(slope_[i], x); };
-    const auto mix = [](double a, double b, double t) { return a + (b - a) * t; };
-    return mix(mix(mix(along(0), along(1), x.x), mix(along(2), along(3), x.x), x.y), mix(mix(along(4), along(5), x.x), mix(along(6), along(7), x.x), x.y), x.z);
-}
-
-WIDER_CLONES void LeafSurface::evaluate(Batch& b) const {
-    float constant[8], slope[8][3];
-    for (int c = 0; c < 8; ++c) {
-        constant[c] = static_cast<float>(constant_[c]);
-        for (int i = 0; i < 3; ++i) slope[c][i] = static_cast<float>(slope_[c][i]);
-    }
-    for (int i = 0; i < 16; ++i) {
-        const float x = b.x[i], y = b.y[i], z = b.z[i];
-        float along[8];
-        for (int c = 0; c < 8; ++c) along[c] = constant[c] + slope[c][0] * x + slope[c][1] * y + slope[c][2] * z;
-        const float y0 = along[0] + (along[1] - along[0]) * x, y1 = along[2] + (along[3] - along[2]) * x;
-        const float y2 = along[4] + (along[5] - along[4]) * x, y3 = along[6] + (along[7] - along[6]) * x;
-        const float z0 = y0 + (y1 - y0) * y, z1 = y2 + (y3 - y2) * y;
-        b.value[i] = z0 + (z1 - z0) * z;
-    }
-}
-
-BernsteinCube::BernsteinCube(const LeafSurface& surface, double lower, double upper) : width_(upper - lower) {
-    const double x[3] = {lower, (lower + upper) / 2, upper};
-    for (int k = 0; k < 3; ++k)
-        for (int j = 0; j < 3; ++j)
-            for (int i = 0; i < 3; ++i) c_[i + 3 * j + 9 * k] = surface.value({x[i], x[j], x[k]});
-    // From values at ends and middle to coefficients, an axis at a time: b1 = 2 f(1/2) - (f0 + f1) / 2.
-    for (const int stride : {1, 3, 9})
-        for (int m = 0; m < 27; ++m)
-            if (m / stride % 3 == 1) c_[m] = 2 * c_[m] - (c_[m - stride] + c_[m + stride]) / 2;
-}
-
-double BernsteinCube::minDerivative(glm::dvec3 n) const {
-    // Each partial has degree 1 along its axis; raised to 2 there, the three share one control net.
-    double least = 1e300;
-    for (int z = 0; z < 3; ++z)
-        for (int y = 0; y < 3; ++y)
-            for (int x = 0; x < 3; ++x) {
-                const double dx = x == 0 ? at(1, y, z) - at(0, y, z) : x == 2 ? at(2, y, z) - at(1, y, z) : (at(2, y, z) - at(0, y, z)) / 2;
-                const double dy = y == 0 ? at(x, 1, z) - at(x, 0, z) : y == 2 ? at(x, 2, z) - at(x, 1, z) : (at(x, 2, z) - at(x, 0, z)) / 2;
-                const double dz = z == 0 ? at(x, y, 1) - at(x, y, 0) : z == 2 ? at(x, y, 2) - at(x, y, 1) : (at(x, y, 2) - at(x, y, 0)) / 2;
-                least = std::min(least, n.x * dx + n.y * dy + n.z * dz);
-            }
-    return 2 * least / width_;
-}
-
-double BernsteinCube::maxCurvature() const {
-    double pure[3] = {}, mixed[3] = {};  // xx yy zz, yz zx xy
-    constexpr int stride[3] = {1, 3, 9};
-    for (int axis = 0; axis < 3; ++axis) {
-        const int s = stride[axis], u = stride[(axis + 1) % 3], v = stride[(axis + 2) % 3];
-        for (int m = 0; m < 27; ++m) {
-            if (m / s % 3 == 0) pure[axis] = std::max(pure[axis], std::abs(c_[m] - 2 * c_[m + s] + c_[m + 2 * s]));
-            if (m / u % 3 < 2 && m / v % 3 < 2) mixed[axis] = std::max(mixed[axis], std::abs(c_[m + u + v] - c_[m + u] - c_[m + v] + c_[m]));
-        }
-    }
-    // Second derivatives are 2 and 4 times these differences; the spectral norm is at most the largest row sum.
-    double norm = 0;
-    for (int i = 0; i < 3; ++i) norm = std::max(norm, 2 * pure[i] + 4 * mixed[(i + 1) % 3] + 4 * mixed[(i + 2) % 3]);
-    return norm / (width_ * width_);
-}
-
-BernsteinCube::Range BernsteinCube::faceRange(int axis, int end) const {
-    constexpr int stride[3] = {1, 3, 9};
-    const int base = 2 * end * stride[axis], u = stride[(axis + 1) % 3], v = stride[(axis + 2) % 3];
-    Range range{1e300, -1e300};
-    for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i) {
-            range.min = std::min(range.min, c_[base + i * u + j * v]);
-            range.max = std::max(range.max, c_[base + i * u + j * v]);
-        }
-    return range;
-}
 
 Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles, double tolerance,
                         const std::function<const CornerVector&(int)>& corner, CertificateScratch& scratch) {
@@ -292,14 +261,13 @@ Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const Certified
     result.minSlope = cube.minDerivative(n);
     if (result.minSlope < kMinSlope) return result;
     result.curvature = cube.maxCurvature();
-    // A ray may be taken to hit at a wall where |f| <= F: there it is at most 2 F / g from the mesh.
-    const double limit = tolerance * result.minSlope / (2 * edge);
-    PolygonBound bound(surface, result.curvature, limit);
-    for (size_t i = 0, begin = 0; i < scratch.ends.size(); begin = scratch.ends[i++])
-        if (!bound.add(std::span(scratch.points).subspan(begin, scratch.ends[i] - begin))) return result;
+    // A ray may be taken to hit at a wall where |f| <= W, W >= F: there it is at most (F + W) / g from the mesh.
+    const double limit = largestWalled(tolerance * result.minSlope / edge);
+    surface.evaluate(scratch.x.data(), scratch.y.data(), scratch.z.data(), scratch.value.data(), (scratch.count + LeafSurface::kBatchStep - 1) / LeafSurface::kBatchStep * LeafSurface::kBatchStep);
+    PolygonBound bound(surface, result.curvature, limit, scratch);
+    if (!bound.addAll()) return result;
     result.maxValue = bound.bound();
-    const uint32_t code = wallCode(result.maxValue);
-    result.soft = code <= kSoftWallMask && (result.maxValue + wallOf(code)) * edge <= tolerance * result.minSlope;
+    result.soft = true;
     return result;
 }
 
@@ -307,6 +275,7 @@ uint32_t wallCode(double value) {
     if (value <= 0) return 0;
     uint32_t code = static_cast<uint32_t>(std::ceil(std::sqrt(value / double(kWallUnit))));
     while (wallOf(code) < value) ++code;
+    while (wallOf(code - 1) >= value) --code;
     return std::min(code, kSoftWallMask + 1);
 }
 

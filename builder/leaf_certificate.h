@@ -16,6 +16,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "builder/leaf_surface.h"
 #include "builder/triangle_geometry.h"
 
 namespace vcp {
@@ -37,44 +38,6 @@ struct CertifiedTriangle {
     uint8_t badEdges = 0;        ///< bit i: the edge from corner i is a border, crease, fold or non-manifold
 };
 
-/// f of a leaf, from its packed corners; leaf space. Independent of the axis order of the faces.
-class LeafSurface {
-public:
-    explicit LeafSurface(const std::array<uint32_t, 8>& codes);
-    [[nodiscard]] double value(glm::dvec3 x) const;
-
-    /// Values at 16 points at once, in float: within kBatchRounding of value() for |x| up to 2.
-    struct Batch {
-        alignas(64) float x[16], y[16], z[16], value[16];
-    };
-    void evaluate(Batch& batch) const;
-    static constexpr double kBatchRounding = 4e-6;
-
-private:
-    std::array<double, 8> constant_;
-    std::array<glm::dvec3, 8> slope_;
-};
-
-/// f over a cube as a tensor-product Bernstein polynomial of degree 2 an axis, which f is.
-class BernsteinCube {
-public:
-    BernsteinCube(const LeafSurface& surface, double lower, double upper);
-    /// Least derivative in direction n, per leaf edge.
-    [[nodiscard]] double minDerivative(glm::dvec3 n) const;
-    /// Bound on the second derivative in any direction.
-    [[nodiscard]] double maxCurvature() const;
-    /// Least and largest value on the face of `axis` at its lower (0) or upper (1) end.
-    struct Range {
-        double min, max;
-    };
-    [[nodiscard]] Range faceRange(int axis, int end) const;
-
-private:
-    [[nodiscard]] double at(int x, int y, int z) const { return c_[x + 3 * y + 9 * z]; }
-    std::array<double, 27> c_;
-    double width_;
-};
-
 struct Certificate {
     bool soft = false;
     std::array<uint32_t, 8> codes{};  ///< packed corners
@@ -85,8 +48,9 @@ struct Certificate {
 
 /// Scratch memory of certify; one a thread.
 struct CertificateScratch {
-    std::vector<glm::dvec3> polygon, clip, points;
-    std::vector<uint32_t> ends;
+    std::vector<float> x, y, z, value;  ///< corners of the clipped triangles, in leaf space, and f there
+    size_t count = 0;                   ///< of them
+    std::vector<uint32_t> ends;         ///< of each polygon among the corners
     std::vector<glm::dvec3> normals;
     std::vector<double> areas;
 };

@@ -99,25 +99,30 @@ bool segmentMeetsBox(glm::dvec3 a, glm::dvec3 b, glm::dvec3 centre, double half)
     return true;
 }
 
-void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, std::vector<glm::dvec3>& polygon,
-               std::vector<glm::dvec3>& scratch) {
-    polygon.assign(triangle.begin(), triangle.end());
-    for (int axis = 0; axis < 3; ++axis) {
-        for (const double side : {1.0, -1.0}) {
-            const double limit = side > 0 ? upper[axis] : -lower[axis];
-            bool inside = true;
-            for (const glm::dvec3& p : polygon) inside = inside && side * p[axis] <= limit;
-            if (inside) continue;
-            scratch.clear();
-            for (size_t i = 0; i < polygon.size(); ++i) {
-                const glm::dvec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
-                const double dp = limit - side * p[axis], dq = limit - side * q[axis];
-                if (dp >= 0) scratch.push_back(p);
-                if ((dp < 0) != (dq < 0)) scratch.push_back(p + (q - p) * (dp / (dp - dq)));
-            }
-            polygon.swap(scratch);
-            if (polygon.size() < 3) return polygon.clear();
+void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Polygon& polygon) {
+    polygon.clear();
+    unsigned beyond[3] = {};  // bit 2 * axis + end: outside that plane
+    for (int i = 0; i < 3; ++i)
+        for (int axis = 0; axis < 3; ++axis)
+            beyond[i] |= (triangle[i][axis] < lower[axis] ? 1u : 0u) << 2 * axis | (triangle[i][axis] > upper[axis] ? 2u : 0u) << 2 * axis;
+    if (beyond[0] & beyond[1] & beyond[2]) return;
+    for (const glm::dvec3& p : triangle) polygon.add(p);
+    const unsigned planes = beyond[0] | beyond[1] | beyond[2];
+    Polygon next;
+    for (int plane = 0; plane < 6; ++plane) {
+        if (!(planes >> plane & 1u)) continue;
+        const int axis = plane / 2;
+        const double side = plane % 2 ? 1 : -1, limit = plane % 2 ? upper[axis] : -lower[axis];
+        next.clear();
+        double dp = limit - side * polygon[polygon.size() - 1][axis];
+        for (size_t i = 0, before = polygon.size() - 1; i < polygon.size(); before = i++) {
+            const double dq = limit - side * polygon[i][axis];
+            if ((dp < 0) != (dq < 0)) next.add(polygon[before] + (polygon[i] - polygon[before]) * (dp / (dp - dq)));
+            if (dq >= 0) next.add(polygon[i]);
+            dp = dq;
         }
+        polygon = next;
+        if (polygon.size() < 3) return polygon.clear();
     }
 }
 

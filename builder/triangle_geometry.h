@@ -40,8 +40,24 @@ private:
 /// Whether a segment meets a closed cube.
 bool segmentMeetsBox(glm::dvec3 a, glm::dvec3 b, glm::dvec3 centre, double half);
 
-/// Clips a triangle to a cube; `polygon` receives its corners in order (fewer than 3: outside).
-void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, std::vector<glm::dvec3>& polygon,
-               std::vector<glm::dvec3>& scratch);
+/// A convex polygon: a triangle cut by the six planes of a box.
+class Polygon {
+public:
+    static constexpr size_t kMaxCorners = 9;
+    [[nodiscard]] size_t size() const { return size_; }
+    [[nodiscard]] bool empty() const { return size_ == 0; }
+    void clear() { size_ = 0; }
+    void add(glm::dvec3 p) { corners_[size_++] = p; }
+    const glm::dvec3& operator[](size_t i) const { return corners_[i]; }
+    [[nodiscard]] const glm::dvec3* begin() const { return corners_.data(); }
+    [[nodiscard]] const glm::dvec3* end() const { return corners_.data() + size_; }
+
+private:
+    std::array<glm::dvec3, kMaxCorners + 1> corners_;  // rounding may add one for an instant
+    size_t size_ = 0;
+};
+
+/// Clips a triangle to a box; `polygon` receives its corners in order (none: outside).
+void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Polygon& polygon);
 
 }  // namespace vcp

@@ -36,7 +36,7 @@ void expectAllBinned(const LatticeMesh& mesh, uint32_t log2Cells, uint32_t level
     }
     const double edge = double(1u << log2Cells);
     const uint32_t side = 1u << level;
-    std::vector<glm::dvec3> polygon, scratch;
+    Polygon polygon;
     size_t overlaps = 0, extra = 0;
     for (uint32_t k = 0; k < mesh.triangles.size(); ++k)
         for (uint32_t z = 0; z < side; ++z)
@@ -44,7 +44,7 @@ void expectAllBinned(const LatticeMesh& mesh, uint32_t log2Cells, uint32_t level
                 for (uint32_t x = 0; x < side; ++x) {
                     const auto meets = [&](double margin) {
                         const glm::dvec3 lower = glm::dvec3(x, y, z) * edge - margin;
-                        clipToBox(triangleOf(mesh, k), lower, lower + edge + 2 * margin, polygon, scratch);
+                        clipToBox(triangleOf(mesh, k), lower, lower + edge + 2 * margin, polygon);
                         return !polygon.empty();
                     };
                     // To touch the widened page is not to overlap it: the margin is wider than what is needed.

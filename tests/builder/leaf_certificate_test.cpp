@@ -287,7 +287,7 @@ TEST(Certificate, HoldsBothWays) {
         std::vector<Triangle3> all;
         for (size_t k = 0; k < mesh.triangles.size(); ++k) all.push_back(mesh.corners(k));
         Samples s(seed);
-        std::vector<glm::dvec3> polygon, scratch;
+        Polygon polygon;
         for (const int edge : {1, 2}) {
             for (int z = 0; z < 32; z += edge)
                 for (int y = 0; y < 32; y += edge)
@@ -317,7 +317,7 @@ TEST(Certificate, HoldsBothWays) {
                         // The mesh to the surface: within the bound f changes its sign.
                         for (const Triangle3& t : all) {
                             if (glm::length(t[0] - lower) > 8) continue;
-                            clipToBox(t, lower, lower + double(edge), polygon, scratch);
+                            clipToBox(t, lower, lower + double(edge), polygon);
                             for (size_t i = 0; i < polygon.size(); ++i) {
                                 const glm::dvec3 p = ((polygon[i] + polygon[(i + 1) % polygon.size()]) / 2.0 - lower) / double(edge);
                                 constexpr double h = 1e-5;

@@ -117,7 +117,7 @@ TEST(PageGeometry, NeighbouringPagesAgreeOnCorners) {
 TEST(PageGeometry, OccupancyIsTouch) {
     Page page(mixedMesh(2), {0, 0, 0});
     std::vector<uint8_t> touched(kCells * kCells * kCells, 0), near(touched);
-    std::vector<glm::dvec3> polygon, scratch;
+    Polygon polygon;
     for (size_t k = 0; k < page.mesh.triangles.size(); ++k) {
         const Triangle3 t = page.triangle(k);
         const BoxOverlap bounds(t);
@@ -126,9 +126,9 @@ TEST(PageGeometry, OccupancyIsTouch) {
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x) {
                     const glm::dvec3 cell(x, y, z);
-                    clipToBox(t, cell, cell + 1.0, polygon, scratch);
+                    clipToBox(t, cell, cell + 1.0, polygon);
                     if (!polygon.empty()) touched[x + kCells * (y + kCells * z)] = 1;
-                    clipToBox(t, cell - 1e-8, cell + 1.0 + 1e-8, polygon, scratch);
+                    clipToBox(t, cell - 1e-8, cell + 1.0 + 1e-8, polygon);
                     if (!polygon.empty()) near[x + kCells * (y + kCells * z)] = 1;
                 }
     }
@@ -238,12 +238,12 @@ void expectSound(Page& page, const PageTree& tree) {
 
 /// Every triangle of a hard leaf's box is in its list.
 void expectHardLeavesComplete(Page& page, const PageTree& tree, std::span<const uint32_t> binned) {
-    std::vector<glm::dvec3> polygon, scratch;
+    Polygon polygon;
     for (const HardLeaf& leaf : tree.hard) {
         const std::set<uint32_t> listed(leaf.triangles.begin(), leaf.triangles.end());
         const glm::dvec3 lower = leaf.box.lowerCells();
         for (uint32_t k = 0; k < binned.size(); ++k) {
-            clipToBox(page.triangle(binned[k]), lower, lower + leaf.box.edgeCells(), polygon, scratch);
+            clipToBox(page.triangle(binned[k]), lower, lower + leaf.box.edgeCells(), polygon);
             ASSERT_TRUE(polygon.empty() || listed.contains(k));
         }
     }

@@ -187,13 +187,13 @@ TEST(BoxOverlap, BoundsAreTheTriangles) {
 }
 
 TEST(ClipToBox, AreasAndPoints) {
-    std::vector<glm::dvec3> polygon, scratch;
+    Polygon polygon;
     for (uint64_t seed = 0; seed < 50000; ++seed) {
         Points p(seed);
         const Triangle3 t{p.latticePoint(4), p.latticePoint(4), p.latticePoint(4)};
         const glm::dvec3 centre = p.latticePoint(2);
         const double half = p.integer(1, 16) / 16.0;
-        clipToBox(t, centre - half, centre + half, polygon, scratch);
+        clipToBox(t, centre - half, centre + half, polygon);
         std::vector<Long3> fast;
         for (const glm::dvec3& q : polygon) {
             fast.emplace_back(q);
@@ -206,7 +206,7 @@ TEST(ClipToBox, AreasAndPoints) {
 }
 
 TEST(ClipToBox, BoxesThatTileKeepTheArea) {
-    std::vector<glm::dvec3> polygon, scratch;
+    Polygon polygon;
     for (uint64_t seed = 0; seed < 500; ++seed) {
         Points p(seed);
         const Triangle3 t{p.point(4), p.point(4), p.point(4)};
@@ -214,7 +214,7 @@ TEST(ClipToBox, BoxesThatTileKeepTheArea) {
         for (int z = -2; z < 2; ++z)
             for (int y = -2; y < 2; ++y)
                 for (int x = -2; x < 2; ++x) {
-                    clipToBox(t, glm::dvec3(x, y, z), glm::dvec3(x + 1, y + 1, z + 1), polygon, scratch);
+                    clipToBox(t, glm::dvec3(x, y, z), glm::dvec3(x + 1, y + 1, z + 1), polygon);
                     std::vector<Long3> part;
                     for (const glm::dvec3& q : polygon) part.emplace_back(q);
                     sum += slowArea(part);
