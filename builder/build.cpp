@@ -43,9 +43,12 @@ constexpr double kCoarseErrorCells = 0.2;
 // Parts of the whole, in time: what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
 
+// What the temporary files look like; a build does not go on where one of another version was.
+constexpr int kTempVersion = 1;
+
 /// What must be the same for a build to go on where another was.
 std::string fingerprint(const BuildOptions& options) {
-    std::string text = fmt::format("{} {:a} {:a} {} {} {}", kFileVersion, options.cell, options.error, options.errorIsRelative, static_cast<int>(options.colour), options.format);
+    std::string text = fmt::format("{} {} {:a} {:a} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error, options.errorIsRelative, static_cast<int>(options.colour), options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);
@@ -87,25 +90,34 @@ public:
     }
 
     Result<BuildReport> run() {
-        auto built = stages();
+        auto built = caught();
         if (built) {
             space_.remove();
             finishReport();
             return report_;
         }
         Error error = built.error();
-        const bool worthKeeping = journal_.active() && (error.code == ErrorCode::Cancelled || error.code == ErrorCode::Io);
+        const bool mayPass = error.code == ErrorCode::Cancelled || error.code == ErrorCode::Io, needsMore = error.code == ErrorCode::Limit && current_;
+        const bool worthKeeping = (journal_.active() || isResumed_) && (mayPass || needsMore);
         if (!worthKeeping) {
-            space_.remove();
+            if (error.code != ErrorCode::Usage) space_.remove();
             if (error.code == ErrorCode::Cancelled) error.message = "cancelled; nothing was written";
         } else {
-            error.message += fmt::format("; the same command with --resume goes on from here, or delete {}", space_.folder().string());
+            error.message += fmt::format("; the same command with --resume{} goes on from here, or delete {}", needsMore ? " and the memory" : "", space_.folder().string());
         }
         if (error.file.empty()) error.file = options_.output.string();
         return error;
     }
 
 private:
+    Result<void> caught() {
+        try {
+            return stages();
+        } catch (const std::bad_alloc&) {
+            return Error{.code = ErrorCode::Limit, .message = "the system has no more memory to give; use a smaller --memory, or fewer --threads"};
+        }
+    }
+
     Result<void> stages() {
         // A wrong output is found before an hour's work, not after it.
         if (auto probe = VcpWriter::create(options_.output, 1); !probe) return probe.error();
@@ -153,11 +165,12 @@ private:
             if (done->is_object()) done_ = *done;
         }
         if (done_.empty()) {
-            space_.remove();
+            space_.clear();
             return {};
         }
         if (done_.value("build", "") != fingerprint(options_))
             return Error{.code = ErrorCode::Usage, .message = "the unfinished build here is of other inputs or options; without --resume it is started again", .file = space_.folder().string()};
+        isResumed_ = true;
         return {};
     }
 
@@ -201,6 +214,7 @@ private:
         measures_ = measuresFrom(done_.at("measures"));
         if (done_.value("stage", "") != "read") return {};
         soup_ = std::make_unique<Soup>(space_, plan_.bufferBytes);
+        space_.clear({kJournalName, soup_->floats.raw().fileName(), soup_->doubles.raw().fileName()});
         VCP_TRY(soup_->floats.raw().reopen(recordedBytes("floats")));
         VCP_TRY(soup_->doubles.raw().reopen(recordedBytes("doubles")));
         return reactivate();
@@ -215,16 +229,27 @@ private:
         partitionRecorded_ = true;
         pass_ = done_.at("pass").get<int>();
         firstBin_ = done_.at("bin").get<size_t>();
+        if (pass_ >= 0) openPass();
+        dropUnfinished();
         const json& spools = done_.at("spools");
         for (size_t i = 0; i < spools_.size(); ++i)
             if (const uint64_t bytes = spools.at(i).at(0).get<uint64_t>(); bytes > 0) VCP_TRY(spools_[i].reopen(bytes, spools.at(i).at(1).get<uint64_t>()));
         VCP_TRY(reactivate());
         if (pass_ < 0) return {};
-        openPass();
         VCP_TRY(current_->raw().reopen(recordedBytes("current")));
         if (recordedBytes("next") > 0) VCP_TRY(next_->raw().reopen(recordedBytes("next")));
         if (recordedBytes("waiting") > 0) VCP_TRY(waiting_->raw().reopen(recordedBytes("waiting")));
         return {};
+    }
+
+    /// Files of work that was not recorded as done only take room.
+    void dropUnfinished() {
+        std::vector<std::string> kept{kJournalName};
+        for (const PageSpool& spool : spools_) kept.insert(kept.end(), {spool.pagesFile(), spool.directoryFile()});
+        for (const auto* bins : {current_.get(), next_.get()})
+            if (bins) kept.push_back(bins->raw().fileName());
+        if (waiting_) kept.push_back(waiting_->raw().fileName());
+        space_.clear(kept);
     }
 
     // Reading and dealing
@@ -300,12 +325,13 @@ private:
         const LatticeSnapper snapper(frame_, colours_ ? &*colours_ : nullptr, usesVertexColours());
         const uint64_t total = soup_->floats.raw().total() + soup_->doubles.raw().total();
         std::atomic<uint64_t> done = 0;
+        std::atomic<bool> failed = false;
         std::mutex mutex;
         Result<void> result;
         const auto all = [&](const auto& bins) {
             const auto blocks = bins.raw().blocks(0);
             tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t i) {
-                if (cancelled_) return;
+                if (cancelled_ || failed) return;
                 auto visit = makeVisit();
                 auto records = bins.read(blocks[i]);
                 Result<void> here = records ? Result<void>() : Result<void>(records.error());
@@ -313,8 +339,9 @@ private:
                     for (const auto& t : *records) snapper.add(t, [&](const LatticeTriangle& piece) { if (here) here = visit(piece); }, painted);
                 if (here) here = visit.finish();
                 progress("sorting", before + kDealingShare / 2 * double(done += blocks[i].records) / double(total));
+                if (here) return;
                 const std::scoped_lock lock(mutex);
-                if (!here && result) result = here;
+                if (!failed.exchange(true)) result = here;
             });
         };
         arena_.execute([&] {
@@ -594,6 +621,7 @@ private:
     TempSpace space_;
     Journal journal_;
     json done_ = json::object();  ///< what an interrupted build recorded
+    bool isResumed_ = false;
     std::optional<tbb::global_control> more_;
     tbb::task_arena arena_;
 

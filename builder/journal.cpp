@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include "builder/temp_space.h"
+
 namespace vcp {
 
 namespace {
-
-constexpr const char* kName = "journal";
 
 std::string hashed(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
 
@@ -29,7 +29,7 @@ Journal::~Journal() {
 
 Result<nlohmann::json> Journal::read(const std::filesystem::path& folder) {
     nlohmann::json all;
-    std::ifstream file(folder / kName);
+    std::ifstream file(folder / kJournalName);
     for (std::string line; std::getline(file, line);) {
         if (line.size() < 18) continue;
         const std::string text = line.substr(17);
@@ -41,7 +41,7 @@ Result<nlohmann::json> Journal::read(const std::filesystem::path& folder) {
 }
 
 Result<void> Journal::record(const std::filesystem::path& folder, const nlohmann::json& fields) {
-    const std::filesystem::path path = folder / kName;
+    const std::filesystem::path path = folder / kJournalName;
     const bool isNew = file_ < 0;
     if (isNew) file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
     if (file_ < 0) return ioError(path, "cannot be opened");
@@ -55,12 +55,14 @@ Result<void> Journal::record(const std::filesystem::path& folder, const nlohmann
         at += static_cast<size_t>(n);
     }
     if (::fdatasync(file_) != 0) return ioError(path, "cannot be made durable");
-    if (!isNew) return {};
+    if (active_) return {};
     const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return ioError(folder, "cannot open the folder");
-    const bool ok = ::fsync(fd) == 0 || errno == EINVAL;
+    active_ = ::fsync(fd) == 0 || errno == EINVAL;
+    const int code = errno;
     ::close(fd);
-    return ok ? Result<void>() : Result<void>(ioError(folder, "cannot make the folder durable"));
+    errno = code;
+    return active_ ? Result<void>() : Result<void>(ioError(folder, "cannot make the folder durable"));
 }
 
 }  // namespace vcp

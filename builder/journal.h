@@ -22,13 +22,14 @@ public:
     /// All fields of the journal in `folder`; null when there is none. Errors: Io.
     static Result<nlohmann::json> read(const std::filesystem::path& folder);
 
-    /// Whether anything was recorded by this object.
-    [[nodiscard]] bool active() const { return file_ >= 0; }
+    /// Whether anything was recorded durably by this object.
+    [[nodiscard]] bool active() const { return active_; }
     /// Appends to the journal in `folder`, durably. Errors: Io.
     Result<void> record(const std::filesystem::path& folder, const nlohmann::json& fields);
 
 private:
     int file_ = -1;
+    bool active_ = false;
 };
 
 }  // namespace vcp

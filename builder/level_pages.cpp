@@ -1,5 +1,6 @@
 #include "builder/level_pages.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <condition_variable>
@@ -38,6 +39,10 @@ BuiltPage buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint
     page.entry.certifiedError = std::nextafter(static_cast<float>(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
     if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
     return page;
+}
+
+uint64_t bytesOf(const LatticeMesh& mesh) {
+    return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) + mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float));
 }
 
 /// Lets pages be built while there is memory for them.
@@ -86,12 +91,13 @@ private:
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end, PageSpool& spool, const std::function<bool(double)>& progress) {
     const TriangleBins bins = binTriangles(mesh, settings.grid, first, end);
+    const uint64_t held = bytesOf(mesh) + bins.triangles.size() * sizeof(uint32_t), free = settings.pageBytes - std::min(held, settings.pageBytes);
     for (size_t i = 0; i < bins.pages.size(); ++i)
-        if (pageWorkBytes(bins.of(i).size()) > settings.pageBytes)
+        if (const uint64_t needed = pageWorkBytes(bins.of(i).size()); needed > free)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a smaller --cell or a larger --memory", bins.of(i).size(),
-                                                (3 * (pageWorkBytes(bins.of(i).size()) - settings.pageBytes) >> 20) + 1)};
-    Admission admission(settings.pageBytes);
+                                                ((needed - free) * 3 / 2 >> 20) + 1)};
+    Admission admission(free);
     InOrder inOrder(spool);
     std::atomic<size_t> next = 0, done = 0;
     std::atomic<bool> stopped = false;

@@ -16,7 +16,7 @@ struct LevelSettings {
     double cell = 0;       ///< world units
     double tolerance = 0;  ///< cells, for soft leaves; the finest level's includes the stray
     bool finest = false;
-    uint64_t pageBytes = 0;  ///< memory for pages under construction
+    uint64_t pageBytes = 0;  ///< memory for the mesh and pages under construction
 };
 
 /// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface

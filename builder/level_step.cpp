@@ -117,8 +117,10 @@ Result<void> LevelStep::run(size_t bin, const LatticeMesh& mesh) {
     VCP_TRY(stepWaiting(bin, mesh, images));
     tbb::enumerable_thread_specific<LevelSink::Batch> batches([&] { return LevelSink::Batch(sink_); });
     std::mutex mutex;
+    std::atomic<bool> failed = false;
     Result<void> result;
     tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), 4096), [&](const auto& range) {
+        if (failed) return;
         LevelSink::Batch& batch = batches.local();
         const auto all = [&]() -> Result<void> {
             for (size_t k = range.begin(); k < range.end(); ++k) {
@@ -136,11 +138,12 @@ Result<void> LevelStep::run(size_t bin, const LatticeMesh& mesh) {
         };
         if (auto done = all(); !done) {
             const std::scoped_lock lock(mutex);
-            result = done;
+            if (!failed.exchange(true)) result = done;
         }
     });
+    if (failed) return result;
     for (auto& batch : batches) VCP_TRY(batch.flush());
-    return result;
+    return {};
 }
 
 }  // namespace vcp

@@ -18,7 +18,7 @@ constexpr uint64_t kBaseBytes = 40 * kMiB;
 constexpr uint64_t kThreadBytes = 6 * kMiB;
 
 // Below it, blocks and bins become so small that the disk does nothing but seek.
-constexpr uint64_t kLeastUsable = 48 * kMiB;
+constexpr uint64_t kLeastUsable = 96 * kMiB;
 
 // A bin's records, its mesh, and what the step to the coarser level needs, measured with room to spare.
 constexpr uint64_t kBinTriangleBytes = 260;
@@ -47,7 +47,8 @@ Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
     plan.vertexBytes = usable / 2;
     plan.tempBytes = usable / 6;
     plan.bufferBytes = usable / 16;
-    plan.pageBytes = usable / 3;
+    // All that temporary files, the next level's blocks and those of waiting triangles leave.
+    plan.pageBytes = usable - plan.tempBytes - plan.bufferBytes * 5 / 4;
     plan.binTriangles = usable / 3 / kBinTriangleBytes;
     return plan;
 }

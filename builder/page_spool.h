@@ -25,6 +25,8 @@ public:
     [[nodiscard]] std::vector<PageEntry>& entries() { return entries_; }
     [[nodiscard]] const std::vector<PageEntry>& entries() const { return entries_; }
     [[nodiscard]] uint64_t bytes() const { return pages_.size(); }
+    [[nodiscard]] const std::string& pagesFile() const { return pages_.name(); }
+    [[nodiscard]] const std::string& directoryFile() const { return directory_.name(); }
 
 private:
     TempFile pages_, directory_;

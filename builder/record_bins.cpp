@@ -56,8 +56,8 @@ void fromPlanes(const std::byte* planes, size_t count, size_t recordBytes, std::
     }
 }
 
-Error damaged() {
-    return {.code = ErrorCode::Io, .message = "temporary data came back damaged; check the disk, then build again"};
+Error damaged(const std::filesystem::path& file) {
+    return {.code = ErrorCode::InvalidInput, .message = "temporary data came back damaged; check the disk, then build again without --resume", .file = file.string()};
 }
 
 }  // namespace
@@ -131,9 +131,9 @@ Result<void> RawBins::reopen(uint64_t bytes) {
     VCP_TRY(file_.reopen(bytes));
     for (uint64_t at = 0; at < bytes;) {
         BlockHeader header;
-        if (bytes - at < sizeof header) return damaged();
+        if (bytes - at < sizeof header) return damaged(file_.path());
         VCP_TRY(file_.read(at, std::as_writable_bytes(std::span(&header, 1))));
-        if (header.magic != BlockHeader::kMagic || header.bin > kMaxBins || header.storedBytes > bytes - at - sizeof header) return damaged();
+        if (header.magic != BlockHeader::kMagic || header.bin > kMaxBins || header.storedBytes > bytes - at - sizeof header) return damaged(file_.path());
         if (header.bin >= blocks_.size()) {
             open_.resize(header.bin + 1);
             blocks_.resize(header.bin + 1);
@@ -161,8 +161,8 @@ Result<void> RawBins::read(const Block& block, std::byte* out) const {
     BlockHeader header;
     std::memcpy(&header, coded.data(), sizeof header);
     const std::span<const std::byte> payload = std::span<const std::byte>(coded).subspan(sizeof header);
-    if (header.records != block.records || header.storedBytes != block.storedBytes || header.hash != XXH3_64bits(payload.data(), payload.size())) return damaged();
-    if (ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size()) return damaged();
+    if (header.records != block.records || header.storedBytes != block.storedBytes || header.hash != XXH3_64bits(payload.data(), payload.size())) return damaged(file_.path());
+    if (ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size()) return damaged(file_.path());
     fromPlanes(planes.data(), block.records, recordBytes_, out);
     return {};
 }

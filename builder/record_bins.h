@@ -41,6 +41,7 @@ public:
     [[nodiscard]] uint64_t count(size_t bin) const { return bin < counts_.size() ? counts_[bin] : 0; }
     [[nodiscard]] uint64_t total() const;
     [[nodiscard]] uint64_t bytes() const { return file_.size(); }
+    [[nodiscard]] const std::string& fileName() const { return file_.name(); }
 
     struct Block {
         uint64_t offset;  ///< of the header

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
 
@@ -41,31 +42,51 @@ Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte
     return {};
 }
 
-Result<void> TempSpace::create() {
-    std::error_code failed;
-    std::filesystem::create_directories(folder_, failed);
-    if (failed) return systemError(folder_, "cannot make the temporary folder", failed.value());
-    return syncFolder(folder_.has_parent_path() ? folder_.parent_path() : ".");
+Result<void> TempSpace::lock() {
+    const std::scoped_lock guard(lockMutex_);
+    return lock_ >= 0 ? Result<void>() : take();
 }
 
-Result<void> TempSpace::lock() {
-    if (lock_ >= 0) return {};
-    VCP_TRY(create());
-    lock_ = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (lock_ < 0) return systemError(folder_, "cannot open the temporary folder", errno);
-    if (::flock(lock_, LOCK_EX | LOCK_NB) == 0) return {};
-    const int code = errno;
-    ::close(lock_);
-    lock_ = -1;
-    if (code == EWOULDBLOCK) return Error{.code = ErrorCode::Io, .message = "another build of this output is running; wait for it or choose another output", .file = folder_.string()};
-    return {};  // a file system without locks
+Result<void> TempSpace::take() {
+    for (;;) {
+        std::error_code failed;
+        std::filesystem::create_directories(folder_, failed);
+        if (failed) return systemError(folder_, "cannot make the temporary folder", failed.value());
+        const int fd = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        if (fd < 0) return systemError(folder_, "cannot open the temporary folder", errno);
+        const bool isHeld = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;  // or a file system without locks
+        // A build that ended may have removed the folder before it was locked here.
+        struct stat opened {}, named {};
+        const bool isSame = ::fstat(fd, &opened) == 0 && ::stat(folder_.c_str(), &named) == 0 && opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+        if (!isHeld && isSame) {
+            lock_ = fd;
+            return syncFolder(folder_.has_parent_path() ? folder_.parent_path() : ".");
+        }
+        ::close(fd);
+        if (isHeld) return Error{.code = ErrorCode::Io, .message = "another build of this output is running; wait for it or choose another output", .file = folder_.string()};
+    }
+}
+
+void TempSpace::clear(const std::vector<std::string>& kept) {
+    if (lock_ < 0) return;
+    std::error_code ignored;
+    const auto isKept = [&](const std::string& name) { return std::find(kept.begin(), kept.end(), name) != kept.end(); };
+    // The journal first: it must not outlive what it speaks of.
+    if (!isKept(kJournalName)) std::filesystem::remove(folder_ / kJournalName, ignored);
+    std::vector<std::filesystem::path> files;
+    for (std::filesystem::directory_iterator at(folder_, ignored), end; !ignored && at != end; at.increment(ignored))
+        if (at->path().extension() == ".spill" && !isKept(at->path().filename().string())) files.push_back(at->path());
+    for (const auto& file : files) std::filesystem::remove(file, ignored);
 }
 
 void TempSpace::remove() {
+    clear();
+    const std::scoped_lock guard(lockMutex_);
+    if (lock_ < 0) return;
     std::error_code ignored;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_, ignored))
-        if (entry.path().extension() == ".spill" || entry.path().filename() == "journal") std::filesystem::remove(entry.path(), ignored);
     std::filesystem::remove(folder_, ignored);  // only when empty
+    ::close(lock_);
+    lock_ = -1;
 }
 
 TempSpace::~TempSpace() {
@@ -109,7 +130,7 @@ Result<uint64_t> TempFile::append(std::span<const std::byte> bytes) {
 
 Result<void> TempFile::flush() {
     if (file_ < 0) {
-        VCP_TRY(space_.create());
+        VCP_TRY(space_.lock());
         file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
         if (file_ < 0) return systemError(path(), "cannot be created", errno);
     }
@@ -152,6 +173,8 @@ Result<void> TempFile::sync() {
     const std::scoped_lock lock(mutex_);
     VCP_TRY(flush());
     if (::fdatasync(file_) != 0) return systemError(path(), "cannot be made durable", errno);
+    if (!isNamed_) VCP_TRY(syncFolder(space_.folder()));
+    isNamed_ = true;
     return {};
 }
 
@@ -160,7 +183,7 @@ Result<void> TempFile::reopen(uint64_t bytes) {
     if (file_ < 0) return systemError(path(), "cannot be opened", errno);
     const off_t size = ::lseek(file_, 0, SEEK_END);
     if (size < 0 || static_cast<uint64_t>(size) < bytes)
-        return Error{.code = ErrorCode::Io, .message = "is shorter than the journal says; build again without --resume", .file = path().string()};
+        return Error{.code = ErrorCode::InvalidInput, .message = "is shorter than the journal says; build again without --resume", .file = path().string()};
     if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return systemError(path(), "cannot be cut", errno);
     flushed_ = end_ = bytes;
     space_.addDisk(static_cast<int64_t>(bytes));
@@ -176,6 +199,7 @@ void TempFile::remove() {
         space_.addDisk(-static_cast<int64_t>(flushed_));
     }
     file_ = -1;
+    isNamed_ = false;
     flushed_ = end_ = 0;
 }
 

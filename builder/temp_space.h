@@ -18,6 +18,9 @@
 
 namespace vcp {
 
+/// The file that journal.h keeps in the folder.
+inline constexpr const char* kJournalName = "journal";
+
 /// The folder and its accounts. Outlives its files. Any thread.
 class TempSpace {
 public:
@@ -25,11 +28,13 @@ public:
     TempSpace(std::filesystem::path folder, uint64_t memoryBytes) : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
 
     [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
-    /// Makes the folder, and its name durable. Errors: Io.
-    Result<void> create();
-    /// Takes the folder for this process until destroyed. Errors: Io (another build holds it).
+    /// Makes the folder, durably, and takes it for this process until removed or destroyed. Files lock it
+    /// before they go there. Errors: Io (another build holds it).
     Result<void> lock();
-    /// Removes the folder with all that a build puts there; what else lies in it stays.
+    /// Removes what a build puts into the folder, but for the files named `kept`, when the folder is held;
+    /// what else lies in it stays.
+    void clear(const std::vector<std::string>& kept = {});
+    /// The same with the folder, which is given back.
     void remove();
     ~TempSpace();
     TempSpace(const TempSpace&) = delete;
@@ -42,10 +47,12 @@ public:
 private:
     friend class TempFile;
     void addDisk(int64_t bytes);
+    Result<void> take();
 
     std::filesystem::path folder_;
     uint64_t memoryBytes_;
     std::atomic<uint64_t> held_ = 0, disk_ = 0, peakDisk_ = 0;
+    std::mutex lockMutex_;
     int lock_ = -1;
 };
 
@@ -57,6 +64,8 @@ public:
     TempFile(const TempFile&) = delete;
     TempFile& operator=(const TempFile&) = delete;
 
+    [[nodiscard]] const std::string& name() const { return name_; }
+    [[nodiscard]] std::filesystem::path path() const { return space_.folder() / name_; }
     [[nodiscard]] uint64_t size() const { return end_; }
     /// Appends; returns where. Errors: Io.
     Result<uint64_t> append(std::span<const std::byte> bytes);
@@ -64,7 +73,7 @@ public:
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const;
     /// Brings all bytes to the disk, durably. Errors: Io.
     Result<void> sync();
-    /// Takes over what an interrupted build left, cut to `bytes`. Errors: Io (missing, shorter).
+    /// Takes over what an interrupted build left, cut to `bytes`. Errors: Io; InvalidInput (missing, shorter).
     Result<void> reopen(uint64_t bytes);
     /// Gives back memory and disk.
     void remove();
@@ -72,13 +81,13 @@ public:
 private:
     static constexpr size_t kPieceBytes = size_t{1} << 18;
 
-    [[nodiscard]] std::filesystem::path path() const { return space_.folder() / name_; }
     Result<void> flush();
     void dropTail();
 
     TempSpace& space_;
     std::string name_;
     int file_ = -1;
+    bool isNamed_ = false;  ///< the folder's entry is durable
     uint64_t flushed_ = 0;  ///< bytes on the disk; the rest is in tail_
     std::atomic<uint64_t> end_ = 0;
     std::vector<std::unique_ptr<std::byte[]>> tail_;

@@ -3,6 +3,8 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <zstd.h>
@@ -41,6 +43,27 @@ Result<void> syncFolder(const std::filesystem::path& file) {
     return {};
 }
 
+/// An empty file of that name, held by this process alone, so that two builds never mix. -1: `error` says why.
+int createAlone(const std::filesystem::path& file, int& error) {
+    for (;;) {
+        const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+        error = errno;
+        if (fd < 0) return -1;
+        const bool isHeld = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+        error = EWOULDBLOCK;
+        // The one who held it may have given it another name or removed it before it was locked here.
+        struct stat opened {}, named {};
+        const bool isSame = ::fstat(fd, &opened) == 0 && ::stat(file.c_str(), &named) == 0 && opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+        if (!isHeld && isSame && ::ftruncate(fd, 0) == 0) return fd;
+        if (!isHeld && isSame) {
+            error = errno;
+            ::unlink(file.c_str());
+        }
+        ::close(fd);
+        if (isHeld || isSame) return -1;
+    }
+}
+
 }  // namespace
 
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
@@ -61,8 +84,10 @@ Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path
     writer->end_ = alignPage(kDirectoryOffset + directoryBytes(pages));
     if (std::error_code ignored; std::filesystem::is_directory(output, ignored))
         return Error{.code = ErrorCode::Io, .message = "is a folder; give a file name", .file = output.string()};
-    writer->file_ = ::open(writer->partial_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (writer->file_ < 0) return ioError(output, "cannot write here", errno);
+    int error = 0;
+    writer->file_ = createAlone(writer->partial_, error);
+    if (writer->file_ < 0 && error == EWOULDBLOCK) return Error{.code = ErrorCode::Io, .message = "another build is writing this file", .file = output.string()};
+    if (writer->file_ < 0) return ioError(output, "cannot write here", error);
     return writer;
 }
 
@@ -135,7 +160,11 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
     if (::rename(partial_.c_str(), output_.c_str()) != 0) return ioError(output_, "cannot rename the finished file", errno);
     ::close(file_);
     file_ = -1;
-    VCP_TRY(syncFolder(output_));
+    if (auto synced = syncFolder(output_); !synced) {
+        Error late = synced.error();
+        late.message += "; " + output_.string() + " is complete, but a power failure may undo its name";
+        return late;
+    }
     return header.fileBytes;
 }
 

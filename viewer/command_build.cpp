@@ -17,6 +17,7 @@ struct BuildCommand {
     std::string output;
     bool resume = false;
     bool dryRun = false;
+    double checkpointSeconds = BuildOptions().checkpointSeconds;
     BuildSettings settings;
     ReportOptions report;
 };
@@ -101,6 +102,7 @@ Result<int> run(const BuildCommand& command) {
     BuildOptions options = command.settings.optionsFor(command.inputs);
     options.output = command.output;
     options.resume = command.resume;
+    options.checkpointSeconds = command.checkpointSeconds;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     const InterruptScope catching;
     options.progress = [&](const BuildProgress& at) {
@@ -127,6 +129,10 @@ Command addBuild(CLI::App& vcp) {
     app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->required();
     addBuildSettings(*app, command->settings);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
+    app->add_option("--checkpoint", command->checkpointSeconds, "What is done is made durable at most so often")
+        ->type_name("SECONDS")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
     app->add_flag("--dry-run", command->dryRun, "Say what is in the meshes and what the build would need; write nothing");
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);

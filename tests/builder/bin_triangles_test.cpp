@@ -22,7 +22,7 @@ Triangle3 triangleOf(const LatticeMesh& mesh, size_t k) {
 }
 
 void expectAllBinned(const LatticeMesh& mesh, uint32_t log2Cells, uint32_t level) {
-    const TriangleBins bins = binTriangles(mesh, log2Cells, level);
+    const TriangleBins bins = binTriangles(mesh, {log2Cells, level});
     ASSERT_EQ(bins.begin.size(), bins.pages.size() + 1);
     ASSERT_TRUE(std::is_sorted(bins.pages.begin(), bins.pages.end()));
     ASSERT_EQ(std::adjacent_find(bins.pages.begin(), bins.pages.end()), bins.pages.end());
@@ -78,6 +78,23 @@ TEST(BinTriangles, TrianglesOnPageWalls) {
     // Ends exactly where a widened page begins.
     test::append(walls, test::boxMesh({2.25, 16 - 2.25, 18.25}, {16 + 2.25, 30, 29.75}, 1));
     expectAllBinned(test::onLattice(walls), 4, 2);
+}
+
+TEST(BinTriangles, ARunOfPages) {
+    const LatticeMesh mesh = test::onLattice(test::torusMesh({32, 32, 32}, 20, 8, 40, 20));
+    const PageGrid grid{3, 3};
+    const TriangleBins all = binTriangles(mesh, grid);
+    for (const auto& [first, end] : {std::pair<uint64_t, uint64_t>{0, 100}, {100, 101}, {77, 400}, {400, 512}, {5, 5}}) {
+        const TriangleBins run = binTriangles(mesh, grid, first, end);
+        std::vector<uint64_t> expected;
+        for (const uint64_t page : all.pages)
+            if (page >= first && page < end) expected.push_back(page);
+        ASSERT_EQ(run.pages, expected);
+        for (size_t i = 0; i < run.pages.size(); ++i) {
+            const auto of = run.of(i), want = all.of(static_cast<size_t>(std::find(all.pages.begin(), all.pages.end(), run.pages[i]) - all.pages.begin()));
+            ASSERT_TRUE(std::equal(of.begin(), of.end(), want.begin(), want.end()));
+        }
+    }
 }
 
 TEST(BinTriangles, OnePage) { expectAllBinned(test::onLattice(test::sphereMesh({16, 16, 16}, 12, 10)), 5, 0); }

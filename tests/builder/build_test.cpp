@@ -133,6 +133,71 @@ TEST_F(Build, SameBytesForAnyThreads) {
     expectIntact();
 }
 
+/// Large enough that a small cap makes several bins.
+IndexedMesh largeScene() {
+    IndexedMesh mesh = test::torusMesh({0.3, 0.2, 0.1}, 2, 0.7, 520, 240);
+    for (glm::dvec3& p : mesh.positions) p *= 1 + 0.02 * std::sin(9 * p.x) * std::cos(7 * p.y);
+    test::append(mesh, test::boxMesh({3, -1, -1}, {4, 1, 1}, 12));
+    // Long triangles, far from the corners of most bins.
+    test::append(mesh, test::boxMesh({-3, -3, -1.2}, {3, 3, -1.1}, 1));
+    return mesh;
+}
+
+TEST_F(Build, SameBytesForAnyMemory) {
+    const fs::path input = ply(largeScene());
+    std::string first;
+    for (const uint64_t megabytes : {4096, 150, 200, 180}) {
+        BuildOptions o = options({input});
+        o.memoryBytes = megabytes << 20;
+        o.checkpointSeconds = 1e9;
+        o.threads = megabytes == 180 ? 1 : 2;
+        const auto report = buildOctree(o);
+        ASSERT_TRUE(report.ok()) << report.error().line();
+        EXPECT_EQ(report->tempBytes == 0, megabytes > 1000) << megabytes;
+        const std::string bytes = contentOf(o.output);
+        if (first.empty()) first = bytes;
+        EXPECT_TRUE(bytes == first) << megabytes << " MiB";
+        EXPECT_FALSE(fs::exists(tempFolderOf(o)));
+    }
+    BuildOptions o = options({input});
+    o.memoryBytes = 140 << 20;
+    fs::remove(o.output);
+    expectError(o, ErrorCode::Limit, "give --memory");
+}
+
+TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
+    IndexedMesh mesh = largeScene();
+    std::vector<uint32_t> colours(mesh.positions.size());
+    for (size_t v = 0; v < colours.size(); ++v) colours[v] = static_cast<uint32_t>(0xff000000u | (v * 77 & 0xffffff));
+    writePly(mesh, folder_ / "straight.ply", colours);
+    BuildOptions o = options({folder_ / "straight.ply"}, "straight.vcp");
+    o.memoryBytes = 150 << 20;
+    ASSERT_TRUE(buildOctree(o).ok());
+    // Triangles shuffled, their corners turned; vertices renumbered.
+    std::mt19937_64 random(3);
+    std::vector<uint32_t> names(mesh.positions.size());
+    std::iota(names.begin(), names.end(), 0u);
+    std::shuffle(names.begin(), names.end(), random);
+    IndexedMesh shuffled = mesh;
+    std::vector<uint32_t> itsColours = colours;
+    for (size_t v = 0; v < names.size(); ++v) {
+        shuffled.positions[names[v]] = mesh.positions[v];
+        itsColours[names[v]] = colours[v];
+    }
+    for (auto& t : shuffled.triangles) {
+        for (uint32_t& v : t) v = names[v];
+        std::rotate(t.begin(), t.begin() + static_cast<ptrdiff_t>(random() % 3), t.end());
+    }
+    std::shuffle(shuffled.triangles.begin(), shuffled.triangles.end(), random);
+    writePly(shuffled, folder_ / "shuffled.ply", itsColours);
+    for (const uint64_t megabytes : {150, 1024}) {
+        BuildOptions other = options({folder_ / "shuffled.ply"}, "shuffled.vcp");
+        other.memoryBytes = megabytes << 20;
+        ASSERT_TRUE(buildOctree(other).ok());
+        EXPECT_TRUE(contentOf(other.output) == contentOf(o.output)) << megabytes << " MiB";
+    }
+}
+
 TEST_F(Build, ReportMatchesTheFile) {
     const IndexedMesh mesh = scene();
     const auto report = buildOctree(options({ply(mesh)}));

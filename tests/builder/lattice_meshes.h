@@ -6,20 +6,45 @@
 
 #include "builder/indexed_mesh.h"
 #include "builder/lattice_mesh.h"
+#include "builder/lattice_soup.h"
 #include "octree/leaf_math.h"
 
 namespace vcp::test {
 
-/// `mesh` in cells, on the lattice; welded, with normals.
-inline LatticeMesh onLattice(const IndexedMesh& mesh) {
-    LatticeMesh out;
-    for (const glm::dvec3& p : mesh.positions) {
-        const glm::dvec3 q = p * double(kLatticePerCell);
-        out.positions.emplace_back(std::lround(q.x), std::lround(q.y), std::lround(q.z));
+/// The triangles of `mesh` (in cells) on the lattice, snapped and cut as the builder does it. `colours`: of the
+/// vertices, or none.
+inline std::vector<LatticeTriangle> soupOf(const IndexedMesh& mesh, const std::vector<uint32_t>& colours = {}) {
+    const LatticeSnapper snapper({.origin = glm::dvec3(0), .cell = 1});
+    std::vector<LatticeTriangle> soup;
+    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
+        WorldTriangle<double> t{};
+        for (int i = 0; i < 3; ++i) {
+            t.corner[i] = mesh.positions[mesh.triangles[k][i]];
+            t.colour[i] = colours.empty() ? 0xffffffffu : colours[mesh.triangles[k][i]];
+        }
+        snapper.add(t, [&](const LatticeTriangle& piece) { soup.push_back(piece); });
     }
-    out.triangles = mesh.triangles;
-    out.stray.assign(out.positions.size(), static_cast<float>(kLatticeRounding));
-    weld(out);
+    return soup;
+}
+
+/// A mesh as the soup it is the mesh of.
+inline std::vector<LatticeTriangle> soupOf(const LatticeMesh& mesh) {
+    std::vector<LatticeTriangle> soup(mesh.triangles.size());
+    for (size_t k = 0; k < soup.size(); ++k) {
+        soup[k].stray = mesh.stray[k];
+        for (int i = 0; i < 3; ++i) {
+            const uint32_t v = mesh.triangles[k][i];
+            soup[k].corner[i] = mesh.positions[v];
+            soup[k].colour[i] = mesh.colours.empty() ? 0xffffffffu : mesh.colours[v];
+            soup[k].normal[i] = mesh.normals[v];
+        }
+    }
+    return soup;
+}
+
+/// `mesh` in cells, on the lattice, with normals.
+inline LatticeMesh onLattice(const IndexedMesh& mesh) {
+    LatticeMesh out = meshOf(soupOf(mesh), false);
     computeNormals(out);
     return out;
 }

@@ -32,7 +32,7 @@ struct Page {
     glm::u32vec3 at;
     std::optional<PageGeometry> geometry;
 
-    Page(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1) : mesh(std::move(m)), bins(binTriangles(mesh, kLog2Cells, level)), at(position) {
+    Page(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1) : mesh(std::move(m)), bins(binTriangles(mesh, {kLog2Cells, level})), at(position) {
         const auto page = std::find(bins.pages.begin(), bins.pages.end(), mortonEncode(at));
         const auto triangles = page == bins.pages.end() ? std::span<const uint32_t>() : bins.of(static_cast<size_t>(page - bins.pages.begin()));
         geometry.emplace(mesh, triangles, at, kLog2Cells);
