@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "octree/leaf_math.h"
-#include "octree/packing.h"
+#include "octree/vertex_normal.h"
 
 namespace vcp {
 
@@ -203,32 +203,19 @@ void splitLongEdges(LatticeMesh& mesh) {
 }
 
 void computeNormals(LatticeMesh& mesh) {
-    constexpr float kCreaseCosine = 0.766f;  // 40 degrees
-    std::vector<glm::vec3> sum(mesh.positions.size(), glm::vec3(0));
-    std::vector<glm::vec3> faces(mesh.triangles.size());
+    std::vector<WideVector> sum(mesh.positions.size(), WideVector(0));
+    std::vector<WideVector> faces(mesh.triangles.size());
     for (size_t k = 0; k < mesh.triangles.size(); ++k) {
         const Index3& t = mesh.triangles[k];
-        glm::dvec3 p[3];
-        for (int i = 0; i < 3; ++i) p[i] = glm::dvec3(mesh.positions[t[i]] - mesh.positions[t[0]]);
-        const glm::vec3 n = glm::vec3(glm::normalize(glm::cross(p[1], p[2])));
-        faces[k] = n;
-        for (int i = 0; i < 3; ++i) {
-            const glm::vec3 u = glm::vec3(glm::normalize(p[(i + 1) % 3] - p[i])), v = glm::vec3(glm::normalize(p[(i + 2) % 3] - p[i]));
-            const float angle = std::acos(std::clamp(glm::dot(u, v), -1.0f, 1.0f));
-            glm::vec3& s = sum[t[i]];
-            s += glm::dot(s, n) < 0 ? -angle * n : angle * n;
-        }
+        faces[k] = areaNormal(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]);
+        for (const uint32_t v : t) addNormal(sum[v], faces[k]);
     }
     std::vector<uint8_t> crease(mesh.positions.size(), 0);
-    for (glm::vec3& s : sum) {
-        const float length = glm::length(s);
-        s = length > 0 ? s / length : glm::vec3(0, 0, 1);
-    }
     for (size_t k = 0; k < mesh.triangles.size(); ++k)
         for (const uint32_t v : mesh.triangles[k])
-            if (std::abs(glm::dot(faces[k], sum[v])) < kCreaseCosine) crease[v] = 1;
+            if (!crease[v] && isCrease(faces[k], sum[v])) crease[v] = 1;
     mesh.normals.resize(mesh.positions.size());
-    for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packNormal(glm::dvec3(sum[v]), crease[v] != 0);
+    for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
 }
 
 }  // namespace vcp

@@ -33,8 +33,8 @@ void weld(LatticeMesh& mesh);
 /// every triangle that has it, so no crack opens; the rounding of that point is added to its stray.
 void splitLongEdges(LatticeMesh& mesh);
 
-/// Vertex normals: the mean of the incident triangles' normals by angle, taken without
-/// orientation (a mesh need not have one). A vertex where a triangle turns away by more than 40 degrees is
+/// Vertex normals (octree/vertex_normal.h): the mean of the incident triangles' normals by area, taken without
+/// orientation (a mesh need not have one); the page codec foretells them from a page's triangles. A vertex where a triangle turns away by more than 40 degrees is
 /// marked as crease: its normal is not to be interpolated.
 void computeNormals(LatticeMesh& mesh);
 
