@@ -210,10 +210,7 @@ void computeNormals(LatticeMesh& mesh) {
         faces[k] = areaNormal(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]);
         for (const uint32_t v : t) addNormal(sum[v], faces[k]);
     }
-    std::vector<uint8_t> crease(mesh.positions.size(), 0);
-    for (size_t k = 0; k < mesh.triangles.size(); ++k)
-        for (const uint32_t v : mesh.triangles[k])
-            if (!crease[v] && isCrease(faces[k], sum[v])) crease[v] = 1;
+    const std::vector<uint8_t> crease = creases(faces, sum, mesh.triangles);
     mesh.normals.resize(mesh.positions.size());
     for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
 }

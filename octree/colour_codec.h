@@ -7,7 +7,7 @@
 #include "octree/codec_page.h"
 #include "octree/face_codec.h"
 #include "octree/leaf_triangles.h"
-#include "octree/position_map.h"
+#include "octree/corner_store.h"
 #include "octree/range_coder.h"
 
 namespace vcp {
@@ -17,7 +17,7 @@ class ColourCodec {
 public:
     /// `faces`, `vertices`: of `page`; read by the encoder, filled by the decoder.
     ColourCodec(Coder& coder, const PageView& page, std::span<uint4> faces, std::span<uint32_t> vertices)
-        : coder_(coder), page_(page), faces_(faces), vertices_(vertices), corners_(page.header.faces), faceDone_(faces.size(), 0), vertexDone_(vertices.size(), 0) {}
+        : coder_(coder), page_(page), faces_(faces), vertices_(vertices), corners_(1 << page.header.log2Cells), faceDone_(faces.size(), 0), vertexDone_(vertices.size(), 0) {}
 
     /// False when the page has faces or vertices that no leaf uses: their colours would be lost.
     bool run() {
@@ -44,12 +44,12 @@ private:
     }
 
     void codeCorner(glm::ivec3 position, int edge, uint32_t& colour) {
-        const uint64_t key = positionKey(position);
-        if (const Known* known = corners_.find(key)) {
-            bool same = colour == known->colour;
+        Known& here = corners_.at(position);
+        if (here.known) {
+            bool same = colour == here.colour;
             coder_.bit(same_, same);
-            if (same) colour = known->colour;
-            else codeColour(colour, known->colour, 0);
+            if (same) colour = here.colour;
+            else codeColour(colour, here.colour, 0);
         } else {
             std::array<uint32_t, 4> sum{};
             uint32_t count = 0;
@@ -58,14 +58,14 @@ private:
                     glm::ivec3 p = position;
                     p[axis] += step * edge;
                     if (p[axis] < 0) continue;
-                    const Known* near = corners_.find(positionKey(p));
-                    if (near == nullptr) continue;
+                    const Known* near = corners_.find(p);
+                    if (near == nullptr || !near->known) continue;
                     ++count;
                     for (size_t i = 0; i < 4; ++i) sum[i] += near->colour >> 8 * i & 255u;
                 }
             codeColour(colour, count > 0 ? mean(sum, count) : last_, 1);
         }
-        corners_.findOrAdd(key).colour = colour;
+        here = {colour, true};
         last_ = colour;
     }
 
@@ -120,17 +120,18 @@ private:
 
     struct Known {
         uint32_t colour = 0;
+        bool known = false;
     };
     Coder& coder_;
     const PageView& page_;
     std::span<uint4> faces_;
     std::span<uint32_t> vertices_;
-    PositionMap<Known> corners_;
+    CornerStore<Known> corners_;
     std::vector<uint8_t> faceDone_, vertexDone_;
     size_t used_ = 0;
     uint32_t last_ = 0;
     BitModel same_, equal_[3];
-    SignedModel channel_[3][4][3];
+    SmallModel channel_[3][4][3];
 };
 
 }  // namespace vcp

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "octree/codec_page.h"
+#include "octree/corner_store.h"
 #include "octree/position_map.h"
 #include "octree/range_coder.h"
 
@@ -20,12 +21,10 @@ inline glm::ivec3 faceCorner(uint32_t axis, int end, int c) {
     return corner;
 }
 
-inline uint64_t positionKey(glm::ivec3 p) { return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << 16 | uint64_t(uint32_t(p.z)) << 32; }
-
 template <class Coder>
 class FaceCodec {
 public:
-    FaceCodec(Coder& coder, CodecPage& page) : coder_(coder), page_(page), leaves_(page.header.softLeaves), corners_(page.header.faces) {}
+    FaceCodec(Coder& coder, CodecPage& page) : coder_(coder), page_(page), leaves_(page.header.softLeaves), corners_(1 << page.header.log2Cells) {}
 
     /// Completes the words of soft leaves and fills the faces.
     void run() {
@@ -49,8 +48,8 @@ private:
         NodePlace place;
     };
     struct Corner {
-        uint32_t code;  ///< its side turned as flip_ said
-        int edge;       ///< of the leaf it was coded for; 0: not coded
+        uint32_t code = 0;  ///< its side turned as flip_ said
+        int edge = 0;       ///< of the leaf it was coded for; 0: not coded
     };
     /// A direction in 1/4096.
     using Direction = glm::ivec3;
@@ -59,7 +58,7 @@ private:
 
     void codeRun(std::vector<Leaf>& order, uint32_t first) {
         uint32_t axis = order[first].source >> kSoftAxisShift & 3u;
-        axis_.code(coder_, axis);
+        coder_.symbol(axis_, axis);
         if (axis > 2) {
             page_.wrong = true;
             return;
@@ -104,7 +103,7 @@ private:
     /// Corners come up to 8 times, on one side of their leaf's surface or the other: a leaf has no outside. flip_
     /// says whether the leaves at hand see it as those before did.
     void codeCorner(glm::ivec3 position, int edge, uint32_t& code) {
-        Corner& known = corners_.findOrAdd(positionKey(position));
+        Corner& known = corners_.at(position);
         if (known.edge != 0) {
             const uint32_t expected = rescaled(known, edge);
             bool same = ((code ^ expected) & 0x7fffffffu) == 0;
@@ -145,7 +144,7 @@ private:
                 glm::ivec3 p = position;
                 p[axis] += step * edge;
                 if (p[axis] < 0) continue;
-                const Corner* corner = corners_.find(positionKey(p));
+                const Corner* corner = corners_.find(p);
                 if (corner == nullptr || corner->edge == 0) continue;
                 const uint32_t code = rescaled(*corner, edge);
                 const Direction n = oriented(code);
@@ -273,12 +272,12 @@ private:
     Coder& coder_;
     CodecPage& page_;
     PositionMap<uint32_t> leaves_;
-    PositionMap<Corner> corners_;
+    CornerStore<Corner> corners_;
     std::vector<uint8_t> done_;
     uint32_t nextFace_ = 0, flip_ = 0;
-    SymbolModel<2> axis_;
+    SymbolModel axis_;
     BitModel goesOn_, same_[2], sideKnown_, sideNew_[5];
-    SignedModel direction_[5][5], distance_[5][4];
+    SmallModel direction_[5][5], distance_[5][4];
 };
 
 }  // namespace vcp

@@ -1,52 +1,85 @@
 #include "octree/leaf_triangles.h"
 
-#include <algorithm>
-
 namespace vcp {
 
-NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)
-    : root_(root), nodes_(nodes), edge_(kLatticePerCell << log2Cells), hardBelow_(nodes.size() / 8, 0) {
-    for (size_t g = hardBelow_.size(); g-- > 0;)
-        for (size_t i = 0; i < 8; ++i) {
-            const uint32_t word = nodes[8 * g + i], type = word >> kNodeTypeShift;
-            if (type == kNodeHard || (type == kNodeInternal && hardBelow_[word & kNodePayloadMask] != 0)) hardBelow_[g] |= static_cast<uint8_t>(1u << i);
+namespace {
+
+template <class Vector>
+auto sumOfSizes(const Vector& v) {
+    const auto size = [](auto x) { return x < 0 ? -x : x; };
+    return size(v.x) + size(v.y) + size(v.z);
+}
+
+}  // namespace
+
+CubeTest::CubeTest(const std::array<glm::i32vec3, 3>& triangle) : corners_(triangle) {
+    std::array<glm::i64vec3, 3> e;
+    for (size_t i = 0; i < 3; ++i) e[i] = glm::i64vec3(triangle[(i + 1) % 3] - triangle[i]);
+    normal_ = {e[0].y * e[1].z - e[0].z * e[1].y, e[0].z * e[1].x - e[0].x * e[1].z, e[0].x * e[1].y - e[0].y * e[1].x};
+    normalSize_ = sumOfSizes(normal_);
+    offset_ = normal_.x * triangle[0].x + normal_.y * triangle[0].y + normal_.z * triangle[0].z;
+    for (int i = 0; i < 3; ++i)
+        for (int axis = 0; axis < 3; ++axis) {
+            const int n = 3 * i + axis, j = (axis + 1) % 3, k = (axis + 2) % 3;
+            const glm::dvec3 d(e[static_cast<size_t>(i)]), a(triangle[static_cast<size_t>(i)]), c(triangle[static_cast<size_t>((i + 2) % 3)]);
+            along_[axis][n] = 0;
+            along_[j][n] = d[k];
+            along_[k][n] = -d[j];
+            // The ends of the edge itself project to the same point.
+            const double pa = 2 * (d[k] * a[j] - d[j] * a[k]), pc = 2 * (d[k] * c[j] - d[j] * c[k]);
+            least_[n] = std::min(pa, pc);
+            most_[n] = std::max(pa, pc);
+            size_[n] = std::abs(d[j]) + std::abs(d[k]);
         }
+}
+
+bool CubeTest::touches(glm::i32vec3 lower, int edge) const {
+    for (const glm::i32vec3& p : corners_) {
+        const glm::i32vec3 d = p - lower;
+        if (std::min(d.x, std::min(d.y, d.z)) >= 0 && std::max(d.x, std::max(d.y, d.z)) <= edge) return true;
+    }
+    // All times two, so that the cube's centre is whole.
+    const int64_t cx = 2 * int64_t{lower.x} + edge, cy = 2 * int64_t{lower.y} + edge, cz = 2 * int64_t{lower.z} + edge;
+    const int64_t plane = 2 * offset_ - (normal_.x * cx + normal_.y * cy + normal_.z * cz);
+    if ((plane < 0 ? -plane : plane) > edge * normalSize_) return false;
+    const double x = static_cast<double>(cx), y = static_cast<double>(cy), z = static_cast<double>(cz), half = edge;
+    int apart = 0;
+    for (int n = 0; n < kAxes; ++n) {
+        const double centre = along_[0][n] * x + along_[1][n] * y + along_[2][n] * z, reach = half * size_[n];
+        apart |= (least_[n] - centre > reach) | (most_[n] - centre < -reach);
+    }
+    return apart == 0;
+}
+
+NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)
+    : nodes_(nodes), cells_(1 << log2Cells), log2Cells_(static_cast<int>(log2Cells)), word_(size_t{1} << (3 * log2Cells)), size_(word_.size()) {
+    fillCells(root, glm::i32vec3(0), log2Cells);
+}
+
+void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge) {
+    const int edge = 1 << log2Edge;
+    if (word >> kNodeTypeShift == kNodeInternal && log2Edge > 0) {
+        const uint32_t* child = &nodes_[size_t{8} * (word & kNodePayloadMask)];
+        for (int o = 0; o < 8; ++o) fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
+        return;
+    }
+    for (int z = lower.z; z < lower.z + edge; ++z)
+        for (int y = lower.y; y < lower.y + edge; ++y)
+            for (int x = lower.x; x < lower.x + edge; ++x) {
+                word_[cell(x, y, z)] = word;
+                size_[cell(x, y, z)] = static_cast<uint8_t>(log2Edge);
+            }
 }
 
 uint32_t NodePlaces::typeAt(glm::i32vec3 p) const {
-    if (std::min(p.x, std::min(p.y, p.z)) < 0 || std::max(p.x, std::max(p.y, p.z)) >= edge_) return kNodeEmpty;
-    uint32_t word = root_;
-    for (int half = edge_ / 2; word >> kNodeTypeShift == kNodeInternal; half /= 2) {
+    const glm::i32vec3 c = p >> kCellShift;
+    if (std::min(c.x, std::min(c.y, c.z)) < 0 || std::max(c.x, std::max(c.y, c.z)) >= cells_) return kNodeEmpty;
+    uint32_t word = word_[cell(c.x, c.y, c.z)];
+    for (int half = kLatticePerCell / 2; word >> kNodeTypeShift == kNodeInternal; half /= 2) {
         const uint32_t octant = (p.x & half ? 1u : 0u) | (p.y & half ? 2u : 0u) | (p.z & half ? 4u : 0u);
-        word = nodes_[8 * (word & kNodePayloadMask) + octant];
+        word = nodes_[size_t{8} * (word & kNodePayloadMask) + octant];
     }
     return word >> kNodeTypeShift;
-}
-
-bool triangleTouchesCube(const std::array<glm::i32vec3, 3>& triangle, glm::i32vec3 lower, int edge) {
-    // Twice as fine, so that the cube's centre is a lattice point even for an edge of one step.
-    const int64_t half = edge;
-    std::array<glm::i64vec3, 3> v;
-    for (int i = 0; i < 3; ++i) {
-        v[i] = glm::i64vec3(triangle[i]) * int64_t{2} - (glm::i64vec3(lower) * int64_t{2} + half);
-        if (std::max(v[i].x, std::max(v[i].y, v[i].z)) <= half && std::min(v[i].x, std::min(v[i].y, v[i].z)) >= -half) return true;
-    }
-    const auto size = [](int64_t x) { return x < 0 ? -x : x; };
-    std::array<glm::i64vec3, 3> e;
-    for (int i = 0; i < 3; ++i) e[i] = glm::i64vec3(triangle[(i + 1) % 3] - triangle[i]);
-    const glm::i64vec3 n(e[0].y * e[1].z - e[0].z * e[1].y, e[0].z * e[1].x - e[0].x * e[1].z, e[0].x * e[1].y - e[0].y * e[1].x);
-    if (size(n.x * v[0].x + n.y * v[0].y + n.z * v[0].z) > half * (size(n.x) + size(n.y) + size(n.z))) return false;
-    for (int i = 0; i < 3; ++i) {
-        // Axes e x (x, y, z). The ends of the edge itself project to the same point.
-        const glm::i64vec3 &a = v[i], &c = v[(i + 2) % 3], &d = e[i];
-        for (int axis = 0; axis < 3; ++axis) {
-            const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-            const int64_t pa = d[k] * a[j] - d[j] * a[k], pc = d[k] * c[j] - d[j] * c[k];
-            const int64_t r = half * (size(d[j]) + size(d[k]));
-            if (std::min(pa, pc) > r || std::max(pa, pc) < -r) return false;
-        }
-    }
-    return true;
 }
 
 }  // namespace vcp

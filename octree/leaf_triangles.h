@@ -16,8 +16,24 @@
 
 namespace vcp {
 
-/// Steps of the lattice in the smallest leaf's edge.
-inline constexpr int kSubcellSteps = kLatticePerCell >> kMaxSubcellDepth;
+/// 2^kCellShift steps of the lattice are a cell.
+inline constexpr int kCellShift = std::countr_zero(static_cast<unsigned>(kLatticePerCell));
+
+/// Exact overlap of a closed triangle with closed cubes whose bounding boxes overlap its own: the separating axis
+/// test (Akenine-Moller 2001).
+class CubeTest {
+public:
+    explicit CubeTest(const std::array<glm::i32vec3, 3>& triangle);
+    [[nodiscard]] bool touches(glm::i32vec3 lower, int edge) const;
+
+private:
+    static constexpr int kAxes = 9;
+    std::array<glm::i32vec3, 3> corners_;
+    glm::i64vec3 normal_;
+    int64_t offset_, normalSize_;
+    // The nine axes e x (x, y, z), times two: all values are integers below 2^53, so doubles are exact.
+    double along_[3][kAxes], least_[kAxes], most_[kAxes], size_[kAxes];
+};
 
 /// Longest edge of a triangle in a page, along an axis: 256 cells. Keeps products within 64 bits.
 inline constexpr int kMaxEdgeSteps = 256 * kLatticePerCell;
@@ -33,46 +49,70 @@ public:
     [[nodiscard]] uint32_t typeAt(glm::i32vec3 point) const;
 
     /// Calls `found(node word)` for every hard leaf that the closed triangle touches, in a fixed order. Returns
-    /// the number of nodes looked at. Coordinates must be below 2^20 + 2^18 and edges at
-    /// most kMaxEdgeSteps along each axis.
+    /// the number of nodes looked at. Coordinates must be below 2^20 + 2^18 and edges at most kMaxEdgeSteps along
+    /// each axis.
     template <class Found>
     uint64_t hardLeavesOf(const std::array<glm::i32vec3, 3>& triangle, Found&& found) const;
 
-    [[nodiscard]] int edge() const { return edge_; }
-
 private:
-    uint32_t root_;
-    std::span<const uint32_t> nodes_;
-    int edge_;                        ///< of the page
-    std::vector<uint8_t> hardBelow_;  ///< by group: bit i: child i is hard or leads to a hard leaf
-};
+    void fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge);
+    [[nodiscard]] size_t cell(int x, int y, int z) const { return static_cast<size_t>(x + (y << log2Cells_)) + (static_cast<size_t>(z) << (2 * log2Cells_)); }
+    template <class Found>
+    uint64_t withinCell(const CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t word, glm::i32vec3 lower, Found&& found) const;
 
-/// Exact overlap of closed triangle and closed cube, whose bounding boxes overlap: the separating axis test
-/// (Akenine-Moller 2001).
-bool triangleTouchesCube(const std::array<glm::i32vec3, 3>& triangle, glm::i32vec3 lower, int edge);
+    std::span<const uint32_t> nodes_;
+    int cells_, log2Cells_;
+    // By cell: the leaf that covers it or its internal node, and the binary logarithm of that node's edge in cells.
+    std::vector<uint32_t> word_;
+    std::vector<uint8_t> size_;
+};
 
 template <class Found>
 uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& found) const {
+    const auto least = [&](int i) { return std::min(t[0][i], std::min(t[1][i], t[2][i])); };
+    const auto most = [&](int i) { return std::max(t[0][i], std::max(t[1][i], t[2][i])); };
+    const glm::i32vec3 low(least(0), least(1), least(2)), high(most(0), most(1), most(2));
+    // Cells that the closed bounding box touches.
+    glm::i32vec3 first, last;
+    for (int i = 0; i < 3; ++i) {
+        first[i] = std::max((low[i] - 1) >> kCellShift, 0);
+        last[i] = std::min(high[i] >> kCellShift, cells_ - 1);
+    }
+    const CubeTest test(t);
+    uint64_t visits = 1;
+    for (int z = first.z; z <= last.z; ++z)
+        for (int y = first.y; y <= last.y; ++y)
+            for (int x = first.x; x <= last.x; ++x) {
+                ++visits;
+                const uint32_t word = word_[cell(x, y, z)], type = word >> kNodeTypeShift;
+                if (type == kNodeHard) {
+                    // A larger leaf is looked at in the first of its cells that come up.
+                    const int size = size_[cell(x, y, z)], rest = (1 << size) - 1;
+                    if ((x > first.x && (x & rest) != 0) || (y > first.y && (y & rest) != 0) || (z > first.z && (z & rest) != 0)) continue;
+                    if (test.touches(kLatticePerCell * glm::i32vec3(x & ~rest, y & ~rest, z & ~rest), kLatticePerCell << size)) found(word);
+                } else if (type == kNodeInternal) {
+                    visits += withinCell(test, low, high, word, kLatticePerCell * glm::i32vec3(x, y, z), found);
+                }
+            }
+    return visits;
+}
+
+template <class Found>
+uint64_t NodePlaces::withinCell(const CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t top, glm::i32vec3 corner, Found&& found) const {
     struct Visit {
         uint32_t word;
         int edge;
         glm::i32vec3 lower;
     };
-    const auto least = [&](int i) { return std::min(t[0][i], std::min(t[1][i], t[2][i])); };
-    const auto most = [&](int i) { return std::max(t[0][i], std::max(t[1][i], t[2][i])); };
-    const glm::i32vec3 low(least(0), least(1), least(2)), high(most(0), most(1), most(2));
-    for (int i = 0; i < 3; ++i)
-        if (low[i] > edge_ || high[i] < 0) return 1;
-    // Eight children a level at most wait; pages have at most 10 levels.
-    Visit stack[96];
-    int top = 0;
+    Visit stack[7 * kMaxSubcellDepth + 1];
+    int waiting = 0;
     uint64_t visits = 0;
-    stack[top++] = {root_, edge_, glm::i32vec3(0)};
-    while (top > 0) {
-        const Visit v = stack[--top];
+    stack[waiting++] = {top, kLatticePerCell, corner};
+    while (waiting > 0) {
+        const Visit v = stack[--waiting];
         ++visits;
         if (v.word >> kNodeTypeShift == kNodeHard) {
-            if (triangleTouchesCube(t, v.lower, v.edge)) found(v.word);
+            if (test.touches(v.lower, v.edge)) found(v.word);
             continue;
         }
         if (v.word >> kNodeTypeShift != kNodeInternal) continue;
@@ -83,9 +123,9 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
         const uint32_t x = (low.x <= middle.x ? 0x55u : 0u) | (high.x >= middle.x ? 0xaau : 0u);
         const uint32_t y = (low.y <= middle.y ? 0x33u : 0u) | (high.y >= middle.y ? 0xccu : 0u);
         const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);
-        for (uint32_t octants = x & y & z & hardBelow_[group]; octants != 0; octants &= octants - 1) {
+        for (uint32_t octants = x & y & z; octants != 0; octants &= octants - 1) {
             const int o = std::countr_zero(octants);
-            stack[top++] = {nodes_[8 * group + static_cast<uint32_t>(o)], half, v.lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2)};
+            stack[waiting++] = {nodes_[size_t{8} * group + static_cast<uint32_t>(o)], half, v.lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2)};
         }
     }
     return visits;

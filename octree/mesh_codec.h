@@ -19,7 +19,8 @@ namespace vcp {
 template <class Coder>
 class MeshCodec {
 public:
-    MeshCodec(Coder& coder, CodecPage& page) : coder_(coder), page_(page), places_(page.header.root, page.nodes, page.header.log2Cells), front_(page.header.vertices) {}
+    MeshCodec(Coder& coder, CodecPage& page)
+        : coder_(coder), page_(page), hardLeaves_(numberLeaves(page)), places_(page.header.root, page.nodes, page.header.log2Cells), front_(page.header.vertices) {}
 
     void run() {
         uint32_t count = 0;
@@ -42,6 +43,15 @@ public:
 private:
     using Index3 = std::array<uint32_t, 3>;
     static constexpr uint32_t kNone = TriangleFront::kNone;
+
+    /// Hard leaves get their numbers into their words, so that places_ tells them apart.
+    static uint32_t numberLeaves(CodecPage& page) {
+        uint32_t count = 0;
+        page.forEachNode([&](uint32_t& word, uint32_t, const NodePlace&) {
+            if (nodeType(word) == kNodeHard) word = kNodeHard << kNodeTypeShift | count++;
+        });
+        return count;
+    }
 
     void codeTriangle() {
         const uint32_t g = front_.first();
@@ -194,13 +204,7 @@ private:
 
     /// Hard leaves' records, in the order of the leaves; their words.
     void fillLeaves() {
-        std::vector<uint32_t> begin{0};  // by leaf
-        page_.forEachNode([&](uint32_t& word, uint32_t, const NodePlace&) {
-            if (nodeType(word) != kNodeHard) return;
-            word = kNodeHard << kNodeTypeShift | static_cast<uint32_t>(begin.size() - 1);
-            begin.push_back(0);
-        });
-        const NodePlaces leaves(page_.header.root, page_.nodes, page_.header.log2Cells);
+        std::vector<uint32_t> begin(size_t{hardLeaves_} + 1, 0);  // by leaf
         struct Entry {
             uint32_t leaf, triangle;
         };
@@ -210,7 +214,7 @@ private:
         uint64_t work = uint64_t{256} * page_.header.triangles + 65536;
         for (uint32_t t = 0; t < triangles_.size(); ++t) {
             const auto& [a, b, c] = triangles_[t];
-            const uint64_t visits = leaves.hardLeavesOf({positions_[a], positions_[b], positions_[c]}, [&](uint32_t word) { entries.push_back({word & kNodePayloadMask, t}); });
+            const uint64_t visits = places_.hardLeavesOf({positions_[a], positions_[b], positions_[c]}, [&](uint32_t word) { entries.push_back({word & kNodePayloadMask, t}); });
             if (entries.size() > page_.header.triangles || visits > work) {
                 page_.wrong = true;
                 return;
@@ -274,10 +278,7 @@ private:
             normals[t] = areaNormal(positions_[i[0]], positions_[i[1]], positions_[i[2]]);
             for (const uint32_t v : i) addNormal(sums[v], normals[t]);
         }
-        std::vector<uint8_t> crease(positions_.size(), 0);
-        for (size_t t = 0; t < triangles_.size(); ++t)
-            for (const uint32_t v : triangles_[t])
-                if (!crease[v] && isCrease(normals[t], sums[v])) crease[v] = 1;
+        const std::vector<uint8_t> crease = creases(normals, sums, triangles_);
         for (uint32_t v = 0; v < positions_.size(); ++v) codeNormal(v, normalGridPoint(sums[v]), crease[v]);
         if constexpr (Coder::kEncodes) page_.vertexSource = source_.vertexOrder();
     }
@@ -319,6 +320,7 @@ private:
 
     Coder& coder_;
     CodecPage& page_;
+    uint32_t hardLeaves_;
     NodePlaces places_;
     TriangleFront front_;
     MeshSource source_;  ///< the encoder's

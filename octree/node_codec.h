@@ -76,8 +76,9 @@ private:
         coder_.bit(occupied_[scale][context], occupied);
         if (!occupied) return kNodeEmpty << kNodeTypeShift;
         uint32_t type = nodeType(source);
-        typeModel_[scale][context & 3u][last_].code(coder_, type);
-        if (type == kNodeEmpty) page_.wrong = true;
+        coder_.symbol(typeModel_[scale][context & 3u][last_], type);
+        if (type == kNodeEmpty || type > kNodeHard) page_.wrong = true;
+        type &= 3u;
         last_ = (last_ << 2 | type) & 15u;
         uint32_t word = type << kNodeTypeShift;
         if (type == kNodeInternal) {
@@ -109,8 +110,10 @@ private:
     uint32_t codes(uint32_t source, const NodePlace& place) {
         const int size = std::min(3, static_cast<int>(std::bit_width(static_cast<unsigned>(place.edge / kSubcellsPerCell))));
         uint32_t wall = source >> kSoftWallShift & kSoftWallMask, dip = source >> kSoftDipShift & 3u;
-        dip_[size][lastDip_].code(coder_, dip);
-        wall_[size][dip][std::min(lastWall_ / 2, 3u)].code(coder_, wall);
+        coder_.symbol(dip_[size][lastDip_], dip);
+        if (dip > 3u) page_.wrong = true;
+        dip &= 3u;
+        coder_.symbol(wall_[size][dip][std::min(lastWall_ / 2, 3u)], wall);
         lastDip_ = dip;
         lastWall_ = wall;
         return wall << kSoftWallShift | dip << kSoftDipShift;
@@ -146,9 +149,9 @@ private:
     std::vector<std::vector<uint8_t>> grid_;  ///< by depth: types of the nodes, leaves repeated below
     uint32_t groupsMade_ = 0, last_ = 0, lastWall_ = 0, lastDip_ = 0;
     BitModel occupied_[3][64];
-    SymbolModel<2> typeModel_[3][4][16];
-    SymbolModel<2> dip_[4][4];
-    SymbolModel<4> wall_[4][4][4];
+    SymbolModel typeModel_[3][4][16];
+    SymbolModel dip_[4][4];
+    SymbolModel wall_[4][4][4];
     SignedModel clearance_[2][4];
 };
 

@@ -35,8 +35,7 @@ Result<std::vector<uint4>> unpackPlain(std::span<const std::byte> packed, uint64
 
 std::vector<std::byte> coded(RangeEncoder& coder) {
     std::vector<std::byte> out{kCoded};
-    const std::vector<std::byte> bytes = coder.finish();
-    out.insert(out.end(), bytes.begin(), bytes.end());
+    coder.finish(out);
     return out;
 }
 
@@ -112,7 +111,7 @@ Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uin
     if (!plausible(page.header, pageBytes)) return broken("page's counts do not match its size");
     page.allocate();
     codePage(coder, page);
-    if (page.wrong || coder.overrun() || !coder.exhausted()) return broken("page does not decode");
+    if (page.wrong || !coder.complete()) return broken("page does not decode");
     return std::move(page.block);
 }
 
@@ -125,7 +124,7 @@ Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint6
     RangeDecoder coder(packed.subspan(1));
     auto* vertices = reinterpret_cast<uint32_t*>(block.data() + page.header.faces);
     const bool all = std::make_unique<ColourCodec<RangeDecoder>>(coder, page, std::span(block.data(), page.header.faces), std::span(vertices, page.header.vertices))->run();
-    if (!all || coder.overrun() || !coder.exhausted()) return broken("colour page does not decode");
+    if (!all || !coder.complete()) return broken("colour page does not decode");
     return block;
 }
 

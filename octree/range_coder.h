@@ -1,12 +1,14 @@
-// Adaptive binary range coding, after Martin 1979 and the LZMA coder: bits with adaptive probabilities, raw
-// bits, and numbers as bit length and mantissa. Encoder and decoder have the same interface, so that a format
-// is written down once, as a template over the coder: `bit(model, value)` reads `value` in the one and sets it
-// in the other. Integers alone decide, so every machine decodes the same.
+// Adaptive range coding: bits with adaptive probabilities (after Martin 1979 and the LZMA coder), symbols of up to
+// 16 values (after Giesen's LZNA models), and numbers as such a symbol and raw bits, which go to a stream of their
+// own. Encoder and decoder have the same interface, so that a format is written down once, as a template over the
+// coder: `bit(model, value)` reads `value` in the one and sets it in the other. Integers alone decide, so every
+// machine decodes the same.
 #pragma once
 
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -22,7 +24,37 @@ struct BitModel {
         const int shift = seen >= 63 ? 6 : std::bit_width(static_cast<unsigned>(seen) + 1u);
         if (seen < 63) ++seen;
         // Ends a little short of certainty: the coder needs room for either bit.
-        zero = static_cast<uint16_t>(bit ? zero - ((zero - 48) >> shift) : zero + ((65488 - zero) >> shift));
+        zero = static_cast<uint16_t>(zero + (((bit ? 48 : 65488) - zero) >> shift));
+    }
+};
+
+/// Probabilities of 16 symbols, cumulative, in 1/32768; none falls below 1.
+struct SymbolModel {
+    static constexpr int kSymbols = 16, kBits = 15;
+
+    alignas(32) int16_t before[kSymbols];  ///< probability of the symbols below each
+    uint16_t seen = 0;
+
+    /// `used`: symbols from it on hardly ever come.
+    explicit SymbolModel(int used = kSymbols) {
+        for (int i = 0; i < kSymbols; ++i) before[i] = static_cast<int16_t>(i < used ? i * ((1 << kBits) - kSymbols) / used + i : (1 << kBits) - kSymbols + i);
+    }
+    [[nodiscard]] uint32_t begin(uint32_t symbol) const { return static_cast<uint32_t>(before[symbol]); }
+    [[nodiscard]] uint32_t end(uint32_t symbol) const { return symbol + 1 < kSymbols ? static_cast<uint32_t>(before[symbol + 1]) : 1u << kBits; }
+    /// The symbol within whose share `target` lies.
+    [[nodiscard]] uint32_t find(uint32_t target) const {
+        int16_t count = 0;
+        for (int i = 0; i < kSymbols; ++i) count = static_cast<int16_t>(count + (before[i] <= static_cast<int16_t>(target) ? 1 : 0));
+        return static_cast<uint32_t>(count - 1);
+    }
+    void learn(uint32_t symbol) {
+        const int shift = seen < 6 ? 2 : seen < 16 ? 3 : seen < 48 ? 4 : 5;
+        if (seen < 48) ++seen;
+        const int16_t at = static_cast<int16_t>(symbol);
+        for (int16_t i = 0; i < kSymbols; ++i) {
+            const int16_t goal = static_cast<int16_t>(i <= at ? i : (1 << kBits) - kSymbols + i);
+            before[i] = static_cast<int16_t>(before[i] + ((goal - before[i]) >> shift));
+        }
     }
 };
 
@@ -32,31 +64,35 @@ public:
 
     void bit(BitModel& model, bool value) {
         const uint32_t bound = (range_ >> 16) * model.zero;
-        if (value) {
-            low_ += bound;
-            range_ -= bound;
-        } else {
-            range_ = bound;
-        }
+        low_ += value ? bound : 0;
+        range_ = value ? range_ - bound : bound;
         model.learn(value);
         normalize();
     }
-    /// The lowest `count` bits of `value`, 0 to 31 of them.
+    void symbol(SymbolModel& model, uint32_t value) {
+        const uint32_t unit = range_ >> SymbolModel::kBits, begin = model.begin(value);
+        low_ += uint64_t{unit} * begin;
+        range_ = value + 1 < SymbolModel::kSymbols ? unit * (model.end(value) - begin) : range_ - unit * begin;
+        model.learn(value);
+        normalize();
+    }
+    /// The lowest `count` bits of `value`, 0 to 32 of them.
     void raw(uint32_t value, int count) {
-        while (count > 0) {
-            const int part = count < 12 ? count : 12;
-            count -= part;
-            range_ >>= part;
-            low_ += uint64_t{range_} * (value >> count & ((1u << part) - 1));
-            normalize();
+        rawBits_ |= (uint64_t{value} & ((uint64_t{1} << count) - 1)) << rawCount_;
+        for (rawCount_ += count; rawCount_ >= 8; rawCount_ -= 8) {
+            raw_.push_back(static_cast<std::byte>(rawBits_ & 255u));
+            rawBits_ >>= 8;
         }
     }
-    /// The bytes; the encoder is done.
-    std::vector<std::byte> finish() {
+    /// Appends all that was coded: bytes of raw bits (4 bytes), raw bits, range coded bytes. The encoder is done.
+    void finish(std::vector<std::byte>& out) {
+        if (rawCount_ > 0) raw_.push_back(static_cast<std::byte>(rawBits_ & 255u));
         for (int i = 0; i < 5; ++i) shiftLow();
         // The decoder takes bytes past the end for zero.
         while (!bytes_.empty() && bytes_.back() == std::byte{0}) bytes_.pop_back();
-        return std::move(bytes_);
+        for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::byte>(raw_.size() >> shift & 255u));
+        out.insert(out.end(), raw_.begin(), raw_.end());
+        out.insert(out.end(), bytes_.begin(), bytes_.end());
     }
 
 private:
@@ -80,50 +116,59 @@ private:
         low_ = (low_ & 0x00ffffffu) << 8;
     }
 
-    std::vector<std::byte> bytes_;
-    uint64_t low_ = 0, waiting_ = 0;
+    std::vector<std::byte> bytes_, raw_;
+    uint64_t low_ = 0, waiting_ = 0, rawBits_ = 0;
     uint32_t range_ = 0xffffffffu;
+    int rawCount_ = 0;
     uint8_t held_ = 0;
     bool started_ = false;
 };
 
-/// Any bytes decode to something; overrun() tells whether there were too few.
+/// Any bytes decode to something; complete() tells whether they were as many as the encoder made.
 class RangeDecoder {
 public:
     static constexpr bool kEncodes = false;
 
-    explicit RangeDecoder(std::span<const std::byte> bytes) : bytes_(bytes) {
+    explicit RangeDecoder(std::span<const std::byte> bytes) {
+        uint64_t rawBytes = 0;
+        for (size_t i = 0; i < 4 && i < bytes.size(); ++i) rawBytes |= std::to_integer<uint64_t>(bytes[i]) << 8 * i;
+        if (bytes.size() < 4 || rawBytes > bytes.size() - 4) {
+            torn_ = true;
+            return;
+        }
+        raw_ = bytes.subspan(4, rawBytes);
+        bytes_ = bytes.subspan(4 + rawBytes);
         for (int i = 0; i < 4; ++i) code_ = code_ << 8 | next();
     }
     void bit(BitModel& model, bool& value) {
         const uint32_t bound = (range_ >> 16) * model.zero;
         value = code_ >= bound;
-        if (value) {
-            code_ -= bound;
-            range_ -= bound;
-        } else {
-            range_ = bound;
-        }
+        code_ -= value ? bound : 0;
+        range_ = value ? range_ - bound : bound;
+        model.learn(value);
+        normalize();
+    }
+    void symbol(SymbolModel& model, uint32_t& value) {
+        const uint32_t unit = range_ >> SymbolModel::kBits, target = code_ / unit;
+        value = model.find(target < 0x7fff ? target : 0x7fff);
+        const uint32_t begin = model.begin(value);
+        code_ -= unit * begin;
+        range_ = value + 1 < SymbolModel::kSymbols ? unit * (model.end(value) - begin) : range_ - unit * begin;
         model.learn(value);
         normalize();
     }
     void raw(uint32_t& value, int count) {
-        value = 0;
-        while (count > 0) {
-            const int part = count < 12 ? count : 12;
-            count -= part;
-            range_ >>= part;
-            const uint32_t most = (1u << part) - 1, digit = code_ / range_;
-            const uint32_t taken = digit < most ? digit : most;
-            code_ -= taken * range_;
-            value = value << part | taken;
-            normalize();
+        while (rawCount_ < count) {
+            const size_t i = rawAt_++;
+            rawBits_ |= uint64_t{i < raw_.size() ? std::to_integer<uint8_t>(raw_[i]) : uint8_t{0}} << rawCount_;
+            rawCount_ += 8;
         }
+        value = static_cast<uint32_t>(rawBits_ & ((uint64_t{1} << count) - 1));
+        rawBits_ >>= count;
+        rawCount_ -= count;
     }
-    /// Whether more was decoded than the bytes held.
-    [[nodiscard]] bool overrun() const { return at_ > bytes_.size() + 8; }
-    /// Whether all bytes were used.
-    [[nodiscard]] bool exhausted() const { return at_ >= bytes_.size(); }
+    /// Whether exactly the bytes that there were have been used.
+    [[nodiscard]] bool complete() const { return !torn_ && rawAt_ == raw_.size() && at_ >= bytes_.size() && at_ <= bytes_.size() + 8; }
 
 private:
     uint32_t next() {
@@ -137,72 +182,74 @@ private:
         }
     }
 
-    std::span<const std::byte> bytes_;
-    size_t at_ = 0;
+    std::span<const std::byte> bytes_, raw_;
+    size_t at_ = 0, rawAt_ = 0;
+    uint64_t rawBits_ = 0;
+    int rawCount_ = 0;
     uint32_t range_ = 0xffffffffu, code_ = 0;
+    bool torn_ = false;
 };
 
-/// A symbol of `Bits` bits, highest first, each bit in the context of those before it.
-template <int Bits>
-struct SymbolModel {
-    BitModel node[1 << Bits];
-
-    template <class Coder>
-    void code(Coder& coder, uint32_t& value) {
-        uint32_t at = 1;
-        for (int i = Bits - 1; i >= 0; --i) {
-            bool b = (value >> i & 1u) != 0;
-            coder.bit(node[at], b);
-            at = at << 1 | (b ? 1u : 0u);
-        }
-        value = at - (1u << Bits);
-    }
-};
-
-/// A number below 2^30: its bit length, the bit after the leading one, the rest raw.
+/// A number below 2^30: its bit length, the rest raw.
 struct NumberModel {
-    SymbolModel<5> length;
-    BitModel second[32][3];
+    SymbolModel length;
 
     template <class Coder>
     void code(Coder& coder, uint32_t& value) {
+        constexpr uint32_t kLong = SymbolModel::kSymbols - 1;
         uint32_t bits = static_cast<uint32_t>(std::bit_width(value));
-        length.code(coder, bits);
-        if (bits > 30) bits = 30;  // only where the bytes were made up
+        uint32_t symbol = bits < kLong ? bits : kLong;
+        coder.symbol(length, symbol);
+        if (symbol == kLong) {
+            uint32_t more = bits - kLong;
+            coder.raw(more, 4);
+            bits = kLong + more;
+        } else {
+            bits = symbol;
+        }
         if (bits < 2) {
             value = bits;
             return;
         }
-        uint32_t top = value >> (bits - 2) & 1u;
-        bool b = top != 0;
-        coder.bit(second[bits][0], b);
-        uint32_t result = 2u | (b ? 1u : 0u);
-        int left = static_cast<int>(bits) - 2;
-        if (left > 0) {
-            const int context = b ? 2 : 1;
-            --left;
-            b = (value >> left & 1u) != 0;
-            coder.bit(second[bits][context], b);
-            result = result << 1 | (b ? 1u : 0u);
-        }
-        uint32_t rest = value & ((1u << left) - 1);
-        coder.raw(rest, left);
-        value = result << left | rest;
+        uint32_t rest = value;
+        coder.raw(rest, static_cast<int>(bits) - 1);
+        value = 1u << (bits - 1) | (rest & ((1u << (bits - 1)) - 1));
     }
 };
 
-/// A signed number of magnitude below 2^30.
+/// A signed number, mostly large; magnitude below 2^30.
 struct SignedModel {
     NumberModel magnitude;
-    BitModel sign;
 
     template <class Coder>
     void code(Coder& coder, int32_t& value) {
         uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value);
         magnitude.code(coder, size);
-        bool negative = value < 0;
-        if (size != 0) coder.bit(sign, negative);
-        value = negative && size != 0 ? -static_cast<int32_t>(size) : static_cast<int32_t>(size);
+        uint32_t negative = value < 0 ? 1u : 0u;
+        if (size != 0) coder.raw(negative, 1);
+        value = negative != 0 && size != 0 ? -static_cast<int32_t>(size) : static_cast<int32_t>(size);
+    }
+};
+
+/// A signed number, mostly from -7 to 7; magnitude below 2^29.
+struct SmallModel {
+    SymbolModel small;
+    NumberModel beyond;
+
+    template <class Coder>
+    void code(Coder& coder, int32_t& value) {
+        constexpr uint32_t kBeyond = 15;
+        uint32_t symbol = value >= -7 && value <= 7 ? static_cast<uint32_t>(value + 7) : kBeyond;
+        coder.symbol(small, symbol);
+        if (symbol < kBeyond) {
+            value = static_cast<int32_t>(symbol) - 7;
+            return;
+        }
+        uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value) - 8;
+        beyond.code(coder, size);
+        uint32_t negative = value < 0 ? 1u : 0u;
+        coder.raw(negative, 1);
+        value = negative != 0 ? -8 - static_cast<int32_t>(size) : 8 + static_cast<int32_t>(size);
     }
 };
 

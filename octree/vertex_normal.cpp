@@ -18,7 +18,10 @@ WideVector shortened(WideVector v, int bits) {
     return {v.x >> shift, v.y >> shift, v.z >> shift};
 }
 
-int64_t product(WideVector a, WideVector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class Vector>
+int64_t product(const Vector& a, const Vector& b) {
+    return int64_t{a.x} * b.x + int64_t{a.y} * b.y + int64_t{a.z} * b.z;
+}
 
 }  // namespace
 
@@ -28,16 +31,27 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
 }
 
 void addNormal(WideVector& sum, WideVector normal) {
-    if (largest(sum) >= int64_t{1} << 61) return;  // only a page made to overflow gets here
-    if (product(shortened(sum, 30), shortened(normal, 30)) < 0) sum -= normal;
+    const int64_t most = std::max(largest(sum), largest(normal));
+    if (most >= int64_t{1} << 61) return;  // only a page made to overflow gets here
+    const bool opposed = most < int64_t{1} << 30 ? product(sum, normal) < 0 : product(shortened(sum, 30), shortened(normal, 30)) < 0;
+    if (opposed) sum -= normal;
     else sum += normal;
 }
 
-bool isCrease(WideVector normal, WideVector sum) {
-    const WideVector n = shortened(normal, 11), s = shortened(sum, 11);
-    const int64_t along = product(n, s);
-    // cos^2 of 40 degrees is 0.5868.
-    return along * along * 10000 < 5868 * product(n, n) * product(s, s);
+std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums, std::span<const std::array<uint32_t, 3>> triangles) {
+    std::vector<glm::i32vec3> of(sums.size());
+    for (size_t v = 0; v < sums.size(); ++v) of[v] = glm::i32vec3(shortened(sums[v], 11));
+    std::vector<uint8_t> crease(sums.size(), 0);
+    for (size_t k = 0; k < triangles.size(); ++k) {
+        const glm::i32vec3 n(shortened(normals[k], 11));
+        const int64_t size = product(n, n);
+        for (const uint32_t v : triangles[k]) {
+            const int64_t along = product(n, of[v]);
+            // cos^2 of 40 degrees is 0.5868.
+            if (along * along * 10000 < 5868 * size * product(of[v], of[v])) crease[v] = 1;
+        }
+    }
+    return crease;
 }
 
 NormalGridPoint normalGridPoint(WideVector sum) {

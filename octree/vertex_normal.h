@@ -3,7 +3,10 @@
 // two agree to the last bit.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include <glm/vec3.hpp>
 
@@ -17,8 +20,8 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 /// Adds a triangle's normal to a vertex' sum, without orientation: turned to the side of the sum.
 void addNormal(WideVector& sum, WideVector normal);
 
-/// Whether the normal of a triangle turns away from that of its vertex by more than 40 degrees.
-bool isCrease(WideVector normal, WideVector sum);
+/// By vertex: whether the normal of one of its triangles turns away from its own by more than 40 degrees.
+std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums, std::span<const std::array<uint32_t, 3>> triangles);
 
 /// Normals are kept to 12 + 12 bits of the octahedron's upper half (z >= 0), 0.06 degrees: they have no side.
 inline constexpr uint32_t kNormalSteps = 4095;
