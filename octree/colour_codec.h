@@ -53,13 +53,11 @@ private:
         } else {
             std::array<uint32_t, 4> sum{};
             uint32_t count = 0;
-            for (int axis = 0; axis < 3; ++axis)
-                for (int step = -1; step <= 1; step += 2) {
-                    glm::ivec3 p = position;
-                    p[axis] += step * edge;
-                    if (p[axis] < 0) continue;
-                    const Known* near = corners_.find(p);
-                    if (near == nullptr || !near->known) continue;
+            const Known* beside[3][2];
+            corners_.neighbours(position, edge, beside);
+            for (const auto& axis : beside)
+                for (const Known* near : axis) {
+                    if (!near->known) continue;
                     ++count;
                     for (size_t i = 0; i < 4; ++i) sum[i] += near->colour >> 8 * i & 255u;
                 }

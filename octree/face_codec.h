@@ -50,6 +50,7 @@ private:
     struct Corner {
         uint32_t code = 0;  ///< its side turned as flip_ said
         int edge = 0;       ///< of the leaf it was coded for; 0: not coded
+        glm::i16vec3 normal{0};  ///< of `code`, on the side of the corner or the other; in 1/4096
     };
     /// A direction in 1/4096.
     using Direction = glm::ivec3;
@@ -92,37 +93,52 @@ private:
             return;
         }
         uint4& face = page_.faces[nextFace_++];
-        if (Coder::kEncodes) page_.faceSource.push_back(sourceFace);
+        if (Coder::kEncodes) {
+            page_.faceSource.push_back(sourceFace);
+            face = page_.source->faces[sourceFace];
+        }
+        glm::ivec3 position[4];
+        uint4 expected(0);
+        bool known[4];
         for (int c = 0; c < 4; ++c) {
-            uint32_t code = Coder::kEncodes ? page_.source->faces[sourceFace][c] : 0;
-            codeCorner(place.lower() + int{place.edge} * faceCorner(axis, end, c), place.edge, code);
+            position[c] = place.lower() + int{place.edge} * faceCorner(axis, end, c);
+            const Corner& corner = corners_.find(position[c]);
+            known[c] = corner.edge != 0;
+            if (known[c]) expected[c] = rescaled(corner, place.edge) ^ flip_ << 31;
+        }
+        // Corners come up to 8 times, mostly all as they were.
+        bool asExpected = true;
+        if (known[0] || known[1] || known[2] || known[3]) {
+            for (int c = 0; c < 4; ++c) asExpected = asExpected && (!known[c] || face[c] == expected[c]);
+            coder_.bit(asExpected_, asExpected);
+        }
+        for (int c = 0; c < 4; ++c) {
+            uint32_t code = face[c];
+            if (known[c] && asExpected) code = expected[c];
+            else codeCorner(position[c], place.edge, code);
             face[c] = code;
         }
     }
 
-    /// Corners come up to 8 times, on one side of their leaf's surface or the other: a leaf has no outside. flip_
-    /// says whether the leaves at hand see it as those before did.
+    /// Corners are on one side of their leaf's surface or the other: a leaf has no outside. flip_ says whether
+    /// the leaves at hand see it as those before did.
     void codeCorner(glm::ivec3 position, int edge, uint32_t& code) {
-        Corner& known = corners_.at(position);
-        if (known.edge != 0) {
-            const uint32_t expected = rescaled(known, edge);
-            bool same = ((code ^ expected) & 0x7fffffffu) == 0;
-            coder_.bit(same_[known.edge == edge ? 0 : 1], same);
-            if (same) {
-                codeSide(code, expected >> 31, sideKnown_, true);
-                code = (expected & 0x7fffffffu) | (code & 0x80000000u);
-            } else {
-                Foretold foretold;
-                foretold.normal = oriented(expected);
-                foretold.distance = signedDistance(expected);
-                foretold.neighbours = 3;
-                foretold.same = true;
-                codeNew(code, foretold);
-            }
-        } else {
-            codeNew(code, foretell(position, edge));
+        const Corner known = corners_.find(position);
+        if (known.edge == 0) return codeNew(code, foretell(position, edge), position, edge);
+        const uint32_t expected = rescaled(known, edge);
+        bool same = ((code ^ expected) & 0x7fffffffu) == 0;
+        coder_.bit(same_[known.edge == edge ? 0 : 1], same);
+        if (same) {
+            codeSide(code, expected >> 31, sideKnown_, true);
+            code = (expected & 0x7fffffffu) | (code & 0x80000000u);
+            return;
         }
-        known = {code ^ flip_ << 31, edge};
+        Foretold foretold;
+        foretold.normal = known.normal;
+        foretold.distance = signedDistance(expected);
+        foretold.neighbours = 3;
+        foretold.same = true;
+        codeNew(code, foretold, position, edge);
     }
 
     /// What the neighbours say about a corner: oriented normal (of any length) and signed distance, in steps of
@@ -139,27 +155,25 @@ private:
     Foretold foretell(glm::ivec3 position, int edge) {
         Foretold f;
         int sum = 0;
+        const Corner* beside[3][2];
+        corners_.neighbours(position, edge, beside);
         for (int axis = 0; axis < 3; ++axis)
-            for (int step = -1; step <= 1; step += 2) {
-                glm::ivec3 p = position;
-                p[axis] += step * edge;
-                if (p[axis] < 0) continue;
-                const Corner* corner = corners_.find(p);
-                if (corner == nullptr || corner->edge == 0) continue;
-                const uint32_t code = rescaled(*corner, edge);
-                const Direction n = oriented(code);
-                const int d = signedDistance(code), slope = -step * n[axis];
+            for (int end = 0; end < 2; ++end) {
+                const Corner& corner = *beside[axis][end];
+                if (corner.edge == 0) continue;
+                const int along = end != 0 ? -1 : 1;  // from there to here
+                const int d = signedDistance(rescaled(corner, edge)), slope = steps(along * corner.normal[axis]);
                 ++f.neighbours;
-                f.normal += n;
-                sum += d + steps(slope);
-                f.along += d + steps(slope) / 2;
-                f.offset[axis] -= step;
+                f.normal += Direction(corner.normal);
+                sum += d + slope;
+                f.along += d + slope / 2;
+                f.offset[axis] += along;
             }
         if (f.neighbours > 0) f.distance = sum / f.neighbours;
         return f;
     }
 
-    void codeNew(uint32_t& code, const Foretold& f) {
+    void codeNew(uint32_t& code, const Foretold& f, glm::ivec3 position, int edge) {
         // The side, then the direction, then the distance: each helps with the next.
         const int certainty = f.neighbours == 0 ? 0 : std::min(4, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(f.distance) / 32))) + 1);
         uint32_t side = code >> 31;
@@ -170,8 +184,8 @@ private:
         uint32_t u = code >> 11 & 1023u, v = code >> 21 & 1023u;
         const uint32_t sizes = codeDirection(u, v, negative ? -f.normal : f.normal, context);
         int foretold = f.distance;
+        const Direction n = oriented(u << 11 | v << 21 | (negative ? 0x80000000u : 0u));
         if (f.neighbours > 0 && !f.same) {
-            const Direction n = oriented(u << 11 | v << 21 | (negative ? 0x80000000u : 0u));
             foretold = (f.along + (steps(n.x) * f.offset.x + steps(n.y) * f.offset.y + steps(n.z) * f.offset.z) / 2) / f.neighbours;
         }
         if (negative) foretold = -foretold;
@@ -181,6 +195,7 @@ private:
         const int distance = foretold + more;
         if (distance < 0 || distance > static_cast<int>(kPackedDistanceMax)) page_.wrong = true;
         code = (static_cast<uint32_t>(distance) & kPackedDistanceMax) | u << 11 | v << 21 | side << 31;
+        corners_.at(position) = {code ^ flip_ << 31, edge, glm::i16vec3(n)};
     }
 
     /// `code`'s side in bit 31 or 0; expected: the side before flip_.
@@ -254,7 +269,8 @@ private:
     static glm::ivec2 gridPoint(Direction n) {
         const int norm = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
         if (norm == 0) return {512, 512};
-        int x = n.x * 1023 / norm, y = n.y * 1023 / norm;
+        const double scale = 1023.0 / norm;
+        int x = static_cast<int>(n.x * scale), y = static_cast<int>(n.y * scale);
         if (n.z < 0) {
             const int before = x;
             x = (1023 - std::abs(y)) * (x >= 0 ? 1 : -1);
@@ -276,7 +292,7 @@ private:
     std::vector<uint8_t> done_;
     uint32_t nextFace_ = 0, flip_ = 0;
     SymbolModel axis_;
-    BitModel goesOn_, same_[2], sideKnown_, sideNew_[5];
+    BitModel goesOn_, asExpected_, same_[2], sideKnown_, sideNew_[5];
     SmallModel direction_[5][5], distance_[5][4];
 };
 

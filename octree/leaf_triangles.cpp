@@ -12,32 +12,38 @@ auto sumOfSizes(const Vector& v) {
 
 }  // namespace
 
-CubeTest::CubeTest(const std::array<glm::i32vec3, 3>& triangle) : corners_(triangle) {
+void CubeTest::prepare() {
     std::array<glm::i64vec3, 3> e;
-    for (size_t i = 0; i < 3; ++i) e[i] = glm::i64vec3(triangle[(i + 1) % 3] - triangle[i]);
+    for (size_t i = 0; i < 3; ++i) e[i] = glm::i64vec3(corners_[(i + 1) % 3] - corners_[i]);
     normal_ = {e[0].y * e[1].z - e[0].z * e[1].y, e[0].z * e[1].x - e[0].x * e[1].z, e[0].x * e[1].y - e[0].y * e[1].x};
     normalSize_ = sumOfSizes(normal_);
-    offset_ = normal_.x * triangle[0].x + normal_.y * triangle[0].y + normal_.z * triangle[0].z;
-    for (int i = 0; i < 3; ++i)
-        for (int axis = 0; axis < 3; ++axis) {
-            const int n = 3 * i + axis, j = (axis + 1) % 3, k = (axis + 2) % 3;
-            const glm::dvec3 d(e[static_cast<size_t>(i)]), a(triangle[static_cast<size_t>(i)]), c(triangle[static_cast<size_t>((i + 2) % 3)]);
-            along_[axis][n] = 0;
-            along_[j][n] = d[k];
-            along_[k][n] = -d[j];
-            // The ends of the edge itself project to the same point.
-            const double pa = 2 * (d[k] * a[j] - d[j] * a[k]), pc = 2 * (d[k] * c[j] - d[j] * c[k]);
+    offset_ = normal_.x * corners_[0].x + normal_.y * corners_[0].y + normal_.z * corners_[0].z;
+    int n = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        const glm::dvec3 d(e[i]), a(corners_[i]), c(corners_[(i + 2) % 3]);
+        // The ends of the edge itself project to the same point.
+        const auto set = [&](double x, double y, double z) {
+            const double pa = 2 * (x * a.x + y * a.y + z * a.z), pc = 2 * (x * c.x + y * c.y + z * c.z);
+            along_[0][n] = x;
+            along_[1][n] = y;
+            along_[2][n] = z;
             least_[n] = std::min(pa, pc);
             most_[n] = std::max(pa, pc);
-            size_[n] = std::abs(d[j]) + std::abs(d[k]);
-        }
+            size_[n++] = std::abs(x) + std::abs(y) + std::abs(z);
+        };
+        set(0, d.z, -d.y);
+        set(-d.z, 0, d.x);
+        set(d.y, -d.x, 0);
+    }
+    prepared_ = true;
 }
 
-bool CubeTest::touches(glm::i32vec3 lower, int edge) const {
+bool CubeTest::touches(glm::i32vec3 lower, int edge) {
     for (const glm::i32vec3& p : corners_) {
         const glm::i32vec3 d = p - lower;
         if (std::min(d.x, std::min(d.y, d.z)) >= 0 && std::max(d.x, std::max(d.y, d.z)) <= edge) return true;
     }
+    if (!prepared_) prepare();
     // All times two, so that the cube's centre is whole.
     const int64_t cx = 2 * int64_t{lower.x} + edge, cy = 2 * int64_t{lower.y} + edge, cz = 2 * int64_t{lower.z} + edge;
     const int64_t plane = 2 * offset_ - (normal_.x * cx + normal_.y * cy + normal_.z * cz);
@@ -52,7 +58,7 @@ bool CubeTest::touches(glm::i32vec3 lower, int edge) const {
 }
 
 NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)
-    : nodes_(nodes), cells_(1 << log2Cells), log2Cells_(static_cast<int>(log2Cells)), word_(size_t{1} << (3 * log2Cells)), size_(word_.size()) {
+    : nodes_(nodes), cells_(1 << log2Cells), log2Cells_(static_cast<int>(log2Cells)), word_(size_t{1} << (3 * log2Cells), kNodeEmpty << kNodeTypeShift), size_(word_.size()) {
     fillCells(root, glm::i32vec3(0), log2Cells);
 }
 
@@ -60,15 +66,18 @@ void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge)
     const int edge = 1 << log2Edge;
     if (word >> kNodeTypeShift == kNodeInternal && log2Edge > 0) {
         const uint32_t* child = &nodes_[size_t{8} * (word & kNodePayloadMask)];
-        for (int o = 0; o < 8; ++o) fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
+        for (int o = 0; o < 8; ++o)
+            if (child[o] >> kNodeTypeShift != kNodeEmpty) fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
         return;
     }
     for (int z = lower.z; z < lower.z + edge; ++z)
-        for (int y = lower.y; y < lower.y + edge; ++y)
-            for (int x = lower.x; x < lower.x + edge; ++x) {
-                word_[cell(x, y, z)] = word;
-                size_[cell(x, y, z)] = static_cast<uint8_t>(log2Edge);
+        for (int y = lower.y; y < lower.y + edge; ++y) {
+            size_t i = cell(lower.x, y, z);
+            for (int x = 0; x < edge; ++x, ++i) {
+                word_[i] = word;
+                size_[i] = static_cast<uint8_t>(log2Edge);
             }
+        }
 }
 
 uint32_t NodePlaces::typeAt(glm::i32vec3 p) const {

@@ -23,14 +23,17 @@ inline constexpr int kCellShift = std::countr_zero(static_cast<unsigned>(kLattic
 /// test (Akenine-Moller 2001).
 class CubeTest {
 public:
-    explicit CubeTest(const std::array<glm::i32vec3, 3>& triangle);
-    [[nodiscard]] bool touches(glm::i32vec3 lower, int edge) const;
+    explicit CubeTest(const std::array<glm::i32vec3, 3>& triangle) : corners_(triangle) {}
+    [[nodiscard]] bool touches(glm::i32vec3 lower, int edge);
 
 private:
+    void prepare();
+
     static constexpr int kAxes = 9;
     std::array<glm::i32vec3, 3> corners_;
     glm::i64vec3 normal_;
     int64_t offset_, normalSize_;
+    bool prepared_ = false;  ///< a corner in the cube spares the rest
     // The nine axes e x (x, y, z), times two: all values are integers below 2^53, so doubles are exact.
     double along_[3][kAxes], least_[kAxes], most_[kAxes], size_[kAxes];
 };
@@ -58,7 +61,7 @@ private:
     void fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge);
     [[nodiscard]] size_t cell(int x, int y, int z) const { return static_cast<size_t>(x + (y << log2Cells_)) + (static_cast<size_t>(z) << (2 * log2Cells_)); }
     template <class Found>
-    uint64_t withinCell(const CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t word, glm::i32vec3 lower, Found&& found) const;
+    uint64_t withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t word, glm::i32vec3 lower, Found&& found) const;
 
     std::span<const uint32_t> nodes_;
     int cells_, log2Cells_;
@@ -78,7 +81,7 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
         first[i] = std::max((low[i] - 1) >> kCellShift, 0);
         last[i] = std::min(high[i] >> kCellShift, cells_ - 1);
     }
-    const CubeTest test(t);
+    CubeTest test(t);
     uint64_t visits = 1;
     for (int z = first.z; z <= last.z; ++z)
         for (int y = first.y; y <= last.y; ++y)
@@ -98,7 +101,7 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
 }
 
 template <class Found>
-uint64_t NodePlaces::withinCell(const CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t top, glm::i32vec3 corner, Found&& found) const {
+uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t top, glm::i32vec3 corner, Found&& found) const {
     struct Visit {
         uint32_t word;
         int edge;

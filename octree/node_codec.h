@@ -39,6 +39,10 @@ private:
         const NodePlace parent = parents_[g];
         const int depth = depth_[g];
         uint32_t known = 0;  // octants that are not empty
+        // The parent's neighbours that are not empty: lower and upper by axis.
+        uint32_t beside[3][2];
+        for (int axis = 0; axis < 3; ++axis)
+            for (int end = 0; end < 2; ++end) beside[axis][end] = typeBeside(parent, depth - 1, axis, end != 0) != kNodeEmpty ? 1u : 0u;
         for (uint32_t o = 0; o < 8; ++o) {
             const size_t i = size_t{8} * g + o;
             page_.places[i] = parent.child(o);
@@ -50,7 +54,7 @@ private:
                     ++before;
                     full += known >> (o ^ bit) & 1u;
                 }
-                outside += typeBeside(parent, depth - 1, axis, (o & bit) != 0) != kNodeEmpty ? 1u : 0u;
+                outside += beside[axis][o >> axis & 1u];
             }
             const uint32_t context = (before * 4 + full) * 4 + outside;
             page_.nodes[i] = node(page_.source != nullptr ? page_.source->nodes[i] : 0, page_.places[i], depth, context);

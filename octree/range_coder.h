@@ -53,7 +53,8 @@ struct SymbolModel {
         const int16_t at = static_cast<int16_t>(symbol);
         for (int16_t i = 0; i < kSymbols; ++i) {
             const int16_t goal = static_cast<int16_t>(i <= at ? i : (1 << kBits) - kSymbols + i);
-            before[i] = static_cast<int16_t>(before[i] + ((goal - before[i]) >> shift));
+            const int16_t away = static_cast<int16_t>(goal - before[i]);
+            before[i] = static_cast<int16_t>(before[i] + static_cast<int16_t>(away >> shift));
         }
     }
 };
@@ -231,25 +232,36 @@ struct SignedModel {
     }
 };
 
-/// A signed number, mostly from -7 to 7; magnitude below 2^29.
+/// A signed number, mostly below 256, more finely modelled: half octaves of its magnitude, the rest raw.
 struct SmallModel {
-    SymbolModel small;
+    SymbolModel half;
     NumberModel beyond;
 
     template <class Coder>
     void code(Coder& coder, int32_t& value) {
         constexpr uint32_t kBeyond = 15;
-        uint32_t symbol = value >= -7 && value <= 7 ? static_cast<uint32_t>(value + 7) : kBeyond;
-        coder.symbol(small, symbol);
-        if (symbol < kBeyond) {
-            value = static_cast<int32_t>(symbol) - 7;
-            return;
+        // 0, 1, 2, 3, 4..5, 6..7, 8..11, 12..15, ... 96..127, 128..191; from 192 on: beyond.
+        const uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value);
+        uint32_t symbol = size;
+        if (size >= 4) {
+            const uint32_t bits = static_cast<uint32_t>(std::bit_width(size));
+            symbol = size >= 192 ? kBeyond : 2 * bits - 2 + (size >> (bits - 2) & 1u);
         }
-        uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value) - 8;
-        beyond.code(coder, size);
+        coder.symbol(half, symbol);
+        uint32_t result = symbol;
+        if (symbol == kBeyond) {
+            result = size - 192;
+            beyond.code(coder, result);
+            result += 192;
+        } else if (symbol >= 4) {
+            const int left = static_cast<int>(symbol) / 2 - 1;
+            uint32_t rest = size;
+            coder.raw(rest, left);
+            result = (2u | (symbol & 1u)) << left | (rest & ((1u << left) - 1));
+        }
         uint32_t negative = value < 0 ? 1u : 0u;
-        coder.raw(negative, 1);
-        value = negative != 0 ? -8 - static_cast<int32_t>(size) : 8 + static_cast<int32_t>(size);
+        if (result != 0) coder.raw(negative, 1);
+        value = negative != 0 && result != 0 ? -static_cast<int32_t>(result) : static_cast<int32_t>(result);
     }
 };
 
