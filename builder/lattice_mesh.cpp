@@ -1,18 +1,15 @@
 #include "builder/lattice_mesh.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numeric>
 
 #include <glm/geometric.hpp>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_sort.h>
 
 #include "octree/leaf_math.h"
-#include "octree/packing.h"
 #include "octree/vcp_file.h"
+#include "octree/vertex_normal.h"
 
 namespace vcp {
 
@@ -180,44 +177,16 @@ std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
 }
 
 void computeNormals(LatticeMesh& mesh) {
-    constexpr float kCreaseCosine = 0.766f;  // 40 degrees
-    struct Face {
-        glm::vec3 normal;
-        float angle[3];
-    };
-    std::vector<Face> faces(mesh.triangles.size());
-    const auto forTriangles = [&](auto&& visit) {
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), 4096), [&](const auto& range) {
-            for (size_t k = range.begin(); k < range.end(); ++k) visit(k);
-        });
-    };
-    forTriangles([&](size_t k) {
-        const auto& t = mesh.triangles[k];
-        // Edges of a page's triangles are exact in float, their products are not.
-        glm::dvec3 edge[3];
-        for (int i = 0; i < 3; ++i) edge[i] = glm::dvec3(mesh.positions[t[(i + 1) % 3]] - mesh.positions[t[i]]);
-        faces[k].normal = glm::vec3(glm::normalize(glm::cross(edge[0], -edge[2])));
-        glm::vec3 along[3];
-        for (int i = 0; i < 3; ++i) along[i] = glm::vec3(glm::normalize(edge[i]));
-        for (int i = 0; i < 3; ++i) faces[k].angle[i] = std::acos(std::clamp(-glm::dot(along[i], along[(i + 2) % 3]), -1.0f, 1.0f));
-    });
-    std::vector<glm::vec3> sum(mesh.positions.size(), glm::vec3(0));
-    for (size_t k = 0; k < mesh.triangles.size(); ++k)
-        for (int i = 0; i < 3; ++i) {
-            glm::vec3& s = sum[mesh.triangles[k][i]];
-            s += (glm::dot(s, faces[k].normal) < 0 ? -faces[k].angle[i] : faces[k].angle[i]) * faces[k].normal;
-        }
-    for (glm::vec3& s : sum) {
-        const float length = glm::length(s);
-        s = length > 0 ? s / length : glm::vec3(0, 0, 1);
+    std::vector<WideVector> sum(mesh.positions.size(), WideVector(0));
+    std::vector<WideVector> faces(mesh.triangles.size());
+    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
+        const std::array<uint32_t, 3>& t = mesh.triangles[k];
+        faces[k] = areaNormal(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]);
+        for (const uint32_t v : t) addNormal(sum[v], faces[k]);
     }
-    std::vector<uint8_t> crease(mesh.positions.size(), 0);
-    forTriangles([&](size_t k) {
-        for (const uint32_t v : mesh.triangles[k])
-            if (std::abs(glm::dot(faces[k].normal, sum[v])) < kCreaseCosine) std::atomic_ref(crease[v]).store(1, std::memory_order_relaxed);
-    });
+    const std::vector<uint8_t> crease = creases(faces, sum, mesh.triangles);
     mesh.normals.resize(mesh.positions.size());
-    for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packNormal(glm::dvec3(sum[v]), crease[v] != 0);
+    for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
 }
 
 }  // namespace vcp

@@ -40,8 +40,8 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
 /// Number of the vertex at `p` in a mesh from meshOf, or none.
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 
-/// Vertex normals: the mean of the incident triangles' normals by angle, taken without
-/// orientation (a mesh need not have one). A vertex where a triangle turns away by more than 40 degrees is
+/// Vertex normals (octree/vertex_normal.h): the mean of the incident triangles' normals by area, taken without
+/// orientation (a mesh need not have one); the page codec foretells them from a page's triangles. A vertex where a triangle turns away by more than 40 degrees is
 /// marked as crease: its normal is not to be interpolated.
 void computeNormals(LatticeMesh& mesh);
 

@@ -9,9 +9,10 @@
 #include <unistd.h>
 
 #include <fmt/format.h>
-#include <zstd.h>
 #define XXH_INLINE_ALL
 #include <xxhash.h>
+
+#include "octree/page_codec.h"
 
 namespace vcp {
 
@@ -66,7 +67,8 @@ Result<void> checkHeader(const ByteReader& reader, const FileHeader& h, std::spa
     if (std::memcmp(h.magic, FileHeader{}.magic, sizeof h.magic) != 0) return fail(0, "not a .vcp file");
     if (h.version != kFileVersion)
         return Error{.code = ErrorCode::Unsupported,
-                     .message = fmt::format("file version {} is not known; this program reads version {}", h.version, kFileVersion),
+                     .message = fmt::format("file version {} is not known; this program reads version {}: {}", h.version, kFileVersion,
+                                                h.version < kFileVersion ? "build it again" : "use a newer program"),
                      .file = reader.name(),
                      .element = "header",
                      .byte = 8};
@@ -143,15 +145,12 @@ private:
     uint64_t end_ = 0, nextChild_ = 0;
 };
 
-Result<std::vector<uint4>> readStored(const ByteReader& reader, std::string element, uint64_t offset, uint32_t stored, uint32_t bytes, uint64_t hash) {
+/// The stored bytes of a page, checked against their hash.
+Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset, uint32_t stored, uint64_t hash) {
     std::vector<std::byte> packed(stored);
     VCP_TRY(reader.read(offset, packed));
     if (hashBytes(packed) != hash) return broken(reader, element, offset, "hash does not match: the page was changed or damaged");
-    const auto wrongSize = [&] { return broken(reader, element, offset, "page does not decompress to its size"); };
-    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes) return wrongSize();
-    std::vector<uint4> out(bytes / 16);
-    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes) return wrongSize();
-    return out;
+    return packed;
 }
 
 }  // namespace
@@ -214,17 +213,21 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     const PageEntry& e = dataset.pages[index];
     const std::string element = fmt::format("page {}", index);
     PageBytes page;
-    auto geometry = readStored(reader, element, e.offset, e.storedBytes, e.pageBytes, e.hash);
-    if (!geometry) return geometry.error();
+    const auto stored = readStored(reader, element, e.offset, e.storedBytes, e.hash);
+    if (!stored) return stored.error();
+    auto geometry = unpackGeometry(*stored, e.pageBytes);
+    if (!geometry) return broken(reader, element, e.offset, geometry.error().message);
     page.geometry = *std::move(geometry);
-    if (withColour && e.colourBytes != 0) {
-        auto colour = readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourBytes, e.colourHash);
-        if (!colour) return colour.error();
-        page.colour = *std::move(colour);
-    }
-    auto view = parsePage(page.geometryBytes(), page.colourBytes());
+    const auto view = parsePage(page.geometryBytes());
     if (!view) return broken(reader, element, e.offset, view.error().line());
     if (view->header.log2Cells != dataset.header.log2Cells) return broken(reader, element, e.offset, "page size differs from the file's");
+    if (!withColour || e.colourBytes == 0) return page;
+    const auto storedColour = readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash);
+    if (!storedColour) return storedColour.error();
+    if (e.colourBytes != colourPageBytes(view->header)) return broken(reader, element + " colour", e.colourOffset, "colour page does not match its page");
+    auto colour = unpackColour(*storedColour, e.colourBytes, *view);
+    if (!colour) return broken(reader, element + " colour", e.colourOffset, colour.error().message);
+    page.colour = *std::move(colour);
     return page;
 }
 

@@ -1,4 +1,4 @@
-// The .vcp file, version 1.
+// The .vcp file, version 2.
 //
 //   offset   bytes        content
 //   0        4096         FileHeader: what is in the file, tables of the levels, where the directory is
@@ -29,7 +29,7 @@
 
 namespace vcp {
 
-inline constexpr uint32_t kFileVersion = 1;
+inline constexpr uint32_t kFileVersion = 2;
 inline constexpr uint32_t kMaxLevels = 22;  ///< Morton codes have 21 bits an axis
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;

@@ -7,24 +7,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <zstd.h>
+#include "octree/page_codec.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr int kCompressionLevel = 3;
-
 uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
 uint64_t directoryBytes(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes; }
-
-std::vector<std::byte> compress(std::span<const std::byte> bytes) {
-    if (bytes.empty()) return {};
-    std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
-    const size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kCompressionLevel);
-    out.resize(ZSTD_isError(size) ? 0 : size);  // cannot fail with a buffer of compressBound
-    return out;
-}
 
 Error ioError(const std::filesystem::path& file, const char* what, int error) {
     std::string message = std::string(what) + ": " + std::strerror(error);
@@ -68,8 +58,9 @@ int createAlone(const std::filesystem::path& file, int& error) {
 
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
     StoredPage page;
-    page.geometry = compress(geometry);
-    page.colour = compress(colour);
+    PackedPage packed = packPage(geometry, colour);
+    page.geometry = std::move(packed.geometry);
+    page.colour = std::move(packed.colour);
     page.geometryBytes = static_cast<uint32_t>(geometry.size());
     page.colourBytes = static_cast<uint32_t>(colour.size());
     return page;

@@ -1,0 +1,131 @@
+#include "octree/page_codec.h"
+
+#include <memory>
+
+#include <zstd.h>
+
+#include "octree/codec_page.h"
+#include "octree/colour_codec.h"
+#include "octree/face_codec.h"
+#include "octree/mesh_codec.h"
+#include "octree/node_codec.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr std::byte kPlain{0}, kCoded{1};
+constexpr int kPlainLevel = 3;
+
+Error broken(std::string message) { return {.code = ErrorCode::InvalidInput, .message = std::move(message)}; }
+
+std::vector<std::byte> plain(std::span<const std::byte> bytes) {
+    std::vector<std::byte> out(1 + ZSTD_compressBound(bytes.size()), kPlain);
+    const size_t size = ZSTD_compress(out.data() + 1, out.size() - 1, bytes.data(), bytes.size(), kPlainLevel);
+    out.resize(1 + (ZSTD_isError(size) ? 0 : size));  // cannot fail with room for compressBound
+    return out;
+}
+
+Result<std::vector<uint4>> unpackPlain(std::span<const std::byte> packed, uint64_t bytes) {
+    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes) return broken("page does not decompress to its size");
+    std::vector<uint4> out(bytes / 16);
+    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes) return broken("page does not decompress to its size");
+    return out;
+}
+
+std::vector<std::byte> coded(RangeEncoder& coder) {
+    std::vector<std::byte> out{kCoded};
+    coder.finish(out);
+    return out;
+}
+
+template <class Coder>
+void codeHeader(Coder& coder, PageHeader& header) {
+    NumberModel model;
+    for (uint32_t* field : {&header.log2Cells, &header.groups, &header.faces, &header.triangles, &header.vertices, &header.softLeaves, &header.hardLeaves})
+        model.code(coder, *field);
+    uint32_t error = std::bit_cast<uint32_t>(header.certifiedError), low = error & 0xffffu, high = error >> 16;
+    coder.raw(low, 16);
+    coder.raw(high, 16);
+    header.certifiedError = std::bit_cast<float>(low | high << 16);
+}
+
+/// The counts of a header, before anything is allocated by them.
+bool plausible(const PageHeader& h, uint64_t pageBytes) {
+    return h.log2Cells >= 1 && h.log2Cells <= 7 && h.groups <= 1u << 27 && h.faces <= kLeafIndexMask && h.triangles <= kLeafIndexMask && h.vertices <= kField21Mask &&
+           h.softLeaves <= h.faces && h.hardLeaves <= h.triangles && pageSections(h).end == pageBytes;
+}
+
+template <class Coder>
+void codePage(Coder& coder, CodecPage& page) {
+    // The models are some tens of kilobytes: not for the stack of a small thread.
+    std::make_unique<NodeCodec<Coder>>(coder, page)->run();
+    if (!page.wrong) std::make_unique<FaceCodec<Coder>>(coder, page)->run();
+    if (!page.wrong) std::make_unique<MeshCodec<Coder>>(coder, page)->run();
+    std::memcpy(page.block.data(), &page.header, sizeof page.header);
+}
+
+std::vector<std::byte> packColour(std::span<const std::byte> colour, const CodecPage& page, const PageView& view) {
+    std::vector<uint4> faces(page.faceSource.size());
+    std::vector<uint32_t> vertices(page.vertexSource.size());
+    const auto* oldFaces = reinterpret_cast<const uint4*>(colour.data());
+    const auto* oldVertices = reinterpret_cast<const uint32_t*>(colour.data() + 16 * faces.size());
+    for (size_t i = 0; i < faces.size(); ++i) faces[i] = oldFaces[page.faceSource[i]];
+    for (size_t i = 0; i < vertices.size(); ++i) vertices[i] = oldVertices[page.vertexSource[i]];
+    RangeEncoder coder;
+    std::make_unique<ColourCodec<RangeEncoder>>(coder, view, faces, vertices)->run();
+    return coded(coder);
+}
+
+}  // namespace
+
+PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
+    PackedPage packed;
+    const auto source = parsePage(geometry);
+    CodecPage page;
+    if (source.ok()) {
+        page.header = source->header;
+        page.source = &*source;
+        page.wrong = !plausible(page.header, geometry.size()) || (source->header.reserved[0] | source->header.reserved[1] | source->header.reserved[2] | source->header.reserved[3] | source->header.reserved[4] | source->header.reserved[5]) != 0;
+    }
+    if (!source.ok() || page.wrong) return {plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
+    page.allocate();
+    RangeEncoder coder;
+    codeHeader(coder, page.header);
+    codePage(coder, page);
+    if (page.wrong) return {plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
+    packed.geometry = coded(coder);
+    if (colour.empty()) return packed;
+    const auto view = parsePage(std::as_bytes(std::span(page.block)));
+    packed.colour = packColour(colour, page, *view);
+    return packed;
+}
+
+Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {
+    if (packed.empty()) return broken("page is empty");
+    if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), pageBytes);
+    if (packed[0] != kCoded) return broken("page is stored in an unknown form");
+    RangeDecoder coder(packed.subspan(1));
+    CodecPage page;
+    codeHeader(coder, page.header);
+    if (!plausible(page.header, pageBytes)) return broken("page's counts do not match its size");
+    page.allocate();
+    codePage(coder, page);
+    if (page.wrong || !coder.complete()) return broken("page does not decode");
+    return std::move(page.block);
+}
+
+Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page) {
+    if (packed.empty()) return broken("colour page is empty");
+    if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), colourBytes);
+    if (packed[0] != kCoded) return broken("colour page is stored in an unknown form");
+    if (colourPageBytes(page.header) != colourBytes) return broken("colour page does not match its page");
+    std::vector<uint4> block(colourBytes / 16);
+    RangeDecoder coder(packed.subspan(1));
+    auto* vertices = reinterpret_cast<uint32_t*>(block.data() + page.header.faces);
+    const bool all = std::make_unique<ColourCodec<RangeDecoder>>(coder, page, std::span(block.data(), page.header.faces), std::span(vertices, page.header.vertices))->run();
+    if (!all || !coder.complete()) return broken("colour page does not decode");
+    return block;
+}
+
+}  // namespace vcp
