@@ -38,7 +38,7 @@ using nlohmann::json;
 
 // Soft leaves of coarser levels may err by this many of their cells; they are looked at where a cell is
 // about a pixel.
-constexpr double kCoarseErrorCells = 0.2;
+constexpr double kCoarseErrorCells = 0.12;
 
 // Parts of the whole, in time: what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;

@@ -1,10 +1,11 @@
 // The step from one level's triangles to the next coarser one's, bin by bin.
 //
-// Each vertex has an image: where it goes, with which colour and normal. A bin knows the images of its own
-// vertices and of those nearby, because it has all triangles around them; and every bin that knows an image
-// knows the same. A triangle is stepped by the lowest bin that has one of its corners. When a corner is too far
-// away, the triangle waits for the bin that has it, taking the images along that are known: bins are worked on
-// in ascending order, so none is visited twice.
+// Each vertex has an image: where it goes, with which colour and normal (coarsen.h). A bin knows the images of its
+// own vertices and of those nearby, because it has all triangles around them; and every bin that knows an image
+// knows the same. Short triangles are stepped together, each image by the lowest bin that has one of its corners.
+// A long triangle is stepped by itself, from the lowest bin that has one of its corners. When another corner is
+// too far away, it waits for the bin that has that, taking the images along that are known: bins are worked on in
+// ascending order, so none is visited twice.
 //
 // The first step leads from the snapped triangles to the finest level: there a vertex stays where it is, and
 // gets its normal.
@@ -12,6 +13,7 @@
 
 #include <atomic>
 
+#include "builder/coarsen.h"
 #include "builder/lattice_mesh.h"
 #include "builder/page_partition.h"
 #include "builder/record_bins.h"
@@ -19,16 +21,15 @@
 
 namespace vcp {
 
-/// A bin's surroundings, in cells, whose triangles it is given: what pages need, and what the images of all
-/// vertices near its pages depend on.
-inline constexpr double kStepMarginCells = 4;
+/// A bin's surroundings, in cells, whose triangles it is given: what pages need (kBinMarginCells), and what the
+/// images and strays of its triangles depend on. From a page's wall, a short triangle reaches 2 cells, its
+/// clusters 2 more; those measured against it and what else these are measured against, 4 each.
+inline constexpr double kStepMarginCells = 12;
 
 /// A triangle whose images are not all known yet.
 struct WaitingTriangle {
     LatticeTriangle from;
-    glm::i32vec3 image[3];
-    uint32_t colour[3];
-    uint32_t normal[3];
+    VertexImage image[3];
     uint32_t known;  ///< bit i: corner i's image is there
 };
 
@@ -69,11 +70,14 @@ public:
 
 private:
     struct Images;
-    Images imagesOf(size_t bin, const LatticeMesh& mesh) const;
+    [[nodiscard]] Images imagesOf(size_t bin, const LatticeMesh& mesh) const;
+    [[nodiscard]] bool isKnown(size_t bin, glm::i32vec3 p) const;
+    [[nodiscard]] size_t binOf(glm::i32vec3 p) const { return partition_.binOf(grid_.pageOf(p)); }
+    Result<void> stepShort(size_t bin, const LatticeMesh& mesh, const VertexClusters& clusters);
+    Result<void> stepLong(size_t bin, const LatticeMesh& mesh, const Images& images);
     Result<void> stepWaiting(size_t bin, const LatticeMesh& mesh, const Images& images);
-    /// Emits a triangle whose images are all known, unless it collapsed; else lets it wait.
+    /// Emits a triangle whose images are all known; else lets it wait.
     Result<void> pass(const WaitingTriangle& w, LevelSink::Batch& batch);
-    [[nodiscard]] float strayOf(const WaitingTriangle& w) const;
 
     bool first_;
     const PageGrid& grid_;
