@@ -50,6 +50,7 @@ constexpr size_t kCompressionMarkBytes = 4;
 /// Decompresses `inner`, of which `start` was read already. Any number of gzip members or zstd frames; zero
 /// bytes may follow. Memory: under 1 MiB for gzip, at most 128 MiB (the largest window accepted) for zstd.
 /// Limit: more than 2000 times the bytes that went in, beyond the first 256 MiB.
-std::unique_ptr<ByteInput> makeDecompressor(Compression compression, std::unique_ptr<ByteInput> inner, std::string start);
+std::unique_ptr<ByteInput> makeDecompressor(Compression compression, std::unique_ptr<ByteInput> inner,
+                                            std::string start);
 
 }  // namespace vcp

@@ -38,7 +38,8 @@ Result<OpenFile> asInput(int file, bool owns) {
         return OpenFile{std::move(input), static_cast<uint64_t>(std::max<off_t>(status.st_size - begin, 0))};
     }
     if (!S_ISFIFO(status.st_mode) && !S_ISSOCK(status.st_mode))
-        return ioError(::isatty(file) ? "is a terminal; pipe a mesh into it" : "is a device, neither a file nor a pipe");
+        return ioError(::isatty(file) ? "is a terminal; pipe a mesh into it"
+                                      : "is a device, neither a file nor a pipe");
     return OpenFile{std::move(input), std::nullopt};
 }
 
@@ -46,7 +47,8 @@ Result<OpenFile> openFile(const std::filesystem::path& path) {
     if (path == "-") return asInput(STDIN_FILENO, false);
     struct stat status {};
     // Asked before the open: a named pipe's waits for a writer, which is right, but a device's might do anything.
-    if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode) && !S_ISFIFO(status.st_mode))
+    if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode) &&
+        !S_ISFIFO(status.st_mode))
         return ioError("is a device, neither a file nor a pipe");
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (file < 0 && errno == ENOENT) return ioError("no such file");

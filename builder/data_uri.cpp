@@ -29,7 +29,8 @@ int hexDigit(char c) {
 std::optional<std::string> decodeDataUri(std::string_view uri) {
     static constexpr auto kValues = base64Values();
     const size_t comma = uri.find(',');
-    if (!isDataUri(uri) || comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64")) return std::nullopt;
+    if (!isDataUri(uri) || comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64"))
+        return std::nullopt;
     std::string_view digits = uri.substr(comma + 1);
     while (digits.ends_with('=')) digits.remove_suffix(1);
     if (digits.size() % 4 == 1) return std::nullopt;

@@ -73,7 +73,8 @@ protected:
     }
 
     static Error truncated(std::string_view what) {
-        return {.code = ErrorCode::InvalidInput, .message = fmt::format("the {} data end early; the file is truncated", what)};
+        return {.code = ErrorCode::InvalidInput,
+                .message = fmt::format("the {} data end early; the file is truncated", what)};
     }
 
 private:
@@ -157,7 +158,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ByteInput> makeDecompressor(Compression compression, std::unique_ptr<ByteInput> inner, std::string start) {
+std::unique_ptr<ByteInput> makeDecompressor(Compression compression, std::unique_ptr<ByteInput> inner,
+                                            std::string start) {
     if (compression == Compression::Gzip) return std::make_unique<GzipInput>(std::move(inner), std::move(start));
     return std::make_unique<ZstdInput>(std::move(inner), std::move(start));
 }

@@ -107,7 +107,9 @@ public:
 private:
     static constexpr uint64_t kBatch = 4096;
 
-    Error error(ErrorCode code, std::string message) const { return {code, std::move(message), name_, element_, std::nullopt}; }
+    Error error(ErrorCode code, std::string message) const {
+        return {code, std::move(message), name_, element_, std::nullopt};
+    }
 
     Result<void> startChild(const DracoBytes& bytes, const DracoSelection& selection) {
         int ends[2];
@@ -136,7 +138,8 @@ private:
             pollfd ready{pipe_, POLLIN, 0};
             const int some = ::poll(&ready, 1, static_cast<int>(std::min<uint64_t>(2 * seconds_, 1'000'000) * 1000));
             if (some < 0 && errno == EINTR) continue;
-            if (some == 0) return error(ErrorCode::Limit, fmt::format("the Draco decoder sent nothing for {} s", 2 * seconds_));
+            if (some == 0)
+                return error(ErrorCode::Limit, fmt::format("the Draco decoder sent nothing for {} s", 2 * seconds_));
             const ssize_t got = ::read(pipe_, p, bytes);
             if (got < 0 && errno == EINTR) continue;
             if (got < 0) return systemError("the pipe of the Draco decoder cannot be read");
@@ -153,10 +156,14 @@ private:
         }
         child_ = -1;
         if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
-            return error(ErrorCode::Limit, fmt::format("the Draco decoder needed more than {} s or {} MiB and was stopped", seconds_, memoryBytes_ >> 20));
+            return error(ErrorCode::Limit,
+                         fmt::format("the Draco decoder needed more than {} s or {} MiB and was stopped", seconds_,
+                                     memoryBytes_ >> 20));
         if (WIFSIGNALED(status))
-            return error(ErrorCode::InvalidInput, fmt::format("the Draco decoder crashed (signal {}); the data are damaged, or need more than {} MiB",
-                                                              WTERMSIG(status), memoryBytes_ >> 20));
+            return error(
+                ErrorCode::InvalidInput,
+                fmt::format("the Draco decoder crashed (signal {}); the data are damaged, or need more than {} MiB",
+                            WTERMSIG(status), memoryBytes_ >> 20));
         return error(ErrorCode::InvalidInput, "the Draco decoder ended early; the data are damaged");
     }
 
@@ -173,7 +180,8 @@ private:
         VCP_TRY(receive(batch.data(), batch.size() * sizeof(DracoVertex)));
         for (const DracoVertex& v : batch) {
             if (!std::isfinite(v.position[0]) || !std::isfinite(v.position[1]) || !std::isfinite(v.position[2]))
-                return error(ErrorCode::InvalidInput, fmt::format("the position of vertex {} is not finite (NaN or infinite)", vertex_));
+                return error(ErrorCode::InvalidInput,
+                             fmt::format("the position of vertex {} is not finite (NaN or infinite)", vertex_));
             chunk.positions.emplace_back(v.position[0], v.position[1], v.position[2]);
             if (info_.hasColour) chunk.colours.push_back(v.colour);
             ++vertex_;
@@ -190,7 +198,8 @@ private:
                 return error(ErrorCode::InvalidInput, fmt::format("face {} names a vertex that does not exist", face_));
             chunk.triangles.push_back({v[0], v[1], v[2]});
             if (reply_.hasUv)
-                chunk.uvs.push_back({glm::vec2(f.uv[0][0], f.uv[0][1]), glm::vec2(f.uv[1][0], f.uv[1][1]), glm::vec2(f.uv[2][0], f.uv[2][1])});
+                chunk.uvs.push_back({glm::vec2(f.uv[0][0], f.uv[0][1]), glm::vec2(f.uv[1][0], f.uv[1][1]),
+                                     glm::vec2(f.uv[2][0], f.uv[2][1])});
             ++face_;
         }
         return {};
@@ -212,8 +221,9 @@ private:
 
 bool looksLikeDraco(std::string_view start) { return start.starts_with("DRACO"); }
 
-Result<std::unique_ptr<MeshStream>> decodeDraco(const DracoBytes& bytes, uint64_t compressedBytes, const DracoSelection& selection,
-                                                uint64_t memoryBytes, std::string name, std::string element) {
+Result<std::unique_ptr<MeshStream>> decodeDraco(const DracoBytes& bytes, uint64_t compressedBytes,
+                                                const DracoSelection& selection, uint64_t memoryBytes, std::string name,
+                                                std::string element) {
     auto stream = std::make_unique<DracoStream>(std::move(name), std::move(element), compressedBytes, memoryBytes);
     VCP_TRY(stream->begin(bytes, selection));
     return std::unique_ptr<MeshStream>(std::move(stream));

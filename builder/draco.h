@@ -32,8 +32,9 @@ using DracoBytes = std::function<Result<std::string>()>;
 
 /// `name` and `element` are for errors; `compressedBytes` scales the time limits (8 s, and 2 s a MiB). Errors:
 /// InvalidInput (no Draco data, damaged, only points), Limit (memory or time), Io.
-Result<std::unique_ptr<MeshStream>> decodeDraco(const DracoBytes& bytes, uint64_t compressedBytes, const DracoSelection& selection,
-                                                uint64_t memoryBytes, std::string name, std::string element);
+Result<std::unique_ptr<MeshStream>> decodeDraco(const DracoBytes& bytes, uint64_t compressedBytes,
+                                                const DracoSelection& selection, uint64_t memoryBytes, std::string name,
+                                                std::string element);
 
 /// A .drc file; `source` stands at its start.
 Result<std::unique_ptr<MeshStream>> openDraco(ByteSource source, uint64_t memoryBytes);

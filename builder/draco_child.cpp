@@ -111,12 +111,15 @@ void decode(const DracoBytes& bytes, const DracoSelection& selection, int pipe) 
     draco::DecoderBuffer buffer;
     buffer.Init(compressed->data(), compressed->size());
     const auto type = draco::Decoder::GetEncodedGeometryType(&buffer);
-    if (!type.ok()) refuse(pipe, ErrorCode::InvalidInput, std::string("is not Draco data (") + type.status().error_msg() + ")");
+    if (!type.ok())
+        refuse(pipe, ErrorCode::InvalidInput, std::string("is not Draco data (") + type.status().error_msg() + ")");
     if (type.value() != draco::TRIANGULAR_MESH)
         refuse(pipe, ErrorCode::InvalidInput, "has no faces, only points; reconstruct a surface first");
     draco::Decoder decoder;
     auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-    if (!decoded.ok()) refuse(pipe, ErrorCode::InvalidInput, std::string("the Draco data are damaged (") + decoded.status().error_msg() + ")");
+    if (!decoded.ok())
+        refuse(pipe, ErrorCode::InvalidInput,
+               std::string("the Draco data are damaged (") + decoded.status().error_msg() + ")");
     const draco::Mesh& mesh = *decoded.value();
 
     const auto* positions = selection.byIdentifier ? attribute(mesh, selection.position, 3)
@@ -124,9 +127,11 @@ void decode(const DracoBytes& bytes, const DracoSelection& selection, int pipe) 
     const auto* colours = selection.byIdentifier ? attribute(mesh, selection.colour, 3)
                                                  : mesh.GetNamedAttribute(draco::GeometryAttribute::COLOR);
     const auto* const uvs = attribute(mesh, selection.uv, 2);
-    if (!positions || positions->num_components() != 3) refuse(pipe, ErrorCode::InvalidInput, "has no positions of 3 components");
+    if (!positions || positions->num_components() != 3)
+        refuse(pipe, ErrorCode::InvalidInput, "has no positions of 3 components");
     if (colours && colours->num_components() < 3) colours = nullptr;
-    if (mesh.num_faces() == 0) refuse(pipe, ErrorCode::InvalidInput, "has no faces, only points; reconstruct a surface first");
+    if (mesh.num_faces() == 0)
+        refuse(pipe, ErrorCode::InvalidInput, "has no faces, only points; reconstruct a surface first");
 
     DracoReply reply;
     reply.vertices = mesh.num_points();

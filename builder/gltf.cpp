@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <set>
 #include <utility>
@@ -15,24 +14,14 @@
 #include "builder/colour_encoding.h"
 #include "builder/data_uri.h"
 #include "builder/draco.h"
+#include "builder/glb.h"
 #include "builder/gltf_primitive.h"
 #include "builder/gltf_scene.h"
 
 namespace vcp {
 namespace {
 
-constexpr std::string_view kGlbMark = "glTF";
-constexpr size_t kGlbHeaderBytes = 12;
-constexpr size_t kChunkHeaderBytes = 8;
-constexpr uint32_t kJsonChunk = 0x4E4F534A;
-constexpr uint32_t kBinaryChunk = 0x004E4942;
 constexpr uint64_t kMostImageBytes = uint64_t{256} << 20;  // embedded ones, together
-
-uint32_t wordAt(std::string_view bytes, size_t offset) {
-    uint32_t word;
-    std::memcpy(&word, bytes.data() + offset, sizeof word);
-    return word;
-}
 
 class GltfStream final : public MeshStream {
 public:
@@ -63,7 +52,8 @@ public:
     [[nodiscard]] std::span<const Material> materials() const override { return materials_; }
     [[nodiscard]] std::span<const std::string> warnings() const override { return warnings_; }
     [[nodiscard]] uint64_t bytesRead() const override {
-        const double share = static_cast<double>(placement_) / static_cast<double>(std::max<size_t>(placements_.size(), 1));
+        const double share =
+            static_cast<double>(placement_) / static_cast<double>(std::max<size_t>(placements_.size(), 1));
         return std::min(info_.fileBytes, static_cast<uint64_t>(share * static_cast<double>(info_.fileBytes)));
     }
 
@@ -89,7 +79,8 @@ private:
     template <class Use>
     void eachPrimitive(Use use) const {
         for (const GltfPlacement& placement : placements_)
-            for (const GltfPrimitive& primitive : document_.meshes[placement.mesh].primitives) use(placement, primitive);
+            for (const GltfPrimitive& primitive : document_.meshes[placement.mesh].primitives)
+                use(placement, primitive);
     }
 
     Rgba8 factorOf(const GltfPrimitive& primitive) const {
@@ -100,7 +91,8 @@ private:
         std::set<Rgba8> factors;
         eachPrimitive([&](const GltfPlacement&, const GltfPrimitive& primitive) {
             factors.insert(factorOf(primitive));
-            info_.hasColour = info_.hasColour || (primitive.draco ? primitive.draco->colour : primitive.colour).has_value();
+            info_.hasColour =
+                info_.hasColour || (primitive.draco ? primitive.draco->colour : primitive.colour).has_value();
         });
         info_.hasColour = info_.hasColour || factors.size() > 1;
     }
@@ -122,14 +114,17 @@ private:
             if (from.image) material.image = images[*from.image];
             materials_.push_back(std::move(material));
         }
-        eachPrimitive([&](const GltfPlacement&, const GltfPrimitive& primitive) { info_.hasMaterials = info_.hasMaterials || hasImage(primitive); });
+        eachPrimitive([&](const GltfPlacement&, const GltfPrimitive& primitive) {
+            info_.hasMaterials = info_.hasMaterials || hasImage(primitive);
+        });
         if (!info_.hasMaterials) materials_.clear();
         return {};
     }
 
     bool hasImage(const GltfPrimitive& primitive) const {
         const bool hasUv = primitive.draco ? primitive.draco->uv.has_value() : primitive.uv.has_value();
-        return hasUv && primitive.material && *primitive.material < materials_.size() && materials_[*primitive.material].image.exists();
+        return hasUv && primitive.material && *primitive.material < materials_.size() &&
+               materials_[*primitive.material].image.exists();
     }
 
     Result<ImageSource> imageOf(size_t number, uint64_t& bytes) {
@@ -172,8 +167,9 @@ private:
             const uint64_t corners = primitive.indices ? accessors[*primitive.indices].count : here;
             const auto* const node = document_.nodes.empty() ? nullptr : &document_.nodes[placement.node];
             const uint64_t times = node && node->instancing ? node->instancing->count : 1;
-            tooMany = tooMany || std::max(here, corners) > kMost || times > kMost ||
-                      static_cast<double>(std::max(here, corners)) * static_cast<double>(times) > static_cast<double>(kMost);
+            tooMany =
+                tooMany || std::max(here, corners) > kMost || times > kMost ||
+                static_cast<double>(std::max(here, corners)) * static_cast<double>(times) > static_cast<double>(kMost);
             if (tooMany) return;
             vertices += here * times;
             faces += (primitive.mode == GltfMode::Triangles ? corners / 3 : std::max<uint64_t>(corners, 2) - 2) * times;
@@ -181,7 +177,10 @@ private:
             known = known && !primitive.draco && !isRange(document_, primitive);
             facesKnown = facesKnown && !primitive.draco && primitive.mode != GltfMode::Strip;
         });
-        if (tooMany) return Error{.code = ErrorCode::Limit, .message = "its instances make more than 2^48 vertices or triangles", .file = name_};
+        if (tooMany)
+            return Error{.code = ErrorCode::Limit,
+                         .message = "its instances make more than 2^48 vertices or triangles",
+                         .file = name_};
         if (known) info_.vertices = vertices;
         if (facesKnown) info_.faces = faces;
         return {};
@@ -193,7 +192,8 @@ private:
             const GltfPlacement& placement = placements_[placement_];
             const auto& primitives = document_.meshes[placement.mesh].primitives;
             if (!instances_) {
-                instances_.emplace(document_, buffers_, document_.nodes.empty() ? GltfNode{} : document_.nodes[placement.node]);
+                instances_.emplace(document_, buffers_,
+                                   document_.nodes.empty() ? GltfNode{} : document_.nodes[placement.node]);
                 primitive_ = primitives.size();
             }
             if (primitive_ < primitives.size()) {
@@ -226,7 +226,11 @@ private:
             part_ = *std::move(part);
             return {};
         }
-        DracoSelection selection{.byIdentifier = true, .position = *primitive.draco->position, .colour = primitive.draco->colour, .uv = std::nullopt, .linearColour = true};
+        DracoSelection selection{.byIdentifier = true,
+                                 .position = *primitive.draco->position,
+                                 .colour = primitive.draco->colour,
+                                 .uv = std::nullopt,
+                                 .linearColour = true};
         if (hasImage(primitive)) selection.uv = primitive.draco->uv;
         const uint32_t view = primitive.draco->view;
         const uint64_t size = document_.views[view].bytes;
@@ -332,41 +336,6 @@ private:
     uint64_t triangles_ = 0;
 };
 
-// What follows the JSON of a GLB: its first buffer.
-Result<std::unique_ptr<RandomBytes>> binaryChunk(ByteSource& source, const std::filesystem::path& path, const MeshOpenOptions& options) {
-    const auto header = source.window(kChunkHeaderBytes);
-    if (!header) return header.error();
-    if (header->size() < kChunkHeaderBytes || wordAt(*header, 4) != kBinaryChunk) return std::unique_ptr<RandomBytes>();
-    const uint64_t bytes = wordAt(*header, 0);
-    source.advance(kChunkHeaderBytes);
-    if (source.isPlainFile()) return openRandomBytes(path, source.offset());
-    auto spool = std::make_unique<Spool>(options.tempFolder);
-    while (spool->size() < bytes && !source.atEnd()) {
-        const auto window = source.window();
-        if (!window) return window.error();
-        const std::string_view taken = window->substr(0, bytes - spool->size());
-        VCP_TRY(spool->append(taken));
-        source.advance(taken.size());
-    }
-    return std::unique_ptr<RandomBytes>(std::move(spool));
-}
-
-// Reads up to the JSON of a GLB, and says how long that is.
-Result<uint64_t> glbJsonBytes(ByteSource& source) {
-    const auto start = source.window(kGlbHeaderBytes + kChunkHeaderBytes);
-    if (!start) return start.error();
-    if (start->size() < kGlbHeaderBytes + kChunkHeaderBytes)
-        return source.error(ErrorCode::InvalidInput, "header", source.size(), "the file ends inside the GLB header");
-    if (wordAt(*start, 4) != 2)
-        return source.error(ErrorCode::Unsupported, "header", 4, fmt::format("is GLB version {}; 2 is read", wordAt(*start, 4)));
-    const uint64_t bytes = wordAt(*start, 12);
-    if (wordAt(*start, 16) != kJsonChunk) return source.error(ErrorCode::InvalidInput, "header", 16, "its first chunk is not JSON");
-    source.advance(kGlbHeaderBytes + kChunkHeaderBytes);
-    if (bytes > source.remaining())
-        return source.error(ErrorCode::InvalidInput, "header", 12, fmt::format("declares {} bytes of JSON, more than the file holds: it is truncated", bytes));
-    return bytes;
-}
-
 }  // namespace
 
 bool looksLikeGltf(std::string_view start) {
@@ -375,13 +344,14 @@ bool looksLikeGltf(std::string_view start) {
     return start.starts_with(kGlbMark) || start.starts_with('{');
 }
 
-Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::filesystem::path& path, const MeshOpenOptions& options) {
+Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::filesystem::path& path,
+                                             const MeshOpenOptions& options) {
     const auto start = source.window(kGlbMark.size());
     if (!start) return start.error();
     const bool binary = start->starts_with(kGlbMark);
     uint64_t jsonBytes = ByteSource::kUnknownSize;
     if (binary) {
-        const auto bytes = glbJsonBytes(source);
+        const auto bytes = readGlbHeader(source);
         if (!bytes) return bytes.error();
         jsonBytes = *bytes;
     }
@@ -389,13 +359,14 @@ Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::files
     if (!document) return document.error();
     std::unique_ptr<RandomBytes> chunk;
     if (binary) {
-        auto read = binaryChunk(source, path, options);
+        auto read = openGlbBinary(source, path, options.tempFolder);
         if (!read) return read.error();
         chunk = *std::move(read);
     }
     std::filesystem::path folder;
     if (!path.empty() && path != "-") folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-    auto stream = std::make_unique<GltfStream>(source.name(), std::move(folder), options, *std::move(document), std::move(chunk));
+    auto stream =
+        std::make_unique<GltfStream>(source.name(), std::move(folder), options, *std::move(document), std::move(chunk));
     VCP_TRY(stream->begin(binary ? "GLB" : "glTF", source.fileBytes()));
     return std::unique_ptr<MeshStream>(std::move(stream));
 }

@@ -25,6 +25,7 @@ bool looksLikeGltf(std::string_view start);
 
 /// `source` stands at the start of the file; `path` is where it was opened, for what lies beside it, or empty. Errors:
 /// as readGltfDocument(), InvalidInput (GLB chunks, buffers, no triangles), Io, and those of Draco.
-Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::filesystem::path& path, const MeshOpenOptions& options);
+Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::filesystem::path& path,
+                                             const MeshOpenOptions& options);
 
 }  // namespace vcp

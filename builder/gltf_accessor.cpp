@@ -40,7 +40,8 @@ double component(GltfComponent type, const char* p, bool normalized) {
 
 }  // namespace
 
-GltfBuffers::GltfBuffers(GltfDocument& document, std::string file, std::filesystem::path folder, std::unique_ptr<RandomBytes> binary)
+GltfBuffers::GltfBuffers(GltfDocument& document, std::string file, std::filesystem::path folder,
+                         std::unique_ptr<RandomBytes> binary)
     : document_(document), file_(std::move(file)), folder_(std::move(folder)), open_(document.buffers.size()) {
     // Only the first buffer may be the chunk.
     if (!open_.empty() && document.buffers[0].uri.empty()) open_[0] = std::move(binary);
@@ -49,7 +50,10 @@ GltfBuffers::GltfBuffers(GltfDocument& document, std::string file, std::filesyst
 Result<RandomBytes*> GltfBuffers::open(uint32_t number) {
     GltfBuffer& buffer = document_.buffers[number];
     const auto wrong = [&](std::string message) {
-        return Error{.code = ErrorCode::InvalidInput, .message = std::move(message), .file = file_, .element = fmt::format("buffer {}", number)};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = std::move(message),
+                     .file = file_,
+                     .element = fmt::format("buffer {}", number)};
     };
     auto& opened = open_[number];
     std::string file = "the file";
@@ -67,7 +71,8 @@ Result<RandomBytes*> GltfBuffers::open(uint32_t number) {
         file = path->string();
     }
     if (opened->size() < buffer.bytes)
-        return wrong(fmt::format("declares {} bytes, but {} has only {} for it: it is truncated", buffer.bytes, file, opened->size()));
+        return wrong(fmt::format("declares {} bytes, but {} has only {} for it: it is truncated", buffer.bytes, file,
+                                 opened->size()));
     return opened.get();
 }
 
@@ -84,7 +89,10 @@ Result<void> GltfBuffers::read(uint32_t view, uint64_t offset, char* to, size_t 
 }
 
 GltfAccessorReader::GltfAccessorReader(const GltfDocument& document, GltfBuffers& buffers, uint32_t accessor)
-    : document_(document), buffers_(buffers), accessor_(document.accessors[accessor]), element_(fmt::format("accessor {}", accessor)) {}
+    : document_(document),
+      buffers_(buffers),
+      accessor_(document.accessors[accessor]),
+      element_(fmt::format("accessor {}", accessor)) {}
 
 Result<void> GltfAccessorReader::read(size_t most, std::vector<double>& out) {
     const auto count = static_cast<size_t>(std::min<uint64_t>(most, left()));
@@ -104,7 +112,8 @@ Result<void> GltfAccessorReader::readDense(size_t count, std::vector<double>& ou
         const size_t here = std::min(atOnce, count - done);
         const size_t bytes = (here - 1) * stride + elementBytes;
         bytes_.resize(bytes);
-        VCP_TRY(buffers_.read(*accessor_.view, accessor_.offset + (next_ + done) * stride, bytes_.data(), bytes, element_));
+        VCP_TRY(
+            buffers_.read(*accessor_.view, accessor_.offset + (next_ + done) * stride, bytes_.data(), bytes, element_));
         decode(bytes_.data(), stride, here, out.data() + done * accessor_.components);
         done += here;
     }
@@ -135,7 +144,8 @@ Result<void> GltfAccessorReader::applySparse(size_t count, std::vector<double>& 
             continue;
         }
         const uint64_t number = sparseRead_ - sparseIndices_.size() + sparseUsed_;
-        VCP_TRY(buffers_.read(sparse.valueView, sparse.valueOffset + number * value.size(), value.data(), value.size(), element_));
+        VCP_TRY(buffers_.read(sparse.valueView, sparse.valueOffset + number * value.size(), value.data(), value.size(),
+                              element_));
         decode(value.data(), value.size(), 1, out.data() + (index - next_) * accessor_.components);
         ++sparseUsed_;
     }
@@ -148,7 +158,8 @@ Result<void> GltfAccessorReader::nextSparseIndex() {
     const size_t bytes = byteSize(sparse.indexType);
     const auto count = static_cast<size_t>(std::min<uint64_t>(kReadBytes / bytes, sparse.count - sparseRead_));
     bytes_.resize(count * bytes);
-    VCP_TRY(buffers_.read(sparse.indexView, sparse.indexOffset + sparseRead_ * bytes, bytes_.data(), bytes_.size(), element_));
+    VCP_TRY(buffers_.read(sparse.indexView, sparse.indexOffset + sparseRead_ * bytes, bytes_.data(), bytes_.size(),
+                          element_));
     sparseIndices_.clear();
     sparseUsed_ = 0;
     for (size_t i = 0; i < count; ++i) {

@@ -16,7 +16,8 @@ class GltfBuffers {
 public:
     /// `document` must outlive this; the data of its data URIs are moved from it. `folder` holds external buffers
     /// (empty: there is none, as for standard input); `binary` is the second chunk of a GLB, or null.
-    GltfBuffers(GltfDocument& document, std::string file, std::filesystem::path folder, std::unique_ptr<RandomBytes> binary);
+    GltfBuffers(GltfDocument& document, std::string file, std::filesystem::path folder,
+                std::unique_ptr<RandomBytes> binary);
 
     /// Reads bytes of a view; precondition: they lie in it. `element` is for errors: InvalidInput (a buffer names no
     /// file below the folder, or is shorter than declared), Io, each with the buffer's file.

@@ -19,7 +19,8 @@ namespace vcp {
 namespace {
 
 constexpr uint64_t kTextLimit = uint64_t{128} << 20;
-constexpr uint64_t kMostZeros = uint64_t{1} << 24;  // elements of an accessor without data
+constexpr uint64_t kMostZeros = 65536;  // elements of an accessor without data, and so many for each sparse one
+constexpr uint64_t kZerosPerValue = 256;
 
 std::optional<GltfComponent> componentOf(uint64_t number) {
     using enum GltfComponent;
@@ -44,10 +45,10 @@ std::optional<GltfComponent> componentOf(uint64_t number) {
 // Extensions without which the surface is still the same.
 bool changesNoSurface(std::string_view extension) {
     static constexpr std::array<std::string_view, 7> kRead{
-        "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "CESIUM_RTC",
+        "KHR_draco_mesh_compression", "KHR_mesh_quantization",   "EXT_mesh_gpu_instancing", "CESIUM_RTC",
         "EXT_mesh_features",          "EXT_structural_metadata", "KHR_node_visibility"};
-    static constexpr std::array<std::string_view, 7> kLooks{"KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_",
-                                                            "EXT_lights_",    "KHR_xmp",      "KHR_animation_"};
+    static constexpr std::array<std::string_view, 7> kLooks{
+        "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "EXT_lights_", "KHR_xmp", "KHR_animation_"};
     return std::ranges::find(kRead, extension) != kRead.end() ||
            std::ranges::any_of(kLooks, [&](std::string_view start) { return extension.starts_with(start); });
 }
@@ -88,7 +89,8 @@ private:
         const JsonFields top(json_, where, check_);
         const Json* const asset = top.find("asset");
         if (!asset || !asset->is_object())
-            return source_.error(ErrorCode::InvalidInput, "", std::nullopt, "is JSON without 'asset'; it is not glTF 2.0");
+            return source_.error(ErrorCode::InvalidInput, "", std::nullopt,
+                                 "is JSON without 'asset'; it is not glTF 2.0");
         const std::string version = JsonFields(*asset, where, check_).text("version");
         if (!version.starts_with("2."))
             return source_.error(ErrorCode::Unsupported, "asset", std::nullopt,
@@ -98,8 +100,9 @@ private:
             const Json& name = (*required)[i];
             const std::string extension = name.is_string() ? name.get<std::string>() : "?";
             if (!changesNoSurface(extension))
-                return source_.error(ErrorCode::Unsupported, "extensionsRequired", std::nullopt,
-                                     fmt::format("needs the extension {}, which is not read; export it without", shownName(extension)));
+                return source_.error(
+                    ErrorCode::Unsupported, "extensionsRequired", std::nullopt,
+                    fmt::format("needs the extension {}, which is not read; export it without", shownName(extension)));
         }
         return {};
     }
@@ -150,7 +153,9 @@ private:
         if (stride < elementBytes) return f.fail("its elements are larger than the byteStride of its bufferView");
         const bool fits = count == 0 || (offset <= room && elementBytes <= room - offset &&
                                          (count - 1) <= (room - offset - elementBytes) / stride);
-        if (!fits) f.fail(fmt::format("{} elements of {} bytes do not fit into bufferView {} of {} bytes", count, elementBytes, number, room));
+        if (!fits)
+            f.fail(fmt::format("{} elements of {} bytes do not fit into bufferView {} of {} bytes", count, elementBytes,
+                               number, room));
     }
 
     void readAccessor(const JsonFields& f) {
@@ -163,7 +168,8 @@ private:
         const std::string shape = f.text("type");
         if (shape == "SCALAR") accessor.components = 1;
         if (shape.size() == 4 && shape.starts_with("VEC")) accessor.components = static_cast<uint32_t>(shape[3] - '0');
-        if (accessor.components > 4 || (accessor.components == 0 && !shape.starts_with("MAT"))) return f.fail("its type is unknown");
+        if (accessor.components > 4 || (accessor.components == 0 && !shape.starts_with("MAT")))
+            return f.fail("its type is unknown");
         const Json* const normalized = f.find("normalized");
         accessor.normalized = normalized && normalized->is_boolean() && normalized->get<bool>();
         accessor.view = f.index("bufferView", document_.views.size());
@@ -175,7 +181,8 @@ private:
         }
         const Json* const sparse = f.find("sparse");
         if (sparse && accessor.components > 0) readSparse(f, *sparse, accessor);
-        // Of a mesh that Draco compressed, the accessors have no view either: kMostZeros is checked where zeros are read.
+        // Of a mesh that Draco compressed, the accessors have no view either: kMostZeros is checked where zeros are
+        // read.
         document_.accessors.push_back(accessor);
     }
 
@@ -197,7 +204,8 @@ private:
         sparse.valueOffset = values.whole("byteOffset", 0);
         if (sparse.count > accessor.count) return f.fail("has more sparse values than elements");
         checkInView(f, sparse.indexView, sparse.indexOffset, sparse.count, byteSize(*type), byteSize(*type));
-        checkInView(f, sparse.valueView, sparse.valueOffset, sparse.count, accessor.elementBytes(), accessor.elementBytes());
+        checkInView(f, sparse.valueView, sparse.valueOffset, sparse.count, accessor.elementBytes(),
+                    accessor.elementBytes());
         accessor.sparse = sparse;
     }
 
@@ -236,6 +244,11 @@ private:
         if (check_.ok()) mesh.primitives.push_back(p);
     }
 
+    // Promises far more than it brings.
+    static bool isEmpty(const GltfAccessor& a) {
+        return !a.view && a.count > kMostZeros + kZerosPerValue * (a.sparse ? a.sparse->count : 0);
+    }
+
     void readDraco(const JsonFields& f, const std::string& uvName, GltfPrimitive& p) {
         const Json* const extensions = f.find("extensions");
         if (!extensions || !extensions->is_object() || !extensions->contains("KHR_draco_mesh_compression")) return;
@@ -258,21 +271,25 @@ private:
         const auto& accessors = document_.accessors;
         const GltfAccessor& position = accessors[p.position];
         if (position.components != 3) f.fail("POSITION has not 3 components");
-        const auto checkAttribute = [&](std::optional<uint32_t> number, uint32_t least, uint32_t most, const char* name) {
+        const auto checkAttribute = [&](std::optional<uint32_t> number, uint32_t least, uint32_t most,
+                                        const char* name) {
             if (!number) return;
             const GltfAccessor& a = accessors[*number];
-            if (a.components < least || a.components > most) f.fail(fmt::format("{} has {} components", name, a.components));
-            if (a.count != position.count) f.fail(fmt::format("{} has {} values for {} vertices", name, a.count, position.count));
-            if (!p.draco && !a.view && a.count > kMostZeros) f.fail(fmt::format("{} has {} values without data", name, a.count));
+            if (a.components < least || a.components > most)
+                f.fail(fmt::format("{} has {} components", name, a.components));
+            if (a.count != position.count)
+                f.fail(fmt::format("{} has {} values for {} vertices", name, a.count, position.count));
+            if (!p.draco && isEmpty(a)) f.fail(fmt::format("{} has {} values without data", name, a.count));
         };
         checkAttribute(p.position, 3, 3, "POSITION");
         checkAttribute(p.colour, 3, 4, "COLOR_0");
         checkAttribute(p.uv, 2, 2, "TEXCOORD");
         if (!p.indices || p.draco) return;
         const GltfAccessor& indices = accessors[*p.indices];
-        const bool whole = indices.type == GltfComponent::Uint8 || indices.type == GltfComponent::Uint16 || indices.type == GltfComponent::Uint32;
+        const bool whole = indices.type == GltfComponent::Uint8 || indices.type == GltfComponent::Uint16 ||
+                           indices.type == GltfComponent::Uint32;
         if (indices.components != 1 || !whole) f.fail("its indices are not unsigned whole numbers");
-        if (!indices.view && indices.count > kMostZeros) f.fail(fmt::format("its {} indices have no data", indices.count));
+        if (isEmpty(indices)) f.fail(fmt::format("its {} indices have no data", indices.count));
     }
 
     void countNodes() {
@@ -312,7 +329,8 @@ private:
         f.numbers("rotation", r);
         f.numbers("scale", s);
         const double length = std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]);
-        const glm::dquat q = length > 0 ? glm::dquat(r[3] / length, r[0] / length, r[1] / length, r[2] / length) : glm::dquat(1, 0, 0, 0);
+        const glm::dquat q = length > 0 ? glm::dquat(r[3] / length, r[0] / length, r[1] / length, r[2] / length)
+                                        : glm::dquat(1, 0, 0, 0);
         const glm::dmat4 moved = glm::translate(glm::dmat4(1), glm::dvec3(t[0], t[1], t[2]));
         return glm::scale(moved * glm::mat4_cast(q), glm::dvec3(s[0], s[1], s[2]));
     }
@@ -330,7 +348,7 @@ private:
             const auto number = attributes.index(key, document_.accessors.size());
             if (!number) return number;
             const GltfAccessor& a = document_.accessors[*number];
-            if (a.components != components || (count && *count != a.count) || (!a.view && a.count > kMostZeros))
+            if (a.components != components || (count && *count != a.count) || isEmpty(a))
                 f.fail(fmt::format("EXT_mesh_gpu_instancing: {} does not fit", key));
             count = a.count;
             return number;
@@ -357,7 +375,8 @@ private:
         const Json* const roots = scene.array("nodes");
         for (size_t i = 0; roots && i < roots->size(); ++i) {
             const Json& root = (*roots)[i];
-            if (!root.is_number_unsigned() || root.get<uint64_t>() >= nodeCount_) return scene.fail("names a node that does not exist");
+            if (!root.is_number_unsigned() || root.get<uint64_t>() >= nodeCount_)
+                return scene.fail("names a node that does not exist");
             const auto node = root.get<uint32_t>();
             document_.roots.push_back(node);
         }
@@ -386,7 +405,8 @@ private:
 Result<GltfDocument> readGltfDocument(ByteSource& source, uint64_t jsonBytes) {
     const auto json = readJson(source, jsonBytes, kTextLimit);
     if (!json) return json.error();
-    if (!json->is_object()) return source.error(ErrorCode::InvalidInput, "JSON", std::nullopt, "is not a JSON object; it is not glTF");
+    if (!json->is_object())
+        return source.error(ErrorCode::InvalidInput, "JSON", std::nullopt, "is not a JSON object; it is not glTF");
     return DocumentReader(source, *json).read();
 }
 

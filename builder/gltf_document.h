@@ -1,5 +1,6 @@
 // What a glTF 2.0 file says in its JSON, as far as surfaces are concerned; validated: every index is in range, every
-// view lies in its buffer, every accessor in its view. The nodes should form trees; whether they do is seen when they are walked.
+// view lies in its buffer, every accessor in its view. The nodes should form trees; whether they do is seen when they
+// are walked.
 #pragma once
 
 #include <array>

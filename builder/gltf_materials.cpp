@@ -105,7 +105,8 @@ private:
         material.wrapU = texture.wrapU;
         material.wrapV = texture.wrapV;
         material.texCoord = static_cast<uint32_t>(f.whole("texCoord", 0));
-        if (!texture.image) document_.warnings.push_back(where_ + ": its texture is in a format that is not read; it is left out");
+        if (!texture.image)
+            document_.warnings.push_back(where_ + ": its texture is in a format that is not read; it is left out");
         const Json* const extensions = f.find("extensions");
         const Json* const transform = extensions ? member(*extensions, "KHR_texture_transform") : nullptr;
         if (transform) readTransform(*transform, material);
@@ -120,7 +121,8 @@ private:
         const Json* const rotation = f.find("rotation");
         const double angle = rotation && rotation->is_number() ? rotation->get<double>() : 0;
         const double c = std::cos(angle), s = std::sin(angle);
-        material.uvMatrix = {glm::dvec3(c * scale[0], s * scale[1], offset[0]), glm::dvec3(-s * scale[0], c * scale[1], offset[1])};
+        material.uvMatrix = {glm::dvec3(c * scale[0], s * scale[1], offset[0]),
+                             glm::dvec3(-s * scale[0], c * scale[1], offset[1])};
         material.texCoord = static_cast<uint32_t>(f.whole("texCoord", material.texCoord));
     }
 

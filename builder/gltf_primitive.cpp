@@ -19,9 +19,9 @@ constexpr size_t kElements = 8192;  // read at once
 
 class PrimitiveStream final : public MeshStream {
 public:
-    PrimitiveStream(const GltfDocument& document, GltfBuffers& buffers, const GltfPrimitive& primitive, const std::filesystem::path& tempFolder)
-        : document_(document),
-          primitive_(primitive),
+    PrimitiveStream(const GltfDocument& document, GltfBuffers& buffers, const GltfPrimitive& primitive,
+                    const std::filesystem::path& tempFolder)
+        : primitive_(primitive),
           vertices_(document.accessors[primitive.position].count),
           positions_(document, buffers, primitive.position),
           uvs_(tempFolder) {
@@ -78,7 +78,8 @@ private:
         for (size_t i = 0; i < count; ++i) {
             const glm::dvec3 position(values_[3 * i], values_[3 * i + 1], values_[3 * i + 2]);
             if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
-                return wrong(primitive_.position, fmt::format("the position of vertex {} is not finite (NaN or infinite)", first + i));
+                return wrong(primitive_.position,
+                             fmt::format("the position of vertex {} is not finite (NaN or infinite)", first + i));
             chunk.positions.push_back(position);
         }
         if (colours_) VCP_TRY(readColours(count, chunk));
@@ -112,7 +113,8 @@ private:
 
     Result<void> takeCorner(uint64_t vertex, MeshChunk& chunk) {
         if (vertex < firstVertex_ || vertex >= vertexEnd_)
-            return wrong(*primitive_.indices, fmt::format("index {} names vertex {}, but there are only {}", corner_, vertex, vertices_));
+            return wrong(*primitive_.indices,
+                         fmt::format("index {} names vertex {}, but there are only {}", corner_, vertex, vertices_));
         vertex -= firstVertex_;
         switch (primitive_.mode) {
             case GltfMode::Triangles:
@@ -120,7 +122,8 @@ private:
                 first_ = last_;
                 break;
             case GltfMode::Strip:
-                if (corner_ > 1) VCP_TRY(corner_ % 2 == 0 ? emit(first_, last_, vertex, chunk) : emit(last_, first_, vertex, chunk));
+                if (corner_ > 1)
+                    VCP_TRY(corner_ % 2 == 0 ? emit(first_, last_, vertex, chunk) : emit(last_, first_, vertex, chunk));
                 first_ = last_;
                 break;
             case GltfMode::Fan:
@@ -150,10 +153,11 @@ private:
     }
 
     static Error wrong(uint32_t accessor, std::string message) {
-        return {.code = ErrorCode::InvalidInput, .message = std::move(message), .element = fmt::format("accessor {}", accessor)};
+        return {.code = ErrorCode::InvalidInput,
+                .message = std::move(message),
+                .element = fmt::format("accessor {}", accessor)};
     }
 
-    const GltfDocument& document_;
     GltfPrimitive primitive_;
     MeshInfo info_;
     uint64_t vertices_;
@@ -172,11 +176,13 @@ private:
 }  // namespace
 
 bool isRange(const GltfDocument& document, const GltfPrimitive& primitive) {
-    return primitive.indices && document.accessors[*primitive.indices].count < document.accessors[primitive.position].count;
+    return primitive.indices &&
+           document.accessors[*primitive.indices].count < document.accessors[primitive.position].count;
 }
 
-Result<std::unique_ptr<MeshStream>> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers, const GltfPrimitive& primitive,
-                                              const std::filesystem::path& tempFolder) {
+Result<std::unique_ptr<MeshStream>> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers,
+                                                      const GltfPrimitive& primitive,
+                                                      const std::filesystem::path& tempFolder) {
     auto stream = std::make_unique<PrimitiveStream>(document, buffers, primitive, tempFolder);
     if (isRange(document, primitive)) VCP_TRY(stream->narrow());
     return std::unique_ptr<MeshStream>(std::move(stream));

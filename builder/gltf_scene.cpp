@@ -25,13 +25,18 @@ Result<std::vector<GltfPlacement>> placementsOf(const GltfDocument& document) {
         const Visit visit = stack.back();
         stack.pop_back();
         if (visit.depth > document.nodes.size())
-            return Error{.code = ErrorCode::InvalidInput, .message = "is its own ancestor", .element = fmt::format("node {}", visit.node)};
+            return Error{.code = ErrorCode::InvalidInput,
+                         .message = "is its own ancestor",
+                         .element = fmt::format("node {}", visit.node)};
         if (++visited + stack.size() > kMostNodes)
-            return Error{.code = ErrorCode::Limit, .message = fmt::format("its scene shows more than {} nodes", kMostNodes)};
+            return Error{.code = ErrorCode::Limit,
+                         .message = fmt::format("its scene shows more than {} nodes", kMostNodes)};
         const GltfNode& node = document.nodes[visit.node];
         const glm::dmat4 worldFromNode = visit.worldFromParent * node.local;
-        if (node.mesh && !document.meshes[*node.mesh].primitives.empty()) placements.push_back({*node.mesh, visit.node, worldFromNode});
-        for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) stack.push_back({*child, visit.depth + 1, worldFromNode});
+        if (node.mesh && !document.meshes[*node.mesh].primitives.empty())
+            placements.push_back({*node.mesh, visit.node, worldFromNode});
+        for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
+            stack.push_back({*child, visit.depth + 1, worldFromNode});
     }
     // Files without nodes show each mesh once.
     if (document.nodes.empty())
@@ -57,7 +62,9 @@ Result<glm::dmat4> GltfInstances::next() {
     if (rotation_) {
         VCP_TRY(rotation_->read(1, r_));
         const double length = std::sqrt(r_[0] * r_[0] + r_[1] * r_[1] + r_[2] * r_[2] + r_[3] * r_[3]);
-        if (length > 0) transform = transform * glm::mat4_cast(glm::dquat(r_[3] / length, r_[0] / length, r_[1] / length, r_[2] / length));
+        if (length > 0)
+            transform =
+                transform * glm::mat4_cast(glm::dquat(r_[3] / length, r_[0] / length, r_[1] / length, r_[2] / length));
     }
     if (scale_) {
         VCP_TRY(scale_->read(1, s_));

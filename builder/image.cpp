@@ -23,9 +23,12 @@ Error damaged(const char* format, std::string detail) {
 }
 
 Result<void> checkSize(uint64_t width, uint64_t height, const ImageLimits& limits) {
-    if (width > 0 && height > 0 && width <= limits.edge && height <= limits.edge && width * height * sizeof(Rgba8) <= limits.bytes) return {};
+    if (width > 0 && height > 0 && width <= limits.edge && height <= limits.edge &&
+        width * height * sizeof(Rgba8) <= limits.bytes)
+        return {};
     return Error{.code = ErrorCode::Limit,
-                 .message = fmt::format("a picture of {} by {} texels; at most {} an edge and {} MiB are read", width, height, limits.edge, limits.bytes >> 20)};
+                 .message = fmt::format("a picture of {} by {} texels; at most {} an edge and {} MiB are read", width,
+                                        height, limits.edge, limits.bytes >> 20)};
 }
 
 Result<Image> decodePng(std::string_view file, const ImageLimits& limits) {
@@ -127,7 +130,9 @@ Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits) {
         return error;
     };
     const uint64_t size = (*bytes)->size();
-    if (size > limits.fileBytes) return named({.code = ErrorCode::Limit, .message = fmt::format("a picture file of more than {} MiB", limits.fileBytes >> 20)});
+    if (size > limits.fileBytes)
+        return named({.code = ErrorCode::Limit,
+                      .message = fmt::format("a picture file of more than {} MiB", limits.fileBytes >> 20)});
     std::string file(size, '\0');
     if (const auto read = (*bytes)->read(0, file.data(), file.size()); !read) return named(read.error());
     auto image = decodeImage(file, limits);

@@ -17,8 +17,8 @@ struct Image {
 };
 
 struct ImageLimits {
-    uint32_t edge = 32768;                       ///< texels
-    uint64_t bytes = uint64_t{512} << 20;        ///< of the decoded texels
+    uint32_t edge = 32768;                 ///< texels
+    uint64_t bytes = uint64_t{512} << 20;  ///< of the decoded texels
     uint64_t fileBytes = uint64_t{256} << 20;
 };
 

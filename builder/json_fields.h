@@ -65,7 +65,8 @@ public:
         const auto value = whole(key);
         if (!value) return std::nullopt;
         if (*value >= count) {
-            fail(std::string("'") + key + "' is " + std::to_string(*value) + ", but there are only " + std::to_string(count));
+            fail(std::string("'") + key + "' is " + std::to_string(*value) + ", but there are only " +
+                 std::to_string(count));
             return std::nullopt;
         }
         return static_cast<uint32_t>(*value);

@@ -66,10 +66,11 @@ struct TooMuch {};  // thrown by the callback; leaves this file as a Limit
 
 Result<nlohmann::json> readJson(ByteSource& source, uint64_t bytes, uint64_t textLimit) {
     const auto tooMuch = [&](uint64_t byte) {
-        return source.error(ErrorCode::Limit, "JSON", byte,
-                            fmt::format("is larger than {} MiB, {} million values or {} levels; keep the data in a file of "
-                                        "their own (.bin or .glb)",
-                                        textLimit >> 20, kMostValues / 1'000'000, kMostLevels));
+        return source.error(
+            ErrorCode::Limit, "JSON", byte,
+            fmt::format("is larger than {} MiB, {} million values or {} levels; keep the data in a file of "
+                        "their own (.bin or .glb)",
+                        textLimit >> 20, kMostValues / 1'000'000, kMostLevels));
     };
     const uint64_t begin = source.offset();
     const uint64_t most = std::min(bytes, source.remaining());
@@ -90,10 +91,12 @@ Result<nlohmann::json> readJson(ByteSource& source, uint64_t bytes, uint64_t tex
     } catch (const nlohmann::json::parse_error& e) {
         if (characters.error) return *characters.error;
         if (cut && characters.left == 0) return tooMuch(source.offset());
-        return source.error(ErrorCode::InvalidInput, "JSON", begin + (e.byte > 0 ? e.byte - 1 : 0),
-                            characters.view.empty() ? "ends too early, or has a syntax error at its end" : "syntax error");
+        return source.error(
+            ErrorCode::InvalidInput, "JSON", begin + (e.byte > 0 ? e.byte - 1 : 0),
+            characters.view.empty() ? "ends too early, or has a syntax error at its end" : "syntax error");
     } catch (const nlohmann::json::exception&) {
-        return source.error(ErrorCode::InvalidInput, "JSON", source.offset() + characters.used, "a number is out of range");
+        return source.error(ErrorCode::InvalidInput, "JSON", source.offset() + characters.used,
+                            "a number is out of range");
     }
 }
 

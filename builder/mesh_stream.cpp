@@ -61,8 +61,9 @@ std::span<const std::string_view> meshFormats() { return kFormats; }
 Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, const MeshOpenOptions& options) {
     const std::string wanted = lower(options.format);
     if (!wanted.empty() && std::ranges::find(kFormats, wanted) == kFormats.end())
-        return Error{.code = ErrorCode::Usage,
-                     .message = fmt::format("unknown mesh format {}; known are {}", shown(wanted), fmt::join(kFormats, ", "))};
+        return Error{
+            .code = ErrorCode::Usage,
+            .message = fmt::format("unknown mesh format {}; known are {}", shown(wanted), fmt::join(kFormats, ", "))};
     auto source = ByteSource::open(path);
     if (!source) return source.error();
     const auto window = source->window(kStartBytes);
@@ -91,7 +92,8 @@ Result<std::vector<std::filesystem::path>> expandInputs(std::span<const std::fil
             continue;
         }
         const auto cannot = [&](const std::error_code& why) {
-            return Error{.code = ErrorCode::Io, .message = "the folder cannot be read: " + why.message(), .file = path.string()};
+            return Error{
+                .code = ErrorCode::Io, .message = "the folder cannot be read: " + why.message(), .file = path.string()};
         };
         std::vector<fs::path> found;
         fs::directory_iterator entry(path, failure);

@@ -51,12 +51,12 @@ struct MeshChunk {
 
 /// What the header says, before anything is read.
 struct MeshInfo {
-    std::string format;                    ///< "PLY binary little endian", "OBJ", "STL ASCII", ...
-    uint64_t fileBytes = 0;                ///< of the file, compressed as it is; 0 for a pipe
-    std::optional<uint64_t> vertices;      ///< declared; absent for formats that do not say (OBJ, ASCII STL)
-    std::optional<uint64_t> faces;         ///< declared polygons (not triangles)
-    bool hasColour = false;                ///< vertex colours; for OBJ and other formats without a header: of the first vertex
-    bool hasMaterials = false;             ///< chunks carry uvs and materials
+    std::string format;                ///< "PLY binary little endian", "OBJ", "STL ASCII", ...
+    uint64_t fileBytes = 0;            ///< of the file, compressed as it is; 0 for a pipe
+    std::optional<uint64_t> vertices;  ///< declared; absent for formats that do not say (OBJ, ASCII STL)
+    std::optional<uint64_t> faces;     ///< declared polygons (not triangles)
+    bool hasColour = false;     ///< vertex colours; for OBJ and other formats without a header: of the first vertex
+    bool hasMaterials = false;  ///< chunks carry uvs and materials
 };
 
 class MeshStream {

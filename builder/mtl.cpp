@@ -56,10 +56,14 @@ private:
 
 class MtlReader {
 public:
-    MtlReader(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings)
+    MtlReader(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
+              std::vector<std::string>& warnings)
         : path_(path), materials_(materials), warnings_(warnings) {}
 
     void read() {
+        // A named pipe would wait for its writer.
+        std::error_code ignored;
+        if (!std::filesystem::is_regular_file(path_, ignored)) return warn("no such file; its colours are left out");
         auto source = ByteSource::open(path_);
         if (!source) return warn(source.error().message + "; its colours are left out");
         if (source->size() > kMostBytes) return warn("is larger than 16 MiB; its colours are left out");
@@ -143,7 +147,8 @@ private:
 
 }  // namespace
 
-void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings) {
+void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
+             std::vector<std::string>& warnings) {
     MtlReader(path, materials, warnings).read();
 }
 

@@ -23,6 +23,7 @@ struct MtlMaterial {
 
 /// Appends the materials of a file. Limits: 16 MiB, 65536 materials. Never fails: what cannot be read is a warning,
 /// one line that names the file.
-void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings);
+void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
+             std::vector<std::string>& warnings);
 
 }  // namespace vcp

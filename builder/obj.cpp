@@ -109,7 +109,8 @@ private:
         bool done = false;  // with the vertices
         for (const char* p = begin_; p != end_;) {
             const char* const word = skipBlanks(p, end_);
-            if (const char* const names = afterKeyword(word, "mtllib")) materials_.addLibrary({names, static_cast<size_t>(lineEnd(names) - names)});
+            if (const char* const names = afterKeyword(word, "mtllib"))
+                materials_.addLibrary({names, static_cast<size_t>(lineEnd(names) - names)});
             if (!done && end_ - word >= 2 && word[0] == 'v' && isBlank(word[1])) {
                 VertexNumbers numbers;
                 const char* q = word + 1;
@@ -167,7 +168,8 @@ private:
     // Where the word `keyword` ends, or nullptr when another stands at p.
     const char* afterKeyword(const char* p, std::string_view keyword) const {
         const auto left = static_cast<size_t>(end_ - p);
-        if (left <= keyword.size() || std::string_view(p, keyword.size()) != keyword || !isBlank(p[keyword.size()])) return nullptr;
+        if (left <= keyword.size() || std::string_view(p, keyword.size()) != keyword || !isBlank(p[keyword.size()]))
+            return nullptr;
         return p + keyword.size();
     }
 
@@ -352,7 +354,8 @@ bool looksLikeObj(std::string_view start) {
 
 Result<std::unique_ptr<MeshStream>> openObj(ByteSource source) { return openObj(std::move(source), {}, {}); }
 
-Result<std::unique_ptr<MeshStream>> openObj(ByteSource source, const std::filesystem::path& path, const MeshOpenOptions& options) {
+Result<std::unique_ptr<MeshStream>> openObj(ByteSource source, const std::filesystem::path& path,
+                                            const MeshOpenOptions& options) {
     auto stream = std::make_unique<ObjStream>(std::move(source), path, options);
     VCP_TRY(stream->begin());
     return std::unique_ptr<MeshStream>(std::move(stream));

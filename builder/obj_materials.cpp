@@ -30,7 +30,8 @@ void ObjMaterials::addLibrary(std::string_view names) {
     if (!wanted_ || warnings_.size() >= kMostWarnings) return;
     names = trimmed(names);
     if (begun_) {
-        warnings_.push_back(fmt::format("{}: the material file {} is named too late in the file; it is left out", file_, shown(names)));
+        warnings_.push_back(
+            fmt::format("{}: the material file {} is named too late in the file; it is left out", file_, shown(names)));
         return;
     }
     const auto add = [&](std::string_view name) {
@@ -38,12 +39,15 @@ void ObjMaterials::addLibrary(std::string_view names) {
         if (path)
             readMtl(*path, read_, warnings_);
         else
-            warnings_.push_back(fmt::format("{}: the material file {} lies outside its folder; it is left out", file_, shown(name)));
+            warnings_.push_back(
+                fmt::format("{}: the material file {} lies outside its folder; it is left out", file_, shown(name)));
     };
     // One name with spaces, or several names.
     const auto whole = nameBelow(folder_, std::string(names));
     std::error_code ignored;
-    if (names.find_first_of(" \t") == std::string_view::npos || (whole && std::filesystem::is_regular_file(*whole, ignored))) return add(names);
+    if (names.find_first_of(" \t") == std::string_view::npos ||
+        (whole && std::filesystem::is_regular_file(*whole, ignored)))
+        return add(names);
     const char* const end = names.data() + names.size();
     for (const char* p = names.data(); p != end && warnings_.size() < kMostWarnings; p = skipSpaces(p, end)) {
         const char* const stop = wordEnd(p, end);
@@ -71,7 +75,8 @@ void ObjMaterials::use(std::string_view name) {
     current_ = found == numbers_.end() ? kNoMaterial : found->second;
     if (found != numbers_.end() || unknownNamed_) return;
     unknownNamed_ = true;
-    warnings_.push_back(fmt::format("{}: the material {} is in none of its material files; its faces have no colour", file_, shown(trimmed(name))));
+    warnings_.push_back(fmt::format("{}: the material {} is in none of its material files; its faces have no colour",
+                                    file_, shown(trimmed(name))));
 }
 
 Result<void> ObjMaterials::addUv(double u, double v) {

@@ -52,9 +52,10 @@ protected:
     }
 
     Error truncated() const {
-        return wrong(source_.offset(), fmt::format("the file ends here, but the header declares {} vertices and {} faces: it is "
-                                                   "truncated or the counts are wrong",
-                                                   header_.vertices, header_.faces));
+        return wrong(source_.offset(),
+                     fmt::format("the file ends here, but the header declares {} vertices and {} faces: it is "
+                                 "truncated or the counts are wrong",
+                                 header_.vertices, header_.faces));
     }
 
     Result<void> addVertex(const glm::dvec3& position, Rgba8 colour, uint64_t byte, MeshChunk& chunk) {
@@ -69,8 +70,9 @@ protected:
     // Takes the next number of the face at `corner`.
     Result<void> addCorner(uint64_t corner, int64_t number, uint64_t byte, MeshChunk& chunk) {
         if (number < 0 || static_cast<uint64_t>(number) >= header_.vertices)
-            return wrong(byte, fmt::format("vertex number {} is out of range; the mesh has {} vertices, numbered from 0",
-                                           number, header_.vertices));
+            return wrong(
+                byte, fmt::format("vertex number {} is out of range; the mesh has {} vertices, numbered from 0", number,
+                                  header_.vertices));
         const auto vertex = static_cast<uint64_t>(number);
         if (corner == 0) first_ = vertex;
         if (corner > 1) chunk.triangles.push_back({first_, last_, vertex});
@@ -79,7 +81,8 @@ protected:
     }
 
     void warnOfFaceColours() {
-        if (warnings_.empty()) warnings_.push_back(source_.name() + ": colours of faces are left out; use PLY with vertex colours");
+        if (warnings_.empty())
+            warnings_.push_back(source_.name() + ": colours of faces are left out; use PLY with vertex colours");
     }
 
     ByteSource source_;
@@ -132,12 +135,15 @@ private:
         for (; p != end_ && count < before + (header_.hasColour ? 4 : 0); p = skipSpaces(p, end_)) {
             const char* const stop = parseReal(p, end_, numbers[count]);
             if (!endsWord(stop)) return notANumber(p);
-            if (count >= before) fractions = fractions || std::find_if(p, stop, [](char c) { return c == '.' || c == 'e' || c == 'E'; }) != stop;
+            if (count >= before)
+                fractions =
+                    fractions || std::find_if(p, stop, [](char c) { return c == '.' || c == 'e' || c == 'E'; }) != stop;
             ++count;
             p = stop;
         }
         const size_t needed = header_.hasColour ? before + 3 : 3;
-        if (count < needed) return wrong(byteAt(line), fmt::format("a vertex needs {} numbers, this one has {}", needed, count));
+        if (count < needed)
+            return wrong(byteAt(line), fmt::format("a vertex needs {} numbers, this one has {}", needed, count));
         Rgba8 colour = 0xFF000000;
         for (size_t channel = 0; header_.hasColour && before + channel < count; ++channel) {
             const double scaled = fractions ? numbers[before + channel] * 255 + 0.5 : numbers[before + channel];
@@ -157,7 +163,8 @@ private:
         for (int64_t corner = 0; corner < corners; ++corner) {
             p = skipSpaces(stop, end_);
             if (p == end_)
-                return wrong(byteAt(line), fmt::format("a face of {} corners, but its line has only {}", corners, corner));
+                return wrong(byteAt(line),
+                             fmt::format("a face of {} corners, but its line has only {}", corners, corner));
             int64_t number = 0;
             stop = parseInteger(p, end_, number);
             if (!endsWord(stop)) return wrong(byteAt(p), shownWord(p, end_) + " is not a vertex number");
@@ -235,7 +242,8 @@ private:
                 if (--left_ == 0) part_ = Part::ColourCount;
                 break;
             case Part::ColourCount:
-                if (number > 4) return wrong(byte, fmt::format("a face colour of {} numbers; there are at most 4", number));
+                if (number > 4)
+                    return wrong(byte, fmt::format("a face colour of {} numbers; there are at most 4", number));
                 if (number > 0) warnOfFaceColours();
                 left_ = number;
                 endColour();

@@ -55,7 +55,8 @@ public:
         OffHeader keyword;
         const size_t bytes = keywordBytes(word, keyword, otherDimension);
         if (otherDimension && bytes > 0)
-            return source_.error(ErrorCode::Unsupported, "header", lineByte_, "4OFF and nOFF have no surface in three dimensions");
+            return source_.error(ErrorCode::Unsupported, "header", lineByte_,
+                                 "4OFF and nOFF have no surface in three dimensions");
         if (bytes > 0) {
             header_ = keyword;
             line_.remove_prefix(static_cast<size_t>(word.data() - line_.data()) + bytes);
@@ -121,10 +122,12 @@ private:
         if (header_.vertices == 0) return wrong("has no vertices");
         if (header_.faces == 0) return wrong("has no faces, only points or lines; reconstruct a surface first");
         const uint64_t left = source_.remaining() + 1;  // the last line may lack its end
-        if (header_.vertices > left / leastVertex || header_.faces > (left - header_.vertices * leastVertex) / leastFace)
-            return wrong(fmt::format("declares {} vertices and {} faces, more than the file can hold: it is truncated "
-                                     "or the counts are wrong",
-                                     header_.vertices, header_.faces));
+        if (header_.vertices > left / leastVertex ||
+            header_.faces > (left - header_.vertices * leastVertex) / leastFace)
+            return wrong(
+                fmt::format("declares {} vertices and {} faces, more than the file can hold: it is truncated "
+                            "or the counts are wrong",
+                            header_.vertices, header_.faces));
         return header_;
     }
 

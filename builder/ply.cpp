@@ -42,7 +42,8 @@ Result<void> checkCounts(const ByteSource& source, const PlyHeader& header) {
         exact = exact && !element.hasLists();
         if (rowBytes > 0 && element.count > left / rowBytes) {
             if (!source.sizeKnown())
-                return elementError(source, element, fmt::format("declares {} rows, more than any file can hold", element.count));
+                return elementError(source, element,
+                                    fmt::format("declares {} rows, more than any file can hold", element.count));
             const uint64_t whole = left / rowBytes;
             std::string message = fmt::format(
                 "the header declares {} rows of {} {} bytes, but the file ends after {} of them: "

@@ -56,8 +56,10 @@ double loadReal(PlyType type, const char* p) {
 template <bool kSwap>
 std::optional<int64_t> loadWhole(PlyType type, const char* p) {
     return loadScalar<kSwap>(type, p, [](auto value) -> std::optional<int64_t> {
-        if constexpr (std::is_floating_point_v<decltype(value)>) return wholeNumber(value);
-        else return value;
+        if constexpr (std::is_floating_point_v<decltype(value)>)
+            return wholeNumber(value);
+        else
+            return value;
     });
 }
 

@@ -53,7 +53,7 @@ public:
     explicit MemoryBytes(std::string bytes) : bytes_(std::move(bytes)) {}
     [[nodiscard]] uint64_t size() const override { return bytes_.size(); }
     Result<void> read(uint64_t offset, char* to, size_t count) override {
-        std::memcpy(to, bytes_.data() + offset, count);
+        if (count > 0) std::memcpy(to, bytes_.data() + offset, count);
         return {};
     }
 
@@ -81,7 +81,9 @@ Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path
     return std::unique_ptr<RandomBytes>(std::make_unique<FileBytes>(file, offset, size > offset ? size - offset : 0));
 }
 
-std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes) { return std::make_unique<MemoryBytes>(std::move(bytes)); }
+std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes) {
+    return std::make_unique<MemoryBytes>(std::move(bytes));
+}
 
 Spool::~Spool() {
     if (file_ >= 0) ::close(file_);
@@ -129,7 +131,7 @@ Result<void> Spool::write(std::string_view bytes) {
 
 Result<void> Spool::read(uint64_t offset, char* to, size_t count) {
     if (file_ >= 0) return readFully(file_, offset, to, count);
-    std::memcpy(to, memory_.data() + offset, count);
+    if (count > 0) std::memcpy(to, memory_.data() + offset, count);
     return {};
 }
 

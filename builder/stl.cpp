@@ -113,7 +113,8 @@ public:
 
 private:
     Error endsAfter(uint64_t facet) const {
-        return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}", facet), kHeaderBytes + facet * kFacetBytes,
+        return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}", facet),
+                             kHeaderBytes + facet * kFacetBytes,
                              fmt::format("the header declares {} facets, but the file ends after {}: it is "
                                          "truncated, the count is wrong, or it is not STL",
                                          facets_, facet));

@@ -106,7 +106,8 @@ std::array<double, 4> Texture::bilinear(const Image& level, glm::dvec2 uv) const
     Light sum{};
     for (int j = 0; j < 2; ++j)
         for (int i = 0; i < 2; ++i) {
-            const uint32_t column = wrapped(left + i, level.width, wrapU_), row = wrapped(top + j, level.height, wrapV_);
+            const uint32_t column = wrapped(left + i, level.width, wrapU_),
+                           row = wrapped(top + j, level.height, wrapV_);
             add(sum, level.texels[size_t{row} * level.width + column], (i ? fx : 1 - fx) * (j ? fy : 1 - fy));
         }
     return sum;

@@ -17,7 +17,8 @@ inline std::string base64(std::string_view bytes) {
     std::string text;
     for (size_t i = 0; i < bytes.size(); i += 3) {
         uint32_t bits = 0;
-        for (size_t j = 0; j < 3; ++j) bits = bits << 8 | (i + j < bytes.size() ? static_cast<uint8_t>(bytes[i + j]) : 0);
+        for (size_t j = 0; j < 3; ++j)
+            bits = bits << 8 | (i + j < bytes.size() ? static_cast<uint8_t>(bytes[i + j]) : 0);
         for (size_t j = 0; j < 4; ++j) text += i + j > bytes.size() ? '=' : kDigits[bits >> (18 - 6 * j) & 63];
     }
     return text;
@@ -39,30 +40,38 @@ struct GltfFile {
     /// Returns the number of the view.
     size_t view(const std::string& bytes, const std::string& extra = "") {
         while (buffer.size() % 4) buffer += '\0';
-        views.push_back(fmt::format(R"({{"buffer":0,"byteOffset":{},"byteLength":{}{}}})", buffer.size(), bytes.size(), extra));
+        views.push_back(
+            fmt::format(R"({{"buffer":0,"byteOffset":{},"byteLength":{}{}}})", buffer.size(), bytes.size(), extra));
         buffer += bytes;
         return views.size() - 1;
     }
-    size_t accessor(const std::string& bytes, int component, const char* type, size_t count, const std::string& extra = "") {
+    size_t accessor(const std::string& bytes, int component, const char* type, size_t count,
+                    const std::string& extra = "") {
         const size_t number = view(bytes);
-        accessors.push_back(fmt::format(R"({{"bufferView":{},"componentType":{},"type":"{}","count":{}{}}})", number, component, type, count, extra));
+        accessors.push_back(fmt::format(R"({{"bufferView":{},"componentType":{},"type":"{}","count":{}{}}})", number,
+                                        component, type, count, extra));
         return accessors.size() - 1;
     }
-    size_t floats(std::initializer_list<float> values, const char* type, size_t count) { return accessor(bytesOf(values), 5126, type, count); }
+    size_t floats(std::initializer_list<float> values, const char* type, size_t count) {
+        return accessor(bytesOf(values), 5126, type, count);
+    }
 
     [[nodiscard]] std::string json(const std::string& uri) const {
-        return fmt::format(R"({{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}{}}}]{}}})",
-                           scene, nodes, meshes, fmt::join(accessors, ","), fmt::join(views, ","), buffer.size(),
-                           uri.empty() ? "" : R"(,"uri":")" + uri + '"', more);
+        return fmt::format(
+            R"({{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}{}}}]{}}})",
+            scene, nodes, meshes, fmt::join(accessors, ","), fmt::join(views, ","), buffer.size(),
+            uri.empty() ? "" : R"(,"uri":")" + uri + '"', more);
     }
-    [[nodiscard]] std::string embedded() const { return json("data:application/octet-stream;base64," + base64(buffer)); }
+    [[nodiscard]] std::string embedded() const {
+        return json("data:application/octet-stream;base64," + base64(buffer));
+    }
     [[nodiscard]] std::string glb() const {
         std::string text = json(""), binary = buffer;
         while (text.size() % 4) text += ' ';
         while (binary.size() % 4) binary += '\0';
         const auto word = [](size_t value) { return bytesOf({static_cast<uint32_t>(value)}); };
-        return "glTF" + word(2) + word(28 + text.size() + binary.size()) + word(text.size()) + "JSON" + text + word(binary.size()) +
-               std::string("BIN\0", 4) + binary;
+        return "glTF" + word(2) + word(28 + text.size() + binary.size()) + word(text.size()) + "JSON" + text +
+               word(binary.size()) + std::string("BIN\0", 4) + binary;
     }
 };
 

@@ -51,22 +51,26 @@ TEST(Gltf, NodesMoveInDoubles) {
     const ReadMesh mesh = read(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     ASSERT_EQ(mesh.positions.size(), 6u);
-    const glm::dvec3 expected[] = {{376000.25, 3790000.5, 0}, {376000.25, 3790002.5, 0}, {375997.25, 3790000.5, 0},
-                                   {376000.25, 3790000.5, 0.125}, {375999.25, 3790000.5, 0.125}, {376000.25, 3790001.5, 0.125}};
+    const glm::dvec3 expected[] = {{376000.25, 3790000.5, 0},     {376000.25, 3790002.5, 0},
+                                   {375997.25, 3790000.5, 0},     {376000.25, 3790000.5, 0.125},
+                                   {375999.25, 3790000.5, 0.125}, {376000.25, 3790001.5, 0.125}};
     for (size_t i = 0; i < 6; ++i) EXPECT_LT(glm::length(mesh.positions[i] - expected[i]), 1e-9) << i;
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 5, 4}})) << "a mirror turns the triangle over";
 }
 
 TEST(Gltf, StripsFansAndSequencesWithAnyIndexType) {
-    const std::vector<Triangle> strip{{0, 1, 2}, {2, 1, 3}, {2, 3, 4}}, fan{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}, list{{0, 1, 2}};
-    const std::string bytes[] = {bytesOf<uint8_t>({0, 1, 2, 3, 4}), bytesOf<uint16_t>({0, 1, 2, 3, 4}), bytesOf<uint32_t>({0, 1, 2, 3, 4}), ""};
+    const std::vector<Triangle> strip{{0, 1, 2}, {2, 1, 3}, {2, 3, 4}}, fan{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}},
+        list{{0, 1, 2}};
+    const std::string bytes[] = {bytesOf<uint8_t>({0, 1, 2, 3, 4}), bytesOf<uint16_t>({0, 1, 2, 3, 4}),
+                                 bytesOf<uint32_t>({0, 1, 2, 3, 4}), ""};
     const int types[] = {5121, 5123, 5125, 0};
     for (int kind = 0; kind < 4; ++kind)
         for (int mode = 4; mode <= 6; ++mode) {
             GltfFile file;
             file.floats({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 2, 2, 0}, "VEC3", 5);
             if (kind < 3) file.accessor(bytes[kind], types[kind], "SCALAR", 5);
-            file.meshes = fmt::format(R"({{"primitives":[{{"attributes":{{"POSITION":0}},"mode":{}{}}}]}})", mode, kind < 3 ? R"(,"indices":1)" : "");
+            file.meshes = fmt::format(R"({{"primitives":[{{"attributes":{{"POSITION":0}},"mode":{}{}}}]}})", mode,
+                                      kind < 3 ? R"(,"indices":1)" : "");
             const ReadMesh mesh = read(file.embedded());
             ASSERT_FALSE(mesh.error) << mesh.line();
             EXPECT_EQ(mesh.triangles, mode == 4 ? list : mode == 5 ? strip : fan) << kind << ' ' << mode;
@@ -140,7 +144,8 @@ TEST(Gltf, BaseColoursCountWhereTheyDiffer) {
     file.more = R"(,"materials":[)" + red + "]";
     file.meshes = R"({"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]})";
     EXPECT_TRUE(read(file.embedded()).colours.empty());
-    file.meshes = R"({"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0},{"attributes":{"POSITION":0},"indices":1}]})";
+    file.meshes =
+        R"({"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0},{"attributes":{"POSITION":0},"indices":1}]})";
     EXPECT_EQ(read(file.embedded()).colours,
               (std::vector<Rgba8>{0xFF0000FF, 0xFF0000FF, 0xFF0000FF, 0xFFFFFFFF, 0xFFFFFFFF, 0xFFFFFFFF}));
 }
@@ -152,30 +157,36 @@ TEST(Gltf, InstancesAreShownOneByOne) {
     file.nodes = R"({"mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2,"SCALE":3}}}})";
     const ReadMesh mesh = read(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
-    EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{10, 0, 0}, {11, 0, 0}, {10, 1, 0}, {20, 0, 0}, {22, 0, 0}, {20, 2, 0}}));
+    EXPECT_EQ(mesh.positions,
+              (std::vector<glm::dvec3>{{10, 0, 0}, {11, 0, 0}, {10, 1, 0}, {20, 0, 0}, {22, 0, 0}, {20, 2, 0}}));
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 4, 5}}));
 }
 
 // A picture of one red texel.
 const std::string kRedPng =
-    "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC";
+    "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/"
+    "pLvAAAAAElFTkSuQmCC";
 
 TEST(Gltf, TexturesComeWithCoordinatesMaterialsAndWarnings) {
     GltfFile file = oneTriangle();
     file.floats({0.25f, 0, 1, 0, 0, 1}, "VEC2", 3);
-    file.meshes = R"({"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_1":2},"indices":1,"material":0},{"attributes":{"POSITION":0},"indices":1,"material":1}]})";
-    file.more = R"(,"images":[{"uri":")" + kRedPng + R"("},{"uri":"missing.png"}],"samplers":[{"wrapS":33071,"wrapT":33648}],)"
-                R"("textures":[{"source":0,"sampler":0},{"source":1}],"materials":[)"
-                R"({"name":"red","pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":0,"extensions":{"KHR_texture_transform":)"
-                R"({"offset":[0.5,0.25],"scale":[2,4],"rotation":1.5707963267948966,"texCoord":1}}}}},)"
-                R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":1}}}])";
+    file.meshes =
+        R"({"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_1":2},"indices":1,"material":0},{"attributes":{"POSITION":0},"indices":1,"material":1}]})";
+    file.more =
+        R"(,"images":[{"uri":")" + kRedPng +
+        R"("},{"uri":"missing.png"}],"samplers":[{"wrapS":33071,"wrapT":33648}],)"
+        R"("textures":[{"source":0,"sampler":0},{"source":1}],"materials":[)"
+        R"({"name":"red","pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":0,"extensions":{"KHR_texture_transform":)"
+        R"({"offset":[0.5,0.25],"scale":[2,4],"rotation":1.5707963267948966,"texCoord":1}}}}},)"
+        R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":1}}}])";
     auto stream = open(ByteSource::fromMemory(file.embedded(), "mesh"));
     const std::string bytes = file.embedded();
     stream = open(ByteSource::fromMemory(bytes, "mesh"));
     ASSERT_TRUE(stream.ok()) << stream.error().line();
     ASSERT_EQ((*stream)->materials().size(), 2u);
     const Material& material = (*stream)->materials()[0];
-    EXPECT_TRUE(material.image.bytes && material.wrapU == Wrap::Clamp && material.wrapV == Wrap::Mirror && material.name == "red");
+    EXPECT_TRUE(material.image.bytes && material.wrapU == Wrap::Clamp && material.wrapV == Wrap::Mirror &&
+                material.name == "red");
     EXPECT_FALSE((*stream)->materials()[1].image.exists());
     EXPECT_EQ((*stream)->warnings().size(), 1u);
     MeshChunk chunk;
@@ -202,8 +213,10 @@ TEST(Gltf, NothingOutsideTheFolderIsOpened) {
     };
     EXPECT_FALSE(readUri("data/in%20side.bin").error) << readUri("data/in%20side.bin").line();
     const std::string absolute = (folder / "outside.bin").string();
-    for (const std::string& uri : {std::string("../outside.bin"), std::string("%2E%2e/outside.bin"), std::string("data/../../outside.bin"), absolute,
-                                   "file://" + absolute, std::string("..\\\\outside.bin"), std::string("https://example.org/a.bin"), std::string("%00")}) {
+    for (const std::string& uri :
+         {std::string("../outside.bin"), std::string("%2E%2e/outside.bin"), std::string("data/../../outside.bin"),
+          absolute, "file://" + absolute, std::string("..\\\\outside.bin"), std::string("https://example.org/a.bin"),
+          std::string("%00")}) {
         const ReadMesh mesh = readUri(uri);
         ASSERT_TRUE(mesh.error) << uri;
         EXPECT_NE(mesh.line().find("names no file in the folder"), std::string::npos) << mesh.line();
@@ -221,22 +234,57 @@ TEST(Gltf, WhatIsWrongIsNamed) {
         change(file);
         return lineOf(file.embedded());
     };
-    const auto has = [](const std::string& line, const char* part) { return line.find(part) != std::string::npos ? "" : line; };
-    EXPECT_EQ(has(with([](GltfFile& f) { f.accessors[0] = R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":4})"; }), "accessor 0: 4 elements"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.accessors[0] = R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":9007199254740992})"; }), "accessor 0"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.accessors[0] = R"({"componentType":5126,"type":"VEC3","count":9007199254740992})"; }), "without data"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.views[0] = R"({"buffer":0,"byteOffset":9007199254740992,"byteLength":4})"; }), "bufferView 0"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.accessors[1] = R"({"bufferView":0,"byteOffset":12,"componentType":5125,"type":"SCALAR","count":3})"; }), "accessor 1: index 0 names vertex 1065353216"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.meshes = R"({"primitives":[{"attributes":{"POSITION":7}}]})"; }), "mesh 0: 'POSITION' is 7"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.nodes = R"({"children":[1]},{"children":[0],"mesh":0})"; }), "own ancestor"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.nodes = R"({"mesh":0,"translation":[1e308,1e308,0],"scale":[1e300,1,1],"children":[1]},{"mesh":0,"scale":[1e300,1,1]})"; }), "infinity"), "");
-    EXPECT_EQ(has(with([](GltfFile& f) { f.more = R"(,"extensionsRequired":["EXT_meshopt_compression"])"; }), "EXT_meshopt_compression"), "");
+    const auto has = [](const std::string& line, const char* part) {
+        return line.find(part) != std::string::npos ? "" : line;
+    };
+    EXPECT_EQ(has(with([](GltfFile& f) {
+                      f.accessors[0] = R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":4})";
+                  }),
+                  "accessor 0: 4 elements"),
+              "");
+    EXPECT_EQ(has(with([](GltfFile& f) {
+                      f.accessors[0] =
+                          R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":9007199254740992})";
+                  }),
+                  "accessor 0"),
+              "");
+    EXPECT_EQ(has(with([](GltfFile& f) {
+                      f.accessors[0] = R"({"componentType":5126,"type":"VEC3","count":9007199254740992})";
+                  }),
+                  "without data"),
+              "");
+    EXPECT_EQ(
+        has(with([](GltfFile& f) { f.views[0] = R"({"buffer":0,"byteOffset":9007199254740992,"byteLength":4})"; }),
+            "bufferView 0"),
+        "");
+    EXPECT_EQ(has(with([](GltfFile& f) {
+                      f.accessors[1] =
+                          R"({"bufferView":0,"byteOffset":12,"componentType":5125,"type":"SCALAR","count":3})";
+                  }),
+                  "accessor 1: index 0 names vertex 1065353216"),
+              "");
+    EXPECT_EQ(has(with([](GltfFile& f) { f.meshes = R"({"primitives":[{"attributes":{"POSITION":7}}]})"; }),
+                  "mesh 0: 'POSITION' is 7"),
+              "");
+    EXPECT_EQ(has(with([](GltfFile& f) { f.nodes = R"({"children":[1]},{"children":[0],"mesh":0})"; }), "own ancestor"),
+              "");
+    EXPECT_EQ(
+        has(with([](GltfFile& f) {
+                f.nodes =
+                    R"({"mesh":0,"translation":[1e308,1e308,0],"scale":[1e300,1,1],"children":[1]},{"mesh":0,"scale":[1e300,1,1]})";
+            }),
+            "infinity"),
+        "");
+    EXPECT_EQ(has(with([](GltfFile& f) { f.more = R"(,"extensionsRequired":["EXT_meshopt_compression"])"; }),
+                  "EXT_meshopt_compression"),
+              "");
     EXPECT_EQ(has(with([](GltfFile& f) {
                       f = GltfFile();
                       f.floats({0, 0, 0, 1, 0, std::numeric_limits<float>::quiet_NaN(), 0, 1, 0}, "VEC3", 3);
                       f.meshes = R"({"primitives":[{"attributes":{"POSITION":0}}]})";
                   }),
-                  "vertex 1 is not finite"), "");
+                  "vertex 1 is not finite"),
+              "");
     EXPECT_EQ(has(lineOf(R"({"asset":{"version":"1.0"}})"), "not glTF 2.0"), "");
     EXPECT_EQ(has(lineOf(R"({"name":"no asset"})"), "not glTF 2.0"), "");
     EXPECT_EQ(has(lineOf(R"({"asset":{"version":"2.0"},)"), "JSON: byte 27: ends too early"), "");
@@ -266,7 +314,8 @@ TEST(Gltf, EveryTruncationOfAGlbIsAnError) {
 TEST(Gltf, TheSameSceneAsPly) {
     const auto gltf = kData / "scenes/sanmiguel_arch/sanmiguel_arch.gltf";
     if (!std::filesystem::exists(gltf)) GTEST_SKIP() << "no " << gltf;
-    const ReadMesh scene = readAll(openMesh(gltf)), flat = readAll(openMesh(kData / "scenes/sanmiguel_arch/sanmiguel_arch_rgb.ply"));
+    const ReadMesh scene = readAll(openMesh(gltf)),
+                   flat = readAll(openMesh(kData / "scenes/sanmiguel_arch/sanmiguel_arch_rgb.ply"));
     ASSERT_FALSE(scene.error) << scene.line();
     ASSERT_EQ(scene.triangles.size(), flat.triangles.size());
     const auto bounds = [](const ReadMesh& mesh) {

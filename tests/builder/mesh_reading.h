@@ -78,7 +78,8 @@ inline ReadMesh readEveryWindow(Opener open, std::string_view bytes) {
         EXPECT_TRUE(cut.error || cut == whole) << "window " << window;
         // Through a pipe a wrong count is found later, at the end instead of in the header.
         const ReadMesh piped = readAll(open(*test::piped(bytes, window, window)));
-        EXPECT_EQ(piped.error.has_value(), whole.error.has_value()) << "piped " << window << ": " << piped.line() << whole.line();
+        EXPECT_EQ(piped.error.has_value(), whole.error.has_value())
+            << "piped " << window << ": " << piped.line() << whole.line();
         EXPECT_TRUE(piped.error || piped == whole) << "piped " << window;
     }
     return whole;

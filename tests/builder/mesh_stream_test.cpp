@@ -82,7 +82,9 @@ TEST_F(OpenMesh, ReadsCompressedFilesWhateverTheName) {
     }
     EXPECT_EQ(errorOf(write("empty.ply.gz", test::gzipped(""))).code, ErrorCode::InvalidInput);
     EXPECT_NE(errorOf(write("b.ply.gz", test::gzipped("cstype"))).message.find("not a PLY file"), std::string::npos);
-    EXPECT_NE(errorOf(write("b.ply", test::gzipped(kPly.substr(0, kPly.size() - 4)))).message.find("after decompression"), std::string::npos);
+    EXPECT_NE(
+        errorOf(write("b.ply", test::gzipped(kPly.substr(0, kPly.size() - 4)))).message.find("after decompression"),
+        std::string::npos);
 }
 
 TEST_F(OpenMesh, TheFormatOfTheOptionsCountsWhereContentDoesNotTell) {
@@ -128,7 +130,8 @@ TEST_F(OpenMesh, AFolderStandsForItsMeshFilesInOrder) {
     const std::filesystem::path inputs[] = {"first.ply", folder_, "-"};
     const auto expanded = expandInputs(inputs);
     ASSERT_TRUE(expanded.ok()) << expanded.error().line();
-    const std::vector<std::filesystem::path> expected{"first.ply", folder_ / "a.stl.gz", folder_ / "b.PLY", folder_ / "c.obj", "-"};
+    const std::vector<std::filesystem::path> expected{"first.ply", folder_ / "a.stl.gz", folder_ / "b.PLY",
+                                                      folder_ / "c.obj", "-"};
     EXPECT_EQ(*expanded, expected);
     const std::filesystem::path empty[] = {folder_ / "inner.ply"};
     ASSERT_FALSE(expandInputs(empty).ok());

@@ -18,7 +18,9 @@ struct Painted {
 
 class ObjMaterialFiles : public testing::Test {
 protected:
-    void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
 
     Painted read(const std::string& obj, const MeshOpenOptions& options = {}) const {
         write("mesh.obj", obj);
@@ -47,9 +49,12 @@ protected:
 const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 0.25\n";
 
 TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
-    write("a b.mtl", "# comment\nnewmtl wood\n  Kd 0.5 0.5 0.5\n  map_Kd -s 2 4 1 -o 0.5 0 0 -clamp on  my wood.png \nnewmtl plain\nKd 1 0 0\n");
+    write("a b.mtl",
+          "# comment\nnewmtl wood\n  Kd 0.5 0.5 0.5\n  map_Kd -s 2 4 1 -o 0.5 0 0 -clamp on  my wood.png \nnewmtl "
+          "plain\nKd 1 0 0\n");
     write("my wood.png", "never looked into");
-    const Painted mesh = read("mtllib a b.mtl\n" + kSquare + "usemtl wood\nf 1/1 2/2 3/3 -1/-1\nusemtl plain\nf 1 2 3\nusemtl wood\nf 1/9 2/2 3//1\n");
+    const Painted mesh = read("mtllib a b.mtl\n" + kSquare +
+                              "usemtl wood\nf 1/1 2/2 3/3 -1/-1\nusemtl plain\nf 1 2 3\nusemtl wood\nf 1/9 2/2 3//1\n");
     EXPECT_TRUE(mesh.active && mesh.warnings.empty()) << mesh.warnings.size();
     ASSERT_EQ(mesh.list.size(), 2u);
     EXPECT_EQ(mesh.list[0].image.path, folder_ / "my wood.png");
@@ -77,7 +82,8 @@ TEST_F(ObjMaterialFiles, PlainColoursCountWhereTheyDiffer) {
 
 TEST_F(ObjMaterialFiles, WhatIsMissingIsAWarning) {
     write("m.mtl", "newmtl a\nmap_Kd missing.png\nnewmtl b\nmap_Kd ../outside.png\nnewmtl c\nKd 1 0 0\n");
-    const Painted mesh = read("mtllib no.mtl m.mtl ../m.mtl\n" + kSquare + "usemtl unknown\nf 1 2 3\nusemtl unknown\nf 1 2 3\n");
+    const Painted mesh =
+        read("mtllib no.mtl m.mtl ../m.mtl\n" + kSquare + "usemtl unknown\nf 1 2 3\nusemtl unknown\nf 1 2 3\n");
     ASSERT_EQ(mesh.warnings.size(), 5u);
     EXPECT_NE(mesh.warnings[0].find("no.mtl: no such file"), std::string::npos);
     EXPECT_NE(mesh.warnings[1].find("missing.png' is missing"), std::string::npos);

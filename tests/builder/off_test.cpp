@@ -21,7 +21,8 @@ std::string lineOf(std::string_view bytes) {
 
 TEST(Off, ReadsPolygonsCommentsAndBlankLines) {
     const ReadMesh mesh = read(
-        "# a comment\n\nOFF # another\n4 2 0\n0 0 0\n1 0 0\r\n\n# between\n1 1 0\n0 1 5.5e-1 # after\n4 0 1 2 3\n3 3 2 1\n");
+        "# a comment\n\nOFF # another\n4 2 0\n0 0 0\n1 0 0\r\n\n# between\n1 1 0\n0 1 5.5e-1 # after\n4 0 1 2 3\n3 3 2 "
+        "1\n");
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.info.format, "OFF ASCII");
     EXPECT_EQ(mesh.positions[3], glm::dvec3(0, 1, 0.55));
@@ -30,7 +31,8 @@ TEST(Off, ReadsPolygonsCommentsAndBlankLines) {
 
 TEST(Off, KeywordCountsAndTheirForms) {
     const std::string body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
-    for (const char* start : {"OFF\n3 1 0\n", "OFF 3 1 3\n", "OFF3 1 3\n", "3 1 0\n", "OFF\n3 1\n", " \tOFF\n3 1 0 # or nah\n", "\xEF\xBB\xBFOFF\n3 1 0\n"})
+    for (const char* start : {"OFF\n3 1 0\n", "OFF 3 1 3\n", "OFF3 1 3\n", "3 1 0\n", "OFF\n3 1\n",
+                              " \tOFF\n3 1 0 # or nah\n", "\xEF\xBB\xBFOFF\n3 1 0\n"})
         EXPECT_EQ(read(start + body).triangles.size(), 1u) << start;
     EXPECT_EQ(openOff(ByteSource::fromMemory("4OFF\n3 1 0\n", "f")).error().code, ErrorCode::Unsupported);
     EXPECT_TRUE(looksLikeOff("# x\n\n STCNOFF BINARY\n"));
@@ -43,7 +45,8 @@ TEST(Off, VertexColoursAreFractionsOrBytes) {
     EXPECT_EQ(bytes.colours, (std::vector<Rgba8>{0xFF0001FF, 0x0700FF00, 0xFF030201}));
     const ReadMesh reals = read("NCOFF\n3 1 0\n");
     EXPECT_TRUE(reals.error) << "the order is C, then N";
-    const ReadMesh both = read("CNOFF\n3 1 0\n0 0 0 0 0 1 1.0 0 0 1\n1 0 0 0 0 1 0 0.5 0 1\n0 1 0 0 0 1 0 0 1 0.0\n3 0 1 2\n");
+    const ReadMesh both =
+        read("CNOFF\n3 1 0\n0 0 0 0 0 1 1.0 0 0 1\n1 0 0 0 0 1 0 0.5 0 1\n0 1 0 0 0 1 0 0 1 0.0\n3 0 1 2\n");
     ASSERT_FALSE(both.error) << both.line();
     EXPECT_EQ(both.colours, (std::vector<Rgba8>{0xFF0000FF, 0xFF008000, 0x00FF0000}));
 }
@@ -57,10 +60,13 @@ TEST(Off, FaceColoursAreAWarning) {
 }
 
 TEST(Off, WhatIsWrongIsNamed) {
-    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 x 0\n3 0 1 2\n").find("vertex 2: byte 24: 'x' is not a number"), std::string::npos);
+    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 x 0\n3 0 1 2\n").find("vertex 2: byte 24: 'x' is not a number"),
+              std::string::npos);
     EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0\n0 0 0\n3 0 1 2\n").find("vertex 1"), std::string::npos);
     EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 nan 0\n0 0 0\n3 0 1 2\n").find("not finite"), std::string::npos);
-    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n").find("face 0: byte 34: vertex number 3 is out of range"), std::string::npos);
+    EXPECT_NE(
+        lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n").find("face 0: byte 34: vertex number 3 is out of range"),
+        std::string::npos);
     EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n").find("only 2"), std::string::npos);
     EXPECT_NE(lineOf("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").find("truncated"), std::string::npos);
     EXPECT_NE(lineOf("OFF\n353535235358 6 0\n0 0 0\n").find("353535235358"), std::string::npos);

@@ -80,7 +80,8 @@ TEST(DataUri, DecodesBase64OfAnyLength) {
         EXPECT_EQ(decodeDataUri("data:x/y;base64," + test::base64(bytes)), bytes);
     }
     EXPECT_EQ(decodeDataUri("data:;base64,-_-_"), std::string("\xFB\xFF\xBF", 3));
-    for (const char* wrong : {"data:,abc", "data:x;base64", "data:;base64,a", "data:;base64,ab*d", "file.bin"}) EXPECT_FALSE(decodeDataUri(wrong)) << wrong;
+    for (const char* wrong : {"data:,abc", "data:x;base64", "data:;base64,a", "data:;base64,ab*d", "file.bin"})
+        EXPECT_FALSE(decodeDataUri(wrong)) << wrong;
 }
 
 TEST(FileBelow, StaysBelowTheFolder) {
@@ -89,7 +90,9 @@ TEST(FileBelow, StaysBelowTheFolder) {
     EXPECT_EQ(fileBelow(folder, "c:d"), std::nullopt);
     EXPECT_EQ(fileBelow(folder, "c/d:e"), folder / "c/d:e");
     EXPECT_EQ(fileBelow(folder, "100%"), folder / "100%");
-    for (const char* wrong : {"", "/etc/passwd", "../x", "c/../../x", "%2e%2e/x", "..%5cx", "\\x", "http://x/y", "c%00d"}) EXPECT_EQ(fileBelow(folder, wrong), std::nullopt) << wrong;
+    for (const char* wrong :
+         {"", "/etc/passwd", "../x", "c/../../x", "%2e%2e/x", "..%5cx", "\\x", "http://x/y", "c%00d"})
+        EXPECT_EQ(fileBelow(folder, wrong), std::nullopt) << wrong;
     EXPECT_EQ(nameBelow(folder, ".\\c\\d.jpg"), folder / "./c/d.jpg");
     EXPECT_EQ(nameBelow(folder, "C:\\d.jpg"), std::nullopt);
     EXPECT_EQ(nameBelow(folder, "100%20.jpg"), folder / "100%20.jpg");

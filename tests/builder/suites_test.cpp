@@ -30,15 +30,19 @@ std::string readToTheEnd(const std::filesystem::path& path) {
         vertices += chunk.positions.size();
         triangles += chunk.triangles.size();
         const MeshInfo& info = (*stream)->info();
-        if (chunk.colours.size() != (info.hasColour ? chunk.positions.size() : 0)) return kBroken + std::string("colours");
+        if (chunk.colours.size() != (info.hasColour ? chunk.positions.size() : 0))
+            return kBroken + std::string("colours");
         if (chunk.uvs.size() != chunk.materials.size()) return kBroken + std::string("uvs");
-        if (!chunk.uvs.empty() && chunk.uvs.size() != chunk.triangles.size()) return kBroken + std::string("uvs of triangles");
+        if (!chunk.uvs.empty() && chunk.uvs.size() != chunk.triangles.size())
+            return kBroken + std::string("uvs of triangles");
         for (const uint32_t material : chunk.materials)
-            if (material != kNoMaterial && material >= (*stream)->materials().size()) return kBroken + std::string("materials");
+            if (material != kNoMaterial && material >= (*stream)->materials().size())
+                return kBroken + std::string("materials");
     }
     const auto& declared = (*stream)->info().vertices;
     if (declared && *declared != vertices) return kBroken + std::string("declared vertices");
-    std::string text = kRead + std::to_string(triangles) + " triangles, " + std::to_string(vertices) + " vertices, " + (*stream)->info().format;
+    std::string text = kRead + std::to_string(triangles) + " triangles, " + std::to_string(vertices) + " vertices, " +
+                       (*stream)->info().format;
     if ((*stream)->info().hasColour) text += ", colours";
     if ((*stream)->info().hasMaterials) text += ", " + std::to_string((*stream)->materials().size()) + " materials";
     for (const std::string& warning : (*stream)->warnings()) text += "; warning: " + warning;

@@ -55,7 +55,8 @@ std::string jpegOf(const Image& image, bool progressive) {
     if (progressive) jpeg_simple_progression(&jpeg);
     jpeg_start_compress(&jpeg, TRUE);
     while (jpeg.next_scanline < jpeg.image_height) {
-        auto* row = const_cast<JSAMPROW>(reinterpret_cast<const JSAMPLE*>(image.texels.data() + jpeg.next_scanline * image.width));
+        auto* row = const_cast<JSAMPROW>(
+            reinterpret_cast<const JSAMPLE*>(image.texels.data() + jpeg.next_scanline * image.width));
         jpeg_write_scanlines(&jpeg, &row, 1);
     }
     jpeg_finish_compress(&jpeg);
@@ -84,7 +85,8 @@ TEST(Image, DecodesPngExactlyAndJpegNearly) {
 TEST(Image, EveryTruncationIsAnError) {
     const Image image = noise(16, 16, 2);
     for (const std::string& file : {pngOf(image), jpegOf(image, false), jpegOf(image, true)})
-        for (size_t kept = 0; kept + 12 < file.size(); ++kept) EXPECT_FALSE(decodeImage(file.substr(0, kept)).ok()) << kept << " of " << file.size();
+        for (size_t kept = 0; kept + 12 < file.size(); ++kept)
+            EXPECT_FALSE(decodeImage(file.substr(0, kept)).ok()) << kept << " of " << file.size();
 }
 
 TEST(Image, FlippedBytesAreReadOrRefused) {
@@ -119,7 +121,8 @@ TEST(Texture, SamplesTexelCentresExactly) {
         for (uint32_t x = 0; x < 5; ++x) {
             const glm::vec2 centre((float(x) + 0.5f) / 5, (float(y) + 0.5f) / 3);
             const Rgba8 got = texture.sample(centre, 0), expected = image.texels[y * 5 + x];
-            for (int shift = 0; shift < 32; shift += 8) EXPECT_NEAR(got >> shift & 0xFF, expected >> shift & 0xFF, 1) << x << ' ' << y;
+            for (int shift = 0; shift < 32; shift += 8)
+                EXPECT_NEAR(got >> shift & 0xFF, expected >> shift & 0xFF, 1) << x << ' ' << y;
         }
 }
 
@@ -147,7 +150,8 @@ TEST(Texture, EveryLevelKeepsTheMeanLight) {
     for (const auto& [width, height] : {std::pair{64u, 64u}, {37u, 5u}, {1u, 9u}, {255u, 3u}}) {
         const Image image = noise(width, height, width);
         double mean = 0;
-        for (const Rgba8 texel : image.texels) mean += srgbToLinear((texel & 0xFF) / 255.0) / double(image.texels.size());
+        for (const Rgba8 texel : image.texels)
+            mean += srgbToLinear((texel & 0xFF) / 255.0) / double(image.texels.size());
         const Rgba8 coarsest = Texture(image).sample({0.5f, 0.5f}, 1e9f);
         EXPECT_NEAR(coarsest & 0xFF, linearToSrgb(mean) * 255, 2) << width << " by " << height;
     }
@@ -162,7 +166,8 @@ TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
     std::vector<Material> materials(4);
     for (unsigned i = 0; i < 3; ++i) {
         materials[i].name = std::to_string(i);
-        materials[i].image.bytes = std::make_shared<const std::string>(pngOf(Image{16, 16, std::vector<Rgba8>(256, rgba(i, i, i))}));
+        materials[i].image.bytes =
+            std::make_shared<const std::string>(pngOf(Image{16, 16, std::vector<Rgba8>(256, rgba(i, i, i))}));
     }
     materials[3].name = "broken";
     materials[3].image.path = "/nowhere/picture.png";

@@ -12,6 +12,7 @@
 
 #include "builder/byte_source.h"
 #include "builder/mesh_stream.h"
+#include "tests/builder/piped_bytes.h"
 
 namespace vcp::fuzz {
 
@@ -28,6 +29,9 @@ struct Outcome {
     std::vector<std::array<uint64_t, 3>> triangles;
 };
 
+// A small file may show a mesh many times.
+constexpr size_t kMostElements = 400'000;
+
 inline Outcome readMesh(Result<std::unique_ptr<MeshStream>> stream) {
     Outcome mesh;
     if (!stream) {
@@ -43,6 +47,15 @@ inline Outcome readMesh(Result<std::unique_ptr<MeshStream>> stream) {
         }
         require(*more == (!chunk.positions.empty() || !chunk.triangles.empty()), "an empty chunk ends the mesh");
         if (!*more) break;
+        if (mesh.positions.size() + mesh.triangles.size() > kMostElements) {
+            mesh.error = "larger than is of use here";
+            return mesh;
+        }
+        require(chunk.uvs.size() == chunk.materials.size() &&
+                    (chunk.uvs.empty() || chunk.uvs.size() == chunk.triangles.size()),
+                "texture coordinates and a material for each triangle");
+        for (const uint32_t material : chunk.materials)
+            require(material == kNoMaterial || material < (*stream)->materials().size(), "materials are in range");
         require(chunk.positions.size() < 200'000 && chunk.triangles.size() < 2'000'000, "a chunk is bounded");
         mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
         mesh.colours.insert(mesh.colours.end(), chunk.colours.begin(), chunk.colours.end());
@@ -60,7 +73,8 @@ inline Outcome readMesh(Result<std::unique_ptr<MeshStream>> stream) {
 
 using Opener = Result<std::unique_ptr<MeshStream>> (*)(ByteSource);
 
-inline void checkMesh(Opener open, std::string_view bytes) {
+// `sizeMatters`: whether the size of the file helps to tell what it is.
+inline void checkMesh(Opener open, std::string_view bytes, bool sizeMatters = false) {
     const Outcome whole = readMesh(open(ByteSource::fromMemory(bytes, "fuzz")));
     require(whole.error.find('\n') == std::string::npos, "an error is one line");
     for (const size_t window : {1, 37}) {
@@ -70,6 +84,12 @@ inline void checkMesh(Opener open, std::string_view bytes) {
         require(cut.positions == whole.positions, "windows do not change positions");
         require(cut.colours == whole.colours, "windows do not change colours");
         require(cut.triangles == whole.triangles, "windows do not change triangles");
+    }
+    if (!sizeMatters && compressionOf(bytes) == Compression::None) {
+        const Outcome piped = readMesh(open(*test::piped(bytes, 11, 64)));
+        require(piped.error.empty() == whole.error.empty(), "a pipe does not change the outcome");
+        require(!whole.error.empty() || (piped.positions == whole.positions && piped.triangles == whole.triangles),
+                "nor the mesh");
     }
 }
 
