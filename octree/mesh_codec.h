@@ -31,6 +31,7 @@ public:
         }
         count_.code(coder_, count);
         if (count > page_.header.triangles) page_.wrong = true;
+        if (page_.header.triangles == 0 && hardLeaves_ + page_.header.vertices > 0) page_.wrong = true;
         if (page_.wrong || page_.header.triangles == 0) return;
         positions_.reserve(page_.header.vertices);
         triangles_.reserve(count);

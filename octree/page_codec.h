@@ -6,8 +6,8 @@
 //              hard leaves, growing across their edges; vertices by the parallelogram rule; normals predicted from
 //              the triangles. Nodes' numbers, leaves' triangle lists and the like are derived.
 //
-// Coding loses nothing, but the page that comes back has its faces, triangle records, vertices and the corners of a
-// triangle in the codec's own order. A page that is not as the builder makes them is stored plainly.
+// Coding loses nothing, but the page that comes back has its groups, faces, triangle records, vertices and the corners
+// of a triangle in the codec's own order. A page that is not as the builder makes them is stored plainly.
 #pragma once
 
 #include <cstddef>
