@@ -405,9 +405,9 @@ TEST(PageCodec, SmoothSurfaceCostsLittle) {
 TEST(PageCodec, GoldenBytes) {
     const WholePage soft = analyticPage(test::sphere({7.2, 8.1, 7.7}, 6), 4, 1), hard = sheet(1, 2, 3, 9).build(1);
     const PackedPage a = packPage(asBytes(soft.geometry), {}), b = packPage(asBytes(hard.geometry), asBytes(hard.colour));
-    EXPECT_EQ(hashBytes(a.geometry), 0u);
-    EXPECT_EQ(hashBytes(b.geometry), 0u);
-    EXPECT_EQ(hashBytes(b.colour), 0u);
+    EXPECT_EQ(hashBytes(a.geometry), 10564386174724560174u);
+    EXPECT_EQ(hashBytes(b.geometry), 1920278069947240605u);
+    EXPECT_EQ(hashBytes(b.colour), 2651053299021788687u);
 }
 
 /// Decodes hostile bytes: refused, or of the size that was asked for.
@@ -435,6 +435,13 @@ TEST(PageCodec, EveryTruncationIsRefused) {
     std::vector<std::byte> longer = packed.geometry;
     longer.resize(longer.size() + 16, std::byte{1});
     EXPECT_FALSE(decodes(longer, page));
+    // Sizes that are no page's, for both forms.
+    for (const std::byte form : {kPlain, kCoded})
+        for (const uint64_t bytes : {0u, 1u, 8u, 63u, 72u, 1000u}) {
+            std::vector<std::byte> other = packed.geometry;
+            other[0] = form;
+            EXPECT_FALSE(unpackGeometry(other, bytes).ok()) << bytes;
+        }
     EXPECT_FALSE(unpackGeometry(packed.geometry, page.geometry.size() * 16 + 16).ok());
     EXPECT_FALSE(unpackColour(packed.colour, page.colour.size() * 16 + 16, page.view()).ok());
     EXPECT_FALSE(unpackColour({}, page.colour.size() * 16, page.view()).ok());
