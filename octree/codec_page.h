@@ -47,8 +47,8 @@ struct CodecPage {
     std::span<uint32_t> normals;
     std::vector<NodePlace> places;  ///< of `nodes`
 
-    const PageView* source = nullptr;  ///< what the encoder codes; groups are in the same order
-    std::vector<uint32_t> faceSource, vertexSource;  ///< encoder: from where in `source`
+    const PageView* source = nullptr;  ///< what the encoder codes
+    std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: from where in `source`
 
     bool wrong = false;  ///< decoder: the bytes are no page; encoder: the page needs the plain form
 
@@ -63,12 +63,15 @@ struct CodecPage {
         vertices = {reinterpret_cast<glm::u32vec2*>(bytes + s.vertices), header.vertices};
         normals = {reinterpret_cast<uint32_t*>(bytes + s.normals), header.vertices};
     }
+    /// The word of node i where the page comes from; 0 for the decoder.
+    [[nodiscard]] uint32_t sourceWord(size_t i) const { return source != nullptr ? source->nodes[size_t{8} * groupSource[i / 8] + i % 8] : 0u; }
+
     /// Calls `visit(word, source word, place)` for the root and every node, in order, until something is wrong.
     template <class Visit>
     void forEachNode(Visit&& visit) {
         const uint16_t edge = static_cast<uint16_t>(kSubcellsPerCell << header.log2Cells);
         visit(header.root, source != nullptr ? source->header.root : 0u, NodePlace{0, 0, 0, edge});
-        for (size_t i = 0; i < nodes.size() && !wrong; ++i) visit(nodes[i], source != nullptr ? source->nodes[i] : 0u, places[i]);
+        for (size_t i = 0; i < nodes.size() && !wrong; ++i) visit(nodes[i], sourceWord(i), places[i]);
     }
 };
 

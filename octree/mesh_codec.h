@@ -31,6 +31,7 @@ public:
         }
         count_.code(coder_, count);
         if (count > page_.header.triangles) page_.wrong = true;
+        if (page_.header.triangles == 0 && hardLeaves_ + page_.header.vertices > 0) page_.wrong = true;
         if (page_.wrong || page_.header.triangles == 0) return;
         positions_.reserve(page_.header.vertices);
         triangles_.reserve(count);
@@ -155,16 +156,42 @@ private:
         const WideVector m(std::abs(n.x), std::abs(n.y), std::abs(n.z));
         const int k = m.x >= m.y && m.x >= m.z ? 0 : m.y >= m.z ? 1 : 2, i = (k + 1) % 3, j = (k + 2) % 3;
         const uint32_t scale = static_cast<uint32_t>(std::clamp(static_cast<int>(std::bit_width(static_cast<uint32_t>(size))) - 7, 0, 5));
-        vertex_[scale][0].code(coder_, more[i]);
+        const std::array<bool, 3> known = codeLevel(gate, foretold, more);
+        if (!known[static_cast<size_t>(i)]) vertex_[scale][0].code(coder_, more[i]);
         const uint32_t spread = category(more[i], scale);
-        vertex_[scale][1 + spread].code(coder_, more[j]);
-        // Where the surface goes on flat, the third coordinate follows from the two.
-        int32_t flat = 0;
-        if (size <= kFlatSteps && n[k] != 0) flat = static_cast<int32_t>(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) + n[j] * std::clamp(more[j], -kFlatSteps, kFlatSteps)) / n[k]);
-        int32_t rest = more[k] - flat;
-        height_[scale][std::max(spread, category(more[j], scale))].code(coder_, rest);
-        more[k] = rest + flat;
+        if (!known[static_cast<size_t>(j)]) vertex_[scale][1 + spread].code(coder_, more[j]);
+        if (!known[static_cast<size_t>(k)]) {
+            // Where the surface goes on flat, the third coordinate follows from the two.
+            int32_t flat = 0;
+            if (size <= kFlatSteps && n[k] != 0) flat = static_cast<int32_t>(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) + n[j] * std::clamp(more[j], -kFlatSteps, kFlatSteps)) / n[k]);
+            int32_t rest = more[k] - flat;
+            height_[scale][std::max(spread, category(more[j], scale))].code(coder_, rest);
+            more[k] = rest + flat;
+        }
         place(foretold + more);
+    }
+
+    /// Walls and isosurfaces: coordinates that are just those of a corner of the gate's triangle. Sets their `more`.
+    std::array<bool, 3> codeLevel(const TriangleFront::Gate& gate, glm::i32vec3 foretold, glm::i32vec3& more) {
+        const glm::i32vec3 corner[3] = {positions_[gate.from], positions_[gate.to], positions_[gate.opposite]};
+        uint32_t which[3] = {0, 0, 0};  // 1 + number of the corner, 0: none
+        if constexpr (Coder::kEncodes)
+            for (int axis = 0; axis < 3; ++axis)
+                for (uint32_t c = 3; c-- > 0;)
+                    if (foretold[axis] + more[axis] == corner[c][axis]) which[axis] = 1 + c;
+        bool any = (which[0] | which[1] | which[2]) != 0;
+        coder_.bit(anyLevel_[lastLevel_], any);
+        lastLevel_ = (lastLevel_ << 1 | (any ? 1u : 0u)) & 7u;
+        std::array<bool, 3> known{};
+        if (!any) return known;
+        for (int axis = 0; axis < 3; ++axis) {
+            const uint32_t ends = (corner[0][axis] == corner[1][axis] ? 1u : 0u) | (corner[0][axis] == corner[2][axis] ? 2u : 0u) | (corner[1][axis] == corner[2][axis] ? 4u : 0u);
+            coder_.symbol(level_[ends], which[axis]);
+            if (which[axis] > 3) page_.wrong = true;
+            known[static_cast<size_t>(axis)] = which[axis] != 0;
+            if (which[axis] != 0) more[axis] = corner[(which[axis] - 1) % 3][axis] - foretold[axis];
+        }
+        return known;
     }
 
     /// How far off a prediction was, 0 to 3, against the edges' size.
@@ -327,10 +354,12 @@ private:
     std::vector<glm::i32vec3> positions_;  ///< of vertices, lattice, from the page's lowest corner
     std::vector<uint8_t> inHard_;          ///< vertices in hard leaves
     std::vector<Index3> triangles_;
-    uint32_t lastBorder_ = 0;
+    uint32_t lastBorder_ = 0, lastLevel_ = 0;
     NumberModel count_, known_;
     BitModel border_[4][8], fresh_[4][8][8], next_[4][8][8], previous_[4][8][8], seedFresh_[3];
     SignedModel seedVertex_[2], vertex_[6][5], height_[6][4], normal_[8];
+    BitModel anyLevel_[8];
+    SymbolModel level_[8];
     BitModel plainNormal_, crease_[2][2], otherNormal_[2];
 };
 

@@ -57,7 +57,7 @@ private:
                 outside += beside[axis][o >> axis & 1u];
             }
             const uint32_t context = (before * 4 + full) * 4 + outside;
-            page_.nodes[i] = node(page_.source != nullptr ? page_.source->nodes[i] : 0, page_.places[i], depth, context);
+            page_.nodes[i] = node(page_.sourceWord(i), page_.places[i], depth, context);
             if (nodeType(page_.nodes[i]) != kNodeEmpty) known |= 1u << o;
             if (page_.wrong) return;
         }
@@ -86,12 +86,13 @@ private:
         last_ = (last_ << 2 | type) & 15u;
         uint32_t word = type << kNodeTypeShift;
         if (type == kNodeInternal) {
-            if (depth >= cellDepth + static_cast<int>(kMaxSubcellDepth) || groupsMade_ >= page_.header.groups || (Coder::kEncodes && source != groupsMade_)) {
+            if (depth >= cellDepth + static_cast<int>(kMaxSubcellDepth) || groupsMade_ >= page_.header.groups) {
                 page_.wrong = true;
                 return word;
             }
             depth_[groupsMade_] = static_cast<uint8_t>(depth + 1);
             parents_.push_back(place);
+            if (Coder::kEncodes) page_.groupSource.push_back(source & kNodePayloadMask);
             word |= groupsMade_++;
         }
         if (type == kNodeSoft) word |= codes(source, place);

@@ -1,5 +1,6 @@
 #include "octree/page_codec.h"
 
+#include <algorithm>
 #include <memory>
 
 #include <zstd.h>
@@ -27,9 +28,9 @@ std::vector<std::byte> plain(std::span<const std::byte> bytes) {
 }
 
 Result<std::vector<uint4>> unpackPlain(std::span<const std::byte> packed, uint64_t bytes) {
-    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes) return broken("page does not decompress to its size");
+    if (bytes % 16 != 0 || ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes) return broken("page does not decode to its size");
     std::vector<uint4> out(bytes / 16);
-    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes) return broken("page does not decompress to its size");
+    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes) return broken("page does not decode to its size");
     return out;
 }
 
@@ -80,21 +81,20 @@ std::vector<std::byte> packColour(std::span<const std::byte> colour, const Codec
 }  // namespace
 
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
-    PackedPage packed;
+    const auto plainly = [&] { return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)}; };
     const auto source = parsePage(geometry);
+    if (!source.ok()) return plainly();
     CodecPage page;
-    if (source.ok()) {
-        page.header = source->header;
-        page.source = &*source;
-        page.wrong = !plausible(page.header, geometry.size()) || (source->header.reserved[0] | source->header.reserved[1] | source->header.reserved[2] | source->header.reserved[3] | source->header.reserved[4] | source->header.reserved[5]) != 0;
-    }
-    if (!source.ok() || page.wrong) return {plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
+    page.header = source->header;
+    page.source = &*source;
+    const auto& reserved = page.header.reserved;
+    if (!plausible(page.header, geometry.size()) || std::any_of(std::begin(reserved), std::end(reserved), [](uint32_t word) { return word != 0; })) return plainly();
     page.allocate();
     RangeEncoder coder;
     codeHeader(coder, page.header);
     codePage(coder, page);
-    if (page.wrong) return {plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
-    packed.geometry = coded(coder);
+    if (page.wrong) return plainly();
+    PackedPage packed{coded(coder), {}};
     if (colour.empty()) return packed;
     const auto view = parsePage(std::as_bytes(std::span(page.block)));
     packed.colour = packColour(colour, page, *view);
@@ -102,29 +102,29 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
 }
 
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {
-    if (packed.empty()) return broken("page is empty");
+    if (packed.empty()) return broken("page does not decode: it is empty");
     if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), pageBytes);
-    if (packed[0] != kCoded) return broken("page is stored in an unknown form");
+    if (packed[0] != kCoded) return broken("page does not decode: unknown form");
     RangeDecoder coder(packed.subspan(1));
     CodecPage page;
     codeHeader(coder, page.header);
-    if (!plausible(page.header, pageBytes)) return broken("page's counts do not match its size");
+    if (!plausible(page.header, pageBytes)) return broken("page does not decode to its size");
     page.allocate();
     codePage(coder, page);
-    if (page.wrong || !coder.complete()) return broken("page does not decode");
+    if (page.wrong || !coder.complete()) return broken("page does not decode to its size");
     return std::move(page.block);
 }
 
 Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page) {
-    if (packed.empty()) return broken("colour page is empty");
+    if (packed.empty()) return broken("colour page does not decode: it is empty");
     if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), colourBytes);
-    if (packed[0] != kCoded) return broken("colour page is stored in an unknown form");
-    if (colourPageBytes(page.header) != colourBytes) return broken("colour page does not match its page");
+    if (packed[0] != kCoded) return broken("colour page does not decode: unknown form");
+    if (colourPageBytes(page.header) != colourBytes) return broken("colour page does not decode to its size");
     std::vector<uint4> block(colourBytes / 16);
     RangeDecoder coder(packed.subspan(1));
     auto* vertices = reinterpret_cast<uint32_t*>(block.data() + page.header.faces);
     const bool all = std::make_unique<ColourCodec<RangeDecoder>>(coder, page, std::span(block.data(), page.header.faces), std::span(vertices, page.header.vertices))->run();
-    if (!all || !coder.complete()) return broken("colour page does not decode");
+    if (!all || !coder.complete()) return broken("colour page does not decode to its size");
     return block;
 }
 

@@ -1,13 +1,16 @@
 // Pages in the file: a form of their bytes from which all that follows from the rest is left out, range coded.
 //
-//   byte 0     0: plain: a zstd frame of the page follows; 1: coded, as below
-//   then       counts; types of the nodes; clearances as differences from what the types allow; runs of soft leaves; the
-//              vector of each of their corners once, predicted from its neighbours; the distinct triangles of the
-//              hard leaves, growing across their edges; vertices by the parallelogram rule; normals predicted from
-//              the triangles. Nodes' numbers, leaves' triangle lists and the like are derived.
+//   byte 0     0: plain: a zstd frame of the page follows; 1: coded, two streams (range_coder.h) follow
+//   nodes      types, breadth first; wall and dip codes; clearances as differences from what the types allow
+//   faces      runs of soft leaves; the vector of each of their corners once, foretold by its neighbours
+//   mesh       the distinct triangles of the hard leaves, growing across their edges; vertices by the parallelogram
+//              rule; normals as differences from those of the triangles
+//   colour     on its own: of each corner and vertex once, foretold by its neighbours
 //
-// Coding loses nothing, but the page that comes back has its faces, triangle records, vertices and the corners of a
-// triangle in the codec's own order. A page that is not as the builder makes them is stored plainly.
+// The numbers of children, faces and records and the leaves' lists of triangles are derived.
+//
+// Coding loses nothing, but the page that comes back has its groups, faces, triangle records, vertices and the corners
+// of a triangle in the codec's own order. A page that is not as the builder makes them is stored plainly.
 #pragma once
 
 #include <cstddef>
@@ -20,20 +23,20 @@
 
 namespace vcp {
 
-/// A page ready for the file, and what it becomes again: with colours, the two orders agree.
+/// A page as it is stored.
 struct PackedPage {
     std::vector<std::byte> geometry, colour;
 };
 
-/// `colour` may be empty. The same bytes for the same page everywhere. Preconditions: both are a page that
-/// parsePage accepts; 16-byte aligned.
+/// `geometry` and `colour` (or nothing) are a page and its colour page, 16-byte aligned. The same bytes for the same
+/// page everywhere. Any thread.
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
 
-/// The page of `pageBytes` bytes. `packed` may be hostile: a few times pageBytes is allocated at most, and what
-/// comes back still has to be checked by parsePage. Errors: InvalidInput.
+/// The page, `pageBytes` long. `packed` may be hostile: nothing is allocated before its counts match pageBytes, then
+/// a few times that at most, and what comes back still has to be checked by parsePage. Errors: InvalidInput.
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes);
 
-/// The colour page of a checked page. Errors: InvalidInput.
+/// The colour page of a checked page; as safe. Errors: InvalidInput.
 Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page);
 
 }  // namespace vcp

@@ -224,7 +224,7 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     if (!withColour || e.colourBytes == 0) return page;
     const auto storedColour = readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash);
     if (!storedColour) return storedColour.error();
-    if (e.colourBytes != colourPageBytes(view->header)) return broken(reader, element + " colour", e.colourOffset, "colour page does not match its page");
+    if (e.colourBytes != colourPageBytes(view->header)) return broken(reader, element + " colour", e.colourOffset, "colour page does not decode to its page's size");
     auto colour = unpackColour(*storedColour, e.colourBytes, *view);
     if (!colour) return broken(reader, element + " colour", e.colourOffset, colour.error().message);
     page.colour = *std::move(colour);

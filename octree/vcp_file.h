@@ -6,7 +6,7 @@
 //                         (x lowest) within a level, so that the coarsest pages' entries and the header are
 //                         within the first 16 KiB
 //   ...                   pages, in the order of the directory, each on 256 bytes: geometry, then colour;
-//                         each a zstd frame; zero bytes between
+//                         each as octree/page_codec.h says; zero bytes between
 //   end-64   64           CommitRecord, written last
 //
 // Every header, block and page carries an XXH3-64; a file whose commit record, header or size disagree was
@@ -78,7 +78,7 @@ struct PageEntry {
     uint64_t colourOffset = 0;
     uint64_t colourHash = 0;
     uint32_t storedBytes = 0;  ///< in the file
-    uint32_t pageBytes = 0;    ///< decompressed
+    uint32_t pageBytes = 0;    ///< decoded
     uint32_t colourStoredBytes = 0;
     uint32_t colourBytes = 0;
     uint32_t firstChild = 0;  ///< entry of the first child page; children are consecutive, in octant order
@@ -132,7 +132,7 @@ Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 /// each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
-/// A page's decompressed bytes, 16-byte aligned.
+/// A page's decoded bytes, 16-byte aligned.
 struct PageBytes {
     std::vector<uint4> geometry;
     std::vector<uint4> colour;  ///< empty when not asked for or absent
@@ -141,8 +141,8 @@ struct PageBytes {
     [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
 };
 
-/// Reads, verifies (hash), decompresses and checks (parsePage) one page. Safe on hostile bytes: allocates at
-/// most the entry's pageBytes, which readDataset has bounded. Any thread.
+/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage) one page. Safe on hostile bytes: allocates
+/// at most a few times the entry's pageBytes, which readDataset has bounded. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 
 /// Reads every byte of the file and checks it, also those between pages. Calls `progress(bytes done)` now and

@@ -9,15 +9,15 @@
 
 namespace vcp {
 
-/// A page compressed for the file.
+/// A page as it is stored in the file.
 struct StoredPage {
     std::vector<std::byte> geometry;
     std::vector<std::byte> colour;
-    uint32_t geometryBytes = 0;  ///< decompressed
+    uint32_t geometryBytes = 0;  ///< decoded
     uint32_t colourBytes = 0;
 };
 
-/// zstd; the same bytes for the same page everywhere.
+/// By octree/page_codec.h; the same bytes for the same page everywhere.
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
 
 /// One thread. Removes the partial file when destroyed before commit.

@@ -14,7 +14,7 @@
 #include "builder/page_encoder.h"
 #include "octree/packing.h"
 #include "octree/page.h"
-#include "octree/vcp_file.h"
+#include "octree/vcp_writer.h"
 #include "tests/builder/lattice_meshes.h"
 #include "tests/builder/test_meshes.h"
 
@@ -361,6 +361,26 @@ TEST(PageEncoder, LeavesComeBack) {
                 }
             }
         }
+    }
+}
+
+// What the codec derives must be what the builder found: else pages are stored plainly, several times as large.
+TEST(PageBuilder, PagesAreStoredCoded) {
+    IndexedMesh soup = test::randomTriangles(300, 8, true);
+    const double scale = 8 / std::abs(soup.positions[0].x + 1e-3);
+    for (glm::dvec3& p : soup.positions) p = glm::clamp(glm::dvec3(16) + scale * p, 2.0, 30.0);
+    const std::pair<IndexedMesh, size_t> scenes[] = {
+        {test::sphereMesh({16, 16, 16}, 11, 60), 4}, {test::sphereMesh({16, 16, 16}, 3, 90), 4}, {test::boxMesh({5, 6, 7}, {20, 21, 24}, 12), 4}, {soup, 2}};
+    for (const auto& [mesh, factor] : scenes) {
+        Page page(test::onLattice(mesh), {0, 0, 0});
+        PageTree tree = buildPageTree(*page.geometry, kTolerance);
+        const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
+        ASSERT_GT(encoded.leaves, 100u);
+        std::vector<uint4> block(encoded.geometry.size() / 16);
+        std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
+        const StoredPage stored = compressPage(std::as_bytes(std::span(block)), {});
+        EXPECT_EQ(stored.geometry[0], std::byte{1}) << "coded";
+        EXPECT_LT(stored.geometry.size() * factor, encoded.geometry.size());
     }
 }
 

@@ -1,0 +1,38 @@
+// What must hold for every stored page, however hostile: it is refused, or decodes to the size that was asked for;
+// and what then is a page can be stored and comes back as the same leaves.
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "octree/page_codec.h"
+
+namespace {
+
+void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "broken: %s\n", what);
+    std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    if (size < 4) return 0;
+    uint32_t pageBytes = 0;
+    std::memcpy(&pageBytes, data, 4);
+    pageBytes %= 1u << 18;
+    const auto packed = std::as_bytes(std::span(data + 4, size - 4));
+    const auto block = vcp::unpackGeometry(packed, pageBytes);
+    if (!block.ok()) return 0;
+    const auto bytes = std::as_bytes(std::span(*block));
+    require(bytes.size() == pageBytes / 16 * 16, "size of the page");
+    const auto page = vcp::parsePage(bytes);
+    if (!page.ok()) return 0;
+    const auto again = vcp::unpackGeometry(vcp::packPage(bytes, {}).geometry, bytes.size());
+    require(again.ok(), "a page can be stored");
+    const auto view = vcp::parsePage(std::as_bytes(std::span(*again)));
+    require(view.ok(), "a stored page comes back");
+    require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves, "with its leaves");
+    (void)vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page);
+    return 0;
+}
