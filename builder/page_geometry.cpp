@@ -19,6 +19,9 @@ constexpr double kCreaseCosine = 0.35;
 // Batches measure distances up to their last bits: so much is left open for the exact ones to settle.
 constexpr double kBatchDistance = 1 + 1e-9;
 
+// Distances to triangles' centres are in float, of coordinates up to some hundred cells: room for rounding.
+constexpr float kBallRounding = 1e-3f;
+
 /// How often an edge occurs, and where it did first: a table with linear probing.
 class EdgeTable {
 public:
@@ -61,6 +64,8 @@ void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
         for (int i = 0; i < 3; ++i) t.corners[i] = glm::vec3(mesh_.positions[mesh_.triangles[k][i]] - origin_) / float(kLatticePerCell);
         const Triangle3 c = cornersOf(t);
         t.normal = glm::vec3(glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0])));
+        t.centre = (t.corners[0] + t.corners[1] + t.corners[2]) / 3.0f;
+        for (const glm::vec3& corner : t.corners) t.radius = std::max(t.radius, glm::distance(corner, t.centre));
         triangles_.push_back(t);
         vertices_.push_back(mesh_.triangles[k]);
     }
@@ -171,18 +176,36 @@ const CornerVector& PageGeometry::corner(glm::ivec3 subcells) {
     return corners_[number - 1];
 }
 
-void PageGeometry::measureFound(glm::dvec3 p, size_t first) {
-    TriangleBatch batch;
-    for (; first < found_.size(); first += TriangleBatch::kSize) {
-        const size_t count = std::min<size_t>(TriangleBatch::kSize, found_.size() - first);
-        for (size_t i = 0; i < TriangleBatch::kSize; ++i) {
-            const Triangle& t = triangles_[found_[first + std::min(i, count - 1)].triangle];
-            for (int c = 0; c < 3; ++c)
-                for (int axis = 0; axis < 3; ++axis) batch.corners[3 * c + axis][i] = t.corners[c][axis];
-        }
-        squaredDistances(p, batch);
-        for (size_t i = 0; i < count; ++i) found_[first + i].squared = batch.squared[i];
+double PageGeometry::measureFound(glm::dvec3 p, size_t first, double least) {
+    const glm::vec3 query(p);
+    float reach = static_cast<float>(std::min(std::sqrt(least), 1e9));
+    for (size_t i = first; i < found_.size(); ++i) {
+        const Triangle& t = triangles_[found_[i].triangle];
+        const float distance = glm::distance(query, t.centre);
+        found_[i].least = distance - t.radius - kBallRounding;
+        reach = std::min(reach, distance + kBallRounding);
     }
+    TriangleBatch batch;
+    uint32_t at[TriangleBatch::kSize];
+    for (size_t i = first; i < found_.size();) {
+        size_t count = 0;
+        for (; i < found_.size() && count < TriangleBatch::kSize; ++i) {
+            if (found_[i].least > reach) continue;
+            const float* corners = &triangles_[found_[i].triangle].corners[0].x;
+            for (int c = 0; c < 9; ++c) batch.corners[c][count] = corners[c];
+            at[count++] = static_cast<uint32_t>(i);
+        }
+        for (size_t k = count; k > 0 && k < TriangleBatch::kSize; ++k)
+            for (auto& corners : batch.corners) corners[k] = corners[0];
+        if (count == 0) break;
+        squaredDistances(p, batch);
+        for (size_t k = 0; k < count; ++k) {
+            found_[at[k]].squared = batch.squared[k];
+            least = std::min(least, batch.squared[k]);
+        }
+        reach = std::min(reach, static_cast<float>(std::sqrt(least)) + kBallRounding);
+    }
+    return least;
 }
 
 CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
@@ -205,11 +228,10 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
                     for (const uint32_t k : trianglesOf({x, y, z}).inside)
                         if (stamp_[k] != stampNow_) {
                             stamp_[k] = stampNow_;
-                            found_.push_back({k, 0});
+                            found_.push_back({k, 0, 1e300});
                         }
                 }
-        measureFound(p, before);
-        for (size_t i = before; i < found_.size(); ++i) least = std::min(least, found_[i].squared);
+        least = measureFound(p, before, least);
         const bool whole = low == glm::ivec3(-kBorder) && high == glm::ivec3(cells_ + kBorder - 1);
         if (least <= double(radius) * radius || whole) break;
         doneLow = low;

@@ -82,6 +82,8 @@ private:
         std::array<glm::vec3, 3> corners;
         glm::vec3 normal;  ///< unit
         uint8_t badEdges;  ///< as in CertifiedTriangle
+        glm::vec3 centre;  ///< a point of the triangle
+        float radius;      ///< all of it is so close to the centre
     };
     static Triangle3 cornersOf(const Triangle& t) { return {glm::dvec3(t.corners[0]), glm::dvec3(t.corners[1]), glm::dvec3(t.corners[2])}; }
 
@@ -89,8 +91,9 @@ private:
     void markBadEdges();
     void fillCells();
     CornerVector searchCorner(glm::dvec3 p);
-    /// Measures the triangles from number `first` in found_.
-    void measureFound(glm::dvec3 p, size_t first);
+    /// Measures the triangles from number `first` in found_, but for those that cannot be closest;
+    /// `least` is the least squared distance before, and returned after.
+    double measureFound(glm::dvec3 p, size_t first, double least);
     [[nodiscard]] size_t cellIndex(glm::ivec3 cell) const {
         const int side = cells_ + 2 * kBorder;
         return static_cast<size_t>(cell.x + kBorder + side * (cell.y + kBorder + side * (cell.z + kBorder)));
@@ -110,7 +113,8 @@ private:
     uint32_t stampNow_ = 0;
     struct Found {
         uint32_t triangle;
-        double squared;
+        float least;     ///< it is not closer than this
+        double squared;  ///< distance, once measured
     };
     std::vector<Found> found_;                              ///< candidates of a search
     std::vector<uint32_t> gridCorner_;                      ///< corners of cells: number in corners_ + 1, 0: not searched

@@ -143,21 +143,29 @@ void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Po
     if (beyond[0] & beyond[1] & beyond[2]) return;
     for (const glm::dvec3& p : triangle) polygon.add(p);
     const unsigned planes = beyond[0] | beyond[1] | beyond[2];
-    Polygon next;
+    if (planes == 0) return;
+    Polygon spare;
+    Polygon *from = &polygon, *to = &spare;
     for (int plane = 0; plane < 6; ++plane) {
         if (!(planes >> plane & 1u)) continue;
         const int axis = plane / 2;
         const double side = plane % 2 ? 1 : -1, limit = plane % 2 ? upper[axis] : -lower[axis];
-        next.clear();
-        double dp = limit - side * polygon[polygon.size() - 1][axis];
-        for (size_t i = 0, before = polygon.size() - 1; i < polygon.size(); before = i++) {
-            const double dq = limit - side * polygon[i][axis];
-            if ((dp < 0) != (dq < 0)) next.add(polygon[before] + (polygon[i] - polygon[before]) * (dp / (dp - dq)));
-            if (dq >= 0) next.add(polygon[i]);
+        to->clear();
+        const glm::dvec3* p = from->end() - 1;
+        double dp = limit - side * (*p)[axis];
+        for (const glm::dvec3& q : *from) {
+            const double dq = limit - side * q[axis];
+            if ((dp < 0) != (dq < 0)) to->add(*p + (q - *p) * (dp / (dp - dq)));
+            if (dq >= 0) to->add(q);
+            p = &q;
             dp = dq;
         }
-        polygon = next;
-        if (polygon.size() < 3) return polygon.clear();
+        std::swap(from, to);
+        if (from->size() < 3) return polygon.clear();
+    }
+    if (from == &spare) {
+        polygon.clear();
+        for (const glm::dvec3& p : spare) polygon.add(p);
     }
 }
 

@@ -61,7 +61,7 @@ public:
     [[nodiscard]] const glm::dvec3* end() const { return corners_.data() + size_; }
 
 private:
-    std::array<glm::dvec3, kMaxCorners + 1> corners_;  // rounding may add one for an instant
+    std::array<glm::dvec3, kMaxCorners> corners_;
     size_t size_ = 0;
 };
 
