@@ -87,15 +87,13 @@ private:
         if (inside.empty()) return;
         if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
         if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth) return makeHard(index, inside);
-        std::array<std::vector<uint32_t>, 8> childAround, childInside;
+        PageGeometry::ChildTriangles& children = children_[depth];
+        geometry_.split(box, around, children);
         size_t together = 0;
-        for (int i = 0; i < 8; ++i) {
-            geometry_.filter(box.child(i), around, childAround[i], childInside[i]);
-            together += childInside[i].size();
-        }
+        for (const auto& list : children.inside) together += list.size();
         if (double(together) > kMaxRepetition * double(inside.size())) return makeHard(index, inside);
         const uint32_t first = addChildren(index);
-        for (uint32_t i = 0; i < 8; ++i) fillCell(first + i, box.child(static_cast<int>(i)), childAround[i], childInside[i], depth + 1);
+        for (uint32_t i = 0; i < 8; ++i) fillCell(first + i, box.child(static_cast<int>(i)), children.around[i], children.inside[i], depth + 1);
     }
 
     uint32_t addChildren(uint32_t index) {
@@ -203,6 +201,7 @@ private:
     std::vector<CertifiedTriangle> triangles_;
     std::vector<const CertifiedTriangle*> pointers_;
     CertificateScratch scratch_;
+    std::array<PageGeometry::ChildTriangles, kMaxSubcellDepth> children_;  ///< of the cell being split, by depth
 };
 
 }  // namespace

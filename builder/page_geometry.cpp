@@ -163,6 +163,31 @@ void PageGeometry::filter(const NodeBox& box, std::span<const uint32_t> candidat
     }
 }
 
+void PageGeometry::split(const NodeBox& box, std::span<const uint32_t> candidates, ChildTriangles& children) const {
+    for (auto* lists : {&children.around, &children.inside})
+        for (std::vector<uint32_t>& list : *lists) list.clear();
+    // With the children as unit cells.
+    const glm::dvec3 lower = box.lowerCells();
+    const double scale = 2 / box.edgeCells();
+    std::vector<uint8_t> met;
+    for (const uint32_t k : candidates) {
+        Triangle3 t = cornersOf(triangles_[k]);
+        for (glm::dvec3& corner : t) corner = (corner - lower) * scale;
+        const CellOverlap overlap(t, kCertificateMarginCells * scale);
+        const glm::ivec3 low = glm::max(overlap.lower(), 0), high = glm::min(overlap.upper(), 1);
+        if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
+        overlap.classify(low, high, met);
+        const uint8_t* how = met.data();
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int x = low.x; x <= high.x; ++x, ++how) {
+                    const size_t child = static_cast<size_t>(x + 2 * y + 4 * z);
+                    if (*how) children.around[child].push_back(k);
+                    if (*how == CellOverlap::kTouches) children.inside[child].push_back(k);
+                }
+    }
+}
+
 const CornerVector& PageGeometry::corner(glm::ivec3 subcells) {
     const glm::ivec3 cell = subcells / kSubcells;
     const size_t side = static_cast<size_t>(cells_) + 1;
@@ -213,10 +238,11 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
     found_.clear();
     ++stampNow_;
     glm::ivec3 doneLow(0), doneHigh(-1);  // cells already looked at
-    for (int radius = 1;; ++radius) {
+    for (double radius = 0.25;; radius = radius < 1 ? 2 * radius : radius + 1) {
         // The cells that a ball of `radius` about p meets.
-        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(p - double(radius))), -kBorder);
-        const glm::ivec3 high = glm::min(glm::ivec3(glm::ceil(p + double(radius))) - 1, cells_ + kBorder - 1);
+        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(p - radius)), -kBorder);
+        const glm::ivec3 high = glm::min(glm::ivec3(glm::ceil(p + radius)) - 1, cells_ + kBorder - 1);
+        if (low == doneLow && high == doneHigh && least > radius * radius) continue;
         const size_t before = found_.size();
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
@@ -233,7 +259,7 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
                 }
         least = measureFound(p, before, least);
         const bool whole = low == glm::ivec3(-kBorder) && high == glm::ivec3(cells_ + kBorder - 1);
-        if (least <= double(radius) * radius || whole) break;
+        if (least <= radius * radius || whole) break;
         doneLow = low;
         doneHigh = high;
     }

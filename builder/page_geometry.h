@@ -61,6 +61,12 @@ public:
     /// The same for a smaller box, from the triangles around its parent.
     void filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around, std::vector<uint32_t>& inside) const;
 
+    /// The same for the eight children of a box.
+    struct ChildTriangles {
+        std::array<std::vector<uint32_t>, 8> around, inside;
+    };
+    void split(const NodeBox& box, std::span<const uint32_t> candidates, ChildTriangles& children) const;
+
     /// Exact closest point of a corner (position in subcells) among the page's triangles, the smallest
     /// (squared distance, triangle) winning. Exact for the whole mesh where it is within 2 cells.
     /// Valid until the next call.
