@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "builder/quadric_fit.h"
 #include "builder/wider_clones.h"
 #include "octree/leaf_math.h"
 #include "octree/packing.h"
@@ -18,6 +19,13 @@ constexpr int kMaxSubdivision = 1;
 
 // Part of the tolerance that may be given away for not bounding a small polygon exactly.
 constexpr double kCheapSlack = 0.15;
+
+// f is a quadric but for terms of third order. Where the mesh's distance from every quadric is this part of the
+// tolerance in the root mean square, next to no leaf would certify: it is not tried.
+constexpr double kHopelessResidual = 0.3;
+
+// A corner whose vector turns so far from the reference (cosine) sees another sheet: likewise.
+constexpr double kHopelessCosine = 0.4;
 
 double clippedArea(const Polygon& polygon, glm::dvec3 normal) {
     glm::dvec3 sum(0);
@@ -57,7 +65,8 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
         s.areas.push_back(clippedArea(polygon, t->normal));
     }
     // The last batch is filled up with the last point.
-    for (size_t i = s.count; i % LeafSurface::kBatchStep != 0; ++i) s.x[i] = s.x[i - 1], s.y[i] = s.y[i - 1], s.z[i] = s.z[i - 1];
+    for (; s.count > 0 && s.count % LeafSurface::kBatchStep != 0; ++s.count)
+        for (auto* list : {&s.x, &s.y, &s.z}) (*list)[s.count] = (*list)[s.count - 1];
     return !s.ends.empty();
 }
 
@@ -249,9 +258,10 @@ Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const Certified
     if (!clipTriangles(lower, edge, triangles, scratch)) return result;
     const glm::dvec3 n = referenceDirection(scratch);
     if (n == glm::dvec3(0)) return result;
+    if (quadricResidual(scratch.x.data(), scratch.y.data(), scratch.z.data(), scratch.count, n) > kHopelessResidual * tolerance / edge) return result;
     for (int i = 0; i < 8; ++i) {
         const CornerVector& c = corner(i);
-        if (c.distance > double(kPackedDistanceRange) * edge) return result;
+        if (c.distance > double(kPackedDistanceRange) * edge || std::abs(glm::dot(c.direction, n)) < kHopelessCosine) return result;
         result.codes[i] = packVector(c.distance / edge, c.direction, glm::dot(c.direction, n) < 0);
     }
 
@@ -263,7 +273,7 @@ Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const Certified
     result.curvature = cube.maxCurvature();
     // A ray may be taken to hit at a wall where |f| <= W, W >= F: there it is at most (F + W) / g from the mesh.
     const double limit = largestWalled(tolerance * result.minSlope / edge);
-    surface.evaluate(scratch.x.data(), scratch.y.data(), scratch.z.data(), scratch.value.data(), (scratch.count + LeafSurface::kBatchStep - 1) / LeafSurface::kBatchStep * LeafSurface::kBatchStep);
+    surface.evaluate(scratch.x.data(), scratch.y.data(), scratch.z.data(), scratch.value.data(), scratch.count);
     PolygonBound bound(surface, result.curvature, limit, scratch);
     if (!bound.addAll()) return result;
     result.maxValue = bound.bound();

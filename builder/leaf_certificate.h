@@ -49,7 +49,7 @@ struct Certificate {
 /// Scratch memory of certify; one a thread.
 struct CertificateScratch {
     std::vector<float> x, y, z, value;  ///< corners of the clipped triangles, in leaf space, and f there
-    size_t count = 0;                   ///< of them
+    size_t count = 0;                   ///< of them, with those that fill up the last batch
     std::vector<uint32_t> ends;         ///< of each polygon among the corners
     std::vector<glm::dvec3> normals;
     std::vector<double> areas;

@@ -73,9 +73,8 @@ private:
         tree_.nodes[index].box = box;
         if (!occupied(box)) return;
         if (box.edge == kSubcells) {
-            std::vector<uint32_t> around, inside;
-            geometry_.trianglesOf(box, around, inside);
-            return fillCell(index, box, around, inside, 0);
+            const PageGeometry::CellTriangles triangles = geometry_.trianglesOf(box.lower / kSubcells);
+            return fillCell(index, box, triangles.around, triangles.inside, 0);
         }
         const uint32_t first = addChildren(index);
         for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(static_cast<int>(i)));
@@ -83,20 +82,18 @@ private:
     }
 
     /// A cell or less: soft if it certifies, hard if its triangles are few or splitting gains nothing, else split.
-    void fillCell(uint32_t index, const NodeBox& box, const std::vector<uint32_t>& around, const std::vector<uint32_t>& inside, uint32_t depth) {
+    void fillCell(uint32_t index, const NodeBox& box, std::span<const uint32_t> around, std::span<const uint32_t> inside, uint32_t depth) {
         tree_.nodes[index].box = box;
         if (inside.empty()) return;
         if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
         if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth) return makeHard(index, inside);
-        std::array<std::vector<uint32_t>, 8> childAround, childInside;
+        PageGeometry::ChildTriangles& children = children_[depth];
+        geometry_.split(box, around, children);
         size_t together = 0;
-        for (int i = 0; i < 8; ++i) {
-            geometry_.filter(box.child(i), around, childAround[i], childInside[i]);
-            together += childInside[i].size();
-        }
+        for (const auto& list : children.inside) together += list.size();
         if (double(together) > kMaxRepetition * double(inside.size())) return makeHard(index, inside);
         const uint32_t first = addChildren(index);
-        for (uint32_t i = 0; i < 8; ++i) fillCell(first + i, box.child(static_cast<int>(i)), childAround[i], childInside[i], depth + 1);
+        for (uint32_t i = 0; i < 8; ++i) fillCell(first + i, box.child(static_cast<int>(i)), children.around[i], children.inside[i], depth + 1);
     }
 
     uint32_t addChildren(uint32_t index) {
@@ -108,11 +105,13 @@ private:
         return first;
     }
 
-    std::optional<Certificate> certify(const NodeBox& box, const std::vector<uint32_t>& around, double tolerance) {
+    std::optional<Certificate> certify(const NodeBox& box, std::span<const uint32_t> around, double tolerance) {
         triangles_.clear();
-        for (const uint32_t k : around) triangles_.push_back(&geometry_.triangle(k));
+        pointers_.clear();
+        for (const uint32_t k : around) triangles_.push_back(geometry_.triangle(k));
+        for (const CertifiedTriangle& t : triangles_) pointers_.push_back(&t);
         const auto corner = [&](int i) -> const CornerVector& { return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)); };
-        const Certificate certificate = certifyLeaf(box.lowerCells(), box.edgeCells(), triangles_, tolerance, corner, scratch_);
+        const Certificate certificate = certifyLeaf(box.lowerCells(), box.edgeCells(), pointers_, tolerance, corner, scratch_);
         if (!certificate.soft) return {};
         return certificate;
     }
@@ -123,10 +122,10 @@ private:
         tree_.soft.push_back({tree_.nodes[index].box, certificate, 0});
     }
 
-    void makeHard(uint32_t index, const std::vector<uint32_t>& triangles) {
+    void makeHard(uint32_t index, std::span<const uint32_t> triangles) {
         tree_.nodes[index].kind = Kind::Hard;
         tree_.nodes[index].index = static_cast<uint32_t>(tree_.hard.size());
-        tree_.hard.push_back({tree_.nodes[index].box, triangles});
+        tree_.hard.push_back({tree_.nodes[index].box, {triangles.begin(), triangles.end()}});
     }
 
     /// The merging rule (Demir and Westermann 2015, section 3, with a true bound): eight siblings become one
@@ -139,7 +138,10 @@ private:
             if (tree_.nodes[c].kind == Kind::Internal) return;
             soft += tree_.nodes[c].kind == Kind::Soft;
             worst = std::max(worst, tree_.nodes[c].kind == Kind::Soft ? errorOf(tree_.soft[tree_.nodes[c].index]) : 0.0);
-            hard += tree_.nodes[c].kind == Kind::Hard;
+            if (tree_.nodes[c].kind != Kind::Hard) continue;
+            // What a child holds, the parent would.
+            if (tree_.hard[tree_.nodes[c].index].triangles.size() > kMergedHardTriangles) return;
+            ++hard;
         }
         const NodeBox box = tree_.nodes[index].box;
         std::vector<uint32_t> around, inside;
@@ -196,8 +198,10 @@ private:
     double tolerance_;
     PageTree tree_;
     std::vector<std::vector<uint8_t>> occupancy_;
-    std::vector<const CertifiedTriangle*> triangles_;
+    std::vector<CertifiedTriangle> triangles_;
+    std::vector<const CertifiedTriangle*> pointers_;
     CertificateScratch scratch_;
+    std::array<PageGeometry::ChildTriangles, kMaxSubcellDepth> children_;  ///< of the cell being split, by depth
 };
 
 }  // namespace

@@ -1,10 +1,12 @@
 #include "builder/page_geometry.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include <glm/common.hpp>
 
+#include "builder/cell_overlap.h"
 #include "octree/leaf_math.h"
 
 namespace vcp {
@@ -14,13 +16,35 @@ namespace {
 // Two triangles that meet at an edge with a sharper turn than this are not one sheet for a certificate.
 constexpr double kCreaseCosine = 0.35;
 
-// Squared distances to bounding boxes are in float: this much room for their rounding.
-constexpr double kBoundsRounding = 1.00001;
+// Batches measure distances up to their last bits: so much is left open for the exact ones to settle.
+constexpr double kBatchDistance = 1 + 1e-9;
 
-struct EdgeUse {
-    uint64_t edge;      ///< smaller vertex in the high word
-    uint32_t triangle;  ///< local
-    uint8_t corner;     ///< where the edge begins
+// Distances to triangles' centres are in float, of coordinates up to some hundred cells: room for rounding.
+constexpr float kBallRounding = 1e-3f;
+
+/// How often an edge occurs, and where it did first: a table with linear probing.
+class EdgeTable {
+public:
+    struct Slot {
+        uint64_t edge = 0;  ///< smaller vertex in the high word; no edge is 0
+        uint32_t firstUse = 0, uses = 0;
+        bool good = false;
+    };
+
+    explicit EdgeTable(size_t edges) : slots_(std::bit_ceil(edges * 4 / 3 + 2)) {}
+
+    uint32_t find(uint32_t a, uint32_t b) {
+        const uint64_t edge = uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+        const size_t mask = slots_.size() - 1;
+        size_t i = (edge * 0x9e3779b97f4a7c15u) >> 32 & mask;
+        while (slots_[i].edge != edge && slots_[i].edge != 0) i = (i + 1) & mask;
+        slots_[i].edge = edge;
+        return static_cast<uint32_t>(i);
+    }
+    Slot& operator[](uint32_t i) { return slots_[i]; }
+
+private:
+    std::vector<Slot> slots_;
 };
 
 }  // namespace
@@ -34,14 +58,16 @@ PageGeometry::PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> tr
 
 void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
     triangles_.reserve(triangles.size());
+    vertices_.reserve(triangles.size());
     for (const uint32_t k : triangles) {
-        CertifiedTriangle t;
-        for (int i = 0; i < 3; ++i) t.corners[i] = glm::dvec3(mesh_.positions[mesh_.triangles[k][i]] - origin_) / double(kLatticePerCell);
-        t.normal = glm::normalize(glm::cross(t.corners[1] - t.corners[0], t.corners[2] - t.corners[0]));
+        Triangle t{};
+        for (int i = 0; i < 3; ++i) t.corners[i] = glm::vec3(mesh_.positions[mesh_.triangles[k][i]] - origin_) / float(kLatticePerCell);
+        const Triangle3 c = cornersOf(t);
+        t.normal = glm::vec3(glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0])));
+        t.centre = (t.corners[0] + t.corners[1] + t.corners[2]) / 3.0f;
+        for (const glm::vec3& corner : t.corners) t.radius = std::max(t.radius, glm::distance(corner, t.centre));
         triangles_.push_back(t);
         vertices_.push_back(mesh_.triangles[k]);
-        overlap_.emplace_back(t.corners);
-        bounds_.push_back({glm::vec3(overlap_.back().lower()), glm::vec3(overlap_.back().upper())});
     }
     stamp_.assign(triangles_.size(), 0);
     const size_t side = static_cast<size_t>(cells_) + 1;
@@ -49,67 +75,58 @@ void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
 }
 
 void PageGeometry::markBadEdges() {
-    std::vector<EdgeUse> uses;
-    uses.reserve(vertices_.size() * 3);
+    EdgeTable table(vertices_.size() * 3);
+    std::vector<std::array<uint32_t, 3>> slots(vertices_.size());
     for (uint32_t k = 0; k < vertices_.size(); ++k)
-        for (uint8_t i = 0; i < 3; ++i) {
+        for (uint32_t i = 0; i < 3; ++i) {
             const uint32_t a = vertices_[k][i], b = vertices_[k][(i + 1) % 3];
-            uses.push_back({uint64_t{std::min(a, b)} << 32 | std::max(a, b), k, i});
-        }
-    std::sort(uses.begin(), uses.end(), [](const EdgeUse& a, const EdgeUse& b) { return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle; });
-    for (size_t begin = 0, end = 0; begin < uses.size(); begin = end) {
-        for (end = begin; end < uses.size() && uses[end].edge == uses[begin].edge;) ++end;
-        bool good = end - begin == 2;
-        if (good) {
+            slots[k][i] = table.find(a, b);
+            EdgeTable::Slot& slot = table[slots[k][i]];
+            if (++slot.uses == 1) slot.firstUse = 4 * k + i;
+            slot.good = false;
+            if (slot.uses != 2) continue;
             // Oriented by the shared edge, both normals agree where the surface continues and oppose at a fold.
-            const CertifiedTriangle &s = triangles_[uses[begin].triangle], &t = triangles_[uses[begin + 1].triangle];
-            const bool sameDirection = vertices_[uses[begin].triangle][uses[begin].corner] == vertices_[uses[begin + 1].triangle][uses[begin + 1].corner];
-            good = (sameDirection ? -1 : 1) * glm::dot(s.normal, t.normal) >= kCreaseCosine;
+            const uint32_t first = slot.firstUse / 4;
+            const bool sameDirection = vertices_[first][slot.firstUse % 4] == a;
+            slot.good = (sameDirection ? -1 : 1) * double(glm::dot(triangles_[first].normal, triangles_[k].normal)) >= kCreaseCosine;
         }
-        if (good) continue;
-        for (size_t i = begin; i < end; ++i) triangles_[uses[i].triangle].badEdges |= static_cast<uint8_t>(1u << uses[i].corner);
-    }
+    for (uint32_t k = 0; k < vertices_.size(); ++k)
+        for (int i = 0; i < 3; ++i) triangles_[k].badEdges |= static_cast<uint8_t>((table[slots[k][i]].good ? 0u : 1u) << i);
 }
 
 void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
     const int side = cells_ + 2 * kBorder;
     const size_t cellCount = static_cast<size_t>(side) * side * side;
-    occupied_.assign(cellCount, 0);
     struct Entry {
-        uint32_t cell, triangle;
-        bool touches;
+        uint32_t list, triangle;
     };
     std::vector<Entry> entries;
     entries.reserve(triangles_.size() * 8);
-    constexpr double m = kCertificateMarginCells;
+    std::vector<uint8_t> met;
+    listBegin_.assign(2 * cellCount + 2, 0);
+    const auto add = [&](glm::ivec3 cell, uint32_t triangle, bool touches) {
+        const size_t list = 2 * cellIndex(cell) + (touches ? 0 : 1);
+        entries.push_back({static_cast<uint32_t>(list), triangle});
+        if (list + 2 < listBegin_.size()) ++listBegin_[list + 2];
+        return touches && std::min({cell.x, cell.y, cell.z}) >= 0 && std::max({cell.x, cell.y, cell.z}) < cells_;
+    };
     for (uint32_t k = 0; k < triangles_.size(); ++k) {
-        const BoxOverlap& overlap = overlap_[k];
-        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(overlap.lower() - m)), -kBorder);
-        const glm::ivec3 high = glm::min(glm::ivec3(glm::floor(overlap.upper() + m)), cells_ + kBorder - 1);
+        const CellOverlap overlap(cornersOf(triangles_[k]), kCertificateMarginCells);
+        const glm::ivec3 low = glm::max(overlap.lower(), -kBorder), high = glm::min(overlap.upper(), cells_ + kBorder - 1);
+        if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
+        overlap.classify(low, high, met);
         bool touchesPage = false;
+        const uint8_t* how = met.data();
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
-                for (int x = low.x; x <= high.x; ++x) {
-                    const glm::dvec3 centre = glm::dvec3(x, y, z) + 0.5;
-                    if (!overlap.test(centre, 0.5 + m)) continue;
-                    const bool touches = overlap.test(centre, 0.5);
-                    const size_t cell = cellIndex({x, y, z});
-                    entries.push_back({static_cast<uint32_t>(cell), k, touches});
-                    if (touches) occupied_[cell] = 1;
-                    touchesPage |= touches && std::min({x, y, z}) >= 0 && std::max({x, y, z}) < cells_;
-                }
+                for (int x = low.x; x <= high.x; ++x, ++how)
+                    if (*how) touchesPage |= add({x, y, z}, k, *how == CellOverlap::kTouches);
         if (touchesPage) stray_ = std::max(stray_, double(mesh_.stray[numbers[k]]));
     }
-    cellBegin_.assign(cellCount + 1, 0);
-    for (const Entry& e : entries) ++cellBegin_[e.cell + 1];
-    for (size_t i = 0; i < cellCount; ++i) cellBegin_[i + 1] += cellBegin_[i];
+    // Counts are two places on: after the sums, place list + 1 holds where the list's next entry goes.
+    for (size_t i = 2; i < listBegin_.size(); ++i) listBegin_[i] += listBegin_[i - 1];
     cellTriangles_.resize(entries.size());
-    cellTouchEnd_.assign(cellBegin_.begin(), cellBegin_.end() - 1);
-    for (const Entry& e : entries)
-        if (e.touches) cellTriangles_[cellTouchEnd_[e.cell]++] = e.triangle;
-    std::vector<uint32_t> next = cellTouchEnd_;
-    for (const Entry& e : entries)
-        if (!e.touches) cellTriangles_[next[e.cell]++] = e.triangle;
+    for (const Entry& e : entries) cellTriangles_[listBegin_[e.list + 1]++] = e.triangle;
 }
 
 void PageGeometry::trianglesOf(const NodeBox& box, std::vector<uint32_t>& around, std::vector<uint32_t>& inside) {
@@ -120,15 +137,13 @@ void PageGeometry::trianglesOf(const NodeBox& box, std::vector<uint32_t>& around
     for (int z = low.z; z <= high.z; ++z)
         for (int y = low.y; y <= high.y; ++y)
             for (int x = low.x; x <= high.x; ++x) {
-                const size_t cell = cellIndex({x, y, z});
-                for (uint32_t i = cellBegin_[cell]; i < cellBegin_[cell + 1]; ++i) {
-                    const uint32_t k = cellTriangles_[i];
+                const CellTriangles cell = trianglesOf({x, y, z});
+                for (const uint32_t k : cell.around)
                     if (stamp_[k] != stampNow_) {
                         stamp_[k] = stampNow_;
                         around.push_back(k);
                     }
-                    if (i < cellTouchEnd_[cell]) inside.push_back(k);
-                }
+                inside.insert(inside.end(), cell.inside.begin(), cell.inside.end());
             }
     std::sort(around.begin(), around.end());
     std::sort(inside.begin(), inside.end());
@@ -140,9 +155,35 @@ void PageGeometry::filter(const NodeBox& box, std::span<const uint32_t> candidat
     inside.clear();
     const double half = box.edgeCells() / 2;
     for (const uint32_t k : candidates) {
-        if (!overlap_[k].test(box.centreCells(), half + kCertificateMarginCells)) continue;
+        const BoxOverlap overlap(cornersOf(triangles_[k]));
+        if (!overlap.test(box.centreCells(), half + kCertificateMarginCells)) continue;
         around.push_back(k);
-        if (overlap_[k].test(box.centreCells(), half)) inside.push_back(k);
+        if (overlap.test(box.centreCells(), half)) inside.push_back(k);
+    }
+}
+
+void PageGeometry::split(const NodeBox& box, std::span<const uint32_t> candidates, ChildTriangles& children) const {
+    for (auto* lists : {&children.around, &children.inside})
+        for (std::vector<uint32_t>& list : *lists) list.clear();
+    // With the children as unit cells.
+    const glm::dvec3 lower = box.lowerCells();
+    const double scale = 2 / box.edgeCells();
+    std::vector<uint8_t> met;
+    for (const uint32_t k : candidates) {
+        Triangle3 t = cornersOf(triangles_[k]);
+        for (glm::dvec3& corner : t) corner = (corner - lower) * scale;
+        const CellOverlap overlap(t, kCertificateMarginCells * scale);
+        const glm::ivec3 low = glm::max(overlap.lower(), 0), high = glm::min(overlap.upper(), 1);
+        if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
+        overlap.classify(low, high, met);
+        const uint8_t* how = met.data();
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int x = low.x; x <= high.x; ++x, ++how) {
+                    const size_t child = static_cast<size_t>(x + 2 * y + 4 * z);
+                    if (*how) children.around[child].push_back(k);
+                    if (*how == CellOverlap::kTouches) children.inside[child].push_back(k);
+                }
     }
 }
 
@@ -159,17 +200,49 @@ const CornerVector& PageGeometry::corner(glm::ivec3 subcells) {
     return corners_[number - 1];
 }
 
+double PageGeometry::measureFound(glm::dvec3 p, size_t first, double least) {
+    const glm::vec3 query(p);
+    float reach = static_cast<float>(std::min(std::sqrt(least), 1e9));
+    for (size_t i = first; i < found_.size(); ++i) {
+        const Triangle& t = triangles_[found_[i].triangle];
+        const float distance = glm::distance(query, t.centre);
+        found_[i].least = distance - t.radius - kBallRounding;
+        reach = std::min(reach, distance + kBallRounding);
+    }
+    TriangleBatch batch;
+    uint32_t at[TriangleBatch::kSize];
+    for (size_t i = first; i < found_.size();) {
+        size_t count = 0;
+        for (; i < found_.size() && count < TriangleBatch::kSize; ++i) {
+            if (found_[i].least > reach) continue;
+            const float* corners = &triangles_[found_[i].triangle].corners[0].x;
+            for (int c = 0; c < 9; ++c) batch.corners[c][count] = corners[c];
+            at[count++] = static_cast<uint32_t>(i);
+        }
+        for (size_t k = count; k > 0 && k < TriangleBatch::kSize; ++k)
+            for (auto& corners : batch.corners) corners[k] = corners[0];
+        if (count == 0) break;
+        squaredDistances(p, batch);
+        for (size_t k = 0; k < count; ++k) {
+            found_[at[k]].squared = batch.squared[k];
+            least = std::min(least, batch.squared[k]);
+        }
+        reach = std::min(reach, static_cast<float>(std::sqrt(least)) + kBallRounding);
+    }
+    return least;
+}
+
 CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
-    ClosestPoint best;
-    best.squared = 1e300;
-    uint32_t bestTriangle = 0;
-    const glm::vec3 pFloat(p);
+    double least = 1e300;
+    found_.clear();
     ++stampNow_;
     glm::ivec3 doneLow(0), doneHigh(-1);  // cells already looked at
-    for (int radius = 1;; ++radius) {
+    for (double radius = 0.25;; radius = radius < 1 ? 2 * radius : radius + 1) {
         // The cells that a ball of `radius` about p meets.
-        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(p - double(radius))), -kBorder);
-        const glm::ivec3 high = glm::min(glm::ivec3(glm::ceil(p + double(radius))) - 1, cells_ + kBorder - 1);
+        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(p - radius)), -kBorder);
+        const glm::ivec3 high = glm::min(glm::ivec3(glm::ceil(p + radius)) - 1, cells_ + kBorder - 1);
+        if (low == doneLow && high == doneHigh && least > radius * radius) continue;
+        const size_t before = found_.size();
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x) {
@@ -177,28 +250,37 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
                         x = doneHigh.x;
                         continue;
                     }
-                    const size_t cell = cellIndex({x, y, z});
-                    for (uint32_t i = cellBegin_[cell]; i < cellTouchEnd_[cell]; ++i) {
-                        const uint32_t k = cellTriangles_[i];
-                        if (stamp_[k] == stampNow_) continue;
-                        stamp_[k] = stampNow_;
-                        const glm::vec3 away = glm::max(glm::max(bounds_[k].lower - pFloat, pFloat - bounds_[k].upper), 0.0f);
-                        if (glm::dot(away, away) > kBoundsRounding * best.squared) continue;
-                        const ClosestPoint c = closestOnTriangle(p, triangles_[k].corners);
-                        if (c.squared < best.squared || (c.squared == best.squared && k < bestTriangle)) {
-                            best = c;
-                            bestTriangle = k;
+                    for (const uint32_t k : trianglesOf({x, y, z}).inside)
+                        if (stamp_[k] != stampNow_) {
+                            stamp_[k] = stampNow_;
+                            found_.push_back({k, 0, 1e300});
                         }
-                    }
                 }
+        least = measureFound(p, before, least);
         const bool whole = low == glm::ivec3(-kBorder) && high == glm::ivec3(cells_ + kBorder - 1);
-        if (best.squared <= double(radius) * radius || whole) break;
+        if (least <= radius * radius || whole) break;
         doneLow = low;
         doneHigh = high;
     }
+    ClosestPoint best;
+    best.squared = 1e300;
+    uint32_t bestTriangle = 0;
+    for (const Found& f : found_) {
+        if (f.squared > least * kBatchDistance) continue;
+        const ClosestPoint c = closestOnTriangle(p, cornersOf(triangles_[f.triangle]));
+        if (c.squared < best.squared || (c.squared == best.squared && f.triangle < bestTriangle)) {
+            best = c;
+            bestTriangle = f.triangle;
+        }
+    }
     CornerVector corner;
     corner.distance = std::sqrt(best.squared);
-    corner.direction = best.squared > 0 ? -best.offset / corner.distance : triangles_[bestTriangle].normal;
+    if (best.squared > 0) {
+        corner.direction = -best.offset / corner.distance;
+    } else {
+        const Triangle3 t = cornersOf(triangles_[bestTriangle]);
+        corner.direction = glm::normalize(glm::cross(t[1] - t[0], t[2] - t[0]));
+    }
     if (!mesh_.colours.empty()) {
         for (int c = 0; c < 4; ++c) {
             double sum = 0.5;

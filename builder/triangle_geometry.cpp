@@ -5,11 +5,20 @@
 
 #include <glm/common.hpp>
 
+#include "builder/wider_clones.h"
+
 namespace vcp {
 
 namespace {
 
 constexpr double kTouch = 1e-9;
+
+// Instead of a zero that is divided by.
+constexpr double kTiny = 1e-300;
+
+// By value: std::min and std::max hide what a vector can do.
+double smaller(double a, double b) { return a < b ? a : b; }
+double larger(double a, double b) { return a > b ? a : b; }
 
 /// Closest point to the origin of the segment a b, as the weight of b.
 double closestOnSegment(glm::dvec3 a, glm::dvec3 b, double& squared) {
@@ -48,6 +57,32 @@ ClosestPoint closestOnTriangle(glm::dvec3 query, const Triangle3& t) {
         best = {c + wca * (a - c), ca, {wca, 0, 1 - wca}};
     }
     return best;
+}
+
+WIDER_CLONES void squaredDistances(glm::dvec3 query, TriangleBatch& batch) {
+    const double px = query.x, py = query.y, pz = query.z;
+    for (int i = 0; i < TriangleBatch::kSize; ++i) {
+        const double ax = batch.corners[0][i] - px, ay = batch.corners[1][i] - py, az = batch.corners[2][i] - pz;
+        const double bx = batch.corners[3][i] - px, by = batch.corners[4][i] - py, bz = batch.corners[5][i] - pz;
+        const double cx = batch.corners[6][i] - px, cy = batch.corners[7][i] - py, cz = batch.corners[8][i] - pz;
+        const double ux = bx - ax, uy = by - ay, uz = bz - az, vx = cx - ax, vy = cy - ay, vz = cz - az, wx = cx - bx, wy = cy - by, wz = cz - bz;
+        // The interior: as in closestOnTriangle.
+        const double nx = uy * vz - vy * uz, ny = uz * vx - vz * ux, nz = ux * vy - vx * uy;
+        const double n2 = nx * nx + ny * ny + nz * nz;
+        const double wc = -((uy * az - ay * uz) * nx + (uz * ax - az * ux) * ny + (ux * ay - ax * uy) * nz);
+        const double wb = -((ay * vz - vy * az) * nx + (az * vx - vz * ax) * ny + (ax * vy - vx * ay) * nz);
+        const double height = ax * nx + ay * ny + az * nz;
+        const double area2 = larger(n2, kTiny), outside = larger(larger(-wb, -wc), larger(wb + wc - n2, kTiny - n2));
+        // The edges a b, a c, b c.
+        const double fu = larger(smaller(-(ax * ux + ay * uy + az * uz) / larger(ux * ux + uy * uy + uz * uz, kTiny), 1.0), 0.0);
+        const double fv = larger(smaller(-(ax * vx + ay * vy + az * vz) / larger(vx * vx + vy * vy + vz * vz, kTiny), 1.0), 0.0);
+        const double fw = larger(smaller(-(bx * wx + by * wy + bz * wz) / larger(wx * wx + wy * wy + wz * wz, kTiny), 1.0), 0.0);
+        const double qx = ax + fu * ux, qy = ay + fu * uy, qz = az + fu * uz, rx = ax + fv * vx, ry = ay + fv * vy, rz = az + fv * vz;
+        const double sx = bx + fw * wx, sy = by + fw * wy, sz = bz + fw * wz;
+        const double edges = smaller(smaller(qx * qx + qy * qy + qz * qz, rx * rx + ry * ry + rz * rz), sx * sx + sy * sy + sz * sz);
+        const double face = height * height / area2;
+        batch.squared[i] = outside > 0 ? edges : face;
+    }
 }
 
 BoxOverlap::BoxOverlap(const Triangle3& t) : t_(t) {
@@ -108,21 +143,29 @@ void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Po
     if (beyond[0] & beyond[1] & beyond[2]) return;
     for (const glm::dvec3& p : triangle) polygon.add(p);
     const unsigned planes = beyond[0] | beyond[1] | beyond[2];
-    Polygon next;
+    if (planes == 0) return;
+    Polygon spare;
+    Polygon *from = &polygon, *to = &spare;
     for (int plane = 0; plane < 6; ++plane) {
         if (!(planes >> plane & 1u)) continue;
         const int axis = plane / 2;
         const double side = plane % 2 ? 1 : -1, limit = plane % 2 ? upper[axis] : -lower[axis];
-        next.clear();
-        double dp = limit - side * polygon[polygon.size() - 1][axis];
-        for (size_t i = 0, before = polygon.size() - 1; i < polygon.size(); before = i++) {
-            const double dq = limit - side * polygon[i][axis];
-            if ((dp < 0) != (dq < 0)) next.add(polygon[before] + (polygon[i] - polygon[before]) * (dp / (dp - dq)));
-            if (dq >= 0) next.add(polygon[i]);
+        to->clear();
+        const glm::dvec3* p = from->end() - 1;
+        double dp = limit - side * (*p)[axis];
+        for (const glm::dvec3& q : *from) {
+            const double dq = limit - side * q[axis];
+            if ((dp < 0) != (dq < 0)) to->add(*p + (q - *p) * (dp / (dp - dq)));
+            if (dq >= 0) to->add(q);
+            p = &q;
             dp = dq;
         }
-        polygon = next;
-        if (polygon.size() < 3) return polygon.clear();
+        std::swap(from, to);
+        if (from->size() < 3) return polygon.clear();
+    }
+    if (from == &spare) {
+        polygon.clear();
+        for (const glm::dvec3& p : spare) polygon.add(p);
     }
 }
 

@@ -22,6 +22,14 @@ struct ClosestPoint {
 /// coordinates are taken about the query, so slivers cost no accuracy (Heidrich 2005 for the interior).
 ClosestPoint closestOnTriangle(glm::dvec3 query, const Triangle3& triangle);
 
+/// Squared distances of a query to several triangles at once: those of closestOnTriangle but for the last bits.
+struct TriangleBatch {
+    static constexpr int kSize = 8;
+    alignas(64) float corners[9][kSize];  ///< x, y, z of each triangle's first, second and third corner
+    alignas(64) double squared[kSize];
+};
+void squaredDistances(glm::dvec3 query, TriangleBatch& batch);
+
 /// Overlap of a triangle with cubes: the separating axis test (Akenine-Moller 2001), on closed sets and
 /// widened by 1e-9, so that a touching triangle always overlaps.
 class BoxOverlap {
@@ -53,7 +61,7 @@ public:
     [[nodiscard]] const glm::dvec3* end() const { return corners_.data() + size_; }
 
 private:
-    std::array<glm::dvec3, kMaxCorners + 1> corners_;  // rounding may add one for an instant
+    std::array<glm::dvec3, kMaxCorners> corners_;
     size_t size_ = 0;
 };
 
