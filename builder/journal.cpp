@@ -33,7 +33,7 @@ Result<nlohmann::json> Journal::read(const std::filesystem::path& folder) {
     for (std::string line; std::getline(file, line);) {
         if (line.size() < 18) continue;
         const std::string text = line.substr(17);
-        if (line.compare(0, 16, hashed(text)) != 0) continue;
+        if (line.compare(0, 16, hashed(text)) != 0 || line[16] != ' ') continue;
         const auto fields = nlohmann::json::parse(text, nullptr, false);
         if (fields.is_object()) all.update(fields);
     }

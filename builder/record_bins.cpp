@@ -1,6 +1,7 @@
 #include "builder/record_bins.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <numeric>
 
 #include <xxhash.h>
@@ -15,9 +16,12 @@ struct BlockHeader {
     uint32_t bin = 0;
     uint32_t records = 0;
     uint32_t storedBytes = 0;
-    uint64_t hash = 0;
+    uint64_t hash = 0;  ///< of the above and of what follows
 
     static constexpr uint32_t kMagic = 0x4b4c4256;
+    [[nodiscard]] uint64_t hashWith(std::span<const std::byte> payload) const {
+        return XXH3_64bits_withSeed(payload.data(), payload.size(), XXH3_64bits(this, offsetof(BlockHeader, hash)));
+    }
 };
 
 constexpr size_t kMaxBlockRecords = 4096, kMinBlockRecords = 64;
@@ -101,7 +105,7 @@ Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& recor
     header.bin = static_cast<uint32_t>(bin);
     header.records = static_cast<uint32_t>(count);
     header.storedBytes = static_cast<uint32_t>(stored);  // cannot fail with a buffer of compressBound
-    header.hash = XXH3_64bits(coded.data() + sizeof header, stored);
+    header.hash = header.hashWith(std::span(coded).subspan(sizeof header, stored));
     std::memcpy(coded.data(), &header, sizeof header);
     const auto offset = file_.append(std::span(coded).first(sizeof header + stored));
     if (!offset) return offset.error();
@@ -133,7 +137,7 @@ Result<void> RawBins::reopen(uint64_t bytes) {
         BlockHeader header;
         if (bytes - at < sizeof header) return damaged(file_.path());
         VCP_TRY(file_.read(at, std::as_writable_bytes(std::span(&header, 1))));
-        if (header.magic != BlockHeader::kMagic || header.bin > kMaxBins || header.storedBytes > bytes - at - sizeof header) return damaged(file_.path());
+        if (header.magic != BlockHeader::kMagic || header.bin > kMaxBins || header.records > kMaxBlockRecords || header.storedBytes > bytes - at - sizeof header) return damaged(file_.path());
         if (header.bin >= blocks_.size()) {
             open_.resize(header.bin + 1);
             blocks_.resize(header.bin + 1);
@@ -161,7 +165,7 @@ Result<void> RawBins::read(const Block& block, std::byte* out) const {
     BlockHeader header;
     std::memcpy(&header, coded.data(), sizeof header);
     const std::span<const std::byte> payload = std::span<const std::byte>(coded).subspan(sizeof header);
-    if (header.records != block.records || header.storedBytes != block.storedBytes || header.hash != XXH3_64bits(payload.data(), payload.size())) return damaged(file_.path());
+    if (header.records != block.records || header.storedBytes != block.storedBytes || header.hash != header.hashWith(payload)) return damaged(file_.path());
     if (ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size()) return damaged(file_.path());
     fromPlanes(planes.data(), block.records, recordBytes_, out);
     return {};

@@ -84,10 +84,16 @@ Result<void> VertexJoin::process(uint64_t chunk) {
 
 Result<void> VertexJoin::finish(const std::string& file) {
     const uint64_t chunks = (vertices_ + chunkVertices_ - 1) / chunkVertices_;
+    const auto missing = [&] {
+        return Error{.code = ErrorCode::InvalidInput, .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_), .file = file};
+    };
+    const auto anyBeyond = [&] {
+        for (uint64_t chunk = chunks; chunk < waiting_.raw().bins(); ++chunk)
+            if (waiting_.count(chunk) > 0) return true;
+        return false;
+    };
     VCP_TRY(waiting_.raw().flush());
-    for (uint64_t chunk = chunks; chunk < waiting_.raw().bins(); ++chunk)
-        if (waiting_.count(chunk) > 0)
-            return Error{.code = ErrorCode::InvalidInput, .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_), .file = file};
+    if (anyBeyond()) return missing();
     for (uint64_t chunk = 0; chunk < chunks; ++chunk) {
         if (chunk > 0) {
             residentFirst_ = chunk * chunkVertices_;
@@ -98,9 +104,10 @@ Result<void> VertexJoin::finish(const std::string& file) {
         VCP_TRY(process(chunk));
         VCP_TRY(waiting_.raw().flush());
         // What waits for a vertex of this chunk that is not there was sent back to it.
-        if (waiting_.count(chunk) > before)
-            return Error{.code = ErrorCode::InvalidInput, .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_), .file = file};
+        if (waiting_.count(chunk) > before) return missing();
     }
+    // What was there was taken from it; the rest names chunks that never came.
+    if (anyBeyond()) return missing();
     later_.remove();
     waiting_.raw().remove();
     std::vector<Vertex>().swap(resident_);
