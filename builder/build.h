@@ -53,7 +53,7 @@ struct BuildOptions {
 /// Default tolerance of the finest level, in its cells.
 inline constexpr double kDefaultErrorCells = 0.08;
 
-struct BuildReport {
+struct BuildFigures {
     uint64_t triangles = 0;            ///< read
     uint64_t degenerateTriangles = 0;  ///< of them, without area
     uint64_t vertices = 0;
@@ -68,6 +68,9 @@ struct BuildReport {
     double cell = 0;          ///< finest cell edge, world units
     double errorTarget = 0;   ///< world units
     double certifiedErrorMax = 0;  ///< of the finest level, world units
+};
+
+struct BuildReport : BuildFigures {
     std::vector<std::string> warnings;  ///< what was left out of the inputs, one line each
 };
 

@@ -1,6 +1,9 @@
 // vcp bench: run time against error, beside Embree measured in the same run.
 #include <fstream>
 
+#include <unistd.h>
+
+#include "builder/memory_plan.h"
 #include "viewer/bench_build.h"
 #include "viewer/bench_rays.h"
 #include "viewer/commands.h"
@@ -11,9 +14,10 @@ namespace vcp {
 
 namespace {
 
-/// A report in its three forms.
+/// A report in its forms; plots by file name without extension.
 struct BenchTexts {
     std::string json, csv, markdown;
+    std::vector<std::pair<std::string, std::string>> plots = {};
 };
 
 struct BenchCommand {
@@ -26,6 +30,13 @@ struct BenchCommand {
 
     [[nodiscard]] std::vector<std::filesystem::path> modelPaths() const { return {models.begin(), models.end()}; }
     [[nodiscard]] double cellLength() const { return cell.empty() ? 0 : parseLength(cell)->value; }
+};
+
+struct BuildBenchCommand : BenchCommand {
+    std::vector<std::string> generated;
+    std::vector<double> errors;
+    std::string memory, temp;
+    uint64_t samples = BenchBuildOptions().samples;
 };
 
 struct RaysCommand : BenchCommand {
@@ -59,6 +70,7 @@ Result<int> publish(const BenchCommand& command, const std::string& name, const 
         VCP_TRY(writeText(folder / (name + ".json"), texts.json));
         VCP_TRY(writeText(folder / (name + ".csv"), texts.csv));
         VCP_TRY(writeText(folder / (name + ".md"), texts.markdown));
+        for (const auto& [plot, svg] : texts.plots) VCP_TRY(writeText(folder / (plot + ".svg"), svg));
     }
     VCP_TRY(printLine(command.report.json ? texts.json : texts.markdown));
     return 0;
@@ -71,21 +83,47 @@ auto progressTo(ProgressDisplay& display) {
     };
 }
 
-Result<int> runBuild(const BenchCommand& command) {
-    VCP_TRY(makeFolder(command.out));
+/// make_scan lies beside vcp.
+Result<std::filesystem::path> findMakeScan() {
+    std::error_code failed;
+    const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
+    auto program = self.parent_path() / "make_scan";
+    if (!failed && ::access(program.c_str(), X_OK) == 0) return program;
+    return Error{ErrorCode::Usage, "--generated needs the program make_scan beside vcp, and it is not there", program.string()};
+}
+
+Result<int> runBuild(const BuildBenchCommand& command) {
+    if (command.models.empty() && command.generated.empty())
+        return Error{ErrorCode::Usage, "which meshes? name them, or make some with --generated 1M,10M"};
     BenchBuildOptions options;
     options.models = command.modelPaths();
+    for (const std::string& size : command.generated) options.generated.push_back(*parseCount(size));
+    if (!options.generated.empty()) {
+        auto makeScan = findMakeScan();
+        if (!makeScan) return makeScan.error();
+        options.makeScan = *makeScan;
+    }
+    VCP_TRY(makeFolder(command.out));
+    options.errors = command.errors;
     if (command.repetitions > 0) options.repetitions = command.repetitions;
     options.threads = command.threads;
+    options.memoryBytes = parseMemory(command.memory, 2 * defaultMemoryBytes()).value_or(0);
+    options.temp = command.temp;
     options.out = command.out;
     options.cell = command.cellLength();
+    options.samples = command.samples;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = progressTo(display);
     const auto report = benchBuild(options);
     display.finish();
     if (!report) return report.error();
-    return publish(command, "bench_build", {benchBuildJson(*report), benchBuildCsv(*report), benchBuildMarkdown(*report)});
+    if (report->rows.empty() && !report->failures.empty()) return report->failures.front();
+    const auto published = publish(command, "bench_build",
+                                   {benchBuildJson(*report), benchBuildCsv(*report), benchBuildMarkdown(*report), benchBuildPlots(*report)});
+    if (!published || report->failures.empty()) return published;
+    // What could be measured is there; the first of what could not is the error.
+    return report->failures.front();
 }
 
 Result<int> runRays(const RaysCommand& command) {
@@ -112,8 +150,8 @@ Result<int> runRays(const RaysCommand& command) {
 }
 
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
-    app.add_option("MODEL", command.models, models)->type_name("")->required();
-    app.add_option("--out", command.out, "Folder for the report as JSON, CSV and Markdown, and for what is built")->type_name("DIR");
+    app.add_option("MODEL", command.models, models)->type_name("");
+    app.add_option("--out", command.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
     app.add_option("--repetitions", command.repetitions, "Runs whose median is reported")->type_name("N")->check(CLI::Range(1, 1000));
     app.add_option("--cell", command.cell, "Edge of the finest cells, world units [chosen from the mesh]")
         ->type_name("LENGTH")
@@ -126,10 +164,36 @@ void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& mo
     addJsonOption(app, command.report);
 }
 
+std::string scanSizeProblem(const std::string& text) {
+    const auto count = parseCount(text);
+    return count && *count >= 10'000 && *count <= 1'000'000'000 ? std::string()
+                                                                : "must be like 500k, 10M or 1G, from 10k to 1G, not \"" + text + "\"";
+}
+
 RunCommand addBenchBuild(CLI::App& bench) {
-    auto command = std::make_shared<BenchCommand>();
+    auto command = std::make_shared<BuildBenchCommand>();
     CLI::App* app = bench.add_subcommand("build", "Time the build, beside Embree building its tree");
     addBenchOptions(*app, *command, "Meshes");
+    app->add_option("--generated", command->generated, "Also build scans of so many triangles, made by make_scan: 1M,10M,100M")
+        ->type_name("N,N")
+        ->delimiter(',')
+        ->check(scanSizeProblem);
+    app->add_option("--errors", command->errors, "Also build each mesh with these tolerances, in cells: 0.02,0.05,0.1")
+        ->type_name("X,X")
+        ->delimiter(',')
+        ->check(CLI::Range(1e-6, 1e3));
+    app->add_option("--memory", command->memory, "Cap on the memory that a build allocates: 512M, 4G, 50% [half of the machine's]")
+        ->type_name("BYTES")
+        ->check([](const std::string& text) {
+            return parseMemory(text, 2 * defaultMemoryBytes()) ? std::string() : "must be like 512M, 4G or 50%, not \"" + text + "\"";
+        });
+    app->add_option("--temp", command->temp, "Folder for temporary files and generated scans [that of what is built]")
+        ->type_name("DIR")
+        ->check(CLI::ExistingDirectory);
+    app->add_option("--samples", command->samples, "Samples of the distance between mesh and surface; 0: not measured")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 1'000'000'000));
     return [command] { return runBuild(*command); };
 }
 
@@ -137,6 +201,7 @@ RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
     addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from");
+    app->get_option("MODEL")->required();
     app->add_option("--methods", command->methods, "certified, reference, embree, embree-single [all]")->type_name("A,B")->delimiter(',');
     app->add_option("--cameras", command->cameras, "whole, half, close, cells [all]")->type_name("A,B")->delimiter(',');
     app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(

@@ -64,6 +64,21 @@ std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {
     return static_cast<uint64_t>(percent / 100 * static_cast<double>(whole));
 }
 
+std::optional<uint64_t> parseCount(std::string_view text) {
+    double number = 0;
+    if (!takeNumber(text, number)) return std::nullopt;
+    if (!text.empty()) {
+        constexpr std::string_view kPrefixes = "KMG";
+        const size_t power = kPrefixes.find(text.front() & ~0x20);
+        if (power == std::string_view::npos || text.size() > 1) return std::nullopt;
+        // One product, rounded once: 1.1M is whole.
+        constexpr double kFactors[] = {1e3, 1e6, 1e9};
+        number *= kFactors[power];
+    }
+    if (!(number >= 1) || number > 1e15 || number != std::floor(number)) return std::nullopt;
+    return static_cast<uint64_t>(number);
+}
+
 std::optional<glm::ivec2> parseSize(std::string_view text) {
     constexpr int kLargest = 16384;
     glm::ivec2 size(0);

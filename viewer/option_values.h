@@ -26,6 +26,10 @@ std::optional<uint64_t> parseBytes(std::string_view text);
 /// As parseBytes, or a part of `whole`: "50%".
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole);
 
+/// "10000", "250k", "1.5M", "1G": a whole number, with factors of 1000. Nothing when malformed, zero, beyond 10^15,
+/// or not whole.
+std::optional<uint64_t> parseCount(std::string_view text);
+
 /// "1920x1200": each from 1 to 16384.
 std::optional<glm::ivec2> parseSize(std::string_view text);
 

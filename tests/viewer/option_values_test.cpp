@@ -27,6 +27,16 @@ TEST(OptionValues, Bytes) {
         EXPECT_FALSE(parseBytes(wrong)) << wrong;
 }
 
+TEST(OptionValues, Counts) {
+    EXPECT_EQ(parseCount("10000"), 10'000u);
+    EXPECT_EQ(parseCount("250k"), 250'000u);
+    EXPECT_EQ(parseCount("1.1M"), 1'100'000u);
+    EXPECT_EQ(parseCount("1G"), 1'000'000'000u);
+    EXPECT_EQ(parseCount("1e6"), 1'000'000u);
+    for (const char* wrong : {"", "M", "0", "-1", "1.5", "1.2345k", "10MB", "10T", "10 M", "1e16", "nan", "inf"})
+        EXPECT_FALSE(parseCount(wrong)) << wrong;
+}
+
 TEST(OptionValues, Sizes) {
     EXPECT_EQ(parseSize("1920x1200"), glm::ivec2(1920, 1200));
     EXPECT_EQ(parseSize("1X1"), glm::ivec2(1, 1));
