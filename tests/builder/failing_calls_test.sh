@@ -21,7 +21,7 @@ awk 'BEGIN {
         print "f", a + 1, b + 1, c + 1; print "f", a + 1, c + 1, d + 1;
     }
 }' >ring.obj
-build=("$vcp" build ring.obj --cell 0.04 --memory 200M --threads 2 --temp temp --checkpoint 0 --progress none -o out.vcp)
+build=("$vcp" build ring.obj --cell 0.1 --memory 200M --threads 2 --temp temp --checkpoint 0 --progress none -o out.vcp)
 "${build[@]}" >/dev/null
 mv out.vcp whole.vcp
 
@@ -30,14 +30,15 @@ LD_PRELOAD=$library FAIL_SHORT=1 "${build[@]}" >/dev/null
 cmp whole.vcp out.vcp || fail "short writes give other bytes"
 rm out.vcp
 
-# sweep ERRNO_OF_ODD ERRNO_OF_EVEN [ON]: fails the first call, the second, ...; with ON all calls after it, too.
+# sweep STEP ERRNO_OF_ODD ERRNO_OF_EVEN [ON]: fails the first call, then the one STEP later, ...; with ON all
+# calls after it, too.
 sweep() {
     local n status error
     local -a on=()
-    if [ $# -gt 2 ]; then on=(FAIL_ON=1); fi
-    for ((n = 1; ; ++n)); do
-        error=$1
-        if [ $((n % 2)) -eq 0 ]; then error=$2; fi
+    if [ $# -gt 3 ]; then on=(FAIL_ON=1); fi
+    for ((n = 1; ; n += $1)); do
+        error=$2
+        if [ $((n % 2)) -eq 0 ]; then error=$3; fi
         rm -f failed
         status=0
         env LD_PRELOAD="$library" FAIL_AT=$n FAIL_ERRNO="$error" FAIL_MARK=failed ${on[@]+"${on[@]}"} "${build[@]}" >/dev/null 2>err.txt || status=$?
@@ -65,8 +66,8 @@ sweep() {
         rm out.vcp
     done
     [ "$n" -gt 30 ] || fail "only $n calls were counted"
-    echo "$((n - 1)) calls failed"
+    echo "$(((n + $1 - 2) / $1)) calls failed"
 }
 enospc=28 eio=5
-sweep $enospc $eio
-sweep $eio $enospc on
+sweep 1 $enospc $eio
+sweep 3 $eio $enospc on
