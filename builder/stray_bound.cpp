@@ -1,12 +1,16 @@
 #include "builder/stray_bound.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <span>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include "builder/triangle_cover.h"
 #include "octree/leaf_math.h"
@@ -66,36 +70,58 @@ struct Box {
     }
 };
 
-class StrayBound {
-public:
-    StrayBound(const LatticeMesh& fine, const VertexClusters& clusters, const CoarseTriangles& coarse)
-        : fine_(fine),
-          clusters_(clusters),
-          coarse_(coarse),
-          coarseFans_(clusters.positions.size(), coarse.mesh.triangles.size(), [&](size_t k) { return coarse.mesh.triangles[k]; }),
-          fineFans_(clusters.positions.size(), fine.triangles.size(), [&](size_t k) { return clustersOf(k); }) {}
+Index3 clustersAt(const LatticeMesh& fine, const VertexClusters& clusters, size_t k) {
+    const Index3& t = fine.triangles[k];
+    return {clusters.ofVertex[t[0]], clusters.ofVertex[t[1]], clusters.ofVertex[t[2]]};
+}
 
-    std::vector<float> run() {
-        const size_t count = coarse_.mesh.triangles.size();
-        stray_.assign(count, 0);
-        moved_.assign(count, std::numeric_limits<double>::infinity());
-        prisms_.reserve(count);
-        for (const Index3& t : coarse_.mesh.triangles) {
+/// What all threads work on.
+struct Meshes {
+    Meshes(const LatticeMesh& fineMesh, const VertexClusters& vertexClusters, const CoarseTriangles& coarseTriangles)
+        : fine(fineMesh),
+          clusters(vertexClusters),
+          coarse(coarseTriangles),
+          coarseFans(clusters.positions.size(), coarse.mesh.triangles.size(), [&](size_t k) { return coarse.mesh.triangles[k]; }),
+          fineFans(clusters.positions.size(), fine.triangles.size(), [&](size_t k) { return clustersAt(fine, clusters, k); }),
+          stray(coarse.mesh.triangles.size(), 0),
+          moved(coarse.mesh.triangles.size(), std::numeric_limits<double>::infinity()) {
+        prisms.reserve(stray.size());
+        for (const Index3& t : coarse.mesh.triangles) {
             Triangle3 corners;
-            for (int i = 0; i < 3; ++i) corners[i] = glm::dvec3(coarse_.mesh.positions[t[i]]) / double(kLatticePerCell);
-            prisms_.emplace_back(corners);
+            for (int i = 0; i < 3; ++i) corners[i] = glm::dvec3(coarse.mesh.positions[t[i]]) / double(kLatticePerCell);
+            prisms.emplace_back(corners);
         }
-        for (size_t k = 0; k < fine_.triangles.size(); ++k) boundFine(k);
-        for (size_t k = 0; k < count; ++k) boundCoarse(k);
-        std::vector<float> stray(count);
-        for (size_t k = 0; k < count; ++k) stray[k] = std::nextafter(static_cast<float>(stray_[k]), std::numeric_limits<float>::infinity());
-        return stray;
     }
 
+    const LatticeMesh& fine;
+    const VertexClusters& clusters;
+    const CoarseTriangles& coarse;
+    Fans coarseFans, fineFans;
+    std::vector<TrianglePrism> prisms;  ///< of the coarse triangles
+    std::vector<double> stray;
+    std::vector<double> moved;  ///< least motion of a preimage, with its stray; infinite for kept thin parts
+};
+
+/// One thread's work on them.
+class StrayBound {
+public:
+    explicit StrayBound(Meshes& meshes)
+        : fine_(meshes.fine), clusters_(meshes.clusters), coarse_(meshes.coarse), coarseFans_(meshes.coarseFans), fineFans_(meshes.fineFans), prisms_(meshes.prisms), stray_(meshes.stray), moved_(meshes.moved) {}
+
+    void moveFine(size_t k) {
+        const uint32_t image = coarse_.imageOf[k];
+        if (image != kNone && !isLongFine(k)) moved_[image] = std::min(moved_[image], motionOf(k) + double(fine_.stray[k]) / 2);
+    }
+    void boundFine(size_t k);
+    void boundCoarse(size_t k);
+
 private:
-    [[nodiscard]] Index3 clustersOf(size_t k) const {
-        const Index3& t = fine_.triangles[k];
-        return {clusters_.ofVertex[t[0]], clusters_.ofVertex[t[1]], clusters_.ofVertex[t[2]]};
+    [[nodiscard]] Index3 clustersOf(size_t k) const { return clustersAt(fine_, clusters_, k); }
+    /// The largest counts, whichever thread comes first.
+    void raise(size_t coarse, double stray) {
+        const std::atomic_ref<double> shared(stray_[coarse]);
+        double now = shared.load(std::memory_order_relaxed);
+        while (now < stray && !shared.compare_exchange_weak(now, stray, std::memory_order_relaxed)) {}
     }
     [[nodiscard]] bool isLongFine(size_t k) const {
         const Index3& t = fine_.triangles[k];
@@ -118,54 +144,6 @@ private:
             squared = std::max(squared, glm::dot(d, d));
         }
         return std::sqrt(squared) / kLatticePerCell;
-    }
-
-    void boundFine(size_t k) {
-        const double before = double(fine_.stray[k]) / 2, moved = motionOf(k) + before;
-        const uint32_t image = coarse_.imageOf[k];
-        if (isLongFine(k)) return;
-        if (image != kNone) moved_[image] = std::min(moved_[image], moved);
-        if (image != kNone && moved - before <= kSmallMotion) {
-            stray_[image] = std::max(stray_[image], moved);
-            return;
-        }
-        coarseFans_.around(clustersOf(k), near_);
-        const Triangle3 t = fineTriangle(k);
-        order_.clear();
-        for (const uint32_t c : near_) {
-            double away = 0;
-            for (const glm::dvec3& p : t) away = std::max(away, std::abs(glm::dot(prisms_[c].normal, p) - prisms_[c].offset));
-            order_.push_back({away, c});
-        }
-        std::sort(order_.begin(), order_.end());
-        others_.clear();
-        for (const auto& [away, c] : order_) others_.push_back(&prisms_[c]);
-        worst_.assign(others_.size(), 0);
-        cover_.bound(t, others_, worst_);
-        for (size_t i = 0; i < worst_.size(); ++i)
-            if (worst_[i] > 0) stray_[order_[i].second] = std::max(stray_[order_[i].second], worst_[i] + before);
-    }
-
-    void boundCoarse(size_t k) {
-        const Index3& t = coarse_.mesh.triangles[k];
-        const bool isImage = moved_[k] < std::numeric_limits<double>::infinity();
-        if (moved_[k] <= stray_[k] || moved_[k] <= kSmallMotion) {
-            stray_[k] = std::max(stray_[k], moved_[k]);
-            return;
-        }
-        fineFans_.around(t, near_);
-        if (!isImage) keepThoseAlong(t);
-        // Those over or under it are enough, but for ridges and borders.
-        pieces_.clear();
-        for (const uint32_t n : near_)
-            if (const FinePiece piece{fineTriangle(n), double(fine_.stray[n]) / 2}; overlap(prisms_[k], piece.corners)) pieces_.push_back(piece);
-        double bound = boundPart(prisms_[k], prisms_[k].corners, 0, pieces_.size(), moved_[k], kPartHalvings);
-        if (bound > kEnough) {
-            pieces_.clear();
-            for (const uint32_t n : near_) pieces_.push_back({fineTriangle(n), double(fine_.stray[n]) / 2});
-            bound = boundPart(prisms_[k], prisms_[k].corners, 0, pieces_.size(), std::min(bound, moved_[k]), kPartHalvings);
-        }
-        stray_[k] = std::max(stray_[k], std::min(moved_[k], bound));
     }
 
     static bool overlap(const TrianglePrism& prism, const Triangle3& t) {
@@ -247,10 +225,9 @@ private:
     const LatticeMesh& fine_;
     const VertexClusters& clusters_;
     const CoarseTriangles& coarse_;
-    Fans coarseFans_, fineFans_;
-    std::vector<TrianglePrism> prisms_;  ///< of the coarse triangles
-    std::vector<double> stray_;
-    std::vector<double> moved_;  ///< least motion of a preimage, with its stray; infinite for kept thin parts
+    const Fans &coarseFans_, &fineFans_;
+    const std::vector<TrianglePrism>& prisms_;
+    std::vector<double>&stray_, &moved_;
 
     TriangleCover cover_{kEnough};
     std::vector<uint32_t> near_;
@@ -261,10 +238,70 @@ private:
     std::vector<double> worst_;
 };
 
+void StrayBound::boundFine(size_t k) {
+    const double before = double(fine_.stray[k]) / 2, moved = motionOf(k) + before;
+    const uint32_t image = coarse_.imageOf[k];
+    if (isLongFine(k)) return;
+    if (image != kNone && moved - before <= kSmallMotion) {
+        raise(image, moved);
+        return;
+    }
+    coarseFans_.around(clustersOf(k), near_);
+    const Triangle3 t = fineTriangle(k);
+    order_.clear();
+    for (const uint32_t c : near_) {
+        double away = 0;
+        for (const glm::dvec3& p : t) away = std::max(away, std::abs(glm::dot(prisms_[c].normal, p) - prisms_[c].offset));
+        order_.push_back({away, c});
+    }
+    std::sort(order_.begin(), order_.end());
+    others_.clear();
+    for (const auto& [away, c] : order_) others_.push_back(&prisms_[c]);
+    worst_.assign(others_.size(), 0);
+    cover_.bound(t, others_, worst_);
+    for (size_t i = 0; i < worst_.size(); ++i)
+        if (worst_[i] > 0) raise(order_[i].second, worst_[i] + before);
+}
+
+void StrayBound::boundCoarse(size_t k) {
+    const Index3& t = coarse_.mesh.triangles[k];
+    const bool isImage = moved_[k] < std::numeric_limits<double>::infinity();
+    if (moved_[k] <= stray_[k] || moved_[k] <= kSmallMotion) {
+        stray_[k] = std::max(stray_[k], moved_[k]);
+        return;
+    }
+    fineFans_.around(t, near_);
+    if (!isImage) keepThoseAlong(t);
+    // Those over or under it are enough, but for ridges and borders.
+    pieces_.clear();
+    for (const uint32_t n : near_)
+        if (const FinePiece piece{fineTriangle(n), double(fine_.stray[n]) / 2}; overlap(prisms_[k], piece.corners)) pieces_.push_back(piece);
+    double bound = boundPart(prisms_[k], prisms_[k].corners, 0, pieces_.size(), moved_[k], kPartHalvings);
+    if (bound > kEnough) {
+        pieces_.clear();
+        for (const uint32_t n : near_) pieces_.push_back({fineTriangle(n), double(fine_.stray[n]) / 2});
+        bound = boundPart(prisms_[k], prisms_[k].corners, 0, pieces_.size(), std::min(bound, moved_[k]), kPartHalvings);
+    }
+    stray_[k] = std::max(stray_[k], std::min(moved_[k], bound));
+}
+
 }  // namespace
 
 std::vector<float> boundStray(const LatticeMesh& fine, const VertexClusters& clusters, const CoarseTriangles& coarse) {
-    return StrayBound(fine, clusters, coarse).run();
+    Meshes meshes(fine, clusters, coarse);
+    tbb::enumerable_thread_specific<StrayBound> workers([&] { return StrayBound(meshes); });
+    for (size_t k = 0; k < fine.triangles.size(); ++k) workers.local().moveFine(k);
+    const auto forAll = [&](size_t count, void (StrayBound::*bound)(size_t)) {
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 256), [&](const auto& range) {
+            StrayBound& worker = workers.local();
+            for (size_t k = range.begin(); k < range.end(); ++k) (worker.*bound)(k);
+        });
+    };
+    forAll(fine.triangles.size(), &StrayBound::boundFine);
+    forAll(meshes.stray.size(), &StrayBound::boundCoarse);
+    std::vector<float> stray(meshes.stray.size());
+    for (size_t k = 0; k < stray.size(); ++k) stray[k] = std::nextafter(static_cast<float>(meshes.stray[k]), std::numeric_limits<float>::infinity());
+    return stray;
 }
 
 }  // namespace vcp

@@ -202,8 +202,10 @@ public:
         std::vector<uint32_t> around, inside;
         geometry_->trianglesOf(box, around, inside);
         if (touched) *touched = inside.size();
+        std::vector<CertifiedTriangle> held;
+        for (const uint32_t k : around) held.push_back(geometry_->triangle(k));
         std::vector<const CertifiedTriangle*> triangles;
-        for (const uint32_t k : around) triangles.push_back(&geometry_->triangle(k));
+        for (const CertifiedTriangle& t : held) triangles.push_back(&t);
         CertificateScratch scratch;
         const auto corner = [&](int i) -> const CornerVector& { return geometry_->corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)); };
         return certifyLeaf(box.lowerCells(), box.edgeCells(), triangles, tolerance, corner, scratch);
@@ -450,8 +452,10 @@ TEST(Certificate, FarCornersAreRefused) {
     PageGeometry geometry(lattice, numbers, glm::u32vec3(0), 5);
     std::vector<uint32_t> around, inside;
     geometry.trianglesOf({glm::ivec3(10, 10, 16) * kSubcells, kSubcells}, around, inside);
+    std::vector<CertifiedTriangle> held;
+    for (const uint32_t k : around) held.push_back(geometry.triangle(k));
     std::vector<const CertifiedTriangle*> triangles;
-    for (const uint32_t k : around) triangles.push_back(&geometry.triangle(k));
+    for (const CertifiedTriangle& t : held) triangles.push_back(&t);
     CornerVector far{1.8, {0, 0, 1}, 0};
     CertificateScratch scratch;
     EXPECT_FALSE(certifyLeaf({10, 10, 16}, 1, triangles, 1, [&](int) -> const CornerVector& { return far; }, scratch).soft);

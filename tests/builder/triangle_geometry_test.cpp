@@ -116,6 +116,31 @@ TEST(ClosestOnTriangle, OnTheTriangleItself) {
     }
 }
 
+TEST(SquaredDistances, AreThoseOfTheTriangles) {
+    for (uint64_t seed = 0; seed < 20000; ++seed) {
+        Points p(seed);
+        const glm::dvec3 query = p.latticePoint(4);
+        TriangleBatch batch;
+        Triangle3 triangles[TriangleBatch::kSize];
+        for (int i = 0; i < TriangleBatch::kSize; ++i) {
+            Triangle3& t = triangles[i];
+            t = {p.latticePoint(4), p.latticePoint(4), p.latticePoint(4)};
+            if (i % 4 == 1) t[1] = t[0] + glm::round(p.point(0.01) * 2048.0) / 2048.0;  // a needle
+            if (i % 4 == 2) t[2] = (t[0] + t[1]) / 2.0;                                  // no area
+            if (i == 3) t[2] = t[1] = t[0];
+            if (i == 7) t[0] = query;
+            for (int c = 0; c < 9; ++c) batch.corners[c][i] = static_cast<float>(t[c / 3][c % 3]);
+            for (glm::dvec3& corner : t) corner = glm::dvec3(glm::vec3(corner));
+        }
+        squaredDistances(query, batch);
+        for (int i = 0; i < TriangleBatch::kSize; ++i) {
+            const double exact = closestOnTriangle(query, triangles[i]).squared;
+            ASSERT_NEAR(batch.squared[i], exact, 1e-12 * exact) << "seed " << seed << " triangle " << i;
+        }
+        ASSERT_EQ(batch.squared[7], 0);
+    }
+}
+
 /// Clips with exact decisions: lattice coordinates are scaled to integers, and so are the box's.
 /// Sutherland and Hodgman in long double: inputs of 24 bits keep cut points exact far beyond what is asked.
 std::vector<Long3> slowClip(const Triangle3& t, glm::dvec3 lower, glm::dvec3 upper) {
