@@ -199,14 +199,15 @@ LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image
     for (int i = 0; i < 3; ++i) moved = std::max(moved, glm::length(glm::dvec3(fine.corner[i]) / 2.0 - glm::dvec3(image[i].position)));
     t.stray = std::nextafter(static_cast<float>(moved / kLatticePerCell + double(fine.stray) / 2), 1e9f);
     if (hasArea(t.corner[0], t.corner[1], t.corner[2])) return t;
-    // Along the longest side, with the third corner where the mesh had it.
+    // Along the longest side, with the third corner where the mesh had it; ties by that.
     int from = 0;
     double longest = -1;
-    for (int i = 0; i < 3; ++i)
-        if (const double length = glm::length(glm::dvec3(t.corner[(i + 1) % 3] - t.corner[i])); length > longest) {
-            longest = length;
-            from = i;
-        }
+    for (int i = 0; i < 3; ++i) {
+        const double length = glm::length(glm::dvec3(t.corner[(i + 1) % 3] - t.corner[i]));
+        if (length < longest || (length == longest && !lessThan(fine.corner[(i + 2) % 3], fine.corner[(from + 2) % 3]))) continue;
+        longest = length;
+        from = i;
+    }
     const glm::i32vec3 a = t.corner[from], b = t.corner[(from + 1) % 3];
     glm::i32vec3& third = t.corner[(from + 2) % 3];
     third = fine.corner[(from + 2) % 3] >> 1;

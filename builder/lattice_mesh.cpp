@@ -162,8 +162,9 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
         const std::vector<uint32_t> renamed = sortVertices(mesh.positions);
         for (uint32_t& v : corners) v = renamed[v];
     }
-    mesh.normals.resize(mesh.positions.size());
-    for (size_t k = 0; k < corners.size(); ++k) mesh.normals[corners[k]] = soup[k / 3].normal[k % 3];
+    // They agree, but where a kept thin part ends at another's vertex: then any will do that does not depend on the order.
+    mesh.normals.assign(mesh.positions.size(), 0xffffffffu);
+    for (size_t k = 0; k < corners.size(); ++k) mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);
     if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
     sortTriangles(soup, corners, mesh);
     return mesh;

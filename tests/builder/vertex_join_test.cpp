@@ -57,7 +57,7 @@ std::vector<World> directJoin(const Indexed& mesh, bool withColour, bool withUv,
             t.colour[i] = withColour ? mesh.colours[v] : 0xffffffffu;
             if (withUv) t.uv[i] = mesh.uvs[k][i];
         }
-        if (withUv) t.material = materialBase + mesh.materials[k];
+        if (withUv) t.material = materialBase + mesh.materials[k] + 1;
         joined.push_back(t);
     }
     std::sort(joined.begin(), joined.end(), less);
