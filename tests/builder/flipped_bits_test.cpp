@@ -71,7 +71,7 @@ TEST(FlippedBits, AllOfASmallFile) {
 }
 
 TEST(FlippedBits, TenThousandOfALargerFile) {
-    const std::string bytes = built(test::torusMesh({1, 2, 3}, 2, 0.7, 60, 30), 0.08);
+    const std::string bytes = built(test::torusMesh({1, 2, 3}, 2, 0.7, 80, 40), 0.06);
     ASSERT_TRUE(verifyFile(FlippedFile(bytes, FlippedFile::kIntact)).ok());
     ASSERT_GT(bytes.size(), 100u << 10);
     const uint64_t bits = bytes.size() * 8;
