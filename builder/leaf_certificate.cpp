@@ -188,7 +188,8 @@ private:
         for (size_t i = begin; i < end; ++i) radius2 = std::max(radius2, glm::dot(point(i) - centre, point(i) - centre));
         const double slack = halfCurvature_ * double(radius2);
         if (accept(double(value), slack)) return true;
-        if (slack / 4 <= kCheapSlack * limit_ || value + slack / 4 <= bound_) {
+        const bool fits = 2 * (end - begin) - 3 <= kHalfway;
+        if (fits && (slack / 4 <= kCheapSlack * limit_ || double(value) + slack / 4 <= bound_)) {
             value = std::max(value, largestHalfway(begin, end));
             if (double(value) > limit_) return false;
             if (accept(double(value), slack / 4)) return true;
@@ -198,7 +199,9 @@ private:
         return true;
     }
 
-    /// Largest |f| halfway along the edges of the polygon's fan of triangles.
+    static constexpr size_t kHalfway = 16;  ///< points halfway along edges: enough for polygons of 9 corners
+
+    /// Largest |f| halfway along the edges of the polygon's fan of triangles: twice the corners less 3.
     float largestHalfway(size_t begin, size_t end) const {
         LeafSurface::Batch batch;
         size_t count = 0;
@@ -207,7 +210,6 @@ private:
             batch.y[count] = 0.5f * (s_.y[i] + s_.y[j]);
             batch.z[count++] = 0.5f * (s_.z[i] + s_.z[j]);
         };
-        static_assert(2 * Polygon::kMaxCorners - 3 <= 16);
         for (size_t i = begin; i + 1 < end; ++i) put(i, i + 1);
         for (size_t i = begin + 2; i < end; ++i) put(begin, i);
         const size_t points = count;

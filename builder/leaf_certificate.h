@@ -55,9 +55,10 @@ struct CertificateScratch {
     std::vector<double> areas;
 };
 
-/// Tries to certify the leaf at `lower` (page space) with edge `edge` cells: soft is true when twice F/g, with
-/// F's rounding, is at most `tolerance` cells. `triangles` are all that overlap the leaf widened by the margin.
-/// `corner` is asked for the vector of corner 0 to 7 only once the mesh itself allows a soft leaf.
+/// Tries to certify the leaf at `lower` (page space) with edge `edge` cells, a power of two: soft is true when
+/// (F + W)/g, W the wall tolerance of F's code, is at most `tolerance` cells. `triangles` are all that overlap
+/// the leaf widened by the margin. `corner` is asked for the vector of corner 0 to 7 only once the mesh itself
+/// allows a soft leaf.
 Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles, double tolerance,
                         const std::function<const CornerVector&(int)>& corner, CertificateScratch& scratch);
 

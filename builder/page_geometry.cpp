@@ -27,9 +27,11 @@ class EdgeTable {
 public:
     struct Slot {
         uint64_t edge = 0;  ///< smaller vertex in the high word; no edge is 0
-        uint32_t firstUse = 0, uses = 0;
+        uint32_t firstUse = 0;
+        uint8_t uses = 0;  ///< 3: three or more
         bool good = false;
     };
+    static_assert(sizeof(Slot) == 16);
 
     explicit EdgeTable(size_t edges) : slots_(std::bit_ceil(edges * 4 / 3 + 2)) {}
 
@@ -82,7 +84,8 @@ void PageGeometry::markBadEdges() {
             const uint32_t a = vertices_[k][i], b = vertices_[k][(i + 1) % 3];
             slots[k][i] = table.find(a, b);
             EdgeTable::Slot& slot = table[slots[k][i]];
-            if (++slot.uses == 1) slot.firstUse = 4 * k + i;
+            slot.uses = static_cast<uint8_t>(std::min(slot.uses + 1, 3));
+            if (slot.uses == 1) slot.firstUse = 4 * k + i;
             slot.good = false;
             if (slot.uses != 2) continue;
             // Oriented by the shared edge, both normals agree where the surface continues and oppose at a fold.
@@ -107,7 +110,7 @@ void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
     const auto add = [&](glm::ivec3 cell, uint32_t triangle, bool touches) {
         const size_t list = 2 * cellIndex(cell) + (touches ? 0 : 1);
         entries.push_back({static_cast<uint32_t>(list), triangle});
-        if (list + 2 < listBegin_.size()) ++listBegin_[list + 2];
+        ++listBegin_[list + 2];
         return touches && std::min({cell.x, cell.y, cell.z}) >= 0 && std::max({cell.x, cell.y, cell.z}) < cells_;
     };
     for (uint32_t k = 0; k < triangles_.size(); ++k) {

@@ -3,7 +3,8 @@
 #pragma once
 
 #include <array>
-#include <vector>
+#include <cassert>
+#include <cstddef>
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -51,11 +52,15 @@ bool segmentMeetsBox(glm::dvec3 a, glm::dvec3 b, glm::dvec3 centre, double half)
 /// A convex polygon: a triangle cut by the six planes of a box.
 class Polygon {
 public:
-    static constexpr size_t kMaxCorners = 9;
+    /// 9, but rounding may bend an edge, and a plane then cut more than two.
+    static constexpr size_t kMaxCorners = 16;
     [[nodiscard]] size_t size() const { return size_; }
     [[nodiscard]] bool empty() const { return size_ == 0; }
     void clear() { size_ = 0; }
-    void add(glm::dvec3 p) { corners_[size_++] = p; }
+    void add(glm::dvec3 p) {
+        assert(size_ < kMaxCorners);
+        corners_[size_++] = p;
+    }
     const glm::dvec3& operator[](size_t i) const { return corners_[i]; }
     [[nodiscard]] const glm::dvec3* begin() const { return corners_.data(); }
     [[nodiscard]] const glm::dvec3* end() const { return corners_.data() + size_; }
