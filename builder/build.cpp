@@ -436,13 +436,15 @@ private:
         waiting_ = std::make_unique<RecordBins<WaitingTriangle>>(space_, fmt::format("waiting{}", pass_), partitionOf(levelOf(pass_)).bins(), plan_.bufferBytes / 4);
     }
 
-    [[nodiscard]] LevelSettings settingsOf(int level) const {
+    [[nodiscard]] LevelSettings settingsOf(int level) {
         LevelSettings settings;
         settings.grid = gridOf(level);
         settings.finest = level + 1 == static_cast<int>(frame_.levels);
         settings.cell = std::ldexp(frame_.cell, static_cast<int>(frame_.levels) - 1 - level);
         settings.tolerance = settings.finest ? report_.errorTarget / settings.cell : kCoarseErrorCells;
         settings.pageBytes = plan_.pageBytes;
+        settings.roomBytes = plan_.tempBytes;
+        settings.makeRoom = [this] { return space_.spill(); };
         return settings;
     }
 

@@ -26,11 +26,16 @@ struct BuiltPage {
     StoredPage stored;
 };
 
-BuiltPage buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
+/// A page's bytes; what they were made of is gone when they are coded.
+EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
     PageGeometry geometry(mesh, triangles, mortonDecode(code), settings.grid.log2Cells);
     const double tolerance = settings.finest ? settings.tolerance - geometry.stray() : settings.tolerance;
     PageTree tree = buildPageTree(geometry, tolerance);
-    const EncodedPage encoded = encodePage(tree, geometry, mesh);
+    return encodePage(tree, geometry, mesh);
+}
+
+BuiltPage buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
+    const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
     BuiltPage page;
     page.entry.morton = code;
     page.entry.level = static_cast<uint8_t>(settings.grid.level);
@@ -43,6 +48,19 @@ BuiltPage buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint
 
 uint64_t bytesOf(const LatticeMesh& mesh) {
     return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) + mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float));
+}
+
+/// Memory to build a page of these triangles.
+uint64_t workOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
+    double touched = 0;
+    for (const uint32_t k : triangles) {
+        glm::dvec3 p[3];
+        for (int i = 0; i < 3; ++i) p[i] = glm::dvec3(mesh.positions[mesh.triangles[k][i]]) / double(kLatticePerCell);
+        // Cells that a flat shape touches: its area over three axes, its rim, and those of its corners.
+        const double perimeter = glm::distance(p[0], p[1]) + glm::distance(p[1], p[2]) + glm::distance(p[2], p[0]);
+        touched += 0.875 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) + 1.5 * perimeter + 4;
+    }
+    return pageWorkBytes(triangles.size(), static_cast<uint64_t>(touched));
 }
 
 /// Lets pages be built while there is memory for them.
@@ -91,23 +109,35 @@ private:
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end, PageSpool& spool, const std::function<bool(double)>& progress) {
     const TriangleBins bins = binTriangles(mesh, settings.grid, first, end);
-    const uint64_t held = bytesOf(mesh) + bins.triangles.size() * sizeof(uint32_t), free = settings.pageBytes - std::min(held, settings.pageBytes);
-    for (size_t i = 0; i < bins.pages.size(); ++i)
-        if (const uint64_t needed = pageWorkBytes(bins.of(i).size()); needed > free)
+    std::vector<uint64_t> work(bins.pages.size());
+    tbb::parallel_for(size_t{0}, work.size(), [&](size_t i) { work[i] = workOf(mesh, bins.of(i)); });
+    const uint64_t held = bytesOf(mesh) + bins.triangles.size() * sizeof(uint32_t);
+    const auto left = [&](uint64_t bytes) { return bytes - std::min(held, bytes); };
+    InOrder inOrder(spool);
+    // Pages that need more than all have together come first, alone, while nothing else takes memory.
+    std::vector<bool> isBuilt(work.size(), false);
+    for (size_t i = 0; i < work.size(); ++i) {
+        if (work[i] <= left(settings.pageBytes)) continue;
+        if (const uint64_t most = left(settings.pageBytes + settings.roomBytes); work[i] > most)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a smaller --cell or a larger --memory", bins.of(i).size(),
-                                                ((needed - free) * 3 / 2 >> 20) + 1)};
-    Admission admission(free);
-    InOrder inOrder(spool);
+                                                ((work[i] - most) * 3 / 2 >> 20) + 1)};
+        VCP_TRY(settings.makeRoom());
+        VCP_TRY(inOrder.put(i, buildPage(settings, mesh, bins.pages[i], bins.of(i))));
+        isBuilt[i] = true;
+    }
+    Admission admission(left(settings.pageBytes));
     std::atomic<size_t> next = 0, done = 0;
     std::atomic<bool> stopped = false;
     std::mutex mutex;
     Result<void> result;
     const auto buildOne = [&](size_t i) -> Result<void> {
-        const uint64_t bytes = pageWorkBytes(bins.of(i).size());
-        admission.enter(bytes);
-        auto put = inOrder.put(i, buildPage(settings, mesh, bins.pages[i], bins.of(i)));
-        admission.leave(bytes);
+        Result<void> put;
+        if (!isBuilt[i]) {
+            admission.enter(work[i]);
+            put = inOrder.put(i, buildPage(settings, mesh, bins.pages[i], bins.of(i)));
+            admission.leave(work[i]);
+        }
         if (put && !progress(double(++done) / double(bins.pages.size()))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         return put;
     };

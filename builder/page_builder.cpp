@@ -6,6 +6,7 @@
 
 #include <glm/common.hpp>
 
+#include "builder/memory_plan.h"
 #include "octree/leaf_math.h"
 
 namespace vcp {
@@ -32,7 +33,7 @@ double errorOf(const SoftLeaf& leaf) {
 
 class TreeBuilder {
 public:
-    TreeBuilder(PageGeometry& geometry, double tolerance) : geometry_(geometry), tolerance_(tolerance) { fillOccupancy(); }
+    TreeBuilder(PageGeometry& geometry, double tolerance) : geometry_(geometry), tolerance_(tolerance), mostLeaves_(mostSplitLeaves(geometry.triangleCount())) { fillOccupancy(); }
 
     PageTree run() {
         tree_.nodes.emplace_back();
@@ -86,7 +87,7 @@ private:
         tree_.nodes[index].box = box;
         if (inside.empty()) return;
         if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
-        if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth) return makeHard(index, inside);
+        if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth || tree_.soft.size() + tree_.hard.size() >= mostLeaves_) return makeHard(index, inside);
         PageGeometry::ChildTriangles& children = children_[depth];
         geometry_.split(box, around, children);
         size_t together = 0;
@@ -196,6 +197,7 @@ private:
 
     PageGeometry& geometry_;
     double tolerance_;
+    size_t mostLeaves_;
     PageTree tree_;
     std::vector<std::vector<uint8_t>> occupancy_;
     std::vector<CertifiedTriangle> triangles_;

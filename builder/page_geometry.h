@@ -73,6 +73,7 @@ public:
     const CornerVector& corner(glm::ivec3 subcells);
 
     [[nodiscard]] bool hasColour() const { return !mesh_.colours.empty(); }
+    [[nodiscard]] size_t triangleCount() const { return triangles_.size(); }
     [[nodiscard]] CertifiedTriangle triangle(uint32_t local) const {
         const Triangle& t = triangles_[local];
         return {cornersOf(t), glm::dvec3(t.normal), t.badEdges};

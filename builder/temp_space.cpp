@@ -99,7 +99,25 @@ void TempSpace::addDisk(int64_t bytes) {
     while (now > peak && !peakDisk_.compare_exchange_weak(peak, now)) {}
 }
 
+Result<void> TempSpace::spill() {
+    const std::scoped_lock lock(filesMutex_);
+    for (TempFile* file : files_) {
+        const std::scoped_lock fileLock(file->mutex_);
+        if (!file->tail_.empty()) VCP_TRY(file->flush());
+    }
+    return {};
+}
+
+TempFile::TempFile(TempSpace& space, std::string name) : space_(space), name_(std::move(name)) {
+    const std::scoped_lock lock(space_.filesMutex_);
+    space_.files_.push_back(this);
+}
+
 TempFile::~TempFile() {
+    {
+        const std::scoped_lock lock(space_.filesMutex_);
+        std::erase(space_.files_, this);
+    }
     dropTail();
     if (file_ >= 0) ::close(file_);
 }

@@ -21,6 +21,8 @@ namespace vcp {
 /// The file that journal.h keeps in the folder.
 inline constexpr const char* kJournalName = "journal";
 
+class TempFile;
+
 /// The folder and its accounts. Outlives its files. Any thread.
 class TempSpace {
 public:
@@ -40,6 +42,9 @@ public:
     TempSpace(const TempSpace&) = delete;
     TempSpace& operator=(const TempSpace&) = delete;
 
+    /// Brings to the disk what the files hold in memory. No file may be appended to meanwhile. Errors: Io.
+    Result<void> spill();
+
     /// Most bytes that lay in the folder at one time.
     [[nodiscard]] uint64_t peakDiskBytes() const { return peakDisk_; }
     [[nodiscard]] uint64_t diskBytes() const { return disk_; }
@@ -52,6 +57,8 @@ private:
     std::filesystem::path folder_;
     uint64_t memoryBytes_;
     std::atomic<uint64_t> held_ = 0, disk_ = 0, peakDisk_ = 0;
+    std::mutex filesMutex_;
+    std::vector<TempFile*> files_;
     std::mutex lockMutex_;
     int lock_ = -1;
 };
@@ -59,7 +66,7 @@ private:
 /// One append-only file. append and sync: one thread at a time; read: any thread, beside append.
 class TempFile {
 public:
-    TempFile(TempSpace& space, std::string name) : space_(space), name_(std::move(name)) {}
+    TempFile(TempSpace& space, std::string name);
     ~TempFile();
     TempFile(const TempFile&) = delete;
     TempFile& operator=(const TempFile&) = delete;
@@ -79,6 +86,7 @@ public:
     void remove();
 
 private:
+    friend class TempSpace;
     static constexpr size_t kPieceBytes = size_t{1} << 18;
 
     Result<void> flush();

@@ -32,7 +32,25 @@ struct TriangleCover::Polygon {
     int count = 0;
     std::array<glm::dvec3, kMost> p;
 
+    Polygon() = default;
+    // Only the corners that there are: most polygons have three to six.
+    Polygon(const Polygon& o) : count(o.count) { std::copy_n(o.p.begin(), count, p.begin()); }
+    Polygon& operator=(const Polygon& o) {
+        count = o.count;
+        std::copy_n(o.p.begin(), count, p.begin());
+        return *this;
+    }
+
     void add(glm::dvec3 q) { p[count++] = q; }
+    /// Whether it has a part inside of all sides of a prism, each taken alone.
+    [[nodiscard]] bool reachesInto(const TrianglePrism& prism) const {
+        for (int s = 0; s < 3; ++s) {
+            double least = std::numeric_limits<double>::infinity();
+            for (int i = 0; i < count; ++i) least = std::min(least, glm::dot(prism.side[s], p[i]) - prism.sideOffset[s]);
+            if (least >= -kThin) return false;
+        }
+        return true;
+    }
 };
 
 TrianglePrism::TrianglePrism(const Triangle3& t, double more) : corners(t), extra(more) {
@@ -88,6 +106,7 @@ double TriangleCover::cover(const Polygon& polygon, size_t first, Match best) {
         }
         const double nearest = low > 0 ? low : high < 0 ? -high : 0, farthest = std::max(high, -low);
         if (nearest + o.extra >= best.distance) continue;
+        if (!polygon.reachesInto(o)) continue;
         // Over a ridge the prisms leave a wedge: what is little outside counts as inside, with its distance.
         const double room = std::max(kThin, std::min(kMostBeside, kBeside * farthest) / o.cornerFactor);
         Polygon rest = polygon;
@@ -111,11 +130,6 @@ double TriangleCover::cover(const Polygon& polygon, size_t first, Match best) {
 /// `most`: how far what is left is outside of a side.
 bool TriangleCover::split(const TrianglePrism& o, double room, Polygon& inside, std::array<Polygon, 3>& outside, double& most) const {
     std::array<double, Polygon::kMost> v;
-    for (int s = 0; s < 3; ++s) {
-        double least = std::numeric_limits<double>::infinity();
-        for (int i = 0; i < inside.count; ++i) least = std::min(least, glm::dot(o.side[s], inside.p[i]) - o.sideOffset[s]);
-        if (least >= -kThin) return false;
-    }
     for (int s = 0; s < 3; ++s) {
         double largest = -std::numeric_limits<double>::infinity();
         for (int i = 0; i < inside.count; ++i) {

@@ -19,10 +19,10 @@ namespace vcp {
 
 /// Largest and smallest cube, in cells of the coarser level. They nest: edges are powers of two.
 inline constexpr double kLargestClusterCells = 1;
-inline constexpr double kSmallestClusterCells = 0.125;
+inline constexpr double kSmallestClusterCells = 0.25;
 
 /// A cube is cut while its vertex would be farther than this from the surface, in cells of the coarser level.
-inline constexpr double kClusterErrorCells = 0.1;
+inline constexpr double kClusterErrorCells = 0.15;
 
 /// Triangles whose bounding box is wider than this, in cells of their level, count as long: they are compared
 /// by how far their corners moved, since what surrounds their other end is not at hand.
