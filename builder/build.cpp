@@ -21,6 +21,7 @@
 #include <oneapi/tbb/task_arena.h>
 #include <xxhash.h>
 
+#include "builder/collapsed_triangles.h"
 #include "builder/estimate.h"
 #include "builder/ingest.h"
 #include "builder/journal.h"
@@ -401,8 +402,6 @@ private:
         };
         VCP_TRY(forLatticeTriangles(kReadingShare + kDealingShare / 2, true, [&] { return Visit{grid, finest_, BinBatch(*current_)}; }));
         VCP_TRY(current_->raw().flush());
-        if (current_->raw().total() == 0)
-            return Error{.code = ErrorCode::InvalidInput, .message = "all triangles are smaller than 1/2048 cell; use a smaller --cell", .file = options_.inputs.front().string()};
         if (colours_) report_.warnings.insert(report_.warnings.end(), colours_->warnings().begin(), colours_->warnings().end());
         colours_.reset();
         auto soup = std::move(soup_);
@@ -496,6 +495,7 @@ private:
         if (soup->empty()) return {};
         Result<void> result;
         arena_.execute([&] {
+            if (vertices) keepThin(*soup, bin);
             LatticeMesh mesh = meshOf(*soup, hasColour());
             std::vector<LatticeTriangle>().swap(*soup);
             if (vertices) computeNormals(mesh);
@@ -503,6 +503,14 @@ private:
             if (result && step) result = step->run(bin, mesh);
         });
         return result;
+    }
+
+    /// Slivers and crumbs that vanish on the lattice.
+    void keepThin(std::vector<LatticeTriangle>& soup, size_t bin) const {
+        const PageGrid grid = gridOf(levelOf(pass_));
+        keepCollapsed(
+            soup, [&](glm::i32vec3 p) { return finest_.binOf(grid.pageOf(p)) == bin; },
+            [&](glm::i32vec3 p, glm::i32vec3 q) { return grid.pageOf(p) == grid.pageOf(q); });
     }
 
     Result<void> endPass() {

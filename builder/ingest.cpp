@@ -127,7 +127,9 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             hasVertexColours |= !chunk.colours.empty();
             VCP_TRY(join.add(chunk, materialBase));
             const uint64_t bytes = doneBytes + (*stream)->bytesRead();
-            if (!progress(double(bytes) / double(std::max<uint64_t>(totalBytes, 1)), writer.triangles())) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            // A pipe does not say how much is to come.
+            const double fraction = totalBytes > 0 ? std::min(double(bytes) / double(totalBytes), 1.0) : 0;
+            if (!progress(fraction, writer.triangles())) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         }
         doneBytes += (*stream)->bytesRead();
         soup.materials.insert(soup.materials.end(), (*stream)->materials().begin(), (*stream)->materials().end());

@@ -20,8 +20,8 @@ public:
     /// `colours`: of the soup's materials; null: vertices keep their own. `vertexColours`: whether these count.
     explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true);
 
-    /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; nothing when it has no area on the
-    /// lattice. An edge is cut at the same lattice point in every triangle that has it, so no crack opens.
+    /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; some may have no area on the
+    /// lattice (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no crack opens.
     /// `painted`: with the materials' colours.
     template <class Real, class Sink>
     void add(const WorldTriangle<Real>& triangle, Sink&& sink, bool painted = true) const {
@@ -50,7 +50,7 @@ private:
         const int count = cut(piece, pieces);
         for (int i = 0; i < count; ++i) cutInto(pieces[i], sink, painted);
         const LatticeTriangle& t = piece.triangle;
-        if (count > 0 || !hasArea(t.corner[0], t.corner[1], t.corner[2])) return;
+        if (count > 0) return;
         if (painted) paint(piece);
         sink(t);
     }

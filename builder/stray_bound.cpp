@@ -24,7 +24,7 @@ constexpr uint32_t kNone = VertexClusters::kNone;
 // Bounds below this are not improved, in coarse cells: a page's error is that of its worst triangle.
 constexpr double kEnough = 0.25;
 // Where the corners moved no farther, that is the bound.
-constexpr double kSmallMotion = 0.25;
+constexpr double kSmallMotion = 0.1;
 
 // A part of a coarse triangle with more fine triangles near it is quartered, at most so often.
 constexpr size_t kManyPieces = 32;

@@ -124,17 +124,17 @@ double boxDistance(glm::dvec3 p, glm::dvec3 lowest, double edge) {
 
 glm::dvec3 octantOffset(uint32_t octant) { return {octant & 1u, octant >> 1 & 1u, octant >> 2 & 1u}; }
 
-/// A leaf of the finest level.
+/// A leaf of the level.
 struct LeafBox {
     uint64_t page;
     glm::dvec3 lowest;  ///< in cells from the page's lowest corner
     double edge;
 };
 
-/// The leaves of the finest cut: as a list, and nearest hard leaves by descent.
-class FinestLeaves {
+/// The leaves of the cut: as a list, and nearest hard leaves by descent.
+class LevelLeaves {
 public:
-    FinestLeaves(const PageCache& cache, const std::vector<uint64_t>& cut)
+    LevelLeaves(const PageCache& cache, const std::vector<uint64_t>& cut)
         : cache_(cache), inCut_(cache.dataset().pages.size(), false) {
         for (const uint64_t page : cut) inCut_[page] = true;
     }
@@ -254,7 +254,7 @@ private:
 };
 
 /// Upper bound on the distance of a world point to the rendered surface.
-double distanceToSurface(const ReferenceCaster& caster, const FinestLeaves& leaves, const MeshSampler::Sample& sample,
+double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leaves, const MeshSampler::Sample& sample,
                          double cell, double certifiedError) {
     double best = kInfinity;
     glm::dvec3 surfaceNormal{0};
@@ -315,13 +315,14 @@ struct Worst {
 Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
                                                const SurfaceDistanceOptions& options) {
     const Dataset& dataset = cache.dataset();
-    const std::vector<uint64_t> cut = cutAtLevel(dataset, dataset.header.levels);
+    const uint32_t level = std::min(options.level, dataset.header.levels - 1);
+    const std::vector<uint64_t> cut = cutAtLevel(dataset, level);
     const auto caster = ReferenceCaster::create(cache, cut);
     if (!caster) return caster.error();
-    const FinestLeaves finest(cache, cut);
+    const LevelLeaves leavesOfLevel(cache, cut);
     const MeshSampler sampler(mesh.mesh());
     if (sampler.empty()) return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle with area"};
-    const double cell = dataset.header.cell, certified = dataset.header.certifiedErrorMax;
+    const double cell = dataset.cellOf(level), certified = dataset.header.level[level].certifiedError;
     SurfaceDistance result;
     result.cell = cell;
     result.certifiedErrorMax = certified;
@@ -333,13 +334,13 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     if (!runner.run(options.samples, 0, 0.6, [&](uint64_t i) {
             SampleRandom random(options.seed, 2 * i);
             const MeshSampler::Sample sample = sampler.sample(i, random);
-            const double distance = distanceToSurface(*caster, finest, sample, cell, certified);
+            const double distance = distanceToSurface(*caster, leavesOfLevel, sample, cell, certified);
             toSurface[i] = static_cast<float>(distance);
             worstOfMesh.add(distance, i, sample.position);
         }))
         return cancelled;
 
-    const std::vector<LeafBox> leaves = finest.list();
+    const std::vector<LeafBox> leaves = leavesOfLevel.list();
     std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock);
     Worst worstOfSurface;
     if (!leaves.empty() && !runner.run(options.samples, 0.6, 1, [&](uint64_t i) {

@@ -1,11 +1,11 @@
-// How far the surface of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify --against`).
+// How far the surface of a level of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify --against`).
 //
 //   mesh to surface   samples: vertices, points on edges, points inside triangles, by area; of triangles that
 //                     have area, for the others show nothing. The distance to
-//                     the surface of the finest level is bounded from above: by short rays through the
+//                     the surface of the level is bounded from above: by short rays through the
 //                     sample in eight and more directions, which start with no wall tolerance, and by the
 //                     exact distance to the triangles of hard leaves, each cut off at its leaf's walls.
-//   surface to mesh   samples: hits of random rays through the leaves of the finest level, every leaf alike.
+//   surface to mesh   samples: hits of random rays through the leaves of the level, every leaf alike.
 //                     The distance to the mesh is exact (MeshBvh).
 // Both measurements are seeded: the same numbers whatever the threads.
 #pragma once
@@ -23,6 +23,7 @@ struct SurfaceDistanceOptions {
     uint64_t samples = 200'000;  ///< points of the mesh, and visits of leaves
     uint64_t seed = 1;
     unsigned threads = 0;  ///< 0: one a processor
+    uint32_t level = UINT32_MAX;  ///< the level whose surface is measured; the finest if there is none of that number
     /// Called from one thread at a time with the fraction done; false cancels. May be empty.
     std::function<bool(double)> progress;
 };
@@ -33,11 +34,11 @@ struct SurfaceDistance {
     glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
     glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
     uint64_t samples = 0;          ///< measured, both ways together
-    double cell = 0;               ///< finest, world units
-    double certifiedErrorMax = 0;  ///< of the finest level, world units
+    double cell = 0;               ///< of the level, world units
+    double certifiedErrorMax = 0;  ///< of the level, world units
 };
 
-/// Measures the finest level of `cache`, all of whose pages it needs loaded. Errors: Usage (a page is not
+/// Measures one level of `cache`, all of whose pages it needs loaded. Errors: Usage (a page is not
 /// loaded), InvalidInput (the mesh has no triangle with area), Cancelled.
 Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
                                                const SurfaceDistanceOptions& options = {});

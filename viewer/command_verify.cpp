@@ -17,6 +17,7 @@ struct VerifyCommand {
     std::string file;
     std::vector<std::string> against;
     uint64_t samples = 200'000;
+    uint32_t level = UINT32_MAX;
     unsigned threads = 0;
     ReportOptions report;
 };
@@ -50,13 +51,17 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     if (!mesh) return mesh.error();
     display.update("sorting the mesh", 0.1);
     const MeshBvh bvh(*mesh);
-    display.update("reading the finest level", 0.2);
+    display.update("reading the level", 0.2);
     auto cache = PageCache::open(command.file);
     if (!cache) return cache.error();
-    VCP_TRY(cache->loadLevel(cache->dataset().header.levels - 1));
+    const uint32_t levels = cache->dataset().header.levels;
+    if (command.level != UINT32_MAX && command.level >= levels)
+        return Error{ErrorCode::Usage, fmt::format("has no level {}, only 0 to {}", command.level, levels - 1), command.file};
+    VCP_TRY(cache->loadLevel(std::min(command.level, levels - 1)));
 
     SurfaceDistanceOptions options;
     options.samples = command.samples;
+    options.level = command.level;
     options.threads = command.threads;
     options.progress = [&](double fraction) {
         display.update("measuring", 0.3 + 0.7 * fraction);
@@ -156,6 +161,7 @@ Command addVerify(CLI::App& vcp) {
         ->type_name("MESH");
     app->add_option("--samples", command->samples, "Samples, each way")->type_name("N")->capture_default_str()->check(
         CLI::Range(1, 1'000'000'000));
+    app->add_option("--level", command->level, "Level to measure, 0 the coarsest [the finest]")->type_name("N");
     app->add_option("--threads", command->threads, "Threads that measure [one a processor]")->type_name("N")->check(
         CLI::Range(1, 1024));
     addProgressOption(*app, command->report);

@@ -20,6 +20,9 @@ int terminalColumns(std::FILE* out) {
     return size.ws_col;
 }
 
+// What stands still is said again after so long, with its new counts.
+constexpr double kJsonSeconds = 2, kPlainSeconds = 30, kBarSeconds = 0.5;
+
 }  // namespace
 
 std::optional<ProgressStyle> progressStyleNamed(std::string_view name) {
@@ -47,7 +50,9 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
 
     const int steps = style_ == ProgressStyle::Json ? 100 : 10;
     const int step = static_cast<int>(std::floor(fraction * steps));
-    if (stage == lastStage_ && step == lastStep_) return;
+    const bool isDue = elapsed - lastSeconds_ >= (style_ == ProgressStyle::Json ? kJsonSeconds : kPlainSeconds);
+    if (stage == lastStage_ && step == lastStep_ && !isDue) return;
+    lastSeconds_ = elapsed;
     lastStage_ = stage;
     lastStep_ = step;
     std::string line;
@@ -69,7 +74,9 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
 
 void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std::string& facts) {
     const int perMille = static_cast<int>(1000 * fraction);
-    if (stage == lastStage_ && perMille == lastPerMille_) return;
+    const bool isDue = seconds() - lastSeconds_ >= kBarSeconds;
+    if (stage == lastStage_ && perMille == lastPerMille_ && !isDue) return;
+    lastSeconds_ = seconds();
     lastStage_ = stage;
     lastPerMille_ = perMille;
     const int columns = std::max(20, terminalColumns(out_) - 1);

@@ -54,6 +54,7 @@ private:
     std::string lastStage_;
     std::string lastBar_;
     int lastStep_ = -1;
+    double lastSeconds_ = 0;
     int lastPerMille_ = -1;
 };
 

@@ -57,14 +57,6 @@ TEST(LatticeSnapper, FloatsAreAsDoubles) {
     for (int i = 0; i < 3; ++i) EXPECT_EQ(a[0].corner[i], b[0].corner[i]);
 }
 
-TEST(LatticeSnapper, WhatHasNoAreaOnTheLatticeGoes) {
-    IndexedMesh mesh;
-    const double step = 1.0 / kLatticePerCell;
-    mesh.positions = {{1, 1, 1}, {1 + step / 4, 1, 1}, {1, 1 + step / 4, 1}, {2, 2, 1}, {3, 3, 1 + step / 3}, {3, 3, 2}};
-    mesh.triangles = {{0, 1, 2}, {0, 3, 4}, {0, 3, 5}};
-    EXPECT_EQ(test::soupOf(mesh).size(), 1u);
-}
-
 TEST(LatticeSnapper, CornersOutsideAreClamped) {
     // Rounding may put a corner a hair below the origin.
     const LatticeSnapper snapper({.origin = {1, 1, 1}, .cell = 1});
