@@ -26,7 +26,7 @@ constexpr std::string_view kHelp =
     "\n"
     "usage: make_scan [--triangles N] [--seed S] [--colour] [--utm] [--parts] -o FILE|-\n"
     "\n"
-    "  --triangles N  exactly so many triangles, 10000 to 1000000000 (500000)\n"
+    "  --triangles N  exactly so many triangles, 10k to 1G (500k)\n"
     "  --seed S       another pose, other folds, other stone (1); the same seed gives the same bytes\n"
     "  --colour       vertex colours\n"
     "  --utm          double positions, z up, with an origin in UTM coordinates\n"
@@ -44,7 +44,11 @@ struct Arguments {
 
 Result<uint64_t> number(std::string_view option, std::string_view text, uint64_t least, uint64_t most) {
     uint64_t value = 0;
-    const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+    auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (const std::string_view unit(end, text.data() + text.size()); problem == std::errc() && unit.size() == 1) {
+        const uint64_t factor = unit == "k" ? 1'000 : unit == "M" ? 1'000'000 : unit == "G" ? 1'000'000'000 : 0;
+        if (factor > 0 && value <= most / factor) value *= factor, ++end;
+    }
     if (problem != std::errc() || end != text.data() + text.size() || value < least || value > most)
         return Error{ErrorCode::Usage, std::string(option) + " wants a whole number from " + std::to_string(least) +
                                            " to " + std::to_string(most) + ", not '" + std::string(text) + "'"};

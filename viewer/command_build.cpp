@@ -100,7 +100,8 @@ Result<int> tell(const BuildOptions& options, bool asJson) {
 
 Result<int> run(const BuildCommand& command) {
     BuildOptions options = command.settings.optionsFor(command.inputs);
-    options.output = command.output;
+    if (command.output.empty() && !command.dryRun) return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
+    options.output = command.output.empty() ? "." : command.output;
     options.resume = command.resume;
     options.checkpointSeconds = command.checkpointSeconds;
     ProgressDisplay display(command.report.progressStyle(), stderr);
@@ -126,7 +127,7 @@ Command addBuild(CLI::App& vcp) {
     auto command = std::make_shared<BuildCommand>();
     CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
     app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder stands for those in it, - for standard input")->type_name("")->required();
-    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->required();
+    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp");
     addBuildSettings(*app, command->settings);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
     app->add_option("--checkpoint", command->checkpointSeconds, "What is done is made durable at most so often")
