@@ -59,13 +59,15 @@ public:
 
     Result<GltfDocument> read() {
         VCP_TRY(checkVersion());
-        each("buffers", "buffer", [&](const JsonFields& f) { readBuffer(f); });
-        each("bufferViews", "bufferView", [&](const JsonFields& f) { readView(f); });
-        each("accessors", "accessor", [&](const JsonFields& f) { readAccessor(f); });
+        const std::string file = "glTF";
+        const JsonFields top(json_, file, check_);
+        top.each("buffers", "buffer", where_, [&](const JsonFields& f) { readBuffer(f); });
+        top.each("bufferViews", "bufferView", where_, [&](const JsonFields& f) { readView(f); });
+        top.each("accessors", "accessor", where_, [&](const JsonFields& f) { readAccessor(f); });
         readGltfMaterials(json_, document_, check_);
-        each("meshes", "mesh", [&](const JsonFields& f) { readMesh(f); });
-        countNodes();
-        each("nodes", "node", [&](const JsonFields& f) { readNode(f); });
+        top.each("meshes", "mesh", where_, [&](const JsonFields& f) { readMesh(f); });
+        countNodes(top);
+        top.each("nodes", "node", where_, [&](const JsonFields& f) { readNode(f); });
         readRoots();
         readCentre();
         if (!check_.ok()) return source_.error(ErrorCode::InvalidInput, check_.element, std::nullopt, check_.message);
@@ -73,17 +75,6 @@ public:
     }
 
 private:
-    // Calls `read` with every object of an array of the file, as long as nothing is wrong.
-    template <class Read>
-    void each(const char* key, const std::string& name, Read read) {
-        const std::string top = "glTF";
-        const Json* const array = JsonFields(json_, top, check_).array(key);
-        for (size_t i = 0; array && i < array->size() && check_.ok(); ++i) {
-            where_ = fmt::format("{} {}", name, i);
-            read(JsonFields((*array)[i], where_, check_));
-        }
-    }
-
     Result<void> checkVersion() {
         const std::string where = "glTF";
         const JsonFields top(json_, where, check_);
@@ -292,9 +283,8 @@ private:
         if (isEmpty(indices)) f.fail(fmt::format("its {} indices have no data", indices.count));
     }
 
-    void countNodes() {
-        const std::string top = "glTF";
-        const Json* const array = JsonFields(json_, top, check_).array("nodes");
+    void countNodes(const JsonFields& top) {
+        const Json* const array = top.array("nodes");
         nodeCount_ = array ? array->size() : 0;
         hasParent_.assign(nodeCount_, false);
     }

@@ -5,8 +5,6 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "builder/colour_encoding.h"
 #include "builder/data_uri.h"
 
@@ -35,32 +33,24 @@ public:
         : json_(json), document_(document), check_(check) {}
 
     void read() {
-        each("images", "image", [&](const JsonFields& f) { readImage(f); });
+        const std::string file = "glTF";
+        const JsonFields top(json_, file, check_);
+        top.each("images", "image", where_, [&](const JsonFields& f) { readImage(f); });
         std::vector<std::pair<Wrap, Wrap>> samplers;
-        each("samplers", "sampler", [&](const JsonFields& f) {
+        top.each("samplers", "sampler", where_, [&](const JsonFields& f) {
             samplers.emplace_back(wrapOf(f.whole("wrapS", 0)), wrapOf(f.whole("wrapT", 0)));
         });
-        each("textures", "texture", [&](const JsonFields& f) {
+        top.each("textures", "texture", where_, [&](const JsonFields& f) {
             Texture texture;
             texture.image = f.index("source", document_.images.size());
             if (const auto sampler = f.index("sampler", samplers.size()))
                 std::tie(texture.wrapU, texture.wrapV) = samplers[*sampler];
             textures_.push_back(texture);
         });
-        each("materials", "material", [&](const JsonFields& f) { readMaterial(f); });
+        top.each("materials", "material", where_, [&](const JsonFields& f) { readMaterial(f); });
     }
 
 private:
-    template <class Read>
-    void each(const char* key, const std::string& name, Read read) {
-        const std::string top = "glTF";
-        const Json* const array = JsonFields(json_, top, check_).array(key);
-        for (size_t i = 0; array && i < array->size() && check_.ok(); ++i) {
-            where_ = fmt::format("{} {}", name, i);
-            read(JsonFields((*array)[i], where_, check_));
-        }
-    }
-
     void readImage(const JsonFields& f) {
         GltfImage image;
         if (f.find("uri")) image.uri = f.text("uri");

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/exact_sum.h"
+#include "builder/lattice_mesh.h"
 #include "builder/mesh_stream.h"
 #include "builder/vertex_join.h"
 #include "octree/leaf_math.h"
@@ -180,6 +181,18 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
     while (std::ldexp(1.0, static_cast<int>(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
     frame.origin = m.boundsMin - glm::dvec3(frame.cell);
     return frame;
+}
+
+Result<double> chooseError(const BuildOptions& options, const SoupMeasures& measures, const GridFrame& frame) {
+    double error = options.error;
+    if (options.errorIsRelative) error *= glm::length(measures.boundsMax - measures.boundsMin);
+    if (error <= 0) error = kDefaultErrorCells * frame.cell;
+    // Rounding to the lattice is part of the error; below a few steps nothing could be certified.
+    const double least = 8 * kLatticeRounding * frame.cell;
+    if (error < least)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("an error of {:g} needs a finer cell than {:g}; use --cell {:g} or smaller", error, frame.cell, error / (8 * kLatticeRounding))};
+    return error;
 }
 
 }  // namespace vcp

@@ -55,4 +55,8 @@ MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 /// `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures);
 
+/// The tolerance of the finest level in world units; `options.error` 0 chooses it. Errors: Limit (finer than the
+/// lattice can tell).
+Result<double> chooseError(const BuildOptions& options, const SoupMeasures& measures, const GridFrame& frame);
+
 }  // namespace vcp

@@ -3,23 +3,20 @@
 #include <cerrno>
 #include <fcntl.h>
 #include <fstream>
-#include <system_error>
+#include <span>
 #include <unistd.h>
 
 #include <fmt/format.h>
 #include <xxhash.h>
 
 #include "builder/temp_space.h"
+#include "octree/durable_file.h"
 
 namespace vcp {
 
 namespace {
 
 std::string hashed(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
-
-Error ioError(const std::filesystem::path& file, const char* what) {
-    return {.code = ErrorCode::Io, .message = std::string(what) + ": " + std::generic_category().message(errno), .file = file.string()};
-}
 
 }  // namespace
 
@@ -44,25 +41,15 @@ Result<void> Journal::record(const std::filesystem::path& folder, const nlohmann
     const std::filesystem::path path = folder / kJournalName;
     const bool isNew = file_ < 0;
     if (isNew) file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    if (file_ < 0) return ioError(path, "cannot be opened");
+    if (file_ < 0) return systemError(path, "cannot be opened", errno, kWhenTempIsFull);
     const std::string text = fields.dump();
     // The line break in front ends a line that an interruption tore.
     const std::string line = fmt::format("{}{} {}\n", isNew ? "\n" : "", hashed(text), text);
-    for (size_t at = 0; at < line.size();) {
-        const ssize_t n = ::write(file_, line.data() + at, line.size() - at);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return ioError(path, "write failed");
-        at += static_cast<size_t>(n);
-    }
-    if (::fdatasync(file_) != 0) return ioError(path, "cannot be made durable");
-    if (active_) return {};
-    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0) return ioError(folder, "cannot open the folder");
-    active_ = ::fsync(fd) == 0 || errno == EINVAL;
-    const int code = errno;
-    ::close(fd);
-    errno = code;
-    return active_ ? Result<void>() : Result<void>(ioError(folder, "cannot make the folder durable"));
+    VCP_TRY(appendAll(file_, std::as_bytes(std::span(line)), path, kWhenTempIsFull));
+    if (::fdatasync(file_) != 0) return systemError(path, "cannot be made durable", errno, kWhenTempIsFull);
+    if (!active_) VCP_TRY(syncFolder(folder));
+    active_ = true;
+    return {};
 }
 
 }  // namespace vcp

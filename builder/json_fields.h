@@ -105,6 +105,16 @@ public:
         return right;
     }
 
+    /// Calls `read` with the fields of every object of an array, as long as nothing is wrong; `where` is then "NAME 3".
+    template <class Read>
+    void each(const char* key, const std::string& name, std::string& where, Read&& read) const {
+        const Json* const objects = array(key);
+        for (size_t i = 0; objects && i < objects->size() && check_.ok(); ++i) {
+            where = name + " " + std::to_string(i);
+            read(JsonFields((*objects)[i], where, check_));
+        }
+    }
+
 private:
     const Json& object_;
     const std::string& where_;

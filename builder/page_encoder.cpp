@@ -7,6 +7,7 @@
 #include <limits>
 #include <unordered_map>
 
+#include "octree/clearance.h"
 #include "octree/leaf_math.h"
 #include "octree/packing.h"
 #include "octree/page.h"
@@ -151,50 +152,16 @@ private:
     std::vector<uint32_t> first_, axis_;
 };
 
-/// Clearances: how far an empty box can grow, in whole cells, before it meets an occupied cell of the page.
-class Clearance {
-public:
-    explicit Clearance(const PageGeometry& geometry) : n_(geometry.cells()) {
-        std::vector<uint64_t> rows(static_cast<size_t>(n_) * n_, 0);
-        for (int z = 0; z < n_; ++z)
-            for (int y = 0; y < n_; ++y)
-                for (int x = 0; x < n_; ++x)
-                    if (geometry.occupied({x, y, z})) rows[static_cast<size_t>(y + n_ * z)] |= uint64_t{1} << x;
-        grown_.push_back(std::move(rows));
-    }
-
-    int of(const NodeBox& box) {
-        const glm::ivec3 low = box.lower / kSubcells;
-        const int edge = box.edge / kSubcells;
-        const uint64_t columns = (edge == 64 ? ~uint64_t{0} : (uint64_t{1} << edge) - 1) << low.x;
-        for (int radius = 0; radius < n_; ++radius) {
-            while (static_cast<int>(grown_.size()) <= radius + 1) grow();
-            const std::vector<uint64_t>& rows = grown_[static_cast<size_t>(radius) + 1];
-            for (int z = low.z; z < low.z + edge; ++z)
-                for (int y = low.y; y < low.y + edge; ++y)
-                    if (rows[static_cast<size_t>(y + n_ * z)] & columns) return radius;
-        }
-        return n_;
-    }
-
-private:
-    /// One more ring of neighbours around the occupied cells.
-    void grow() {
-        const std::vector<uint64_t>& in = grown_.back();
-        const uint64_t all = n_ == 64 ? ~uint64_t{0} : (uint64_t{1} << n_) - 1;
-        std::vector<uint64_t> x(in.size()), y(in.size()), z(in.size());
-        for (size_t i = 0; i < in.size(); ++i) x[i] = (in[i] | in[i] << 1 | in[i] >> 1) & all;
-        const auto at = [&](const std::vector<uint64_t>& rows, int j, int k) { return j < 0 || k < 0 || j >= n_ || k >= n_ ? 0 : rows[static_cast<size_t>(j + n_ * k)]; };
-        for (int k = 0; k < n_; ++k)
-            for (int j = 0; j < n_; ++j) y[static_cast<size_t>(j + n_ * k)] = at(x, j, k) | at(x, j - 1, k) | at(x, j + 1, k);
-        for (int k = 0; k < n_; ++k)
-            for (int j = 0; j < n_; ++j) z[static_cast<size_t>(j + n_ * k)] = at(y, j, k) | at(y, j, k - 1) | at(y, j, k + 1);
-        grown_.push_back(std::move(z));
-    }
-
-    int n_;
-    std::vector<std::vector<uint64_t>> grown_;
-};
+/// The cells of the page that hold a part of the mesh.
+Clearance clearanceOf(const PageGeometry& geometry) {
+    const int n = geometry.cells();
+    Clearance clearance(n);
+    for (int z = 0; z < n; ++z)
+        for (int y = 0; y < n; ++y)
+            for (int x = 0; x < n; ++x)
+                if (geometry.occupied({x, y, z})) clearance.occupy({x, y, z}, 1);
+    return clearance;
+}
 
 /// Triangle records and vertices of the hard leaves.
 class TrianglePacker {
@@ -261,7 +228,7 @@ private:
                        faces_.axis(n.index) << kSoftAxisShift | faces_.firstFace(n.index);
             }
             case TreeNode::Kind::Hard: return triangles_.add(tree_.hard[n.index]);
-            default: return emptyNode(n.box.edge >= kSubcells ? clearance_.of(n.box) : 0);
+            default: return emptyNode(n.box.edge >= kSubcells ? clearance_.of(n.box.lower / kSubcells, n.box.edge / kSubcells) : 0);
         }
     }
 
@@ -288,7 +255,7 @@ EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh
     const bool withColour = !mesh.colours.empty();
     const FacePacker faces(tree, map, geometry, withColour);
     TrianglePacker triangles(geometry, mesh);
-    Clearance clearance(geometry);
+    Clearance clearance = clearanceOf(geometry);
     const NodePacker nodes(tree, faces, triangles, clearance);
 
     EncodedPage page;

@@ -4,43 +4,18 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
+
+#include "octree/durable_file.h"
 
 namespace vcp {
 
 namespace {
 
-Error systemError(const std::filesystem::path& file, const char* what, int code) {
-    std::string message = std::string(what) + ": " + std::generic_category().message(code);
-    if (code == ENOSPC || code == EDQUOT) message += "; free some space, or give --temp a folder with more";
-    return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()};
-}
-
-Result<void> syncFolder(const std::filesystem::path& folder) {
-    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0) return systemError(folder, "cannot open the folder", errno);
-    const bool ok = ::fsync(fd) == 0 || errno == EINVAL;  // some file systems have no fsync of folders
-    const int code = errno;
-    ::close(fd);
-    if (!ok) return systemError(folder, "cannot make the folder durable", code);
-    return {};
-}
+Error tempError(const std::filesystem::path& file, const char* what, int code) { return systemError(file, what, code, kWhenTempIsFull); }
 
 }  // namespace
-
-Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes, const std::filesystem::path& file) {
-    while (!bytes.empty()) {
-        const ssize_t n = ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return systemError(file, "write failed", n == 0 ? EIO : errno);
-        offset += static_cast<uint64_t>(n);
-        bytes = bytes.subspan(static_cast<size_t>(n));
-    }
-    return {};
-}
 
 Result<void> TempSpace::lock() {
     const std::scoped_lock guard(lockMutex_);
@@ -51,19 +26,17 @@ Result<void> TempSpace::take() {
     for (;;) {
         std::error_code failed;
         std::filesystem::create_directories(folder_, failed);
-        if (failed) return systemError(folder_, "cannot make the temporary folder", failed.value());
+        if (failed) return tempError(folder_, "cannot make the temporary folder", failed.value());
         const int fd = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-        if (fd < 0) return systemError(folder_, "cannot open the temporary folder", errno);
-        const bool isHeld = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;  // or a file system without locks
-        // A build that ended may have removed the folder before it was locked here.
-        struct stat opened {}, named {};
-        const bool isSame = ::fstat(fd, &opened) == 0 && ::stat(folder_.c_str(), &named) == 0 && opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
-        if (!isHeld && isSame) {
+        if (fd < 0) return tempError(folder_, "cannot open the temporary folder", errno);
+        const NameLock lock = lockName(fd, folder_);
+        if (lock == NameLock::Taken) {
             lock_ = fd;
-            return syncFolder(folder_.has_parent_path() ? folder_.parent_path() : ".");
+            return syncFolder(folder_.parent_path());
         }
         ::close(fd);
-        if (isHeld) return Error{.code = ErrorCode::Io, .message = "another build of this output is running; wait for it or choose another output", .file = folder_.string()};
+        // Gone: a build that ended has removed the folder.
+        if (lock == NameLock::Held) return Error{.code = ErrorCode::Io, .message = "another build of this output is running; wait for it or choose another output", .file = folder_.string()};
     }
 }
 
@@ -150,12 +123,12 @@ Result<void> TempFile::flush() {
     if (file_ < 0) {
         VCP_TRY(space_.lock());
         file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-        if (file_ < 0) return systemError(path(), "cannot be created", errno);
+        if (file_ < 0) return tempError(path(), "cannot be created", errno);
     }
     uint64_t left = end_ - flushed_;
     for (const auto& piece : tail_) {
         const size_t n = static_cast<size_t>(std::min<uint64_t>(left, kPieceBytes));
-        VCP_TRY(writeAll(file_, flushed_, std::span(piece.get(), n), path()));
+        VCP_TRY(writeAll(file_, flushed_, std::span(piece.get(), n), path(), kWhenTempIsFull));
         flushed_ += n;
         left -= n;
         space_.addDisk(static_cast<int64_t>(n));
@@ -180,7 +153,7 @@ Result<void> TempFile::read(uint64_t offset, std::span<std::byte> bytes) const {
         lock.unlock();
         const ssize_t n = ::pread(file_, bytes.data(), wanted, static_cast<off_t>(offset));
         if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return systemError(path(), "read failed", n == 0 ? EIO : errno);
+        if (n <= 0) return tempError(path(), "read failed", n == 0 ? EIO : errno);
         offset += static_cast<uint64_t>(n);
         bytes = bytes.subspan(static_cast<size_t>(n));
     }
@@ -190,7 +163,7 @@ Result<void> TempFile::read(uint64_t offset, std::span<std::byte> bytes) const {
 Result<void> TempFile::sync() {
     const std::scoped_lock lock(mutex_);
     VCP_TRY(flush());
-    if (::fdatasync(file_) != 0) return systemError(path(), "cannot be made durable", errno);
+    if (::fdatasync(file_) != 0) return tempError(path(), "cannot be made durable", errno);
     if (!isNamed_) VCP_TRY(syncFolder(space_.folder()));
     isNamed_ = true;
     return {};
@@ -198,11 +171,11 @@ Result<void> TempFile::sync() {
 
 Result<void> TempFile::reopen(uint64_t bytes) {
     file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (file_ < 0) return systemError(path(), "cannot be opened", errno);
+    if (file_ < 0) return tempError(path(), "cannot be opened", errno);
     const off_t size = ::lseek(file_, 0, SEEK_END);
     if (size < 0 || static_cast<uint64_t>(size) < bytes)
         return Error{.code = ErrorCode::InvalidInput, .message = "is shorter than the journal says; build again without --resume", .file = path().string()};
-    if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return systemError(path(), "cannot be cut", errno);
+    if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
     flushed_ = end_ = bytes;
     space_.addDisk(static_cast<int64_t>(bytes));
     return {};

@@ -21,6 +21,9 @@ namespace vcp {
 /// The file that journal.h keeps in the folder.
 inline constexpr const char* kJournalName = "journal";
 
+/// What to do about a folder that is full.
+inline constexpr const char* kWhenTempIsFull = "free some space, or give --temp a folder with more";
+
 class TempFile;
 
 /// The folder and its accounts. Outlives its files. Any thread.
@@ -101,8 +104,5 @@ private:
     std::vector<std::unique_ptr<std::byte[]>> tail_;
     mutable std::mutex mutex_;
 };
-
-/// Writes all of `bytes` at `offset`. Errors: Io, naming `file`.
-Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes, const std::filesystem::path& file);
 
 }  // namespace vcp

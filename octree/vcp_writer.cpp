@@ -3,10 +3,9 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "octree/durable_file.h"
 #include "octree/page_codec.h"
 
 namespace vcp {
@@ -16,41 +15,18 @@ namespace {
 uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
 uint64_t directoryBytes(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes; }
 
-Error ioError(const std::filesystem::path& file, const char* what, int error) {
-    std::string message = std::string(what) + ": " + std::strerror(error);
-    if (error == ENOSPC) message += "; free some space or choose another folder";
-    return {.code = ErrorCode::Io, .message = message, .file = file.string()};
-}
-
-Result<void> syncFolder(const std::filesystem::path& file) {
-    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0) return ioError(folder, "cannot open the folder", errno);
-    const bool ok = ::fsync(fd) == 0 || errno == EINVAL;  // some file systems have no fsync of folders
-    const int error = errno;
-    ::close(fd);
-    if (!ok) return ioError(folder, "cannot make the folder durable", error);
-    return {};
-}
-
 /// An empty file of that name, held by this process alone, so that two builds never mix. -1: `error` says why.
 int createAlone(const std::filesystem::path& file, int& error) {
     for (;;) {
         const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
         error = errno;
         if (fd < 0) return -1;
-        const bool isHeld = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-        error = EWOULDBLOCK;
-        // The one who held it may have given it another name or removed it before it was locked here.
-        struct stat opened {}, named {};
-        const bool isSame = ::fstat(fd, &opened) == 0 && ::stat(file.c_str(), &named) == 0 && opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
-        if (!isHeld && isSame && ::ftruncate(fd, 0) == 0) return fd;
-        if (!isHeld && isSame) {
-            error = errno;
-            ::unlink(file.c_str());
-        }
+        const NameLock lock = lockName(fd, file);
+        if (lock == NameLock::Taken && ::ftruncate(fd, 0) == 0) return fd;
+        error = lock == NameLock::Held ? EWOULDBLOCK : errno;
+        if (lock == NameLock::Taken) ::unlink(file.c_str());
         ::close(fd);
-        if (isHeld || isSame) return -1;
+        if (lock != NameLock::Gone) return -1;
     }
 }
 
@@ -78,7 +54,7 @@ Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path
     int error = 0;
     writer->file_ = createAlone(writer->partial_, error);
     if (writer->file_ < 0 && error == EWOULDBLOCK) return Error{.code = ErrorCode::Io, .message = "another build is writing this file", .file = output.string()};
-    if (writer->file_ < 0) return ioError(output, "cannot write here", error);
+    if (writer->file_ < 0) return systemError(output, "cannot write here", error);
     return writer;
 }
 
@@ -88,16 +64,7 @@ VcpWriter::~VcpWriter() {
     ::unlink(partial_.c_str());
 }
 
-Result<void> VcpWriter::write(uint64_t offset, std::span<const std::byte> bytes) {
-    while (!bytes.empty()) {
-        const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return ioError(output_, "write failed", n == 0 ? EIO : errno);
-        offset += static_cast<uint64_t>(n);
-        bytes = bytes.subspan(static_cast<size_t>(n));
-    }
-    return {};
-}
+Result<void> VcpWriter::write(uint64_t offset, std::span<const std::byte> bytes) { return writeAll(file_, offset, bytes, output_); }
 
 Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
     entry.offset = end_;
@@ -145,13 +112,13 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
     commit.directoryHash = hashBytes(directory);
     commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash)));
     // The record is the promise that all else is there: it goes out after the rest is durable.
-    if (::fsync(file_) != 0) return ioError(output_, "cannot make the file durable", errno);
+    if (::fsync(file_) != 0) return systemError(output_, "cannot make the file durable", errno);
     VCP_TRY(write(end_, std::as_bytes(std::span(&commit, 1))));
-    if (::fsync(file_) != 0) return ioError(output_, "cannot make the file durable", errno);
-    if (::rename(partial_.c_str(), output_.c_str()) != 0) return ioError(output_, "cannot rename the finished file", errno);
+    if (::fsync(file_) != 0) return systemError(output_, "cannot make the file durable", errno);
+    if (::rename(partial_.c_str(), output_.c_str()) != 0) return systemError(output_, "cannot rename the finished file", errno);
     ::close(file_);
     file_ = -1;
-    if (auto synced = syncFolder(output_); !synced) {
+    if (auto synced = syncFolder(output_.parent_path()); !synced) {
         Error late = synced.error();
         late.message += "; " + output_.string() + " is complete, but a power failure may undo its name";
         return late;

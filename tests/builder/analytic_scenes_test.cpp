@@ -5,57 +5,27 @@
 #include <cmath>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include "builder/build.h"
 #include "builder/ray_classes.h"
-#include "builder/surface_distance.h"
 #include "octree/reference_caster.h"
-#include "tests/builder/test_meshes.h"
+#include "tests/builder/built_mesh.h"
 
 namespace vcp {
 namespace {
 
-class Scene {
+class Scene : public test::BuiltMesh {
 public:
-    Scene(const IndexedMesh& mesh, double cell) : mesh_(mesh), bvh_(mesh_) {
-        folder_ =
-            std::filesystem::temp_directory_path() /
-            fmt::format("vcp-scene-{}-{}", ::getpid(), ::testing::UnitTest::GetInstance()->current_test_info()->name());
-        std::filesystem::create_directories(folder_);
-        test::writeObj(mesh, folder_ / "mesh.obj");
-        BuildOptions options;
-        options.inputs = {folder_ / "mesh.obj"};
-        options.output = folder_ / "mesh.vcp";
-        options.cell = cell;
-        const auto built = buildOctree(options);
-        EXPECT_TRUE(built.ok()) << built.error().line();
-        if (!built) return;
-        auto cache = PageCache::open(options.output);
-        EXPECT_TRUE(cache.ok()) << cache.error().line();
-        if (!cache) return;
-        cache_ = std::make_unique<PageCache>(std::move(*cache));
-        const auto loaded = cache_->loadAll();
-        EXPECT_TRUE(loaded.ok()) << loaded.error().line();
-    }
-    ~Scene() { std::filesystem::remove_all(folder_); }
-    Scene(const Scene&) = delete;
-    Scene& operator=(const Scene&) = delete;
-
-    [[nodiscard]] bool ok() const { return cache_ != nullptr; }
-    [[nodiscard]] const MeshBvh& bvh() const { return bvh_; }
-    [[nodiscard]] const PageCache& cache() const { return *cache_; }
-    [[nodiscard]] uint32_t levels() const { return cache_->dataset().header.levels; }
+    using BuiltMesh::BuiltMesh;
 
     /// Judges pictures of 8 cameras of a level.
     RayClassTable look(uint32_t level, int pixels, CastOptions options = {}) const {
-        const auto cut = cutAtLevel(cache_->dataset(), level);
-        const auto caster = ReferenceCaster::create(*cache_, cut, options);
+        const auto cut = cutAtLevel(cache().dataset(), level);
+        const auto caster = ReferenceCaster::create(cache(), cut, options);
         EXPECT_TRUE(caster.ok());
-        const double cell = cache_->dataset().cellOf(level);
-        const RayJudge judge(bvh_, cell, cache_->dataset().header.level[level].certifiedError);
-        const glm::dvec3 centre = 0.5 * (bvh_.low() + bvh_.high());
-        const double radius = 0.5 * glm::distance(bvh_.low(), bvh_.high());
+        const double cell = cache().dataset().cellOf(level);
+        const RayJudge judge(bvh(), cell, cache().dataset().header.level[level].certifiedError);
+        const glm::dvec3 centre = 0.5 * (bvh().low() + bvh().high());
+        const double radius = 0.5 * glm::distance(bvh().low(), bvh().high());
         RayClassTable table;
         for (int view = 0; view < 8; ++view) {
             // The first three along axes: rays in the planes of the grid.
@@ -97,21 +67,7 @@ public:
         }
     }
 
-    void expectMeasuredWithinCertified() const {
-        ASSERT_TRUE(ok());
-        SurfaceDistanceOptions options;
-        options.samples = 4000;
-        const auto d = measureSurfaceDistance(*cache_, bvh_, options);
-        ASSERT_TRUE(d.ok()) << d.error().line();
-        EXPECT_LE(d->meshToSurface.max, d->certifiedErrorMax * 1.000001);
-        EXPECT_LE(d->surfaceToMesh.max, d->certifiedErrorMax * 1.000001);
-    }
-
-private:
-    IndexedMesh mesh_;
-    MeshBvh bvh_;
-    std::filesystem::path folder_;
-    std::unique_ptr<PageCache> cache_;
+    void expectMeasuredWithinCertified() const { test::expectWithinCertified(*this, 4000); }
 };
 
 TEST(AnalyticScenes, RotatingSphere) {

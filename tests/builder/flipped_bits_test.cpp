@@ -6,10 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
 #include "octree/vcp_file.h"
-#include "tests/builder/test_meshes.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/builder/built_mesh.h"
 
 namespace vcp {
 namespace {
@@ -34,17 +32,7 @@ private:
     std::string name_ = "flipped.vcp";
 };
 
-std::string built(const IndexedMesh& mesh, double cell) {
-    const TestFolder folder("vcp_flipped_bits_test");
-    test::writeObj(mesh, folder / "mesh.obj");
-    BuildOptions options;
-    options.inputs = {folder / "mesh.obj"};
-    options.output = folder / "mesh.vcp";
-    options.cell = cell;
-    const auto report = buildOctree(options);
-    EXPECT_TRUE(report.ok()) << report.error().line();
-    return contentOf(options.output);
-}
+std::string built(const IndexedMesh& mesh, double cell) { return contentOf(test::BuiltMesh(mesh, cell).file()); }
 
 /// A bit of `bits` that is not found when it is wrong.
 template <class BitOf>

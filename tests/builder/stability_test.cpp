@@ -6,51 +6,14 @@
 
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
 #include "builder/ray_classes.h"
-#include "builder/surface_distance.h"
 #include "octree/reference_caster.h"
-#include "tests/builder/test_meshes.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/builder/built_mesh.h"
 
 namespace vcp {
 namespace {
 
-/// A mesh, built, with all its pages.
-class Built {
-public:
-    Built(const IndexedMesh& mesh, double cell) : mesh_(mesh), bvh_(mesh_) {
-        test::writeObj(mesh, folder_ / "mesh.obj");
-        BuildOptions options;
-        options.inputs = {folder_ / "mesh.obj"};
-        options.output = folder_ / "mesh.vcp";
-        options.cell = cell;
-        options.threads = 2;
-        auto report = buildOctree(options);
-        EXPECT_TRUE(report.ok()) << report.error().line();
-        if (!report) return;
-        report_ = *report;
-        auto cache = PageCache::open(options.output);
-        EXPECT_TRUE(cache.ok()) << cache.error().line();
-        if (!cache) return;
-        cache_ = std::make_unique<PageCache>(std::move(*cache));
-        const auto loaded = cache_->loadAll();
-        EXPECT_TRUE(loaded.ok()) << loaded.error().line();
-    }
-
-    [[nodiscard]] bool ok() const { return cache_ != nullptr; }
-    [[nodiscard]] const PageCache& cache() const { return *cache_; }
-    [[nodiscard]] const BuildReport& report() const { return report_; }
-    [[nodiscard]] const MeshBvh& bvh() const { return bvh_; }
-    [[nodiscard]] uint32_t levels() const { return cache_->dataset().header.levels; }
-
-private:
-    IndexedMesh mesh_;
-    MeshBvh bvh_;
-    TestFolder folder_{"vcp_stability_test"};
-    BuildReport report_;
-    std::unique_ptr<PageCache> cache_;
-};
+using Built = test::BuiltMesh;
 
 struct Ray {
     glm::dvec3 origin, direction;
@@ -105,21 +68,6 @@ std::vector<Ray> raysAt(const Built& built, size_t count, uint64_t seed) {
 // What floats may add where a ray meets a triangle nearly edge-on, of the distance it came.
 constexpr double kFloatSlack = 2e-5;
 
-/// No point of the mesh is farther from the surface than certified, and no point of the surface from the mesh: at
-/// every level.
-void expectClose(const Built& built) {
-    for (uint32_t level = 0; level < built.levels(); ++level) {
-        SCOPED_TRACE(testing::Message() << "level " << level << " of " << built.levels());
-        SurfaceDistanceOptions options;
-        options.samples = 3000;
-        options.level = level;
-        const auto d = measureSurfaceDistance(built.cache(), built.bvh(), options);
-        ASSERT_TRUE(d.ok()) << d.error().line();
-        EXPECT_LE(d->meshToSurface.max, d->certifiedErrorMax * 1.000001);
-        EXPECT_LE(d->surfaceToMesh.max, d->certifiedErrorMax * 1.000001);
-    }
-}
-
 /// `coarsest`: the first level that rays are cast at.
 void expectRight(const Built& built, size_t rays = 6000, uint32_t coarsest = 0) {
     ASSERT_TRUE(built.ok());
@@ -145,7 +93,7 @@ void expectRight(const Built& built, size_t rays = 6000, uint32_t coarsest = 0) 
             EXPECT_GT(table.count(RayClass::Hit), 0u);
         }
     }
-    expectClose(built);
+    test::expectWithinCertified(built, 3000);
 }
 
 void expectRight(const IndexedMesh& mesh, double cell, size_t rays = 6000) { expectRight(Built(mesh, cell), rays); }
@@ -222,8 +170,7 @@ TEST(Stability, NeedlesThinnerThanTheLattice) {
         mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
     const Built built(mesh, 0.03);
-    ASSERT_TRUE(built.ok());
-    expectClose(built);
+    test::expectWithinCertified(built, 3000);
 }
 
 TEST(Stability, SliverFanInASmoothSurface) {

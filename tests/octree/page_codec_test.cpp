@@ -3,29 +3,23 @@
 #include "octree/page_codec.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
-#include <map>
 #include <random>
-#include <set>
 
 #include <gtest/gtest.h>
 
 #include "octree/leaf_triangles.h"
-#include "octree/vertex_normal.h"
 #include "tests/octree/analytic_page.h"
+#include "tests/octree/soup_page.h"
 
 namespace vcp {
 namespace {
 
-using Block = std::vector<uint4>;
+using test::asBytes, test::Block, test::randomColours, test::sheet, test::soup, test::SoupPage, test::WholePage;
+
 constexpr std::byte kPlain{0}, kCoded{1};
-
-std::span<const std::byte> asBytes(const Block& block) { return std::as_bytes(std::span(block)); }
-
-struct WholePage {
-    Block geometry, colour;
-    [[nodiscard]] PageView view() const { return *parsePage(asBytes(geometry), asBytes(colour)); }
-};
 
 /// A vertex with all that belongs to it; triangles as sorted triples of them.
 using Vertex = std::array<uint32_t, 4>;
@@ -108,211 +102,8 @@ void expectRoundTrip(const WholePage& page, std::byte form) {
     expectSamePage(page.view(), unpack(packPage(asBytes(back.geometry), asBytes(back.colour)), page).view());
 }
 
-Block randomColours(const PageView& page, uint32_t seed) {
-    std::mt19937 random(seed);
-    Block colours(colourPageBytes(page.header) / 16, uint4(0));
-    auto* bytes = reinterpret_cast<uint8_t*>(colours.data());
-    const size_t used = size_t{16} * page.header.faces + size_t{4} * page.header.vertices;
-    for (size_t i = 0; i < used; ++i) bytes[i] = static_cast<uint8_t>(i % 4 == 3 ? 255 : 100 + random() % 40);
-    return colours;
-}
-
 WholePage analyticPage(const test::SignedDistanceField& field, uint32_t log2Cells, uint32_t axis) {
     return {test::AnalyticPageBuilder(field, glm::dvec3(0), 1, log2Cells, axis, 0.05f, 3).build().bytes.geometry, {}};
-}
-
-/// Whether a closed triangle touches a closed cube: for certain, or perhaps (clipped with a little room).
-struct Touch {
-    bool certain, perhaps;
-};
-Touch clipped(const std::array<glm::i32vec3, 3>& t, glm::i32vec3 lower, int edge) {
-    const auto meets = [&](double room) {
-        std::vector<glm::dvec3> polygon(t.begin(), t.end());
-        for (int plane = 0; plane < 6 && !polygon.empty(); ++plane) {
-            const int axis = plane / 2;
-            const double side = plane % 2 != 0 ? 1 : -1;
-            const double limit = (side > 0 ? lower[axis] + edge : -lower[axis]) + room;
-            std::vector<glm::dvec3> kept;
-            for (size_t i = 0; i < polygon.size(); ++i) {
-                const glm::dvec3 p = polygon[i], q = polygon[(i + 1) % polygon.size()];
-                const double dp = limit - side * p[axis], dq = limit - side * q[axis];
-                if (dp >= 0) kept.push_back(p);
-                if ((dp >= 0) != (dq >= 0)) kept.push_back(p + (q - p) * (dp / (dp - dq)));
-            }
-            polygon = kept;
-        }
-        return !polygon.empty();
-    };
-    return {meets(-1e-6), meets(1e-6)};
-}
-
-TEST(CubeTest, AgreesWithClipping) {
-    std::mt19937 random(3);
-    size_t touching = 0, apart = 0;
-    for (int i = 0; i < 60000; ++i) {
-        SCOPED_TRACE(i);
-        const int range = 1 << (2 + i % 10);
-        const auto any = [&] { return static_cast<int>(random() % static_cast<unsigned>(2 * range)) - range; };
-        const std::array<glm::i32vec3, 3> t{glm::i32vec3(any(), any(), any()), glm::i32vec3(any(), any(), any()), glm::i32vec3(any(), any(), any())};
-        const glm::i32vec3 lower(any(), any(), any());
-        const int edge = 1 + static_cast<int>(random() % static_cast<unsigned>(range));
-        const Touch expected = clipped(t, lower, edge);
-        // The bounding boxes must overlap.
-        bool boxes = true;
-        for (int axis = 0; axis < 3; ++axis)
-            boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edge && std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
-        if (!boxes) continue;
-        const bool touches = CubeTest(t).touches(lower, edge);
-        ASSERT_TRUE(touches || !expected.certain);
-        ASSERT_TRUE(!touches || expected.perhaps);
-        ++(touches ? touching : apart);
-    }
-    EXPECT_GT(touching, 5000u);
-    EXPECT_GT(apart, 5000u);
-}
-
-TEST(CubeTest, TouchingCounts) {
-    const int e = 256;
-    const glm::i32vec3 o(512, 512, 512);
-    // In the plane of a face; at a corner; along an edge; a step away from each.
-    EXPECT_TRUE(CubeTest({glm::i32vec3(768, 0, 0), {768, 2000, 0}, {768, 0, 2000}}).touches(o, e));
-    EXPECT_FALSE(CubeTest({glm::i32vec3(769, 0, 0), {769, 2000, 0}, {769, 0, 2000}}).touches({513, 512, 512}, 255));
-    EXPECT_TRUE(CubeTest({glm::i32vec3(768 * 3, 0, 0), {0, 768 * 3, 0}, {0, 0, 768 * 3}}).touches(o, e));
-    EXPECT_FALSE(CubeTest({glm::i32vec3(768 * 3 + 1, 0, 0), {0, 768 * 3 + 1, 0}, {0, 0, 768 * 3 + 1}}).touches(o, e));
-    // The largest triangle and page that there may be.
-    const int far = kMaxEdgeSteps;
-    const glm::i32vec3 corner(-far / 2, -far / 2, -far / 2);
-    EXPECT_TRUE(CubeTest({corner, corner + glm::i32vec3(far, far, 0), corner + glm::i32vec3(far, 0, far)}).touches(glm::i32vec3(0), kLatticePerCell << 7));
-}
-
-/// A page with one level of cells or subcells, every leaf hard that a triangle touches.
-class SoupPage {
-public:
-    SoupPage(uint32_t log2Cells, uint32_t depth) : depth_(depth) { header_.log2Cells = log2Cells; }
-
-    uint32_t vertex(glm::i32vec3 p) {
-        positions_.push_back(p);
-        return static_cast<uint32_t>(positions_.size() - 1);
-    }
-    void triangle(uint32_t a, uint32_t b, uint32_t c) { triangles_.push_back({a, b, c}); }
-
-    [[nodiscard]] WholePage build(uint32_t seed) {
-        std::mt19937 random(seed);
-        sums_.assign(positions_.size(), WideVector(0));
-        for (const auto& t : triangles_)
-            for (const uint32_t v : t) addNormal(sums_[v], areaNormal(positions_[t[0]], positions_[t[1]], positions_[t[2]]));
-        std::vector<std::pair<glm::i32vec3, uint32_t>> queue;  // internal nodes, breadth first
-        header_.root = node(glm::i32vec3(0), 0, queue);
-        for (size_t i = 0; i < queue.size(); ++i)
-            for (int o = 0; o < 8; ++o) {
-                const int edge = edgeAt(queue[i].second + 1);
-                nodes_.push_back(node(queue[i].first + edge * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), queue[i].second + 1, queue));
-            }
-        header_.groups = static_cast<uint32_t>(nodes_.size() / 8);
-        header_.triangles = static_cast<uint32_t>(records_.size());
-        header_.vertices = static_cast<uint32_t>(numbers_.size());
-        const PageSections s = pageSections(header_);
-        WholePage page{Block(s.end / 16), {}};
-        auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
-        std::memcpy(out, &header_, sizeof header_);
-        if (!nodes_.empty()) std::memcpy(out + s.nodes, nodes_.data(), nodes_.size() * 4);
-        if (!records_.empty()) std::memcpy(out + s.triangles, records_.data(), records_.size() * 8);
-        auto* vertices = reinterpret_cast<glm::u32vec2*>(out + s.vertices);
-        auto* normals = reinterpret_cast<uint32_t*>(out + s.normals);
-        for (const auto& [v, number] : numbers_) {
-            const glm::i32vec3 p = positions_[v] + kLatticeBias;
-            vertices[number] = pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
-            // As computed, near that, or any at all.
-            NormalGridPoint point = normalGridPoint(sums_[v]);
-            if (random() % 4 == 0) point.u = static_cast<uint32_t>(random() % (kNormalSteps + 1));
-            normals[number] = random() % 8 == 0 ? static_cast<uint32_t>(random()) : packGridNormal(point, random() % 5 == 0);
-        }
-        page.colour = randomColours(*parsePage(asBytes(page.geometry)), seed);
-        return page;
-    }
-
-    bool forgetATriangle = false;  ///< in the first leaf that has two
-
-private:
-    [[nodiscard]] int edgeAt(uint32_t depth) const { return (kLatticePerCell << header_.log2Cells) >> depth; }
-
-    uint32_t node(glm::i32vec3 lower, uint32_t depth, std::vector<std::pair<glm::i32vec3, uint32_t>>& queue) {
-        std::vector<uint32_t> inside;
-        for (uint32_t k = 0; k < triangles_.size(); ++k) {
-            const std::array<glm::i32vec3, 3> t{positions_[triangles_[k][0]], positions_[triangles_[k][1]], positions_[triangles_[k][2]]};
-            bool boxes = true;
-            for (int axis = 0; axis < 3; ++axis)
-                boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edgeAt(depth) && std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
-            if (boxes && CubeTest(t).touches(lower, edgeAt(depth))) inside.push_back(k);
-        }
-        if (inside.empty()) return emptyNode(0.25 * double(depth));
-        if (depth < depth_) {
-            queue.emplace_back(lower, depth);
-            return kNodeInternal << kNodeTypeShift | static_cast<uint32_t>(queue.size() - 1);
-        }
-        ++header_.hardLeaves;
-        if (forgetATriangle && inside.size() > 1) {
-            inside.pop_back();
-            forgetATriangle = false;
-        }
-        const uint32_t first = static_cast<uint32_t>(records_.size()), count = static_cast<uint32_t>(inside.size());
-        if (count >= kHardCountLong) records_.emplace_back(count, 0u);
-        for (const uint32_t k : inside) {
-            uint32_t v[3];
-            for (size_t i = 0; i < 3; ++i) v[i] = numbers_.try_emplace(triangles_[k][i], static_cast<uint32_t>(numbers_.size())).first->second;
-            records_.push_back(pack21(v[0], v[1], v[2]));
-        }
-        return kNodeHard << kNodeTypeShift | std::min(count, kHardCountLong) << kHardCountShift | first;
-    }
-
-    PageHeader header_;
-    uint32_t depth_;
-    std::vector<glm::i32vec3> positions_;
-    std::vector<std::array<uint32_t, 3>> triangles_;
-    std::vector<WideVector> sums_;
-    std::vector<uint32_t> nodes_;
-    std::vector<glm::u32vec2> records_;
-    std::map<uint32_t, uint32_t> numbers_;  ///< of vertices in the page
-};
-
-glm::i32vec3 randomPoint(std::mt19937& random, int edge) {
-    const auto any = [&] { return static_cast<int>(random() % static_cast<unsigned>(edge)); };
-    return {any(), any(), any()};
-}
-
-/// Triangles anywhere, many of which share vertices: borders, fans, edges of three and more.
-SoupPage soup(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_t vertices, uint32_t triangles) {
-    std::mt19937 random(seed);
-    SoupPage page(log2Cells, depth);
-    const int edge = kLatticePerCell << log2Cells;
-    for (uint32_t i = 0; i < vertices; ++i) page.vertex(randomPoint(random, edge + edge / 4) - edge / 8);
-    std::set<std::array<uint32_t, 3>> made;
-    while (made.size() < triangles) {
-        std::array<uint32_t, 3> v;
-        for (uint32_t& at : v) at = static_cast<uint32_t>(random() % vertices);
-        std::array<uint32_t, 3> sorted = v;
-        std::sort(sorted.begin(), sorted.end());
-        if (sorted[0] == sorted[1] || sorted[1] == sorted[2] || !made.insert(sorted).second) continue;
-        page.triangle(v[0], v[1], v[2]);
-    }
-    return page;
-}
-
-/// A bumpy sheet of n x n squares with holes, in both windings.
-SoupPage sheet(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_t n) {
-    std::mt19937 random(seed);
-    SoupPage page(log2Cells, depth);
-    const int edge = kLatticePerCell << log2Cells;
-    for (uint32_t y = 0; y <= n; ++y)
-        for (uint32_t x = 0; x <= n; ++x)
-            page.vertex({static_cast<int>(x) * edge / static_cast<int>(n), static_cast<int>(y) * edge / static_cast<int>(n), edge / 2 + static_cast<int>(random() % 300)});
-    for (uint32_t y = 0; y < n; ++y)
-        for (uint32_t x = 0; x < n; ++x) {
-            const uint32_t a = x + (n + 1) * y, b = a + 1, c = a + n + 1, d = c + 1;
-            if (random() % 9 != 0) page.triangle(a, b, c);
-            if (random() % 9 != 0) random() % 2 == 0 ? page.triangle(b, d, c) : page.triangle(c, d, b);
-        }
-    return page;
 }
 
 TEST(PageCodec, SoftPagesComeBack) {
@@ -468,39 +259,6 @@ TEST(PageCodec, HostileBytesAreHarmless) {
             if (!bytes.empty()) bytes[0] = kCoded;
             decodes(bytes, page);
         }
-    }
-}
-
-TEST(VertexNormal, GridPointsComeBackAndAreNear) {
-    std::mt19937 random(9);
-    for (int i = 0; i < 20000; ++i) {
-        SCOPED_TRACE(i);
-        const int bits = 1 + i % 40;
-        const auto any = [&] { return static_cast<int64_t>(random() | uint64_t{random()} << 32) >> (63 - bits); };
-        const WideVector sum(any(), any(), any());
-        if (sum == WideVector(0)) continue;
-        const bool crease = i % 2 != 0;
-        const NormalGridPoint point = normalGridPoint(sum), turned = normalGridPoint(-sum);
-        const uint32_t code = packGridNormal(point, crease);
-        NormalGridPoint back{};
-        ASSERT_TRUE(gridPointOf(code, back));
-        ASSERT_EQ(back.u, point.u);
-        ASSERT_EQ(back.v, point.v);
-        ASSERT_EQ(turned.u, point.u) << "a normal has no side";
-        ASSERT_EQ(turned.v, point.v);
-        ASSERT_EQ((code & kNormalCreaseBit) != 0, crease);
-        const glm::dvec3 n = glm::normalize(glm::dvec3(sum)), m = f64::decodeNormal(code);
-        ASSERT_LT(glm::length(glm::cross(n, m)), 0.00122) << "0.07 degrees";
-    }
-}
-
-TEST(VertexNormal, CreasesTurnByFortyDegrees) {
-    for (const int degrees : {0, 10, 38, 42, 80, 138, 142, 180}) {
-        const double a = degrees * 3.14159265358979 / 180;
-        const WideVector sum(0, 0, 1 << 20);
-        const WideVector normal(static_cast<int64_t>(std::sin(a) * 1e6), 0, static_cast<int64_t>(std::cos(a) * 1e6));
-        const std::vector<std::array<uint32_t, 3>> triangles{{0, 0, 0}};
-        EXPECT_EQ(creases(std::span(&normal, 1), std::span(&sum, 1), triangles)[0] != 0, degrees > 40 && degrees < 140) << degrees;
     }
 }
 

@@ -1,8 +1,8 @@
 // vcp bench build from the outside: the rows that programs rely on, and that they agree with each other.
-#include <cstdio>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <memory>
+#include <iterator>
 #include <set>
 #include <sstream>
 #include <string>
@@ -10,9 +10,8 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sys/wait.h>
 
-#include "test_folder.h"
+#include "vcp_program.h"
 
 namespace vcp {
 namespace {
@@ -20,26 +19,13 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-struct Ran {
-    int status = -1;
-    std::string out, err;
-};
-
 class BenchBuild : public testing::Test {
 protected:
     BenchBuild() : folder_("vcp_bench_build_test"), ball_((folder_ / "ball.ply").string()) { writeBall(ball_, 30, 60); }
 
     [[nodiscard]] Ran run(const std::string& arguments) const {
-        const std::string err = (folder_ / "err").string();
-        const std::string command = std::string(VCP_EXECUTABLE) + " bench build " + arguments + " 2>" + err;
-        Ran ran;
-        std::FILE* pipe = ::popen(command.c_str(), "r");
-        if (!pipe) return ran;
-        char buffer[4096];
-        while (const size_t count = std::fread(buffer, 1, sizeof(buffer), pipe)) ran.out.append(buffer, count);
-        ran.status = WEXITSTATUS(::pclose(pipe));
-        ran.err = contentOf(err);
-        return ran;
+        std::istringstream words("bench build " + arguments);
+        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
     }
 
     static constexpr const char* kQuick = " --repetitions 1 --samples 500 --json";
@@ -142,7 +128,7 @@ TEST_F(BenchBuild, AModelThatFailsDoesNotTakeTheOthersAlong) {
     const Ran ran = run(broken + " " + ball_ + kQuick);
     EXPECT_EQ(ran.status, 1);
     EXPECT_NE(ran.err.find("broken.ply"), std::string::npos) << ran.err;
-    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << ran.err;
+    EXPECT_EQ(ran.errLines(), 1u) << ran.err;
     const Json rows = Json::parse(ran.out)["rows"];
     ASSERT_EQ(rows.size(), 1u);
     expectRow(rows[0]);
@@ -153,7 +139,7 @@ TEST_F(BenchBuild, WrongUsageEndsWith2) {
     for (const std::string wrong : {"", "--generated 10", "--generated 1.5", "--generated 2G", "--errors 0", "--errors x", "--memory 0", "--samples -1"}) {
         const Ran ran = run((wrong.starts_with("--gen") ? "" : wrong.empty() ? "" : ball_ + " ") + wrong);
         EXPECT_EQ(ran.status, 2) << wrong;
-        EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << ran.err;
+        EXPECT_EQ(ran.errLines(), 1u) << ran.err;
     }
 }
 

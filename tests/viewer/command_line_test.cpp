@@ -1,8 +1,6 @@
 // The executable as people and scripts meet it: exit status, stdout, stderr, files.
-#include <algorithm>
 #include <cctype>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -10,28 +8,18 @@
 #include <string>
 #include <vector>
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "render/renderer.h"
-#include "test_folder.h"
+#include "vcp_program.h"
 
 namespace vcp {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-struct Ran {
-    int status = -1;
-    std::string out, err;
-
-    [[nodiscard]] size_t errLines() const { return static_cast<size_t>(std::count(err.begin(), err.end(), '\n')); }
-};
 
 class CommandLine : public testing::Test {
 protected:
@@ -53,40 +41,8 @@ protected:
         return file;
     }
 
-    /// Starts `vcp`; the caller waits for it.
-    static pid_t start(const std::vector<std::string>& arguments, const std::string& out = "out", bool smallFiles = false) {
-        const fs::path outFile = out[0] == '/' ? fs::path(out) : *folder_ / out, errFile = *folder_ / "err";
-        const pid_t child = fork();
-        if (child != 0) return child;
-        dup2(open(outFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
-        dup2(open(errFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
-        setenv("XDG_CACHE_HOME", (*folder_ / "cache").c_str(), 1);
-        unsetenv("DISPLAY");
-        unsetenv("WAYLAND_DISPLAY");
-        if (smallFiles) {
-            // Writes beyond 8 KiB fail, as on a full disk.
-            std::signal(SIGXFSZ, SIG_IGN);
-            const rlimit limit{8192, 8192};
-            setrlimit(RLIMIT_FSIZE, &limit);
-        }
-        std::vector<char*> argv = {const_cast<char*>("vcp")};
-        for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-        argv.push_back(nullptr);
-        execv(VCP_EXECUTABLE, argv.data());
-        _exit(127);
-    }
-
-    static Ran wait(pid_t child) {
-        Ran ran;
-        int status = 0;
-        waitpid(child, &status, 0);
-        ran.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
-        ran.out = contentOf(*folder_ / "out");
-        ran.err = contentOf(*folder_ / "err");
-        return ran;
-    }
-
-    static Ran run(const std::vector<std::string>& arguments) { return wait(start(arguments)); }
+    static VcpProgram program() { return VcpProgram(*folder_); }
+    static Ran run(const std::vector<std::string>& arguments) { return program().run(arguments); }
 
     /// One line on stderr that names `named`; nothing on stdout; the status.
     static void expectFailure(const Ran& ran, int status, const std::string& named) {
@@ -370,12 +326,12 @@ TEST_F(CommandLine, UnwritableOutputs) {
 TEST_F(CommandLine, FullDiskLeavesNothingHalfWritten) {
     dataset();
     const fs::path file = *folder_ / "full.vcp", png = *folder_ / "full.png";
-    expectFailure(wait(start({"build", ball().string(), "-o", file.string()}, "out", true)), 1, "full.vcp");
+    expectFailure(program().wait(program().start({"build", ball().string(), "-o", file.string()}, "stdout", true)), 1, "full.vcp");
     EXPECT_FALSE(fs::exists(file));
     EXPECT_FALSE(fs::exists(file.string() + ".partial"));
     if (!hasDevice()) return;
     const fs::path depth = *folder_ / "full.pfm";
-    expectFailure(wait(start({"render", dataset().string(), "-o", png.string(), "--depth", depth.string(), "--size", "300x200"}, "out", true)), 1, "full.");
+    expectFailure(program().wait(program().start({"render", dataset().string(), "-o", png.string(), "--depth", depth.string(), "--size", "300x200"}, "stdout", true)), 1, "full.");
     EXPECT_FALSE(fs::exists(png));
     EXPECT_FALSE(fs::exists(depth));
     EXPECT_FALSE(fs::exists(depth.string() + ".partial"));
@@ -383,7 +339,7 @@ TEST_F(CommandLine, FullDiskLeavesNothingHalfWritten) {
 
 TEST_F(CommandLine, FullStandardOutputIsAFailure) {
     if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
-    const Ran ran = wait(start({"info", dataset().string()}, "/dev/full"));
+    const Ran ran = program().wait(program().start({"info", dataset().string()}, "/dev/full"));
     EXPECT_EQ(ran.status, 1);
     EXPECT_NE(ran.err.find("standard output"), std::string::npos) << ran.err;
 }
@@ -391,10 +347,10 @@ TEST_F(CommandLine, FullStandardOutputIsAFailure) {
 TEST_F(CommandLine, InterruptedBuildLeavesNothing) {
     const fs::path big = *folder_ / "big.ply", file = *folder_ / "big.vcp";
     writeBall(big, 500, 1000);
-    const pid_t child = start({"build", big.string(), "-o", file.string(), "--threads", "1"});
+    const pid_t child = program().start({"build", big.string(), "-o", file.string(), "--threads", "1"});
     usleep(300'000);
     kill(child, SIGINT);
-    const Ran ran = wait(child);
+    const Ran ran = program().wait(child);
     EXPECT_EQ(ran.status, 1) << "a build of a million triangles took less than the test waits";
     EXPECT_FALSE(fs::exists(file));
     EXPECT_FALSE(fs::exists(file.string() + ".partial"));

@@ -1,0 +1,108 @@
+#include "builder/dataset_assembly.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "octree/page.h"
+#include "octree/vcp_writer.h"
+
+namespace vcp {
+
+namespace {
+
+/// A page that only leads to finer ones: the surface moved out of it when the level was made.
+StoredPage passagePage(uint32_t log2Cells) {
+    PageHeader header;
+    header.log2Cells = log2Cells;
+    header.root = emptyNode(0);
+    return compressPage(std::as_bytes(std::span(&header, 1)), {});
+}
+
+/// Every page gets a parent. A passage's entry has no leaves.
+void addPassages(std::deque<PageSpool>& levels) {
+    const auto byMorton = [](const PageEntry& a, const PageEntry& b) { return a.morton < b.morton; };
+    for (size_t level = levels.size() - 1; level > 0; --level) {
+        std::vector<PageEntry>& parents = levels[level - 1].entries();
+        std::vector<PageEntry> missing;
+        for (const PageEntry& page : levels[level].entries()) {
+            PageEntry passage;
+            passage.morton = page.morton >> 3;
+            passage.level = static_cast<uint8_t>(level - 1);
+            if (!missing.empty() && missing.back().morton == passage.morton) continue;
+            if (!std::binary_search(parents.begin(), parents.end(), passage, byMorton)) missing.push_back(passage);
+        }
+        parents.insert(parents.end(), missing.begin(), missing.end());
+        std::sort(parents.begin(), parents.end(), byMorton);
+    }
+}
+
+/// Every parent knows its children.
+void linkChildren(std::deque<PageSpool>& levels) {
+    uint64_t first = levels[0].entries().size();
+    for (size_t level = 0; level + 1 < levels.size(); ++level) {
+        size_t child = 0;
+        const std::vector<PageEntry>& children = levels[level + 1].entries();
+        for (PageEntry& page : levels[level].entries()) {
+            page.firstChild = static_cast<uint32_t>(first + child);
+            for (; child < children.size() && children[child].morton >> 3 == page.morton; ++child)
+                page.childMask |= static_cast<uint8_t>(1u << (children[child].morton & 7));
+            if (page.childMask == 0) page.firstChild = 0;
+        }
+        first += children.size();
+    }
+}
+
+void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
+    header.levels = static_cast<uint32_t>(levels.size());
+    header.pages = 0;
+    for (size_t level = 0; level < levels.size(); ++level) {
+        LevelRow& row = header.level[level];
+        row.firstEntry = header.pages;
+        row.pages = levels[level].entries().size();
+        for (const PageEntry& page : levels[level].entries()) row.certifiedError = std::max(row.certifiedError, double(page.certifiedError));
+        header.pages += row.pages;
+    }
+    header.certifiedErrorMax = header.level[levels.size() - 1].certifiedError;
+    for (const PageEntry& entry : levels.back().entries()) {
+        header.leaves += entry.leaves;
+        header.hardLeaves += entry.hardLeaves;
+    }
+}
+
+}  // namespace
+
+FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double errorTarget, bool hasColour) {
+    FileHeader header;
+    for (int i = 0; i < 3; ++i) {
+        header.origin[i] = frame.origin[i];
+        header.boundsMin[i] = measures.boundsMin[i];
+        header.boundsMax[i] = measures.boundsMax[i];
+    }
+    header.cell = frame.cell;
+    header.log2Cells = frame.log2Cells;
+    header.errorTarget = errorTarget;
+    header.triangles = measures.triangles;
+    header.degenerateTriangles = measures.degenerateTriangles;
+    header.vertices = measures.vertices;
+    header.flags = hasColour ? kFlagColour : 0;
+    return header;
+}
+
+Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output, const std::function<bool(double)>& progress) {
+    addPassages(levels);
+    linkChildren(levels);
+    describeLevels(levels, header);
+    auto writer = VcpWriter::create(output, header.pages);
+    if (!writer) return writer.error();
+    uint64_t done = 0;
+    for (const PageSpool& level : levels)
+        for (const PageEntry& entry : level.entries()) {
+            auto page = entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passagePage(header.log2Cells));
+            if (!page) return page.error();
+            VCP_TRY((*writer)->append(entry, *page));
+            if (!progress(double(++done) / double(header.pages + 1))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = output.string()};
+        }
+    return (*writer)->commit(header);
+}
+
+}  // namespace vcp

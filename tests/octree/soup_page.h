@@ -1,0 +1,168 @@
+// Pages of hard leaves from any triangles, for tests of what codes them.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+#include <random>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "octree/leaf_triangles.h"
+#include "octree/page.h"
+#include "octree/vertex_normal.h"
+
+namespace vcp::test {
+
+using Block = std::vector<uint4>;
+
+inline std::span<const std::byte> asBytes(const Block& block) { return std::as_bytes(std::span(block)); }
+
+struct WholePage {
+    Block geometry, colour;
+    [[nodiscard]] PageView view() const { return *parsePage(asBytes(geometry), asBytes(colour)); }
+};
+
+inline Block randomColours(const PageView& page, uint32_t seed) {
+    std::mt19937 random(seed);
+    Block colours(colourPageBytes(page.header) / 16, uint4(0));
+    auto* bytes = reinterpret_cast<uint8_t*>(colours.data());
+    const size_t used = size_t{16} * page.header.faces + size_t{4} * page.header.vertices;
+    for (size_t i = 0; i < used; ++i) bytes[i] = static_cast<uint8_t>(i % 4 == 3 ? 255 : 100 + random() % 40);
+    return colours;
+}
+
+/// A page with one level of cells or subcells, every leaf hard that a triangle touches.
+class SoupPage {
+public:
+    SoupPage(uint32_t log2Cells, uint32_t depth) : depth_(depth) { header_.log2Cells = log2Cells; }
+
+    uint32_t vertex(glm::i32vec3 p) {
+        positions_.push_back(p);
+        return static_cast<uint32_t>(positions_.size() - 1);
+    }
+    void triangle(uint32_t a, uint32_t b, uint32_t c) { triangles_.push_back({a, b, c}); }
+
+    [[nodiscard]] WholePage build(uint32_t seed) {
+        std::mt19937 random(seed);
+        sums_.assign(positions_.size(), WideVector(0));
+        for (const auto& t : triangles_)
+            for (const uint32_t v : t) addNormal(sums_[v], areaNormal(positions_[t[0]], positions_[t[1]], positions_[t[2]]));
+        std::vector<std::pair<glm::i32vec3, uint32_t>> queue;  // internal nodes, breadth first
+        header_.root = node(glm::i32vec3(0), 0, queue);
+        for (size_t i = 0; i < queue.size(); ++i)
+            for (int o = 0; o < 8; ++o) {
+                const int edge = edgeAt(queue[i].second + 1);
+                nodes_.push_back(node(queue[i].first + edge * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), queue[i].second + 1, queue));
+            }
+        header_.groups = static_cast<uint32_t>(nodes_.size() / 8);
+        header_.triangles = static_cast<uint32_t>(records_.size());
+        header_.vertices = static_cast<uint32_t>(numbers_.size());
+        const PageSections s = pageSections(header_);
+        WholePage page{Block(s.end / 16), {}};
+        auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
+        std::memcpy(out, &header_, sizeof header_);
+        if (!nodes_.empty()) std::memcpy(out + s.nodes, nodes_.data(), nodes_.size() * 4);
+        if (!records_.empty()) std::memcpy(out + s.triangles, records_.data(), records_.size() * 8);
+        auto* vertices = reinterpret_cast<glm::u32vec2*>(out + s.vertices);
+        auto* normals = reinterpret_cast<uint32_t*>(out + s.normals);
+        for (const auto& [v, number] : numbers_) {
+            const glm::i32vec3 p = positions_[v] + kLatticeBias;
+            vertices[number] = pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
+            // As computed, near that, or any at all.
+            NormalGridPoint point = normalGridPoint(sums_[v]);
+            if (random() % 4 == 0) point.u = static_cast<uint32_t>(random() % (kNormalSteps + 1));
+            normals[number] = random() % 8 == 0 ? static_cast<uint32_t>(random()) : packGridNormal(point, random() % 5 == 0);
+        }
+        page.colour = randomColours(*parsePage(asBytes(page.geometry)), seed);
+        return page;
+    }
+
+    bool forgetATriangle = false;  ///< in the first leaf that has two
+
+private:
+    [[nodiscard]] int edgeAt(uint32_t depth) const { return (kLatticePerCell << header_.log2Cells) >> depth; }
+
+    uint32_t node(glm::i32vec3 lower, uint32_t depth, std::vector<std::pair<glm::i32vec3, uint32_t>>& queue) {
+        std::vector<uint32_t> inside;
+        for (uint32_t k = 0; k < triangles_.size(); ++k) {
+            const std::array<glm::i32vec3, 3> t{positions_[triangles_[k][0]], positions_[triangles_[k][1]], positions_[triangles_[k][2]]};
+            bool boxes = true;
+            for (int axis = 0; axis < 3; ++axis)
+                boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edgeAt(depth) && std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
+            if (boxes && CubeTest(t).touches(lower, edgeAt(depth))) inside.push_back(k);
+        }
+        if (inside.empty()) return emptyNode(0.25 * double(depth));
+        if (depth < depth_) {
+            queue.emplace_back(lower, depth);
+            return kNodeInternal << kNodeTypeShift | static_cast<uint32_t>(queue.size() - 1);
+        }
+        ++header_.hardLeaves;
+        if (forgetATriangle && inside.size() > 1) {
+            inside.pop_back();
+            forgetATriangle = false;
+        }
+        const uint32_t first = static_cast<uint32_t>(records_.size()), count = static_cast<uint32_t>(inside.size());
+        if (count >= kHardCountLong) records_.emplace_back(count, 0u);
+        for (const uint32_t k : inside) {
+            uint32_t v[3];
+            for (size_t i = 0; i < 3; ++i) v[i] = numbers_.try_emplace(triangles_[k][i], static_cast<uint32_t>(numbers_.size())).first->second;
+            records_.push_back(pack21(v[0], v[1], v[2]));
+        }
+        return kNodeHard << kNodeTypeShift | std::min(count, kHardCountLong) << kHardCountShift | first;
+    }
+
+    PageHeader header_;
+    uint32_t depth_;
+    std::vector<glm::i32vec3> positions_;
+    std::vector<std::array<uint32_t, 3>> triangles_;
+    std::vector<WideVector> sums_;
+    std::vector<uint32_t> nodes_;
+    std::vector<glm::u32vec2> records_;
+    std::map<uint32_t, uint32_t> numbers_;  ///< of vertices in the page
+};
+
+inline glm::i32vec3 randomPoint(std::mt19937& random, int edge) {
+    const auto any = [&] { return static_cast<int>(random() % static_cast<unsigned>(edge)); };
+    return {any(), any(), any()};
+}
+
+/// Triangles anywhere, many of which share vertices: borders, fans, edges of three and more.
+inline SoupPage soup(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_t vertices, uint32_t triangles) {
+    std::mt19937 random(seed);
+    SoupPage page(log2Cells, depth);
+    const int edge = kLatticePerCell << log2Cells;
+    for (uint32_t i = 0; i < vertices; ++i) page.vertex(randomPoint(random, edge + edge / 4) - edge / 8);
+    std::set<std::array<uint32_t, 3>> made;
+    while (made.size() < triangles) {
+        std::array<uint32_t, 3> v;
+        for (uint32_t& at : v) at = static_cast<uint32_t>(random() % vertices);
+        std::array<uint32_t, 3> sorted = v;
+        std::sort(sorted.begin(), sorted.end());
+        if (sorted[0] == sorted[1] || sorted[1] == sorted[2] || !made.insert(sorted).second) continue;
+        page.triangle(v[0], v[1], v[2]);
+    }
+    return page;
+}
+
+/// A bumpy sheet of n x n squares with holes, in both windings.
+inline SoupPage sheet(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_t n) {
+    std::mt19937 random(seed);
+    SoupPage page(log2Cells, depth);
+    const int edge = kLatticePerCell << log2Cells;
+    for (uint32_t y = 0; y <= n; ++y)
+        for (uint32_t x = 0; x <= n; ++x)
+            page.vertex({static_cast<int>(x) * edge / static_cast<int>(n), static_cast<int>(y) * edge / static_cast<int>(n), edge / 2 + static_cast<int>(random() % 300)});
+    for (uint32_t y = 0; y < n; ++y)
+        for (uint32_t x = 0; x < n; ++x) {
+            const uint32_t a = x + (n + 1) * y, b = a + 1, c = a + n + 1, d = c + 1;
+            if (random() % 9 != 0) page.triangle(a, b, c);
+            if (random() % 9 != 0) random() % 2 == 0 ? page.triangle(b, d, c) : page.triangle(c, d, b);
+        }
+    return page;
+}
+
+}  // namespace vcp::test
