@@ -177,6 +177,7 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
                      .message = fmt::format("a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; use --cell {:g} or larger", frame.cell, longest,
                                             longest / kMaxExtentCells),
                      .file = nameOf(options)};
+    if (longest * kLatticePerCell < frame.cell) return badInput(options, fmt::format("all of it is smaller than 1/{} cell; use a smaller --cell", kLatticePerCell));
     const double cellsAcross = longest / frame.cell + 2;
     while (std::ldexp(1.0, static_cast<int>(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
     frame.origin = m.boundsMin - glm::dvec3(frame.cell);
