@@ -95,10 +95,14 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
     codePage(coder, page);
     if (page.wrong) return plainly();
     PackedPage packed{coded(coder), {}};
+    // What does not come back as it was is not written: a day's build is worth more than the time to look.
+    const auto again = unpackGeometry(packed.geometry, geometry.size());
+    if (!again || std::memcmp(again->data(), page.block.data(), geometry.size()) != 0) return plainly();
     if (colour.empty()) return packed;
     const auto view = parsePage(std::as_bytes(std::span(page.block)));
     packed.colour = packColour(colour, page, *view);
-    return packed;
+    const auto colourAgain = unpackColour(packed.colour, colour.size(), *view);
+    return colourAgain ? packed : plainly();
 }
 
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {

@@ -59,6 +59,9 @@ struct SymbolModel {
     }
 };
 
+/// Zero bytes at the end that are not stored, at most.
+inline constexpr size_t kSparedZeros = 8;
+
 class RangeEncoder {
 public:
     static constexpr bool kEncodes = true;
@@ -89,8 +92,8 @@ public:
     void finish(std::vector<std::byte>& out) {
         if (rawCount_ > 0) raw_.push_back(static_cast<std::byte>(rawBits_ & 255u));
         for (int i = 0; i < 5; ++i) shiftLow();
-        // The decoder takes bytes past the end for zero.
-        while (!bytes_.empty() && bytes_.back() == std::byte{0}) bytes_.pop_back();
+        // The decoder takes some bytes past the end for zero.
+        for (size_t i = 0; i < kSparedZeros && !bytes_.empty() && bytes_.back() == std::byte{0}; ++i) bytes_.pop_back();
         for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::byte>(raw_.size() >> shift & 255u));
         out.insert(out.end(), raw_.begin(), raw_.end());
         out.insert(out.end(), bytes_.begin(), bytes_.end());
@@ -169,7 +172,7 @@ public:
         rawCount_ -= count;
     }
     /// Whether exactly the bytes that there were have been used.
-    [[nodiscard]] bool complete() const { return !torn_ && rawAt_ == raw_.size() && at_ >= bytes_.size() && at_ <= bytes_.size() + 8; }
+    [[nodiscard]] bool complete() const { return !torn_ && rawAt_ == raw_.size() && at_ >= bytes_.size() && at_ <= bytes_.size() + kSparedZeros; }
 
 private:
     uint32_t next() {
