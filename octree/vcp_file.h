@@ -123,6 +123,8 @@ public:
     virtual Result<void> read(uint64_t offset, std::span<std::byte> bytes) const = 0;
     [[nodiscard]] virtual uint64_t size() const = 0;
     [[nodiscard]] virtual const std::string& name() const = 0;
+    /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
+    virtual void interrupt() const {}
 };
 
 /// Opens a local file for bounded reads (pread). Errors: Io.
