@@ -29,6 +29,7 @@ BOUNDARY = "4d2f"
 
 class Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
     folder = "."
     count = 0
     good = {}
