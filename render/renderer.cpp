@@ -190,6 +190,10 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
     }
 }
 
+void Renderer::waitForPage(std::chrono::milliseconds timeout) {
+    if (state_->residency) state_->residency->waitForPage(timeout);
+}
+
 PassConstants Renderer::State::constantsFor(const FrameRequest& request) const {
     PassConstants c;
     c.access = access;

@@ -16,6 +16,7 @@
 // same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -162,6 +163,10 @@ public:
     /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
     /// returns true (asked several times a second).
     Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
+
+    /// Waits until the loader has read a page, has nothing to do, or the time is over: between updates, where a
+    /// host has nothing else to do. Other calls never wait for reads.
+    void waitForPage(std::chrono::milliseconds timeout);
 
     /// Draws the cut of the last update and waits for the GPU. Without a dataset: background.
     Result<FrameStats> render(const FrameRequest& request);
