@@ -6,6 +6,7 @@
 #include "builder/surface_distance.h"
 #include "octree/vcp_file.h"
 #include "streaming/http_reader.h"
+#include "streaming/read_ahead.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
@@ -131,7 +132,8 @@ Result<int> run(const VerifyCommand& command) {
     const InterruptScope catching;
     const auto reader = openReader(command.file, command.source);
     if (!reader) return reader.error();
-    const auto dataset = checkBytes(**reader, command.report.progressStyle());
+    const ReadAhead ahead(*reader);
+    const auto dataset = checkBytes(ahead, command.report.progressStyle());
     if (!dataset) return broken(command, dataset.error());
 
     Json json = {{"ok", true}, {"pages", dataset->header.pages}, {"bytes", dataset->header.fileBytes}};

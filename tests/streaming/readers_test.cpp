@@ -8,6 +8,7 @@
 #include "streaming/caching_reader.h"
 #include "streaming/faulty_reader.h"
 #include "streaming/page_source.h"
+#include "streaming/read_ahead.h"
 #include "tests/streaming/test_files.h"
 #include "tests/viewer/test_folder.h"
 
@@ -178,6 +179,22 @@ TEST(CachingReader, DamagedAndDistrustedBlocksAreReadAgain) {
     EXPECT_EQ(file->bytesRead(), 2 * file->size() + kCacheBlockBytes);
     fs::permissions(folder.path(), fs::perms::owner_all);
     EXPECT_EQ(CachingReader::open(file, "a", "/dev/null/x", 1).error().code, ErrorCode::Io);
+}
+
+TEST(ReadAhead, SmallStepsAreFewReads) {
+    const auto file = std::make_shared<CountingBytes>(100003);
+    const ReadAhead ahead(file, 10000);
+    for (uint64_t at = 0; at < file->size();) {
+        const uint64_t size = std::min<uint64_t>(at % 700, file->size() - at);
+        const auto bytes = bytesAt(ahead, at, size);
+        ASSERT_TRUE(bytes);
+        EXPECT_TRUE(isRight(*bytes, at));
+        at += size + 1;
+    }
+    EXPECT_LE(file->reads, 12u);
+    EXPECT_TRUE(isRight(*bytesAt(ahead, 500, 20000), 500)) << "back, and more than a piece";
+    EXPECT_FALSE(bytesAt(ahead, file->size() - 3, 4));
+    EXPECT_FALSE(bytesAt(ahead, file->size() + 3, 4));
 }
 
 /// Counts reads of a real file.
