@@ -93,7 +93,6 @@ public:
     [[nodiscard]] PoolSlot slotOf(uint64_t page) const { return slots_.at(page).slot; }
     [[nodiscard]] uint64_t unitsTaken() const { return allocator_.unitsTaken(); }
     [[nodiscard]] size_t pagesResident() const { return slots_.size(); }
-    [[nodiscard]] bool moves() const { return moving_; }
     [[nodiscard]] const PolicyCounts& counts() const { return counts_; }
 
 private:
