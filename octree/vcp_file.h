@@ -123,6 +123,10 @@ public:
     virtual Result<void> read(uint64_t offset, std::span<std::byte> bytes) const = 0;
     [[nodiscard]] virtual uint64_t size() const = 0;
     [[nodiscard]] virtual const std::string& name() const = 0;
+    /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
+    virtual void interrupt() const {}
+    /// What read() gave for these bytes proved wrong: a copy of them is not used again.
+    virtual void distrust(uint64_t offset, uint64_t bytes) const { static_cast<void>(offset), static_cast<void>(bytes); }
 };
 
 /// Opens a local file for bounded reads (pread). Errors: Io.

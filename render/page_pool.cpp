@@ -24,10 +24,11 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("a pool of {} bytes is more than shaders can address on '{}'; at most {}", bytes,
                                             device.info().name, chunkBytes * frame::kMaxPoolChunks)};
-    std::unique_ptr<PagePool> pool(new PagePool(device, SlotAllocator(units, chunkBytes / kPoolUnitBytes)));
+    std::unique_ptr<PagePool> pool(new PagePool(device, units * kPoolUnitBytes));
     pool->chunkShift_ = static_cast<uint32_t>(std::countr_zero(chunkBytes / 16));
     constexpr VkBufferUsageFlags kUsage =
-        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+        VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
     for (uint64_t done = 0; done < pool->bytes(); done += chunkBytes) {
         Chunk chunk;
         auto buffer = device.createBuffer(std::min(chunkBytes, pool->bytes() - done), kUsage, MemoryUse::Local);
@@ -44,30 +45,47 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
 
 PagePool::~PagePool() = default;
 
-std::optional<PoolSlot> PagePool::allocate(uint64_t bytes) {
-    const uint64_t units = unitsOf(bytes);
-    const auto first = slots_.allocate(units);
-    if (!first) return std::nullopt;
-    return PoolSlot{*first, units};
+Result<void> PagePool::reserveStaging(uint64_t bytes) {
+    if (staging_.bytes() >= bytes) return {};
+    auto staging = device_.createBuffer(std::bit_ceil(bytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Upload);
+    if (!staging) return staging.error();
+    staging_ = std::move(*staging);
+    return {};
 }
 
-Result<void> PagePool::write(PoolSlot slot, std::span<const std::byte> bytes) {
-    assert(bytes.size() <= slot.units * kPoolUnitBytes && bytes.size() % 16 == 0);
-    const uint64_t chunkBytes = uint64_t{16} << chunkShift_;
-    const uint64_t at = slot.firstUnit * kPoolUnitBytes;
-    const Chunk& chunk = chunks_[at / chunkBytes];
+Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes) {
+    assert(at + bytes.size() <= slot.units * kPoolUnitBytes && at % 16 == 0 && bytes.size() % 16 == 0);
+    const uint64_t to = slot.firstUnit * kPoolUnitBytes + at;
+    const Chunk& chunk = chunks_[to / chunkBytes()];
     if (std::byte* mapped = chunk.buffer.mapped()) {
-        std::memcpy(mapped + at % chunkBytes, bytes.data(), bytes.size());
+        std::memcpy(mapped + to % chunkBytes(), bytes.data(), bytes.size());
         return {};
     }
-    if (staging_.bytes() < bytes.size()) {
-        auto staging = device_.createBuffer(std::bit_ceil(bytes.size()), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
-        if (!staging) return staging.error();
-        staging_ = std::move(*staging);
-    }
+    VCP_TRY(reserveStaging(bytes.size()));
     std::memcpy(staging_.mapped(), bytes.data(), bytes.size());
     return device_.submitAndWait([&](VkCommandBuffer commands) {
-        const VkBufferCopy region{0, at % chunkBytes, bytes.size()};
+        const VkBufferCopy region{0, to % chunkBytes(), bytes.size()};
+        vkCmdCopyBuffer(commands, staging_.handle(), chunk.buffer.handle(), 1, &region);
+    });
+}
+
+Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
+    const uint64_t bytes = from.units * kPoolUnitBytes;
+    const uint64_t source = from.firstUnit * kPoolUnitBytes, target = to.firstUnit * kPoolUnitBytes;
+    assert(from.units == to.units && source / chunkBytes() == target / chunkBytes());
+    const Chunk& chunk = chunks_[source / chunkBytes()];
+    if (std::byte* mapped = chunk.buffer.mapped()) {
+        std::memmove(mapped + target % chunkBytes(), mapped + source % chunkBytes(), bytes);
+        return {};
+    }
+    // Regions of one copy must not overlap: by way of the staging buffer.
+    VCP_TRY(reserveStaging(bytes));
+    VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{source % chunkBytes(), 0, bytes};
+        vkCmdCopyBuffer(commands, chunk.buffer.handle(), staging_.handle(), 1, &region);
+    }));
+    return device_.submitAndWait([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, target % chunkBytes(), bytes};
         vkCmdCopyBuffer(commands, staging_.handle(), chunk.buffer.handle(), 1, &region);
     });
 }

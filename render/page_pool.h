@@ -1,22 +1,18 @@
 // Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that
 // shaders see as texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into
 // their slots; elsewhere through a staging buffer and a copy. A slot is written only while no frame that
-// could read it is in flight: the renderer waits for each frame.
+// could read it is in flight: the renderer waits for each frame. Who is in which slot is not known here
+// (streaming/residency_policy.h).
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "render/slot_allocator.h"
 #include "render/vulkan/device.h"
+#include "streaming/slot_allocator.h"
 
 namespace vcp {
-
-struct PoolSlot {
-    uint64_t firstUnit = 0, units = 0;
-};
 
 class PagePool {
 public:
@@ -24,15 +20,14 @@ public:
     static Result<std::unique_ptr<PagePool>> create(Device& device, uint64_t bytes, PageAccess access);
     ~PagePool();
 
-    std::optional<PoolSlot> allocate(uint64_t bytes) ;
-    void release(PoolSlot slot) { slots_.release(slot.firstUnit, slot.units); }
-    /// Precondition: bytes fit into the slot and are a multiple of 16. Errors: Device.
-    Result<void> write(PoolSlot slot, std::span<const std::byte> bytes);
+    /// Writes at byte `at` of a slot. Precondition: they fit into the slot and are multiples of 16. Errors: Device.
+    Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes);
+    /// Copies a slot's bytes; the two are of one chunk and may overlap. Errors: Device.
+    Result<void> move(PoolSlot from, PoolSlot to);
 
     /// Number of the slot's first texel, over all chunks.
     [[nodiscard]] uint32_t texel(PoolSlot slot) const { return static_cast<uint32_t>(slot.firstUnit * (kPoolUnitBytes / 16)); }
-    [[nodiscard]] uint64_t bytes() const { return slots_.units() * kPoolUnitBytes; }
-    [[nodiscard]] uint64_t bytesTaken() const { return slots_.unitsTaken() * kPoolUnitBytes; }
+    [[nodiscard]] uint64_t bytes() const { return bytes_; }
 
     [[nodiscard]] uint32_t chunks() const { return static_cast<uint32_t>(chunks_.size()); }
     [[nodiscard]] uint32_t chunkShift() const { return chunkShift_; }
@@ -44,10 +39,12 @@ private:
         Buffer buffer;
         TexelView view;
     };
-    PagePool(Device& device, SlotAllocator slots) : device_(device), slots_(std::move(slots)) {}
+    PagePool(Device& device, uint64_t bytes) : device_(device), bytes_(bytes) {}
+    [[nodiscard]] uint64_t chunkBytes() const { return uint64_t{16} << chunkShift_; }
+    Result<void> reserveStaging(uint64_t bytes);
 
     Device& device_;
-    SlotAllocator slots_;
+    uint64_t bytes_;
     std::vector<Chunk> chunks_;
     uint32_t chunkShift_ = 0;
     Buffer staging_;

@@ -33,7 +33,7 @@ void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry) {
 }  // namespace
 
 std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
-                                  const std::function<const ResidentPage&(uint64_t)>& pageOf) {
+                                  const std::function<ResidentPage(uint64_t)>& pageOf) {
     if (cut.empty()) return std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
     const std::vector<Part> parts = partsOf(dataset, cut);
     // Breadth first, so that the children of a page stand together.

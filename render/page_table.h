@@ -17,12 +17,12 @@ namespace vcp {
 struct ResidentPage {
     PageHeader header;
     uint32_t texel = 0;        ///< in the page pool
-    uint32_t colourTexel = 0;  ///< in the colour pool; 0 without colour
+    uint32_t colourTexel = 0;  ///< in the same pool; 0 without colour
 };
 
 /// Texels of the table, three a record, the root's first. `cut`: numbers of pages, none above another;
 /// `pageOf(page)`: of a page of the cut. An empty cut gives a root without children.
 std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
-                                  const std::function<const ResidentPage&(uint64_t)>& pageOf);
+                                  const std::function<ResidentPage(uint64_t)>& pageOf);
 
 }  // namespace vcp

@@ -140,11 +140,18 @@ std::vector<std::string> Renderer::validationMessages() const { return state_->i
 
 Result<void> Renderer::open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
     close();
-    auto residency = Residency::create(*state_->device, state_->access, state_->options.budgetBytes, state_->options.colour,
-                                       state_->options.loaderThreads, std::move(dataset), std::move(source));
+    const RendererOptions& o = state_->options;
+    ResidencyOptions options;
+    options.budgetBytes = o.budgetBytes;
+    options.uploadBytes = o.uploadBytes;
+    options.loader.withColour = o.colour;
+    options.loader.threads = o.loaderThreads;
+    options.loader.heldBytes = o.ramBytes;
+    auto residency = Residency::create(*state_->device, state_->access, options, std::move(dataset), std::move(source));
     if (!residency) return residency.error();
     state_->residency = std::move(*residency);
-    state_->resources->setPools(&state_->residency->pages(), state_->residency->colours());
+    const PagePool* pool = &state_->residency->pages();
+    state_->resources->setPools(pool, state_->residency->hasColour() ? pool : nullptr);
     return {};
 }
 
@@ -183,13 +190,17 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
     }
 }
 
+void Renderer::waitForPage(std::chrono::milliseconds timeout) {
+    if (state_->residency) state_->residency->waitForPage(timeout);
+}
+
 PassConstants Renderer::State::constantsFor(const FrameRequest& request) const {
     PassConstants c;
     c.access = access;
     if (residency) {
-        c.poolChunks = std::max(residency->pages().chunks(), residency->colours() != nullptr ? residency->colours()->chunks() : 1);
+        c.poolChunks = residency->pages().chunks();
         c.chunkShift = residency->pages().chunkShift();
-        c.colour = residency->colours() != nullptr;
+        c.colour = residency->hasColour();
     }
     c.countSteps = request.countSteps || request.shading.mode == ShadingMode::Steps;
     return c;
@@ -268,8 +279,8 @@ Result<FrameStats> Renderer::State::collectStats(const FrameRequest& request) co
     stats.msShade = (*ms)[2];
     stats.pipelines = resources->pipelinesMade();
     if (residency) {
-        stats.colourBytes = residency->colours() != nullptr ? residency->colours()->bytes() : 0;
-        stats.poolBytes = residency->pages().bytes() + stats.colourBytes;
+        stats.colourBytes = residency->colourBytes();
+        stats.poolBytes = residency->pages().bytes();
         stats.pagesInCut = static_cast<uint32_t>(residency->cut().size());
     }
     return stats;

@@ -16,6 +16,7 @@
 // same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -66,6 +67,8 @@ struct RendererOptions {
     bool validation = false;        ///< validation layers, core and synchronization; see validationMessages
     PageAccess access = PageAccess::Auto;
     uint32_t loaderThreads = 2;
+    uint64_t ramBytes = 256ull << 20;     ///< of pages being read and not in the pool yet, never exceeded
+    uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
 };
 
@@ -107,7 +110,14 @@ struct UpdateResult {
     double errorPixels = 0;     ///< largest projected certified error in the cut (inf without a page)
     uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
+    bool relaxed = false;       ///< the budget is too small for the view's pixel error; errorPixels says what it has
+    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool since open()
+    uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
+    uint64_t reloads = 0;       ///< pages loaded twice in one still view: always 0
+    uint64_t failures = 0;      ///< reads that failed and were, or will be, tried again
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
+    uint32_t pagesMissing = 0;  ///< wanted, not resident
+    uint32_t pagesPending = 0;  ///< wished for, being read, or waiting for an update
     uint32_t coarsestLevel = 0, finestLevel = 0;  ///< of the pages in the cut
     std::vector<Error> problems;  ///< pages that cannot be read; each is reported once
 };
@@ -120,7 +130,7 @@ struct FrameStats {
     double msFrame = 0;       ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
     uint64_t poolBytes = 0;     ///< allocated for the pool
-    uint64_t colourBytes = 0;   ///< of these, for colour
+    uint64_t colourBytes = 0;   ///< of colour, in the pool
     uint32_t pagesInCut = 0;
     uint32_t pipelines = 0;     ///< made since create()
 };
@@ -153,6 +163,10 @@ public:
     /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
     /// returns true (asked several times a second).
     Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
+
+    /// Waits until the loader has read a page, has nothing to do, or the time is over: between updates, where a
+    /// host has nothing else to do. Other calls never wait for reads.
+    void waitForPage(std::chrono::milliseconds timeout);
 
     /// Draws the cut of the last update and waits for the GPU. Without a dataset: background.
     Result<FrameStats> render(const FrameRequest& request);

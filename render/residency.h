@@ -1,9 +1,9 @@
-// Which pages of one dataset are in the pool: takes in what the loader has read, makes room by dropping
-// what no recent view wanted, and keeps the cut that can be drawn.
+// Which pages of one dataset are in the pool: carries out what the policy (streaming/residency_policy.h) decides,
+// between the loader's threads and the pool in the device's memory.
 //
-// A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while the
-// selection wants it, dropped when its slot is needed: pages wanted longest ago first, of equals children
-// before parents. The root stays. All in the caller's thread but the loader's reads.
+// A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while views
+// want it, evicted when its slot is needed. What an update takes in is capped, so that no frame waits for
+// many pages. All in the caller's thread but the loader's reads.
 #pragma once
 
 #include <memory>
@@ -14,17 +14,22 @@
 #include "render/page_table.h"
 #include "render/renderer.h"
 #include "streaming/page_loader.h"
-#include "streaming/page_selection.h"
+#include "streaming/residency_policy.h"
 
 namespace vcp {
 
+struct ResidencyOptions {
+    uint64_t budgetBytes = 512ull << 20;  ///< of the pool
+    uint64_t uploadBytes = 16ull << 20;   ///< that one update takes in; one page at least
+    LoaderOptions loader;
+};
+
 class Residency {
 public:
-    /// Allocates the pools: never more than budgetBytes together, and no more than the dataset can fill.
-    /// Errors: Device, Limit.
-    static Result<std::unique_ptr<Residency>> create(Device& device, PageAccess access, uint64_t budgetBytes, bool colour,
-                                                     uint32_t loaderThreads, std::shared_ptr<const Dataset> dataset,
-                                                     std::shared_ptr<const PageSource> source);
+    /// Allocates the pool: never more than budgetBytes, and no more than the dataset can fill. Where the device
+    /// has not so much, half of it, and so on. Errors: Device; Limit, where the coarsest page has no room.
+    static Result<std::unique_ptr<Residency>> create(Device& device, PageAccess access, const ResidencyOptions& options,
+                                                     std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
 
     /// Precondition: no frame is in flight. Never waits for the loader. Errors: Device.
     Result<UpdateResult> update(const SelectionView& view);
@@ -36,32 +41,23 @@ public:
     [[nodiscard]] const std::vector<uint64_t>& cut() const { return cut_; }
     [[nodiscard]] std::vector<glm::uvec4> table() const;
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
-    /// Null without colour.
-    [[nodiscard]] const PagePool* colours() const { return colourPool_.get(); }
+    [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
+    /// Of the pages in the pool.
+    [[nodiscard]] uint64_t colourBytes() const;
 
 private:
-    struct Slots {
-        ResidentPage page;
-        PoolSlot geometry, colour;
-        uint64_t lastWanted = 0;
-    };
-    Residency() = default;
-    Result<void> createPools(Device& device, PageAccess access, uint64_t budgetBytes, bool colour);
-    Result<void> takeIn(UpdateResult& result);
-    Result<bool> place(uint64_t page, const PageBytes& bytes);
-    bool makeRoom();
-    void drop(uint64_t page);
-    void wish(const Selection& selection);
+    explicit Residency(const ResidencyOptions& options) : options_(options) {}
+    Result<void> createPool(Device& device, PageAccess access);
+    Result<bool> place(const LoadedPage& page);
+    UpdateResult report(const PolicyOutcome& outcome) const;
 
+    ResidencyOptions options_;
     std::shared_ptr<const Dataset> dataset_;
-    std::unique_ptr<PagePool> pool_, colourPool_;
+    std::unique_ptr<ResidencyPolicy> policy_;
+    std::unique_ptr<PagePool> pool_;
     std::unique_ptr<PageLoader> loader_;
-    std::unordered_map<uint64_t, Slots> slots_;
-    std::vector<uint64_t> pageBytes_;  // what selection counts a page with
-    std::vector<uint8_t> resident_, unavailable_;
+    std::unordered_map<uint64_t, PageHeader> headers_;  // of resident pages
     std::vector<uint64_t> cut_;
-    uint64_t budget_ = 0;  // what selection may plan with
-    uint64_t updates_ = 0;
 };
 
 }  // namespace vcp

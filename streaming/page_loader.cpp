@@ -1,56 +1,68 @@
 #include "streaming/page_loader.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
 
 namespace vcp {
 
 namespace {
 
+constexpr uint32_t kLongestRun = 64;
+/// Pages are read with a more urgent one where they are at least so urgent, compared with it.
+constexpr double kRunUrgency = 0.5;
+
 uint64_t sizeOf(const LoadedPage& page) {
     return page.bytes ? page.bytes->geometryBytes().size() + page.bytes->colourBytes().size() : 0;
 }
 
+double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
 }  // namespace
 
-PageLoader::PageLoader(std::shared_ptr<const PageSource> source, bool withColour, uint32_t threads, uint64_t heldBytes)
-    : source_(std::move(source)), withColour_(withColour), heldBytes_(std::max<uint64_t>(heldBytes, 1)) {
-    for (uint32_t i = 0; i < std::max(threads, 1u); ++i) threads_.emplace_back([this] { run(); });
+PageLoader::PageLoader(std::shared_ptr<const PageSource> source, const LoaderOptions& options)
+    : source_(std::move(source)), options_(options), queue_(options.retry), working_(std::max(options.threads, 1u)) {
+    for (uint32_t i = 0, threads = working_; i < threads; ++i) threads_.emplace_back([this] { work(); });
 }
 
 PageLoader::~PageLoader() {
     {
-        const std::lock_guard lock(mutex_);
+        std::unique_lock lock(mutex_);
         stop_ = true;
+        work_.notify_all();
+        ready_.notify_all();
+        // A thread may just be about to read: it is interrupted until it has ended.
+        while (working_ > 0) {
+            lock.unlock();
+            source_->interrupt();
+            lock.lock();
+            ready_.wait_for(lock, std::chrono::milliseconds(10), [&] { return working_ == 0; });
+        }
     }
-    work_.notify_all();
-    ready_.notify_all();
     for (std::thread& thread : threads_) thread.join();
 }
 
 void PageLoader::request(std::vector<PageRequest> wishes) {
-    std::stable_sort(wishes.begin(), wishes.end(),
-                     [](const PageRequest& a, const PageRequest& b) { return a.priority > b.priority; });
-    std::reverse(wishes.begin(), wishes.end());
     {
         const std::lock_guard lock(mutex_);
-        std::erase_if(wishes, [&](const PageRequest& wish) { return begun_.contains(wish.page); });
-        wishes_ = std::move(wishes);
+        queue_.replace(std::move(wishes));
     }
     work_.notify_all();
     ready_.notify_all();
 }
 
-std::vector<LoadedPage> PageLoader::collect(size_t most) {
+std::vector<LoadedPage> PageLoader::collect(uint64_t mostBytes) {
     std::vector<LoadedPage> pages;
     {
         const std::lock_guard lock(mutex_);
-        const auto end = done_.begin() + static_cast<std::ptrdiff_t>(std::min(most, done_.size()));
+        uint64_t bytes = 0;
+        auto end = done_.begin();
+        while (end != done_.end() && (end == done_.begin() || bytes + sizeOf(*end) <= mostBytes)) bytes += sizeOf(*end++);
         pages.assign(std::make_move_iterator(done_.begin()), std::make_move_iterator(end));
         done_.erase(done_.begin(), end);
-        for (const LoadedPage& page : pages) {
-            begun_.erase(page.page);
-            doneBytes_ -= sizeOf(page);
-        }
+        for (const LoadedPage& page : pages) queue_.delivered(page.page);
+        stats_.heldBytes -= bytes;
     }
     work_.notify_all();
     return pages;
@@ -58,36 +70,90 @@ std::vector<LoadedPage> PageLoader::collect(size_t most) {
 
 bool PageLoader::waitForPage(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
-    ready_.wait_for(lock, timeout, [&] { return !done_.empty() || (wishes_.empty() && begun_.empty()) || stop_; });
+    ready_.wait_for(lock, timeout, [&] { return !done_.empty() || queue_.pending() == 0 || stop_; });
     return !done_.empty();
 }
 
 size_t PageLoader::pending() const {
     const std::lock_guard lock(mutex_);
-    return wishes_.size() + begun_.size();
+    return queue_.pending();
 }
 
-uint64_t PageLoader::bytesRead() const {
+LoaderStats PageLoader::stats() const {
     const std::lock_guard lock(mutex_);
-    return bytesRead_;
+    return stats_;
 }
 
-void PageLoader::run() {
-    std::unique_lock lock(mutex_);
-    while (true) {
-        work_.wait(lock, [&] { return stop_ || mayBegin(); });
-        if (stop_) return;
-        const uint64_t page = wishes_.back().page;
-        wishes_.pop_back();
-        if (!begun_.insert(page).second) continue;  // wished for twice
-        lock.unlock();
-        LoadedPage loaded{page, source_->read(page, withColour_)};
-        lock.lock();
-        doneBytes_ += sizeOf(loaded);
-        bytesRead_ += sizeOf(loaded);
-        done_.push_back(std::move(loaded));
-        ready_.notify_all();
+/// Reserves memory for the most urgent page and those read with it; nothing where none may begin now. A run of
+/// no pages: one was handed over unread.
+std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
+    const auto wish = queue_.next(now);
+    if (!wish) return std::nullopt;
+    const uint64_t first = wish->page;
+    const uint64_t bytes = source_->bytesToRead(first, options_.withColour);
+    if (bytes > options_.heldBytes) {
+        queue_.begin(first);
+        handOver(first, Error{.code = ErrorCode::Limit,
+                              .message = fmt::format("reading it takes {} bytes of memory, more than the {} bytes allowed", bytes, options_.heldBytes),
+                              .element = fmt::format("page {}", first)});
+        return Run{first, 0};
     }
+    if (!fits(bytes)) return std::nullopt;
+    Run run{first, 0};
+    const uint32_t most = source_->runFrom(first, kLongestRun, options_.withColour);
+    do {
+        const uint64_t page = first + run.count;
+        const uint64_t more = source_->bytesToRead(page, options_.withColour);
+        if (run.count > 0 && (!queue_.mayBegin(page, wish->priority * kRunUrgency, now) || !fits(more))) break;
+        queue_.begin(page);
+        stats_.heldBytes += more;
+        stats_.heldBytesMax = std::max(stats_.heldBytesMax, stats_.heldBytes);
+    } while (++run.count < most);
+    return run;
+}
+
+void PageLoader::handOver(uint64_t page, Result<PageBytes> bytes) {
+    done_.push_back({page, std::move(bytes)});
+    stats_.heldBytes += sizeOf(done_.back());
+    ready_.notify_all();
+}
+
+void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
+    for (uint32_t i = 0; i < run.count; ++i) {
+        const uint64_t page = run.first + i;
+        stats_.heldBytes -= source_->bytesToRead(page, options_.withColour);
+        if (pages[i]) {
+            handOver(page, std::move(pages[i]));
+            stats_.bytesRead += sizeOf(done_.back());
+            ++stats_.pagesRead;
+        } else if (pages[i].error().code == ErrorCode::Cancelled) {
+            queue_.returned(page);
+        } else {
+            ++stats_.failures;
+            if (queue_.failed(page, pages[i].error().code, steadySeconds())) handOver(page, std::move(pages[i]));
+        }
+    }
+}
+
+void PageLoader::work() {
+    std::unique_lock lock(mutex_);
+    while (!stop_) {
+        const double now = steadySeconds();
+        if (const auto run = beginRun(now)) {
+            lock.unlock();
+            auto pages = source_->readRun(run->first, run->count, options_.withColour);
+            lock.lock();
+            finishRun(*run, std::move(pages));
+            work_.notify_all();  // memory was given back
+        } else {
+            // Woken by new wishes, by collect(), or when a page may be tried again.
+            const double wait = queue_.nextTry() - now;
+            if (wait > 0 && std::isfinite(wait)) work_.wait_for(lock, std::chrono::duration<double>(wait));
+            else work_.wait(lock);
+        }
+    }
+    --working_;
+    ready_.notify_all();
 }
 
 }  // namespace vcp

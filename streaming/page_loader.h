@@ -2,7 +2,12 @@
 //
 // A page's way: wished for in request(), read and checked by a thread, fetched with collect(). request()
 // replaces all wishes before it, but those that a thread has begun with; so what no view wants any more is
-// not read. Nothing here waits but waitForPage() and the destructor, which lets reads in progress end.
+// not read. What fails is tried again after a while, and given up after a few attempts (request_queue.h);
+// meanwhile the threads read other pages. Pages that lie together and are about as urgent are read together
+// where the source says so.
+//
+// Memory is reserved before a page is read and given back when it is collected: heldBytes() never exceeds the
+// limit. Nothing here waits but waitForPage() and the destructor, which interrupts reads in progress.
 #pragma once
 
 #include <chrono>
@@ -10,32 +15,38 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
-#include <unordered_set>
 #include <vector>
 
 #include "streaming/page_source.h"
+#include "streaming/request_queue.h"
 
 namespace vcp {
 
-struct PageRequest {
-    uint64_t page;
-    double priority;  ///< larger first; of equals the order of the list
-
-    bool operator==(const PageRequest&) const = default;
-};
-
 struct LoadedPage {
     uint64_t page;
-    Result<PageBytes> bytes;
+    Result<PageBytes> bytes;  ///< an error: the page was given up
+};
+
+struct LoaderOptions {
+    bool withColour = true;
+    uint32_t threads = 2;
+    uint64_t heldBytes = 64ull << 20;  ///< of pages being read and not collected yet
+    RetryPolicy retry;
+};
+
+struct LoaderStats {
+    uint64_t bytesRead = 0;  ///< decompressed, of all pages that were read without an error
+    uint64_t pagesRead = 0;  ///< without an error
+    uint64_t failures = 0;   ///< of single attempts
+    uint64_t heldBytes = 0, heldBytesMax = 0;
 };
 
 /// All functions but the constructor and destructor may be called from any thread.
 class PageLoader {
 public:
-    /// `heldBytes`: pages that are read but not collected yet take at most this much (and one page a thread
-    /// more); then the threads rest.
-    PageLoader(std::shared_ptr<const PageSource> source, bool withColour, uint32_t threads, uint64_t heldBytes);
+    PageLoader(std::shared_ptr<const PageSource> source, const LoaderOptions& options);
     ~PageLoader();
     PageLoader(const PageLoader&) = delete;
     PageLoader& operator=(const PageLoader&) = delete;
@@ -43,8 +54,9 @@ public:
     /// Replaces the list of wishes. Pages being read or waiting to be collected are not read again.
     void request(std::vector<PageRequest> wishes);
 
-    /// Pages that are done, in the order they were; at most `most`. Never waits for a read.
-    std::vector<LoadedPage> collect(size_t most = SIZE_MAX);
+    /// Pages that are done, in the order they were; as many as have `mostBytes` together, but one at least.
+    /// Never waits for a read.
+    std::vector<LoadedPage> collect(uint64_t mostBytes = UINT64_MAX);
 
     /// Waits until collect() would give something. False: after `timeout`, or nothing is wished for or under
     /// way.
@@ -52,24 +64,29 @@ public:
 
     /// Wishes not begun, being read, or not collected.
     [[nodiscard]] size_t pending() const;
-    /// Decompressed bytes of all pages that were read without an error.
-    [[nodiscard]] uint64_t bytesRead() const;
+    [[nodiscard]] LoaderStats stats() const;
 
 private:
-    void run();
-    [[nodiscard]] bool mayBegin() const { return !wishes_.empty() && doneBytes_ < heldBytes_; }
+    struct Run {
+        uint64_t first = 0;
+        uint32_t count = 0;
+    };
+    void work();
+    [[nodiscard]] std::optional<Run> beginRun(double now);
+    void finishRun(Run run, std::vector<Result<PageBytes>> pages);
+    void handOver(uint64_t page, Result<PageBytes> bytes);
+    [[nodiscard]] bool fits(uint64_t bytes) const { return bytes <= options_.heldBytes - stats_.heldBytes; }
 
     const std::shared_ptr<const PageSource> source_;
-    const bool withColour_;
-    const uint64_t heldBytes_;
+    const LoaderOptions options_;
 
     mutable std::mutex mutex_;
     std::condition_variable work_, ready_;
-    std::vector<PageRequest> wishes_;  // the most urgent last
-    std::unordered_set<uint64_t> begun_;  // being read or in done_
+    RequestQueue queue_;
     std::vector<LoadedPage> done_;
-    uint64_t doneBytes_ = 0, bytesRead_ = 0;
+    LoaderStats stats_;
     bool stop_ = false;
+    uint32_t working_ = 0;  // threads that have not ended
     std::vector<std::thread> threads_;
 };
 

@@ -60,23 +60,25 @@ bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionVie
     return true;
 }
 
-Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
-                      std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
-                      std::span<const uint8_t> unavailable) {
-    Selection selection;
-    selection.errorPixels = kInfinity;
-    selection.complete = true;
-    if (dataset.pages.empty() || unavailable[0] != 0 || pageBytes[0] > budgetBytes) return selection;
+namespace {
 
-    const auto errorOf = [&](uint64_t page) {
-        const PageEntry& entry = dataset.pages[page];
-        return inFrustum(dataset, entry, view) ? projectedError(dataset, entry, view) : 0;
-    };
-    std::vector<uint8_t> refined(dataset.pages.size(), 0);
+/// Of pages outside of the view: none.
+double errorInView(const Dataset& dataset, uint64_t page, const SelectionView& view) {
+    const PageEntry& entry = dataset.pages[page];
+    return inFrustum(dataset, entry, view) ? projectedError(dataset, entry, view) : 0;
+}
+
+}  // namespace
+
+PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
+                       std::span<const uint8_t> unavailable) {
+    PageChoice choice;
+    choice.refined.assign(dataset.pages.size(), 0);
+    if (dataset.pages.empty() || unavailable[0] != 0 || pageBytes[0] > budgetBytes) return choice;
     std::priority_queue<Candidate> open;
     uint64_t bytes = pageBytes[0];
-    selection.wanted.push_back({0, kInfinity});
-    open.push({errorOf(0), 0});
+    choice.wanted.push_back({0, kInfinity});
+    open.push({errorInView(dataset, 0, view), 0});
     while (!open.empty()) {
         const Candidate next = open.top();
         open.pop();
@@ -87,38 +89,52 @@ Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_
         uint64_t more = 0;
         for (uint64_t child = children.first; child < children.end; ++child) more += pageBytes[child];
         if (bytes + more > budgetBytes) {
-            selection.relaxed = true;
+            choice.relaxed = true;
             break;
         }
         bytes += more;
-        refined[next.page] = 1;
+        choice.refined[next.page] = 1;
         for (uint64_t child = children.first; child < children.end; ++child) {
-            selection.wanted.push_back({child, next.error});
-            open.push({errorOf(child), child});
+            choice.wanted.push_back({child, next.error});
+            open.push({errorInView(dataset, child, view), child});
         }
     }
-    selection.complete = std::all_of(selection.wanted.begin(), selection.wanted.end(),
-                                     [&](const WantedPage& wanted) { return resident[wanted.page] != 0; });
+    return choice;
+}
 
-    // What is drawn: refined where all children are there.
-    if (resident[0] == 0) return selection;
-    selection.errorPixels = 0;
+DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice, std::span<const uint8_t> resident) {
+    DrawableCut drawable;
+    drawable.errorPixels = kInfinity;
+    drawable.complete = std::all_of(choice.wanted.begin(), choice.wanted.end(), [&](const WantedPage& wanted) { return resident[wanted.page] != 0; });
+    if (choice.wanted.empty() || resident[0] == 0) return drawable;
+    drawable.errorPixels = 0;
+    // Refined where all children are there.
     std::vector<uint64_t> walk{0};
     while (!walk.empty()) {
         const uint64_t page = walk.back();
         walk.pop_back();
         const Children children = childrenOf(dataset.pages[page]);
-        if (refined[page] != 0 && allOf(children, [&](uint64_t child) { return resident[child] != 0; })) {
+        if (choice.refined[page] != 0 && allOf(children, [&](uint64_t child) { return resident[child] != 0; })) {
             for (uint64_t child = children.first; child < children.end; ++child) walk.push_back(child);
             continue;
         }
-        selection.cut.push_back(page);
+        drawable.cut.push_back(page);
         // Inside a page's box the error has no bound; it is reported as seen from a cell away.
         const PageEntry& entry = dataset.pages[page];
+        const double error = errorInView(dataset, page, view);
         const double fromACell = double(entry.certifiedError) * view.pixelsPerUnit / dataset.cellOf(entry.level);
-        selection.errorPixels = std::max(selection.errorPixels, view.orthographic ? errorOf(page) : std::min(errorOf(page), fromACell));
+        drawable.errorPixels = std::max(drawable.errorPixels, view.orthographic ? error : std::min(error, fromACell));
     }
-    std::sort(selection.cut.begin(), selection.cut.end());
+    std::sort(drawable.cut.begin(), drawable.cut.end());
+    return drawable;
+}
+
+Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
+                      std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
+                      std::span<const uint8_t> unavailable) {
+    Selection selection;
+    static_cast<PageChoice&>(selection) = choosePages(dataset, view, budgetBytes, pageBytes, unavailable);
+    static_cast<DrawableCut&>(selection) = drawableCut(dataset, view, selection, resident);
     return selection;
 }
 

@@ -31,6 +31,8 @@ struct SelectionView {
     /// Inward planes of the frustum: a point x is outside of a plane where dot(xyz, x - eye) + w < 0.
     std::array<glm::dvec4, 4> planes{};
     double errorPixels = 0.5;
+
+    bool operator==(const SelectionView&) const = default;
 };
 
 struct WantedPage {
@@ -38,17 +40,31 @@ struct WantedPage {
     double priority;  ///< projected error in pixels of what is drawn without it; the root's is infinite
 };
 
-struct Selection {
+/// What a view wants, whatever is resident.
+struct PageChoice {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
+    std::vector<uint8_t> refined;  ///< one a page of the dataset: replaced by its children
+    bool relaxed = false;          ///< the budget kept a page from being refined
+};
+
+/// `pageBytes[i]`: what page i takes of the budget (any unit). `unavailable[i]`: it cannot be read; its parent is
+/// drawn in its place. Both have one element a page of the dataset.
+PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
+                       std::span<const uint8_t> unavailable);
+
+/// What can be drawn of a choice.
+struct DrawableCut {
     std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
     double errorPixels = 0;     ///< largest projected error in the cut, of pages in view, from no nearer than a cell; infinite without one
     bool complete = false;      ///< all that is wanted is resident; also where nothing can be
-    bool relaxed = false;       ///< the budget kept a page from being refined
 };
 
-/// `pageBytes[i]`: what page i takes of the budget. `resident[i]`: whether it may be drawn. `unavailable[i]`:
-/// it cannot be read; its parent is drawn in its place. All three have one element a page of the dataset.
+/// `resident[i]`: page i may be drawn.
+DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice, std::span<const uint8_t> resident);
+
+/// Both in one: the answer for a view and what is resident.
+struct Selection : PageChoice, DrawableCut {};
 Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
                       std::span<const uint8_t> unavailable);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "octree/vcp_file.h"
 
@@ -15,21 +16,38 @@ public:
     /// Bytes of page `page` of the directory, verified, decompressed and parsed without complaint (readPage).
     /// Colour is empty where the dataset has none or it is not asked for.
     virtual Result<PageBytes> read(uint64_t page, bool withColour) const = 0;
+
+    /// Pages `first` to `first + count - 1`, as read() would give each; where they lie together, in one read.
+    virtual std::vector<Result<PageBytes>> readRun(uint64_t first, uint32_t count, bool withColour) const;
+    /// How many pages from `first` on are best read together, at most `most`; at least 1.
+    [[nodiscard]] virtual uint32_t runFrom(uint64_t first, uint32_t most, bool withColour) const;
+
+    /// Memory that reading a page takes: its stored bytes, twice, and what it returns.
+    [[nodiscard]] virtual uint64_t bytesToRead(uint64_t page, bool withColour) const = 0;
+    /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
+    virtual void interrupt() const {}
 };
 
 /// Pages of a .vcp file behind any ByteReader (openFile for a local one).
 class FilePageSource final : public PageSource {
 public:
-    FilePageSource(std::shared_ptr<const ByteReader> reader, std::shared_ptr<const Dataset> dataset)
-        : reader_(std::move(reader)), dataset_(std::move(dataset)) {}
+    /// `runBytes`: pages that lie together are read together up to so many stored bytes. Worth it where a
+    /// read takes long however short it is; 0: one page at a time.
+    FilePageSource(std::shared_ptr<const ByteReader> reader, std::shared_ptr<const Dataset> dataset, uint64_t runBytes = 0)
+        : reader_(std::move(reader)), dataset_(std::move(dataset)), runBytes_(runBytes) {}
 
-    Result<PageBytes> read(uint64_t page, bool withColour) const override {
-        return readPage(*reader_, *dataset_, page, withColour);
-    }
+    Result<PageBytes> read(uint64_t page, bool withColour) const override;
+    std::vector<Result<PageBytes>> readRun(uint64_t first, uint32_t count, bool withColour) const override;
+    [[nodiscard]] uint32_t runFrom(uint64_t first, uint32_t most, bool withColour) const override;
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override;
+    void interrupt() const override { reader_->interrupt(); }
 
 private:
+    Result<PageBytes> readFrom(const ByteReader& bytes, uint64_t page, bool withColour) const;
+
     std::shared_ptr<const ByteReader> reader_;
     std::shared_ptr<const Dataset> dataset_;
+    uint64_t runBytes_;
 };
 
 }  // namespace vcp

@@ -7,6 +7,7 @@
 
 #include "builder/memory_plan.h"
 #include "builder/mesh_stream.h"
+#include "streaming/http_reader.h"
 #include "viewer/interrupt.h"
 #include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"
@@ -89,7 +90,7 @@ ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.tri
 
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          ProgressStyle progress) {
-    const auto isDataset = [](const std::string& input) { return looksLikeDataset(input); };
+    const auto isDataset = [](const std::string& input) { return isHttpUrl(input) || looksLikeDataset(input); };
     if (inputs.size() == 1 && isDataset(inputs.front())) return std::filesystem::path(inputs.front());
     if (std::any_of(inputs.begin(), inputs.end(), isDataset))
         return Error{ErrorCode::Usage, "several inputs must all be meshes; one .vcp at a time"};

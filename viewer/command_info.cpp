@@ -4,6 +4,7 @@
 #include "octree/vcp_file.h"
 #include "viewer/commands.h"
 #include "viewer/option_values.h"
+#include "viewer/source_settings.h"
 
 namespace vcp {
 
@@ -11,6 +12,7 @@ namespace {
 
 struct InfoCommand {
     std::string file;
+    SourceSettings source;
     ReportOptions report;
 };
 
@@ -93,7 +95,7 @@ std::string summary(const std::string& file, const Dataset& dataset) {
 }
 
 Result<int> run(const InfoCommand& command) {
-    const auto reader = openFile(command.file);
+    const auto reader = openReader(command.file, command.source);
     if (!reader) return reader.error();
     const auto dataset = readDataset(**reader);
     if (!dataset) return dataset.error();
@@ -109,7 +111,8 @@ Result<int> run(const InfoCommand& command) {
 Command addInfo(CLI::App& vcp) {
     auto command = std::make_shared<InfoCommand>();
     CLI::App* app = vcp.add_subcommand("info", "Say what is in a .vcp file");
-    app->add_option("FILE", command->file, "A .vcp file")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
+    addSourceSettings(*app, command->source);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};
 }

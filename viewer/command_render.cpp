@@ -129,11 +129,11 @@ Result<int> run(const RenderCommand& command) {
     const glm::ivec2 size = parseSize(command.size).value();
     const auto path = datasetFor(command.inputs, command.build, command.report.progressStyle());
     if (!path) return path.error();
-    const auto open = openDataset(*path);
+    const auto open = openDataset(path->string(), command.render.source);
     if (!open) return open.error();
     const auto camera = command.render.cameraFor(open->bounds(), size);
     if (!camera) return camera.error();
-    auto renderer = Renderer::create(command.render.rendererOptions());
+    auto renderer = Renderer::create(command.render.rendererOptions(*open));
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(open->dataset, open->source));
 
@@ -167,7 +167,7 @@ std::string checkPlane(const std::string& text) {
 Command addRender(CLI::App& vcp) {
     auto command = std::make_shared<RenderCommand>();
     CLI::App* app = vcp.add_subcommand("render", "Render a .vcp file or meshes into a picture, without a window");
-    app->add_option("IN", command->inputs, "A .vcp file, or meshes, which are built into the cache first")
+    app->add_option("IN", command->inputs, "A .vcp file or its http(s) address, or meshes, which are built into the cache first")
         ->type_name("")
         ->required();
     app->add_option("-o,--output", command->output, "The PNG file to write")->type_name("OUT.png")->required();

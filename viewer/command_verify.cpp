@@ -5,9 +5,12 @@
 
 #include "builder/surface_distance.h"
 #include "octree/vcp_file.h"
+#include "streaming/http_reader.h"
+#include "streaming/read_ahead.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
+#include "viewer/source_settings.h"
 
 namespace vcp {
 
@@ -19,6 +22,7 @@ struct VerifyCommand {
     uint64_t samples = 200'000;
     uint32_t level = UINT32_MAX;
     unsigned threads = 0;
+    SourceSettings source;
     ReportOptions report;
 };
 
@@ -123,10 +127,13 @@ Result<int> broken(const VerifyCommand& command, const Error& error) {
 }
 
 Result<int> run(const VerifyCommand& command) {
+    if (isHttpUrl(command.file) && !command.against.empty())
+        return Error{ErrorCode::Usage, "--against needs a local file"};
     const InterruptScope catching;
-    const auto reader = openFile(command.file);
+    const auto reader = openReader(command.file, command.source);
     if (!reader) return reader.error();
-    const auto dataset = checkBytes(**reader, command.report.progressStyle());
+    const ReadAhead ahead(*reader);
+    const auto dataset = checkBytes(ahead, command.report.progressStyle());
     if (!dataset) return broken(command, dataset.error());
 
     Json json = {{"ok", true}, {"pages", dataset->header.pages}, {"bytes", dataset->header.fileBytes}};
@@ -156,7 +163,8 @@ Result<int> run(const VerifyCommand& command) {
 Command addVerify(CLI::App& vcp) {
     auto command = std::make_shared<VerifyCommand>();
     CLI::App* app = vcp.add_subcommand("verify", "Check every byte of a .vcp file, and its surface against the mesh");
-    app->add_option("FILE", command->file, "A .vcp file")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
+    addSourceSettings(*app, command->source);
     app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
         ->type_name("MESH");
     app->add_option("--samples", command->samples, "Samples, each way")->type_name("N")->capture_default_str()->check(

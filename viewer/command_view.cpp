@@ -44,7 +44,7 @@ Json toJson(const WindowReport& report) {
 Result<int> run(const ViewCommand& command) {
     const auto path = datasetFor(command.inputs, command.build, command.report.progressStyle());
     if (!path) return path.error();
-    const auto open = openDataset(*path);
+    const auto open = openDataset(path->string(), command.render.source);
     if (!open) return open.error();
     WindowOptions options;
     options.size = parseSize(command.size).value();
@@ -60,7 +60,7 @@ Result<int> run(const ViewCommand& command) {
 Command addView(CLI::App& vcp) {
     auto command = std::make_shared<ViewCommand>();
     CLI::App* app = vcp.add_subcommand("view", "Open a window on a .vcp file or on meshes");
-    app->add_option("IN", command->inputs, "A .vcp file, or meshes, which are built into the cache first")
+    app->add_option("IN", command->inputs, "A .vcp file or its http(s) address, or meshes, which are built into the cache first")
         ->type_name("")
         ->required();
     app->add_option("--size", command->size, "Width and height of the window")

@@ -14,10 +14,12 @@ std::string checkBudget(const std::string& text) {
 
 }  // namespace
 
-RendererOptions RenderSettings::rendererOptions() const {
+RendererOptions RenderSettings::rendererOptions(const OpenDataset& open) const {
     RendererOptions options;
     options.device = device;
     options.budgetBytes = parseBytes(budget).value_or(options.budgetBytes);
+    options.ramBytes = parseBytes(ram).value_or(options.ramBytes);
+    options.loaderThreads = open.loaderThreads();
     // Colour pages are neither read nor kept when nothing would show them.
     options.colour = shading == "lit";
     return options;
@@ -66,24 +68,13 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("BYTES")
         ->capture_default_str()
         ->check(checkBudget);
+    app.add_option("--ram", settings.ram, "Memory for subvolumes on their way there, never exceeded")
+        ->type_name("BYTES")
+        ->capture_default_str()
+        ->check(checkBudget);
+    addSourceSettings(app, settings.source);
     app.add_option("--device", settings.device, "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")
         ->type_name("DEVICE");
-}
-
-Box OpenDataset::bounds() const {
-    const FileHeader& h = dataset->header;
-    return {{h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]}, {h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]}};
-}
-
-Result<OpenDataset> openDataset(const std::filesystem::path& path) {
-    auto reader = openFile(path);
-    if (!reader) return reader.error();
-    auto dataset = readDataset(**reader);
-    if (!dataset) return dataset.error();
-    OpenDataset open;
-    open.dataset = std::make_shared<const Dataset>(*std::move(dataset));
-    open.source = std::make_shared<const FilePageSource>(*reader, open.dataset);
-    return open;
 }
 
 }  // namespace vcp

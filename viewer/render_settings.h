@@ -7,19 +7,22 @@
 #include "render/renderer.h"
 #include "viewer/commands.h"
 #include "viewer/orbit_camera.h"
+#include "viewer/source_settings.h"
 
 namespace vcp {
 
 struct RenderSettings {
     std::string device;
     std::string budget = "512M";
+    std::string ram = "256M";
     double errorPixels = 0.5;
     std::string camera = "fit";
     std::string up = "y";
     std::string light = "camera";
     std::string shading = "lit";
+    SourceSettings source;
 
-    [[nodiscard]] RendererOptions rendererOptions() const;
+    [[nodiscard]] RendererOptions rendererOptions(const OpenDataset& open) const;
     [[nodiscard]] Shading shadingChosen() const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
@@ -28,16 +31,5 @@ struct RenderSettings {
 };
 
 void addRenderSettings(CLI::App& app, RenderSettings& settings);
-
-/// A file opened for showing.
-struct OpenDataset {
-    std::shared_ptr<const Dataset> dataset;
-    std::shared_ptr<const PageSource> source;
-
-    [[nodiscard]] Box bounds() const;
-};
-
-/// Errors: those of openFile and readDataset.
-Result<OpenDataset> openDataset(const std::filesystem::path& path);
 
 }  // namespace vcp

@@ -207,7 +207,7 @@ Result<WindowReport> showWindow(const OpenDataset& open, const RenderSettings& s
     if (!camera) return camera.error();
 
     ViewerOptions viewerOptions;
-    viewerOptions.renderer = settings.rendererOptions();
+    viewerOptions.renderer = settings.rendererOptions(open);
     viewerOptions.renderer.surface = system.surfaceSource();
     viewerOptions.errorPixels = settings.errorPixels;
     viewerOptions.shading = settings.shadingChosen();

@@ -3,7 +3,7 @@
 // binding   what                           written by        read by
 //  0        frame constants                CPU (upload)      all
 //  1, 2     page pool, texels and storage  page_pool         beam, trace
-//  3, 4     colour pool                    page_pool         trace with kColour
+//  3, 4     page pool, for colour          page_pool         trace with kColour
 //  5, 6     page table                     CPU (upload)      beam, trace
 //  7, 8     tile starts                    beam              trace, shade
 //  9, 10    tile list, indirect dispatch   beam              trace
@@ -58,7 +58,7 @@ public:
     Result<void> setTable(std::span<const glm::uvec4> table);
     /// What the picture shows where nothing is hit: a word a row. Precondition: resize(), and a row each.
     void setBackground(std::vector<uint32_t> rows);
-    /// Null pools: nothing is shown.
+    /// Null pools: nothing is shown, or without colour. They may be the same.
     void setPools(const PagePool* pages, const PagePool* colours);
 
     /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.

@@ -25,6 +25,7 @@ public:
         if (!withColour) bytes.colour.clear();
         return bytes;
     }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool) const override { return pages_[page].geometryBytes().size() + pages_[page].colourBytes().size(); }
     std::set<uint64_t> broken;
 
 private:

@@ -1,6 +1,7 @@
 // Loader threads with a fake source. Run under TSan as well.
 #include "streaming/page_loader.h"
 
+#include <algorithm>
 #include <atomic>
 #include <set>
 
@@ -22,7 +23,7 @@ public:
             std::unique_lock lock(mutex_);
             begun_.push_back(page);
             changed_.notify_all();
-            changed_.wait(lock, [&] { return !held_; });
+            changed_.wait(lock, [&] { return !held_ && (page != stalling || interrupted_); });
         }
         if (page == failing) return Error{.code = ErrorCode::Io, .message = "broken", .element = "page 13"};
         PageBytes bytes;
@@ -30,6 +31,7 @@ public:
         if (withColour) bytes.colour.assign(1, uint4(7));
         return bytes;
     }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t, bool withColour) const override { return (words_ + (withColour ? 1 : 0)) * sizeof(uint4); }
     void hold(bool held) {
         const std::lock_guard lock(mutex_);
         held_ = held;
@@ -44,7 +46,14 @@ public:
         return begun_;
     }
 
-    uint64_t failing = UINT64_MAX;
+    void interrupt() const override {
+        const std::lock_guard lock(mutex_);
+        interrupted_ = true;
+        changed_.notify_all();
+    }
+    void letGo() const { interrupt(); }
+
+    uint64_t failing = UINT64_MAX, stalling = UINT64_MAX;
 
 private:
     size_t words_;
@@ -52,7 +61,17 @@ private:
     mutable std::condition_variable changed_;
     mutable std::vector<uint64_t> begun_;
     bool held_ = false;
+    mutable bool interrupted_ = false;
 };
+
+LoaderOptions options(bool withColour, uint32_t threads, uint64_t heldBytes) {
+    LoaderOptions made;
+    made.withColour = withColour;
+    made.threads = threads;
+    made.heldBytes = heldBytes;
+    made.retry = {.attempts = 3, .damagedAttempts = 2, .firstDelaySeconds = 1e-3};
+    return made;
+}
 
 std::vector<LoadedPage> collectAll(PageLoader& loader, size_t pages) {
     std::vector<LoadedPage> all;
@@ -63,7 +82,7 @@ std::vector<LoadedPage> collectAll(PageLoader& loader, size_t pages) {
 
 TEST(PageLoader, DeliversEveryWishOnce) {
     const auto source = std::make_shared<FakeSource>();
-    PageLoader loader(source, true, 3, 1 << 20);
+    PageLoader loader(source, options(true, 3, 1 << 20));
     std::vector<PageRequest> wishes;
     for (uint64_t page = 0; page < 100; ++page) wishes.push_back({page, double(page % 7)});
     loader.request(wishes);
@@ -76,14 +95,14 @@ TEST(PageLoader, DeliversEveryWishOnce) {
     }
     EXPECT_EQ(seen.size(), 100u);
     EXPECT_EQ(loader.pending(), 0u);
-    EXPECT_EQ(loader.bytesRead(), 100u * 32);
+    EXPECT_EQ(loader.stats().bytesRead, 100u * 32);
     EXPECT_FALSE(loader.waitForPage(kLong)) << "nothing is under way: it must not wait";
 }
 
 TEST(PageLoader, UrgentFirstOfEqualsInOrder) {
     const auto source = std::make_shared<FakeSource>();
     source->hold(true);
-    PageLoader loader(source, false, 1, 1 << 20);
+    PageLoader loader(source, options(false, 1, 1 << 20));
     loader.request({{50, 1}});
     source->waitUntilBegun(1);
     loader.request({{1, 1}, {2, 5}, {3, 5}, {4, 9}});
@@ -95,7 +114,7 @@ TEST(PageLoader, UrgentFirstOfEqualsInOrder) {
 TEST(PageLoader, StaleWishesAreNotRead) {
     const auto source = std::make_shared<FakeSource>();
     source->hold(true);
-    PageLoader loader(source, false, 1, 1 << 20);
+    PageLoader loader(source, options(false, 1, 1 << 20));
     loader.request({{1, 9}, {2, 8}, {3, 7}});
     source->waitUntilBegun(1);
     loader.request({{4, 1}});
@@ -106,7 +125,7 @@ TEST(PageLoader, StaleWishesAreNotRead) {
 
 TEST(PageLoader, APageBeingReadOrHeldIsNotReadAgain) {
     const auto source = std::make_shared<FakeSource>();
-    PageLoader loader(source, false, 2, 1 << 20);
+    PageLoader loader(source, options(false, 2, 1 << 20));
     for (int i = 0; i < 50; ++i) loader.request({{1, 1}, {2, 1}, {1, 2}});
     ASSERT_TRUE(loader.waitForPage(kLong));
     for (int i = 0; i < 50; ++i) loader.request({{1, 1}, {2, 1}});
@@ -117,18 +136,18 @@ TEST(PageLoader, APageBeingReadOrHeldIsNotReadAgain) {
 TEST(PageLoader, AnErrorIsDeliveredLikeAPage) {
     const auto source = std::make_shared<FakeSource>();
     source->failing = 13;
-    PageLoader loader(source, false, 2, 1 << 20);
+    PageLoader loader(source, options(false, 2, 1 << 20));
     loader.request({{13, 1}});
     const auto pages = collectAll(loader, 1);
     ASSERT_EQ(pages.size(), 1u);
     ASSERT_FALSE(pages[0].bytes);
     EXPECT_EQ(pages[0].bytes.error().line(), "page 13: broken");
-    EXPECT_EQ(loader.bytesRead(), 0u);
+    EXPECT_EQ(loader.stats().bytesRead, 0u);
 }
 
-TEST(PageLoader, RestsWhenTooMuchIsHeld) {
+TEST(PageLoader, MemoryIsNeverExceeded) {
     const auto source = std::make_shared<FakeSource>(64);  // 1 KiB a page
-    PageLoader loader(source, false, 2, 4096);
+    PageLoader loader(source, options(false, 3, 4096 + 512));
     std::vector<PageRequest> wishes;
     for (uint64_t page = 0; page < 64; ++page) wishes.push_back({page, 0});
     loader.request(wishes);
@@ -136,16 +155,69 @@ TEST(PageLoader, RestsWhenTooMuchIsHeld) {
     while (collected < 64 && loader.waitForPage(kLong)) {
         std::this_thread::sleep_for(milliseconds(2));
         const auto pages = loader.collect();
-        EXPECT_LE(pages.size(), 4u + 2u);
+        EXPECT_LE(pages.size(), 4u);
         collected += pages.size();
     }
     EXPECT_EQ(collected, 64u);
+    EXPECT_EQ(loader.stats().heldBytesMax, 4096u) << "all of it is used";
+    EXPECT_EQ(loader.stats().heldBytes, 0u);
+}
+
+TEST(PageLoader, APageLargerThanTheMemoryIsAnError) {
+    const auto source = std::make_shared<FakeSource>(64);
+    PageLoader loader(source, options(false, 2, 1023));
+    loader.request({{0, 2}, {1, 1}});
+    for (const LoadedPage& page : collectAll(loader, 2)) {
+        ASSERT_FALSE(page.bytes);
+        EXPECT_EQ(page.bytes.error().code, ErrorCode::Limit);
+    }
+    EXPECT_TRUE(source->begun().empty());
+    EXPECT_EQ(loader.stats().heldBytesMax, 0u);
+}
+
+TEST(PageLoader, AStalledReadHoldsNobodyUp) {
+    const auto source = std::make_shared<FakeSource>();
+    source->stalling = 5;
+    PageLoader loader(source, options(false, 2, 1 << 20));
+    std::vector<PageRequest> wishes{{5, 9}};
+    for (uint64_t page = 10; page < 40; ++page) wishes.push_back({page, 1});
+    loader.request(wishes);
+    EXPECT_EQ(collectAll(loader, 30).size(), 30u) << "while page 5 is being read";
+    EXPECT_EQ(loader.pending(), 1u);
+    source->letGo();
+    EXPECT_EQ(collectAll(loader, 1).size(), 1u);
+}
+
+TEST(PageLoader, AFailedReadIsTriedAgainAndGivenUpOnce) {
+    const auto source = std::make_shared<FakeSource>();
+    source->failing = 13;
+    PageLoader loader(source, options(false, 2, 1 << 20));
+    loader.request({{13, 1}, {14, 1}});
+    const auto pages = collectAll(loader, 2);
+    ASSERT_EQ(pages.size(), 2u);
+    EXPECT_EQ(loader.stats().failures, 3u);
+    const auto begun = source->begun();
+    EXPECT_EQ(std::count(begun.begin(), begun.end(), 13u), 3);
+    for (int i = 0; i < 3; ++i) loader.request({{13, 1}});
+    EXPECT_FALSE(loader.waitForPage(kLong)) << "nobody asks for it again";
+    EXPECT_EQ(source->begun().size(), begun.size());
+}
+
+TEST(PageLoader, StopsDuringAStalledRead) {
+    const auto source = std::make_shared<FakeSource>();
+    source->stalling = 3;
+    {
+        PageLoader loader(source, options(false, 2, 1 << 20));
+        loader.request({{3, 1}});
+        source->waitUntilBegun(1);
+    }
+    EXPECT_EQ(source->begun().size(), 1u);
 }
 
 TEST(PageLoader, StopsAtAnyMoment) {
     for (int i = 0; i < 200; ++i) {
         const auto source = std::make_shared<FakeSource>();
-        PageLoader loader(source, false, 1 + i % 4, 1 << 20);
+        PageLoader loader(source, options(false, 1 + i % 4, 1 << 20));
         std::vector<PageRequest> wishes;
         for (uint64_t page = 0; page < 20; ++page) wishes.push_back({page, 0});
         loader.request(wishes);

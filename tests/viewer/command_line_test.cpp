@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "render/renderer.h"
+#include "tests/streaming/range_server.h"
 #include "vcp_program.h"
 
 namespace vcp {
@@ -61,7 +62,7 @@ protected:
 };
 std::unique_ptr<TestFolder> CommandLine::folder_;
 
-constexpr const char* kCommands[] = {"build", "info", "verify", "render", "view", "devices", "bench"};
+constexpr const char* kCommands[] = {"build", "info", "verify", "render", "view", "stress", "devices", "bench"};
 
 TEST_F(CommandLine, HelpOfEveryCommandBothWays) {
     const Ran all = run({"--help"});
@@ -367,6 +368,49 @@ TEST_F(CommandLine, DegenerateTrianglesAreCountedNotFatal) {
     ASSERT_EQ(ran.status, 0) << ran.err;
     EXPECT_EQ(Json::parse(ran.out)["triangles"], 3);
     EXPECT_EQ(Json::parse(ran.out)["degenerate_triangles"], 1);
+}
+
+TEST_F(CommandLine, ADatasetBehindAServerIsThatOfTheFile) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const fs::path file = dataset();
+    const test::RangeServer server(folder_->path());
+    ASSERT_TRUE(server.runs());
+    const std::string url = server.url("ball.vcp"), cache = (*folder_ / "blocks").string();
+    const Json local = Json::parse(run({"info", file.string(), "--json"}).out), remote = Json::parse(run({"info", url, "--json"}).out);
+    EXPECT_EQ(local["triangles"], remote["triangles"]);
+    EXPECT_EQ(local["level"], remote["level"]);
+    EXPECT_EQ(run({"verify", url, "--progress", "none"}).status, 0);
+    const std::string here = (*folder_ / "here.png").string(), there = (*folder_ / "there.png").string();
+    ASSERT_EQ(run({"render", file.string(), "-o", here, "--size", "160x120"}).status, 0);
+    for (int i = 0; i < 2; ++i) {
+        const Ran ran = run({"render", url, "-o", there, "--size", "160x120", "--cache", cache});
+        ASSERT_EQ(ran.status, 0) << ran.err;
+        EXPECT_EQ(contentOf(there), contentOf(here));
+        fs::remove(there);
+    }
+    EXPECT_FALSE(fs::is_empty(cache));
+    expectFailure(run({"info", server.url("none.vcp")}), 1, "no such file on the server");
+    expectFailure(run({"render", server.url("ball.vcp?fault=whole"), "-o", there}), 1, "does not answer range requests");
+}
+
+TEST_F(CommandLine, StressReportsAndItsInvariantsHold) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const std::string out = (*folder_ / "stress").string();
+    const Ran ran = run({"stress", dataset().string(), "--path", "teleport", "--frames", "20", "--size", "96x64", "--budget", "1M", "--error-pixels", "0.05",
+                         "--faults", "error=0.1,corrupt=0.01,stall=30ms,spread=2ms", "--seed", "3", "--out", out, "--json", "--progress", "none"});
+    ASSERT_EQ(ran.status, 0) << ran.err << ran.out.substr(0, 2000);
+    const Json json = Json::parse(ran.out);
+    EXPECT_EQ(json["violations"], Json::array());
+    for (const char* field : {"first_picture_seconds", "settled_seconds", "bytes_read", "bytes_needed", "budget_bytes", "resident_bytes_max"})
+        EXPECT_GT(json[field].get<double>(), 0) << field;
+    for (const char* field : {"frame_ms", "frame_ms_no_loads"})
+        for (const char* q : {"p50", "p95", "p99", "max"}) EXPECT_GT(json[field][q].get<double>(), 0) << field << q;
+    EXPECT_LE(json["resident_bytes_max"].get<uint64_t>(), json["budget_bytes"].get<uint64_t>());
+    EXPECT_EQ(json["samples"].size(), 20u);
+    for (const char* name : {"stress.json", "stress.md", "stress_bytes.svg", "stress_pages.svg", "stress_frames.svg", "stress_error.svg"})
+        EXPECT_GT(fs::file_size(fs::path(out) / name), 100u) << name;
+    expectFailure(run({"stress", dataset().string(), "--path", "no/such/file"}), 1, "no/such/file");
+    expectFailure(run({"stress", dataset().string(), "--faults", "error=2"}), 2, "error=2");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Slots of the page pool against an obvious model.
-#include "render/slot_allocator.h"
+#include "streaming/slot_allocator.h"
 
 #include <map>
 #include <random>
@@ -19,8 +19,10 @@ TEST(SlotAllocator, NeverOverlapsNeverExceedsNeverCrossesAChunk) {
         for (int step = 0; step < 2000; ++step) {
             if (random() % 3 != 0) {
                 const uint64_t size = 1 + random() % 12;
-                const auto first = slots.allocate(size);
-                if (!first) continue;
+                const auto slot = slots.allocate(size);
+                if (!slot) continue;
+                ASSERT_EQ(slot->units, size);
+                const uint64_t* first = &slot->firstUnit;
                 ASSERT_LE(*first + size, units) << seed;
                 ASSERT_EQ(*first / chunk, (*first + size - 1) / chunk) << seed;
                 const auto after = taken.lower_bound(*first);
@@ -30,7 +32,7 @@ TEST(SlotAllocator, NeverOverlapsNeverExceedsNeverCrossesAChunk) {
                 sum += size;
             } else if (!taken.empty()) {
                 auto at = std::next(taken.begin(), static_cast<std::ptrdiff_t>(random() % taken.size()));
-                slots.release(at->first, at->second);
+                slots.release({at->first, at->second});
                 sum -= at->second;
                 taken.erase(at);
             }
@@ -41,13 +43,13 @@ TEST(SlotAllocator, NeverOverlapsNeverExceedsNeverCrossesAChunk) {
 
 TEST(SlotAllocator, FullIsFullAndReleasedIsReused) {
     SlotAllocator slots(8, 8);
-    EXPECT_EQ(slots.allocate(5), 0u);
+    EXPECT_EQ(slots.allocate(5), (PoolSlot{0, 5}));
     EXPECT_EQ(slots.allocate(4), std::nullopt);
-    EXPECT_EQ(slots.allocate(3), 5u);
+    EXPECT_EQ(slots.allocate(3), (PoolSlot{5, 3}));
     EXPECT_EQ(slots.allocate(1), std::nullopt);
-    slots.release(0, 5);
-    EXPECT_EQ(slots.allocate(2), 0u);
-    EXPECT_EQ(slots.allocate(3), 2u);
+    slots.release({0, 5});
+    EXPECT_EQ(slots.allocate(2), (PoolSlot{0, 2}));
+    EXPECT_EQ(slots.allocate(3), (PoolSlot{2, 3}));
     EXPECT_EQ(slots.unitsTaken(), 8u);
     EXPECT_EQ(SlotAllocator(100, 8).allocate(9), std::nullopt) << "more than a chunk";
 }

@@ -12,18 +12,29 @@ inline constexpr uint64_t kPoolUnitBytes = 16384;
 
 constexpr uint64_t unitsOf(uint64_t bytes) { return (bytes + kPoolUnitBytes - 1) / kPoolUnitBytes; }
 
+struct PoolSlot {
+    uint64_t firstUnit = 0, units = 0;
+
+    [[nodiscard]] uint64_t end() const { return firstUnit + units; }
+    bool operator==(const PoolSlot&) const = default;
+};
+
 class SlotAllocator {
 public:
     /// `units` in all; a slot never crosses a multiple of `unitsPerChunk`.
     SlotAllocator(uint64_t units, uint64_t unitsPerChunk);
 
-    /// First unit of the lowest run of `units` free ones, or nothing. Precondition: units > 0.
-    std::optional<uint64_t> allocate(uint64_t units);
-    /// Precondition: allocate() gave `first` for `units`.
-    void release(uint64_t first, uint64_t units);
+    /// The lowest run of `units` free ones, or nothing. Precondition: units > 0.
+    std::optional<PoolSlot> allocate(uint64_t units);
+    /// Precondition: all of it is free and in one chunk.
+    void take(PoolSlot slot);
+    /// Precondition: all of it is taken.
+    void release(PoolSlot slot);
 
     [[nodiscard]] uint64_t units() const { return taken_.size(); }
+    [[nodiscard]] uint64_t unitsPerChunk() const { return unitsPerChunk_; }
     [[nodiscard]] uint64_t unitsTaken() const { return unitsTaken_; }
+    [[nodiscard]] uint64_t unitsFree() const { return units() - unitsTaken_; }
 
 private:
     std::vector<bool> taken_;

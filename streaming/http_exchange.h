@@ -1,0 +1,70 @@
+// One request for ranges of a file and its answer: what HttpReader sends and receives, over libcurl.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "octree/result.h"
+#include "streaming/http_reader.h"
+
+namespace vcp {
+
+/// Bytes first to last of the file, both included.
+struct ByteRange {
+    uint64_t first = 0, last = 0;
+
+    [[nodiscard]] uint64_t size() const { return last - first + 1; }
+    bool operator==(const ByteRange&) const = default;
+};
+
+/// "Content-Range: bytes 0-99/1234". Nothing where it is not of this form or the range is outside of the file.
+struct ContentRange {
+    ByteRange range;
+    uint64_t fileBytes = 0;
+};
+std::optional<ContentRange> parseContentRange(std::string_view value);
+
+struct BodyPart {
+    ByteRange range;
+    std::span<const std::byte> bytes;  ///< in the body
+};
+
+/// The parts of a multipart/byteranges body (RFC 9110, 14.6); empty where it is not one. Safe on hostile
+/// bytes.
+std::vector<BodyPart> parseBodyParts(std::span<const std::byte> body, std::string_view contentType);
+
+/// What the server answered, after all redirects.
+struct HttpAnswer {
+    long status = 0;
+    std::string url;  ///< that answered
+    std::string range, type, coding, entityTag, lastModified;  ///< header fields; empty where there are none
+    std::vector<std::byte> body;
+};
+
+/// A connection, kept alive between requests. One thread at a time.
+class HttpConnection {
+public:
+    explicit HttpConnection(const HttpOptions& options);
+    ~HttpConnection();
+    HttpConnection(const HttpConnection&) = delete;
+    HttpConnection& operator=(const HttpConnection&) = delete;
+
+    /// Sends GET with `Range: bytes=RANGES` and `condition` (a header line, may be empty). At most `most` bytes
+    /// of body are taken: a longer one is an error, and so is one shorter than announced. The body of an
+    /// answer other than 206 is not read. Stops when `epoch` changes. Errors: Io, InvalidInput (TLS,
+    /// redirects), Cancelled; the message only.
+    Result<HttpAnswer> get(const std::string& url, const std::string& ranges, const std::string& condition, uint64_t most,
+                           const std::atomic<uint64_t>& epoch);
+
+private:
+    void* curl_;
+    HttpOptions options_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,68 @@
+// A file behind http:// or https://, read by range requests (RFC 9110, section 14).
+//
+// open() asks for the first bytes, which say how large the file is and which version of it this is. Where
+// they begin a .vcp file, a second request brings the rest of the directory, the coarsest page and the
+// commit record in two ranges; so a first picture takes two requests. Every later request carries If-Match
+// with the entity tag of the first answer (If-Unmodified-Since without a strong tag), and every answer's tag
+// and size are compared with the first: a file that changes on the server while it is read is an error, not
+// a mixture.
+//
+// An answer is accepted as a whole or not at all: status 206, the range that was asked for, of a file of the
+// same size, neither a byte short nor a byte long, and no content coding. Redirects are followed, at most 5,
+// never from https to http. TLS certificates are verified. Each reading thread has a connection of its own,
+// kept alive between reads; HTTP/2 where the server offers it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+struct HttpOptions {
+    std::filesystem::path caFile = {};  ///< certificates of authorities to trust, PEM; empty: the system's
+    double connectSeconds = 10;
+    double stallSeconds = 10;       ///< an answer that brings no byte for so long has failed; whole seconds
+    uint64_t firstBytes = 64 << 10; ///< of the first request
+};
+
+/// Whether this is an http:// or https:// address.
+bool isHttpUrl(std::string_view text);
+
+/// The server is not trusted: what it sends is checked before it is used, and no answer takes more memory
+/// than was asked for (and 4 KiB).
+class HttpReader final : public ByteReader {
+public:
+    /// Errors: Io (no connection, time-out, a server in trouble: worth another try), InvalidInput (not found,
+    /// not allowed, no ranges, certificate not trusted), each in one line that begins with the address.
+    static Result<std::shared_ptr<HttpReader>> open(const std::string& url, const HttpOptions& options = {});
+    ~HttpReader() override;
+    HttpReader(const HttpReader&) = delete;
+    HttpReader& operator=(const HttpReader&) = delete;
+
+    /// Any thread. Errors as for open(); also InvalidInput where the file changed since open(), and
+    /// Cancelled after interrupt().
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
+    [[nodiscard]] uint64_t size() const override;
+    [[nodiscard]] const std::string& name() const override;
+
+    /// Ends reads that are under way soon, with Cancelled. Any thread.
+    void interrupt() const override;
+
+    /// Address, size and version of the file: equal for equal bytes.
+    [[nodiscard]] std::string identity() const;
+    /// Requests sent so far, and bytes of bodies received.
+    [[nodiscard]] uint64_t requests() const;
+    [[nodiscard]] uint64_t bytesReceived() const;
+
+private:
+    struct State;
+    explicit HttpReader(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,93 @@
+#include "streaming/page_source.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace vcp {
+
+namespace {
+
+// Pages stand on 256 bytes; a gap of this size, such as colour that nobody wants, is read and thrown away.
+constexpr uint64_t kLargestGap = 4096;
+
+struct Extent {
+    uint64_t begin = 0, end = 0;
+};
+
+/// Where a page's stored bytes are; geometry and colour follow each other.
+Extent extentOf(const PageEntry& page, bool withColour) {
+    const bool colour = withColour && page.colourStoredBytes != 0;
+    return {page.offset, colour ? page.colourOffset + page.colourStoredBytes : page.offset + page.storedBytes};
+}
+
+/// A stretch of a file that has been read already.
+class Stretch final : public ByteReader {
+public:
+    Stretch(const ByteReader& file, uint64_t begin, std::vector<std::byte> bytes) : file_(file), begin_(begin), bytes_(std::move(bytes)) {}
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
+        if (offset < begin_ || bytes.size() > bytes_.size() || offset - begin_ > bytes_.size() - bytes.size()) return file_.read(offset, bytes);
+        std::memcpy(bytes.data(), bytes_.data() + (offset - begin_), bytes.size());
+        return {};
+    }
+    [[nodiscard]] uint64_t size() const override { return file_.size(); }
+    [[nodiscard]] const std::string& name() const override { return file_.name(); }
+
+private:
+    const ByteReader& file_;
+    uint64_t begin_;
+    std::vector<std::byte> bytes_;
+};
+
+}  // namespace
+
+std::vector<Result<PageBytes>> PageSource::readRun(uint64_t first, uint32_t count, bool withColour) const {
+    std::vector<Result<PageBytes>> pages;
+    for (uint64_t page = first; page < first + count; ++page) pages.push_back(read(page, withColour));
+    return pages;
+}
+
+uint32_t PageSource::runFrom(uint64_t, uint32_t, bool) const { return 1; }
+
+Result<PageBytes> FilePageSource::read(uint64_t page, bool withColour) const {
+    if (runBytes_ == 0) return readFrom(*reader_, page, withColour);
+    return std::move(readRun(page, 1, withColour).front());
+}
+
+Result<PageBytes> FilePageSource::readFrom(const ByteReader& bytes, uint64_t page, bool withColour) const {
+    auto read = readPage(bytes, *dataset_, page, withColour);
+    if (!read && read.error().code == ErrorCode::InvalidInput) {
+        const Extent extent = extentOf(dataset_->pages[page], withColour);
+        reader_->distrust(extent.begin, extent.end - extent.begin);
+    }
+    return read;
+}
+
+std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t count, bool withColour) const {
+    if (runBytes_ == 0) return PageSource::readRun(first, count, withColour);
+    const uint64_t begin = dataset_->pages[first].offset, end = extentOf(dataset_->pages[first + count - 1], withColour).end;
+    std::vector<std::byte> stored(end - begin);
+    if (const auto got = reader_->read(begin, stored); !got) return std::vector<Result<PageBytes>>(count, got.error());
+    const Stretch stretch(*reader_, begin, std::move(stored));
+    std::vector<Result<PageBytes>> pages;
+    for (uint64_t page = first; page < first + count; ++page) pages.push_back(readFrom(stretch, page, withColour));
+    return pages;
+}
+
+uint32_t FilePageSource::runFrom(uint64_t first, uint32_t most, bool withColour) const {
+    uint32_t count = 1;
+    const Extent start = extentOf(dataset_->pages[first], withColour);
+    for (uint64_t last = start.end; count < most && first + count < dataset_->pages.size(); ++count) {
+        const Extent next = extentOf(dataset_->pages[first + count], withColour);
+        if (next.begin > last + kLargestGap || next.end - start.begin > runBytes_) break;
+        last = next.end;
+    }
+    return count;
+}
+
+uint64_t FilePageSource::bytesToRead(uint64_t page, bool withColour) const {
+    const PageEntry& entry = dataset_->pages[page];
+    const uint64_t geometry = 2 * uint64_t{entry.storedBytes} + entry.pageBytes;
+    return withColour ? geometry + 2 * uint64_t{entry.colourStoredBytes} + entry.colourBytes : geometry;
+}
+
+}  // namespace vcp

@@ -1,0 +1,227 @@
+#include "streaming/residency_policy.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace vcp {
+
+namespace {
+
+// Wishes for what comes later are less urgent than any for what is in view.
+constexpr double kAheadUrgency = 1e-9;
+
+/// What first fit may leave unused: in every chunk less than the largest page needs. One chunk can be
+/// gathered whole.
+uint64_t unusableUnits(PoolShape pool, uint64_t largestPage) {
+    const uint64_t chunks = (pool.units + pool.unitsPerChunk - 1) / pool.unitsPerChunk;
+    return chunks > 1 ? chunks * (largestPage - 1) : 0;
+}
+
+uint64_t largestPageUnits(const Dataset& dataset, bool withColour) {
+    uint64_t largest = 1;
+    for (const PageEntry& page : dataset.pages) largest = std::max(largest, pageUnits(page, withColour));
+    return largest;
+}
+
+}  // namespace
+
+uint64_t pageUnits(const PageEntry& page, bool withColour) {
+    return unitsOf(uint64_t{page.pageBytes} + (withColour ? page.colourBytes : 0));
+}
+
+PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes) {
+    uint64_t all = 0;
+    for (const PageEntry& page : dataset.pages) all += pageUnits(page, withColour);
+    const uint64_t chunk = chunkBytes / kPoolUnitBytes, largest = largestPageUnits(dataset, withColour);
+    uint64_t useful = std::max<uint64_t>(all, 1);
+    if (all > chunk && chunk > largest) {
+        const uint64_t chunks = (all + chunk - largest) / (chunk - largest + 1);
+        useful = all + chunks * (largest - 1);
+    }
+    return {std::min(useful, budgetBytes / kPoolUnitBytes), chunk};
+}
+
+ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool)
+    : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk) {
+    for (const PageEntry& page : dataset_->pages) pageUnits_.push_back(pageUnits(page, withColour));
+    const uint64_t unusable = unusableUnits(pool, largestPageUnits(*dataset_, withColour));
+    planned_ = pool.units > unusable ? pool.units - unusable : 0;
+    const size_t pages = dataset_->pages.size();
+    resident_.assign(pages, 0);
+    unavailable_.assign(pages, 0);
+    loadedIn_.assign(pages, 0);
+    ranks_.assign(pages, Rank::Stale);
+}
+
+void ResidencyPolicy::look(const SelectionView& view) {
+    ++round_;
+    moving_ = !view_ || *view_ != view;
+    if (moving_) stillSince_ = round_;
+    if (moving_ || stale_) {
+        choice_ = choosePages(*dataset_, view, planned_, pageUnits_, unavailable_);
+        std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
+        ahead_.clear();
+        if (moving_ && view_) lookAhead(view, *view_);
+        for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
+        stale_ = moving_;  // a still view looks at nothing ahead
+    }
+    view_ = view;
+    for (const WantedPage& wanted : choice_.wanted)
+        if (const auto at = slots_.find(wanted.page); at != slots_.end()) at->second.lastWanted = round_;
+}
+
+void ResidencyPolicy::lookAhead(const SelectionView& view, const SelectionView& before) {
+    if (view.orthographic != before.orthographic) return;
+    SelectionView later = view;
+    later.eye += double(kAheadRounds) * (view.eye - before.eye);
+    for (size_t i = 0; i < later.planes.size(); ++i) later.planes[i] += double(kAheadRounds) * (view.planes[i] - before.planes[i]);
+    ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, unavailable_).wanted;
+    for (const WantedPage& wanted : ahead_) ranks_[wanted.page] = Rank::Ahead;
+}
+
+bool ResidencyPolicy::mayEvict(uint64_t page, const Resident& resident, Rank forRank) const {
+    if (page == 0 || rankOf(page) >= forRank) return false;
+    return !moving_ || resident.loaded + kSettlingRounds <= round_;
+}
+
+bool ResidencyPolicy::evictOne(Rank forRank) {
+    // Least wanted first, then wanted longest ago; deeper levels come later in the directory.
+    const auto isBetter = [&](const auto& a, const auto& b) {
+        if (rankOf(a.first) != rankOf(b.first)) return rankOf(a.first) < rankOf(b.first);
+        if (a.second.lastWanted != b.second.lastWanted) return a.second.lastWanted < b.second.lastWanted;
+        return a.first > b.first;
+    };
+    auto best = slots_.end();
+    for (auto at = slots_.begin(); at != slots_.end(); ++at)
+        if (mayEvict(at->first, at->second, forRank) && (best == slots_.end() || isBetter(*at, *best))) best = at;
+    if (best == slots_.end()) return false;
+    evict(best->first);
+    return true;
+}
+
+void ResidencyPolicy::evict(uint64_t page) {
+    const PoolSlot slot = slots_.at(page).slot;
+    allocator_.release(slot);
+    pageAt_.erase(slot.firstUnit);
+    slots_.erase(page);
+    resident_[page] = 0;
+    ++counts_.evictions;
+}
+
+/// Moves pages down until `units` free ones are on end, as few units as possible. False: no chunk has so many.
+bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
+    struct Window {
+        uint64_t begin = 0, end = 0, cost = UINT64_MAX;  // units
+    } best;
+    const uint64_t perChunk = allocator_.unitsPerChunk();
+    for (uint64_t chunk = 0; chunk < allocator_.units(); chunk += perChunk) {
+        const uint64_t chunkEnd = std::min(chunk + perChunk, allocator_.units());
+        // Slots of the chunk and the gap before each; the last entry is the gap at the end.
+        std::vector<PoolSlot> gaps;
+        uint64_t at = chunk;
+        for (auto slot = pageAt_.lower_bound(chunk); slot != pageAt_.end() && slot->first < chunkEnd; ++slot) {
+            gaps.push_back({at, slot->first - at});
+            at = slots_.at(slot->second).slot.end();
+        }
+        gaps.push_back({at, chunkEnd - at});
+        uint64_t free = 0;
+        for (size_t first = 0, last = 0; last < gaps.size(); ++last) {
+            free += gaps[last].units;
+            while (free - gaps[first].units >= units && first < last) free -= gaps[first++].units;
+            const uint64_t cost = gaps[last].end() - gaps[first].firstUnit - free;
+            if (free >= units && cost < best.cost) best = {gaps[first].firstUnit, gaps[last].end(), cost};
+        }
+    }
+    if (best.cost == UINT64_MAX) return false;
+    uint64_t to = best.begin;
+    for (auto at = pageAt_.lower_bound(best.begin); at != pageAt_.end() && at->first < best.end;) {
+        const uint64_t page = at->second;
+        at = pageAt_.erase(at);
+        PoolSlot& slot = slots_.at(page).slot;
+        const PoolSlot from = slot;
+        slot.firstUnit = to;
+        to = slot.end();
+        pageAt_.emplace(slot.firstUnit, page);
+        if (slot == from) continue;
+        allocator_.release(from);
+        allocator_.take(slot);
+        moves.push_back({page, from, slot});
+        ++counts_.moves;
+    }
+    return true;
+}
+
+Placement ResidencyPolicy::place(uint64_t page) {
+    Placement placement;
+    if (isResident(page) || unavailable_[page] != 0) return placement;
+    const uint64_t units = pageUnits_[page];
+    const Rank rank = rankOf(page);
+    placement.slot = allocator_.allocate(units);
+    while (!placement.slot) {
+        // What nobody wants any more takes no work.
+        if (rank == Rank::Stale) break;
+        if (allocator_.unitsFree() >= units && gather(units, placement.moves)) placement.slot = allocator_.allocate(units);
+        else if (!evictOne(rank)) break;
+        else placement.slot = allocator_.allocate(units);
+    }
+    if (!placement.slot) {
+        ++counts_.refused;
+        return placement;
+    }
+    slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, round_});
+    pageAt_.emplace(placement.slot->firstUnit, page);
+    resident_[page] = 1;
+    ++counts_.loads;
+    if (loadedIn_[page] == stillSince_) ++counts_.reloads;
+    loadedIn_[page] = stillSince_;
+    return placement;
+}
+
+/// Units that are free or hold pages that may go.
+uint64_t ResidencyPolicy::unitsWithin(Rank forRank) const {
+    uint64_t units = allocator_.unitsFree();
+    for (const auto& [page, resident] : slots_)
+        if (mayEvict(page, resident, forRank)) units += resident.slot.units;
+    return units;
+}
+
+PolicyOutcome ResidencyPolicy::finish() const {
+    PolicyOutcome outcome;
+    assert(view_);
+    outcome.drawable = drawableCut(*dataset_, *view_, choice_, resident_);
+    outcome.relaxed = choice_.relaxed;
+    outcome.wanted = choice_.wanted.size();
+    // Wishes in order of urgency, as long as there is room for them.
+    uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
+    bool full = false;
+    for (const WantedPage& wanted : choice_.wanted) {
+        if (isResident(wanted.page)) continue;
+        ++outcome.missing;
+        full = full || reserved + pageUnits_[wanted.page] > room;
+        if (full) continue;
+        reserved += pageUnits_[wanted.page];
+        outcome.wishes.push_back({wanted.page, wanted.priority});
+    }
+    if (ahead_.empty() || full) return outcome;
+    room = unitsWithin(Rank::Ahead);
+    for (const WantedPage& wanted : ahead_) {
+        if (isResident(wanted.page) || rankOf(wanted.page) != Rank::Ahead) continue;
+        reserved += pageUnits_[wanted.page];
+        if (reserved > room) break;
+        outcome.wishes.push_back({wanted.page, std::min(wanted.priority, 1e6) * kAheadUrgency});
+    }
+    return outcome;
+}
+
+bool ResidencyPolicy::giveUp(uint64_t page) {
+    if (unavailable_[page] != 0) return false;
+    unavailable_[page] = 1;
+    stale_ = true;
+    return true;
+}
+
+void ResidencyPolicy::clear() {
+    while (!slots_.empty()) evict(slots_.begin()->first);
+}
+
+}  // namespace vcp

@@ -1,0 +1,306 @@
+// The policy with a source, a pool and a time made by hand: whatever the tree, the budget, the order of
+// arrival, the faults and the history, budgets hold and every view settles on the same pages.
+#include "streaming/residency_policy.h"
+
+#include <algorithm>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "tests/streaming/test_trees.h"
+
+namespace vcp {
+namespace {
+
+constexpr uint64_t kChunkBytes = 64 * kPoolUnitBytes;
+
+struct Conditions {
+    uint64_t budgetBytes = 0;
+    double failRate = 0;     // of single reads
+    std::set<uint64_t> bad;  // pages that never can be read
+    uint64_t seed = 0;       // order of arrival
+    size_t perRound = 3;     // pages that arrive
+};
+
+/// A pool that remembers which page's bytes are in each unit, a queue, and reads that end in any order.
+class Simulation {
+public:
+    Simulation(std::shared_ptr<const Dataset> dataset, Conditions conditions)
+        : dataset_(std::move(dataset)), c_(std::move(conditions)), random_(c_.seed),
+          shape_(poolShapeFor(*dataset_, dataset_->hasColour(), c_.budgetBytes, kChunkBytes)),
+          policy(dataset_, dataset_->hasColour(), shape_), queue_({.attempts = 12, .damagedAttempts = 12}), content_(shape_.units, kNothing) {
+        EXPECT_LE(shape_.units * kPoolUnitBytes, c_.budgetBytes);
+    }
+
+    /// One round; true when it says that it has settled.
+    bool round(const SelectionView& view) {
+        now_ += 0.1;
+        std::vector<uint64_t> read;
+        for (size_t i = 0; i < c_.perRound; ++i) {
+            begin();
+            if (underWay_.empty()) break;
+            const auto at = underWay_.begin() + static_cast<std::ptrdiff_t>(random_() % underWay_.size());
+            const uint64_t page = *at;
+            underWay_.erase(at);
+            if (c_.bad.contains(page) || double(random_() % 1000) < 1000 * c_.failRate) {
+                if (!queue_.failed(page, ErrorCode::Io, now_)) continue;
+                queue_.delivered(page);
+                EXPECT_TRUE(policy.giveUp(page)) << "reported twice";
+                continue;
+            }
+            queue_.delivered(page);
+            ++reads;
+            read.push_back(page);
+        }
+        policy.look(view);
+        for (const uint64_t page : read) carryOut(page, policy.place(page));
+        outcome = policy.finish();
+        queue_.replace(outcome.wishes);
+        check();
+        // Nothing wanted is missing, so nothing of it is queued or under way.
+        return outcome.drawable.complete;
+    }
+
+    /// Rounds of a still view until it has settled.
+    void settle(const SelectionView& view) {
+        round(view);
+        const uint64_t reloads = policy.counts().reloads;
+        for (int i = 0; !round(view); ++i) ASSERT_LT(i, 20000) << "does not settle";
+        EXPECT_EQ(policy.counts().reloads, reloads) << "a still view loaded a page twice";
+        const auto cut = outcome.drawable.cut;
+        const uint64_t loads = policy.counts().loads;
+        // What was under way for other views may still arrive; the picture stays.
+        for (int i = 0; i < 20; ++i) {
+            EXPECT_TRUE(round(view));
+            EXPECT_EQ(outcome.drawable.cut, cut);
+        }
+        for (const PageRequest& wish : outcome.wishes) ADD_FAILURE() << "settled, and wishes for page " << wish.page;
+        EXPECT_GE(policy.counts().loads, loads);
+    }
+
+    uint64_t reads = 0;
+
+private:
+    static constexpr uint64_t kNothing = UINT64_MAX;
+
+    void begin() {
+        while (underWay_.size() < 4) {
+            const auto wish = queue_.next(now_);
+            if (!wish) return;
+            EXPECT_FALSE(policy.isResident(wish->page)) << "what is there is not read";
+            queue_.begin(wish->page);
+            underWay_.push_back(wish->page);
+        }
+    }
+
+    void carryOut(uint64_t page, const Placement& placement) {
+        for (const PageMove& move : placement.moves) {
+            ASSERT_LT(move.to.firstUnit, move.from.firstUnit);
+            for (uint64_t i = 0; i < move.from.units; ++i) {
+                ASSERT_EQ(content_[move.from.firstUnit + i], move.page) << "moves what is not there";
+                content_[move.to.firstUnit + i] = move.page;
+            }
+        }
+        if (!placement.slot) return;
+        ASSERT_EQ(placement.slot->firstUnit / shape_.unitsPerChunk, (placement.slot->end() - 1) / shape_.unitsPerChunk);
+        for (uint64_t i = placement.slot->firstUnit; i < placement.slot->end(); ++i) content_[i] = page;
+    }
+
+    /// What is resident is where the policy says, whole; the sum is within the budget.
+    void check() {
+        uint64_t units = 0;
+        for (uint64_t page = 0; page < dataset_->pages.size(); ++page) {
+            if (!policy.isResident(page)) continue;
+            const PoolSlot slot = policy.slotOf(page);
+            ASSERT_LE(slot.end(), content_.size());
+            for (uint64_t i = slot.firstUnit; i < slot.end(); ++i) ASSERT_EQ(content_[i], page);
+            units += slot.units;
+        }
+        ASSERT_EQ(units, policy.unitsTaken());
+        for (const uint64_t page : outcome.drawable.cut) ASSERT_TRUE(policy.isResident(page));
+    }
+
+    std::shared_ptr<const Dataset> dataset_;
+    Conditions c_;
+    std::mt19937_64 random_;
+    PoolShape shape_;
+
+public:
+    ResidencyPolicy policy;
+    PolicyOutcome outcome;
+
+private:
+    RequestQueue queue_;
+    std::vector<uint64_t> underWay_;
+    std::vector<uint64_t> content_;
+    double now_ = 0;
+};
+
+std::shared_ptr<const Dataset> treeFor(uint64_t seed) {
+    const uint32_t maxBytes = seed % 3 == 0 ? 16384 : 12 * 16384;
+    return std::make_shared<const Dataset>(test::randomTree(seed, 3 + seed % 2, seed % 2 == 0 ? 0.7 : 0.5, maxBytes));
+}
+
+uint64_t allBytes(const Dataset& dataset) {
+    uint64_t units = 0;
+    for (const PageEntry& page : dataset.pages) units += pageUnits(page, dataset.hasColour());
+    return units * kPoolUnitBytes;
+}
+
+/// From just more than the coarsest page to all.
+uint64_t randomBudget(const Dataset& dataset, std::mt19937_64& random) {
+    const uint64_t least = (pageUnits(dataset.pages[0], dataset.hasColour()) + 1) * kPoolUnitBytes;
+    const double part = std::pow(double(random() % 1000) / 999, 2);
+    return least + static_cast<uint64_t>(part * double(allBytes(dataset)));
+}
+
+/// What a view should settle on, from selection alone.
+std::vector<uint64_t> idealCut(const Dataset& dataset, const SelectionView& view, const std::set<uint64_t>& bad) {
+    std::vector<uint64_t> units;
+    std::vector<uint8_t> all(dataset.pages.size(), 1), unavailable(dataset.pages.size(), 0);
+    for (const PageEntry& page : dataset.pages) units.push_back(pageUnits(page, dataset.hasColour()));
+    for (const uint64_t page : bad) unavailable[page] = 1, all[page] = 0;
+    return selectPages(dataset, view, UINT64_MAX, units, all, unavailable).cut;
+}
+
+TEST(ResidencyPolicy, SettlesOnTheSamePagesWhateverTheHistoryOrderAndFaults) {
+    int differentFromIdeal = 0, relaxed = 0;
+    for (uint64_t seed = 0; seed < 60; ++seed) {
+        SCOPED_TRACE(seed);
+        const auto dataset = treeFor(seed);
+        std::mt19937_64 random(seed);
+        const uint64_t budget = randomBudget(*dataset, random);
+        const SelectionView view = test::randomView(random, 0.5);
+        Simulation plain(dataset, {.budgetBytes = budget, .failRate = 0, .bad = {}, .seed = 1, .perRound = 8});
+        if (!plain.policy.hasRoom()) continue;
+        plain.settle(view);
+        for (uint64_t other = 0; other < 3; ++other) {
+            Simulation wild(dataset, {.budgetBytes = budget, .failRate = 0.2, .bad = {}, .seed = seed * 10 + other, .perRound = 1 + random() % 5});
+            SelectionView moving = view;
+            for (int i = 0; i < 40; ++i) {
+                if (random() % 5 == 0) moving = test::randomView(random, 0.5);
+                if (random() % 2 == 0) moving.eye.x += 0.02;
+                wild.round(moving);
+            }
+            wild.settle(view);
+            EXPECT_EQ(wild.outcome.drawable.cut, plain.outcome.drawable.cut);
+            EXPECT_EQ(wild.outcome.drawable.errorPixels, plain.outcome.drawable.errorPixels);
+        }
+        const bool same = plain.outcome.drawable.cut == idealCut(*dataset, view, {});
+        EXPECT_EQ(same, !plain.outcome.relaxed) << "relaxed is said where, and only where, the budget is too small";
+        differentFromIdeal += same ? 0 : 1;
+        relaxed += plain.outcome.relaxed ? 1 : 0;
+    }
+    EXPECT_GT(relaxed, 5);
+    EXPECT_LT(differentFromIdeal, 55) << "and budgets that suffice were among them";
+}
+
+TEST(ResidencyPolicy, ABudgetThatSufficesGivesTheUnbudgetedPicture) {
+    for (uint64_t seed = 0; seed < 40; ++seed) {
+        SCOPED_TRACE(seed);
+        const auto dataset = treeFor(seed);
+        std::mt19937_64 random(seed);
+        const SelectionView view = test::randomView(random, 0.5);
+        Simulation all(dataset, {.budgetBytes = UINT64_MAX >> 1, .failRate = 0, .bad = {}, .seed = seed});
+        all.settle(view);
+        EXPECT_EQ(all.outcome.drawable.cut, idealCut(*dataset, view, {}));
+        EXPECT_FALSE(all.outcome.relaxed);
+    }
+}
+
+TEST(ResidencyPolicy, PagesThatCannotBeReadAreDrawnFromTheirParents) {
+    for (uint64_t seed = 0; seed < 30; ++seed) {
+        SCOPED_TRACE(seed);
+        const auto dataset = treeFor(seed);
+        std::mt19937_64 random(seed);
+        std::set<uint64_t> bad;
+        for (uint64_t page = 1; page < dataset->pages.size(); ++page)
+            if (random() % 10 == 0) bad.insert(page);
+        SelectionView view = test::randomView(random, 0);
+        for (glm::dvec4& plane : view.planes) plane = {0, 0, 0, 1};  // all is in view: all is wanted
+        Simulation damaged(dataset, {.budgetBytes = UINT64_MAX >> 1, .failRate = 0.1, .bad = bad, .seed = seed});
+        damaged.settle(view);
+        EXPECT_EQ(damaged.outcome.drawable.cut, idealCut(*dataset, view, bad));
+    }
+}
+
+TEST(ResidencyPolicy, AShakingViewDoesNotThrash) {
+    // In turn ahead and behind, each of which wants all of the pool.
+    uint64_t shaking = 0, without = 0;
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+        const auto dataset = std::make_shared<const Dataset>(test::randomTree(seed, 4, 0.9, 16384));
+        SelectionView views[2];
+        for (int i = 0; i < 2; ++i) {
+            views[i].eye = {0.5, 0.4, 0.6};
+            views[i].errorPixels = 0.05;
+            views[i].pixelsPerUnit = 1000;
+            for (glm::dvec4& plane : views[i].planes) plane = {i == 0 ? 1 : -1, 0, 0, -0.01};
+        }
+        Simulation sim(dataset, {.budgetBytes = allBytes(*dataset) / 3, .failRate = 0, .bad = {}, .seed = seed, .perRound = 50});
+        if (!sim.policy.hasRoom()) continue;
+        sim.settle(views[0]);
+        const uint64_t before = sim.policy.counts().loads;
+        for (int i = 1; i <= 240; ++i) sim.round(views[i % 2]);
+        shaking += sim.policy.counts().loads - before;
+        // What one exchange takes.
+        const uint64_t base = sim.policy.counts().loads;
+        for (int i = 0; i < 4; ++i) sim.settle(views[i % 2]);
+        without += (sim.policy.counts().loads - base) / 4;
+    }
+    EXPECT_GT(without, 50u) << "the views do want different pages";
+    EXPECT_LT(shaking, without * 240 / 10);
+}
+
+TEST(ResidencyPolicy, LooksAheadAlongTheMotionOnly) {
+    const auto dataset = std::make_shared<const Dataset>(test::randomTree(4, 4, 1, 16384));
+    SelectionView view;
+    view.pixelsPerUnit = 1000;
+    view.errorPixels = 1;
+    for (glm::dvec4& plane : view.planes) plane = {1, 0, 0, 0};  // all that is ahead in x
+    view.eye = {-6, 0.5, 0.5};
+    Simulation sim(dataset, {.budgetBytes = UINT64_MAX >> 1, .failRate = 0, .bad = {}, .seed = 1, .perRound = 1000});
+    sim.settle(view);
+    const uint64_t still = sim.policy.counts().loads;
+    view.eye.x += 0.3;
+    sim.round(view);
+    EXPECT_GT(sim.outcome.wishes.size(), sim.outcome.missing) << "nearer pages, which this view does not want yet";
+    const auto wishes = sim.outcome.wishes;
+    EXPECT_TRUE(std::is_sorted(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.priority > b.priority; }));
+    sim.round(view);
+    EXPECT_EQ(sim.outcome.wishes.size(), sim.outcome.missing) << "it stands still";
+    EXPECT_GE(sim.policy.counts().loads, still);
+}
+
+TEST(ResidencyPolicy, ChildrenGoBeforeParentsAndTheCoarsestStays) {
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+        const auto dataset = treeFor(seed);
+        std::mt19937_64 random(seed);
+        std::vector<uint64_t> parent(dataset->pages.size(), 0);
+        for (uint64_t page = 0; page < dataset->pages.size(); ++page)
+            for (uint32_t i = 0; i < uint32_t(std::popcount(dataset->pages[page].childMask)); ++i) parent[dataset->pages[page].firstChild + i] = page;
+        Simulation sim(dataset, {.budgetBytes = allBytes(*dataset) / 2, .failRate = 0, .bad = {}, .seed = seed});
+        if (!sim.policy.hasRoom()) continue;
+        sim.settle(test::randomView(random, 0.5));
+        for (int i = 0; i < 10; ++i) {
+            sim.settle(test::randomView(random, 0.2));
+            for (uint64_t page = 0; page < dataset->pages.size(); ++page)
+                EXPECT_TRUE(!sim.policy.isResident(page) || sim.policy.isResident(parent[page])) << page;
+        }
+    }
+}
+
+TEST(ResidencyPolicy, AfterALossTheSameViewSettlesAgain) {
+    const auto dataset = treeFor(5);
+    std::mt19937_64 random(5);
+    const SelectionView view = test::randomView(random, 0.5);
+    Simulation sim(dataset, {.budgetBytes = allBytes(*dataset), .failRate = 0, .bad = {}, .seed = 5});
+    sim.settle(view);
+    const auto cut = sim.outcome.drawable.cut;
+    sim.policy.clear();
+    EXPECT_EQ(sim.policy.unitsTaken(), 0u);
+    for (int i = 0; !sim.round(view); ++i) ASSERT_LT(i, 10000);
+    EXPECT_EQ(sim.outcome.drawable.cut, cut);
+}
+
+}  // namespace
+}  // namespace vcp

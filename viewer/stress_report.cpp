@@ -1,0 +1,109 @@
+// The report of vcp stress as JSON, Markdown and plots.
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "viewer/option_values.h"
+#include "viewer/plot_svg.h"
+#include "viewer/stress.h"
+
+namespace vcp {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json toJson(const Quantiles& q) { return {{"p50", q.p50}, {"p95", q.p95}, {"p99", q.p99}, {"max", q.max}}; }
+
+Json toJson(const StressSample& s) {
+    return {{"seconds", s.seconds}, {"frame_ms", s.frameMs}, {"error_pixels", s.errorPixels}, {"resident_bytes", s.residentBytes},
+            {"requests", s.pending}, {"loads", s.loads},     {"evictions", s.evictions},       {"missing", s.missing}};
+}
+
+double ratio(double a, double b) { return b > 0 ? a / b : 0; }
+
+std::string row(const std::string& name, const Quantiles& q) {
+    return fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, q.p50, q.p95, q.p99, q.max);
+}
+
+template <class Value>
+PlotSeries series(const StressReport& report, const std::string& name, Value valueOf) {
+    PlotSeries made{name, {}};
+    for (const StressSample& sample : report.samples) made.points.push_back({sample.seconds, valueOf(sample)});
+    return made;
+}
+
+}  // namespace
+
+std::string stressJson(const StressReport& r) {
+    Json samples = Json::array();
+    for (const StressSample& sample : r.samples) samples.push_back(toJson(sample));
+    const Json json = {{"name", r.name},
+                       {"path", r.path},
+                       {"faults", r.faults},
+                       {"seed", r.seed},
+                       {"frames", r.frames},
+                       {"device", r.device},
+                       {"first_picture_seconds", r.firstPictureSeconds},
+                       {"detail_90_seconds", r.detail90Seconds},
+                       {"settled_seconds", r.settledSeconds},
+                       {"path_settled_seconds", r.pathSettledSeconds},
+                       {"bytes_read", r.bytesRead},
+                       {"bytes_needed", r.bytesNeeded},
+                       {"reads", r.requests},
+                       {"failed_reads", r.failures},
+                       {"pages_given_up", r.pagesGivenUp},
+                       {"budget_bytes", r.budgetBytes},
+                       {"resident_bytes_max", r.residentBytesMax},
+                       {"ram_bytes", r.ramBytes},
+                       {"held_bytes_max", r.heldBytesMax},
+                       {"loads", r.loads},
+                       {"evictions", r.evictions},
+                       {"relaxed", r.relaxed},
+                       {"error_pixels", r.errorPixels},
+                       {"frame_ms", toJson(r.frameMs)},
+                       {"frame_ms_no_loads", toJson(r.frameMsNoLoads)},
+                       {"violations", r.violations},
+                       {"samples", samples}};
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string stressMarkdown(const StressReport& r) {
+    std::string text = fmt::format("# Streaming {}\n\nPath {}, {} frames, seed {}, on {}. Faults: {}.\n\n", r.name, r.path, r.frames, r.seed,
+                                   r.device, r.faults.empty() ? "none" : r.faults);
+    text += r.violations.empty() ? "**All invariants hold.**\n\n" : "**Broken invariants:**\n\n";
+    for (const std::string& violation : r.violations) text += "- " + violation + "\n";
+    if (!r.violations.empty()) text += "\n";
+    text += fmt::format("| first picture | 90 % detail | settled | path settled |\n|---|---|---|---|\n| {:.3f} s | {:.3f} s | {:.3f} s | {:.3f} s |\n\n",
+                        r.firstPictureSeconds, r.detail90Seconds, r.settledSeconds, r.pathSettledSeconds);
+    text += fmt::format("| budget | resident at most | memory | held at most | read | needed | read over needed |\n|---|---|---|---|---|---|---|\n"
+                        "| {} | {} | {} | {} | {} | {} | {:.2f} |\n\n",
+                        formatBytes(r.budgetBytes), formatBytes(r.residentBytesMax), formatBytes(r.ramBytes), formatBytes(r.heldBytesMax),
+                        formatBytes(r.bytesRead), formatBytes(r.bytesNeeded), ratio(double(r.bytesRead), double(r.bytesNeeded)));
+    text += "| frame, ms | p50 | p95 | p99 | max |\n|---|---|---|---|---|\n" + row("with loads", r.frameMs) + row("without loads", r.frameMsNoLoads);
+    text += fmt::format("\np99 with loads is {:.2f} of that without. {} pages loaded, {} evicted; {} reads failed, {} pages given up. "
+                        "The last view settled at {:.2g} pixels of error{}.\n",
+                        ratio(r.frameMs.p99, r.frameMsNoLoads.p99), formatCount(r.loads), formatCount(r.evictions), formatCount(r.failures),
+                        formatCount(r.pagesGivenUp), r.errorPixels, r.relaxed ? "; the budget was too small for some views" : "");
+    text += "\n![resident bytes](stress_bytes.svg)\n![pages](stress_pages.svg)\n![frame time](stress_frames.svg)\n![error](stress_error.svg)\n";
+    return text;
+}
+
+std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport& r) {
+    const auto plot = [&](const std::string& title, const std::string& unit, std::vector<PlotSeries> all) {
+        Plot made{.title = title, .xName = "seconds", .yName = unit};
+        made.series = std::move(all);
+        return made;
+    };
+    Plot bytes = plot("Resident bytes", "MB", {series(r, "resident", [](const StressSample& s) { return 1e-6 * double(s.residentBytes); })});
+    bytes.levels = {{"budget", 1e-6 * double(r.budgetBytes)}};
+    const Plot pages = plot("Pages", "pages", {series(r, "requests", [](const StressSample& s) { return double(s.pending); }),
+                                               series(r, "loads a frame", [](const StressSample& s) { return double(s.loads); }),
+                                               series(r, "evictions a frame", [](const StressSample& s) { return double(s.evictions); })});
+    const Plot frames = plot("Frame time", "ms", {series(r, "frame", [](const StressSample& s) { return s.frameMs; })});
+    const Plot error = plot("Error and missing detail", "pixels; % of pages",
+                            {series(r, "pixel error", [](const StressSample& s) { return s.errorPixels; }),
+                             series(r, "missing detail, %", [](const StressSample& s) { return 100 * s.missing; })});
+    return {{"stress_bytes", plotSvg(bytes)}, {"stress_pages", plotSvg(pages)}, {"stress_frames", plotSvg(frames)}, {"stress_error", plotSvg(error)}};
+}
+
+}  // namespace vcp
