@@ -9,6 +9,7 @@
 #include "builder/build.h"
 #include "viewer/bench_cameras.h"
 #include "viewer/bench_tracer.h"
+#include "viewer/peers/parallel_rows.h"
 
 namespace vcp {
 
