@@ -1,10 +1,13 @@
 // vcp bench: run time against error, beside Embree measured in the same run.
 #include <fstream>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include "builder/memory_plan.h"
 #include "viewer/bench_build.h"
+#include "viewer/bench_methods.h"
 #include "viewer/bench_rays.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
@@ -45,6 +48,7 @@ struct RaysCommand : BenchCommand {
     std::string device;
     int views = 1;
     int judgeEvery = 1;
+    bool sweep = false;
 };
 
 Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
@@ -140,13 +144,15 @@ Result<int> runRays(const RaysCommand& command) {
     options.out = command.out;
     options.cell = command.cellLength();
     options.judgeEvery = command.judgeEvery;
+    options.sweep = command.sweep;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = progressTo(display);
     const auto report = benchRays(options);
     display.finish();
     if (!report) return report.error();
-    return publish(command, "bench_rays", {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report)});
+    return publish(command, "bench_rays",
+                   {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
 }
 
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
@@ -200,9 +206,10 @@ RunCommand addBenchBuild(CLI::App& bench) {
 RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
-    addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from");
-    app->get_option("MODEL")->required();
-    app->add_option("--methods", command->methods, "certified, reference, embree, embree-single [all]")->type_name("A,B")->delimiter(',');
+    addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
+    app->add_option("--methods", command->methods, fmt::format("{} [all]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_flag("--sweep", command->sweep,
+                  "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the other octrees");
     app->add_option("--cameras", command->cameras, "whole, half, close, cells [all]")->type_name("A,B")->delimiter(',');
     app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(
         CLI::Range(1, 1000));

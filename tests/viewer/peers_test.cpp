@@ -1,10 +1,13 @@
 // The peers of the ray benchmark on shapes whose answer is known, and against slow references.
 #include <cmath>
+#include <map>
+#include <numbers>
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "../builder/test_meshes.h"
+#include "viewer/analytic_models.h"
 #include "viewer/bench_cameras.h"
 #include "viewer/peers/distance_octree.h"
 #include "viewer/peers/grid_points.h"
@@ -171,6 +174,9 @@ TEST_F(PeersOnASphere, MergingSavesBytesAndEveryRuleCanBeSwitched) {
     options.band = 1;
     auto thin = PaperCaster::create(bvh_, options, {.threads = 2});
     ASSERT_TRUE(merged && whole && thin);
+    const auto distances = DistanceCaster::create(bvh_, sides_, {}, {.threads = 2});
+    ASSERT_TRUE(distances);
+    EXPECT_EQ(distances->bytes(), merged->bytes());
     EXPECT_LT(merged->tree().leaves, whole->tree().leaves);
     EXPECT_LT(thin->tree().leaves, whole->tree().leaves);
     EXPECT_LT(thin->bytes(), whole->bytes());
@@ -277,6 +283,28 @@ TEST(Peers, CellsTooSmallAreRefused) {
     const auto paper = PaperCaster::create(bvh, {}, {.cell = 1e-6});
     ASSERT_FALSE(paper);
     EXPECT_EQ(paper.error().code, ErrorCode::Limit);
+}
+
+TEST(AnalyticModels, AreClosedAndOrientedOutwards) {
+    for (const AnalyticModel& model : analyticModels()) {
+        double volume = 0;
+        std::map<std::pair<std::array<double, 3>, std::array<double, 3>>, int> edges;
+        const auto key = [](glm::dvec3 p) { return std::array<double, 3>{p.x, p.y, p.z}; };
+        for (uint64_t t = 0; t < model.mesh.triangles.size(); ++t) {
+            const auto v = model.mesh.corners(t);
+            volume += glm::dot(v[0], glm::cross(v[1], v[2])) / 6;
+            if (model.mesh.triangles.size() > 100) continue;
+            for (int k = 0; k < 3; ++k) {
+                ++edges[{key(v[k]), key(v[(k + 1) % 3])}];
+                --edges[{key(v[(k + 1) % 3]), key(v[k])}];
+            }
+        }
+        for (const auto& [edge, count] : edges) EXPECT_EQ(count, 0) << model.name;
+        const double exact = model.name == "sphere"  ? 4.0 / 3 * std::numbers::pi
+                             : model.name == "torus" ? 2 * std::numbers::pi * std::numbers::pi * 0.7 * 0.09
+                                                     : 8 * 0.7 * 0.2 * kAnalyticModelCell;
+        EXPECT_NEAR(volume, exact, 1e-3 * exact) << model.name;
+    }
 }
 
 TEST(MeshSides, BoxFromAllSides) {

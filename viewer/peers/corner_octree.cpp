@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 
@@ -71,6 +73,13 @@ private:
     [[nodiscard]] CornerSample sampled(glm::ivec3 point) const {
         const CornerSample* known = points_.find(point);
         return known ? *known : sampleAt(point);
+    }
+    /// Cells, without sign; nothing where it is more than `within`.
+    [[nodiscard]] std::optional<float> distanceWithin(glm::ivec3 point, float within) const {
+        if (const CornerSample* known = points_.find(point)) return std::abs(known->distance);
+        const auto nearest = mesh_.nearestPoint(tree_.frame.worldFromGrid(glm::dvec3(point)), within * options_.cell);
+        if (!nearest) return {};
+        return static_cast<float>(nearest->distance / options_.cell);
     }
     [[nodiscard]] CornerSamples cornersOf(glm::ivec3 low, int size) const {
         CornerSamples corners;
@@ -238,10 +247,11 @@ private:
     }
     void leastOnFace(glm::ivec3 from, glm::ivec3 to, float& least) const {
         const glm::ivec3 middle = (from + to) / 2;
-        const float d = std::abs(sampled(middle).distance);
-        least = std::min(least, d);
-        const glm::ivec3 reach = glm::max(to - middle, middle - from);
-        if (from == to || d - glm::length(glm::vec3(reach)) >= least) return;
+        const float reach = glm::length(glm::vec3(glm::max(to - middle, middle - from)));
+        const auto d = distanceWithin(middle, (least + reach) * 1.00001f);
+        if (!d) return;
+        least = std::min(least, *d);
+        if (from == to || *d - reach >= least) return;
         const glm::ivec3 extent = to - from;
         int axis = extent.x >= extent.y ? 0 : 1;
         if (extent.z > extent[axis]) axis = 2;
@@ -257,26 +267,33 @@ private:
             const glm::ivec3 p = at(a).low, q = at(b).low;
             return std::tie(a.level, p.z, p.y, p.x) < std::tie(b.level, q.z, q.y, q.x);
         });
-        std::vector<CornerSamples> samples(leaves_.size());
+        tree_.leaves = leaves_.size();
+        std::vector<bool> adjoins(leaves_.size());
+        std::vector<uint32_t> slice(leaves_.size());
+        uint32_t slices = 0;
+        for (size_t i = 0; i < leaves_.size(); ++i) {
+            const glm::ivec3 along(1 << leaves_[i].level, 0, 0);
+            adjoins[i] = i > 0 && leaves_[i - 1].level == leaves_[i].level && at(leaves_[i - 1]).low + along == at(leaves_[i]).low;
+            slice[i] = adjoins[i] ? slices - 1 : slices;
+            slices = slice[i] + 2;
+            tree_.nodes[at(leaves_[i]).word] = -static_cast<int32_t>(slice[i]) - 1;
+        }
+        tree_.largest = largestDistance();
+        tree_.slices.resize(slices);
+        forEachIndex(leaves_.size(), options_.threads, [&](size_t i) {
+            const CornerSamples corners = cornersOf(at(leaves_[i]).low, 1 << leaves_[i].level);
+            // A shared slice is written once, by the leaf before.
+            for (uint32_t x = adjoins[i] ? 1 : 0; x < 2; ++x)
+                for (uint32_t k = 0; k < 4; ++k) tree_.slices[slice[i] + x][k] = field_.pack(corners[x + 2 * k], tree_.largest);
+        });
+    }
+    [[nodiscard]] float largestDistance() const {
         std::vector<float> largest(leaves_.size());
         forEachIndex(leaves_.size(), options_.threads, [&](size_t i) {
-            samples[i] = cornersOf(at(leaves_[i]).low, 1 << leaves_[i].level);
-            for (const CornerSample& corner : samples[i]) largest[i] = std::max(largest[i], std::abs(corner.distance));
+            for (const CornerSample& corner : cornersOf(at(leaves_[i]).low, 1 << leaves_[i].level))
+                largest[i] = std::max(largest[i], std::abs(corner.distance));
         });
-        for (const float each : largest) tree_.largest = std::max(tree_.largest, each);
-        tree_.leaves = leaves_.size();
-        const auto addSlice = [&](const CornerSamples& corners, int x) {
-            auto& slice = tree_.slices.emplace_back();
-            for (int k = 0; k < 4; ++k) slice[k] = field_.pack(corners[x + 2 * k], tree_.largest);
-        };
-        for (size_t i = 0; i < leaves_.size(); ++i) {
-            const int size = 1 << leaves_[i].level;
-            const bool adjoins = i > 0 && leaves_[i - 1].level == leaves_[i].level &&
-                                 at(leaves_[i - 1]).low + glm::ivec3(size, 0, 0) == at(leaves_[i]).low;
-            if (!adjoins) addSlice(samples[i], 0);
-            tree_.nodes[at(leaves_[i]).word] = -static_cast<int32_t>(tree_.slices.size() - 1) - 1;
-            addSlice(samples[i], 1);
-        }
+        return largest.empty() ? 1 : std::ranges::max(largest);
     }
 
     const MeshBvh& mesh_;

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "viewer/peers/paper_octree.h"
+
 namespace vcp {
 
 namespace {
@@ -12,11 +14,9 @@ public:
     [[nodiscard]] float band() const override { return options_.band; }
     [[nodiscard]] bool isSigned() const override { return true; }
     [[nodiscard]] float mergeThreshold() const override { return options_.mergeThreshold; }
-    [[nodiscard]] float mergeError(const CornerSamples& corners, float, glm::vec3 at,
+    [[nodiscard]] float mergeError(const CornerSamples& corners, float size, glm::vec3 at,
                                    const CornerSample& exact) const override {
-        std::array<float, 8> values;
-        for (size_t k = 0; k < 8; ++k) values[k] = corners[k >> 2 | (k & 1) << 1 | (k & 2) << 1].distance;
-        return std::abs(Trilinear(values).at(at) - exact.distance);
+        return vectorMergeError(corners, size, at, exact);
     }
     [[nodiscard]] uint32_t pack(const CornerSample& sample, float) const override {
         return std::bit_cast<uint32_t>(sample.distance);

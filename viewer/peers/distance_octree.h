@@ -1,8 +1,9 @@
 // Signed distances at the corners, 32-bit floats, in the structure of corner_octree.h.
 //
-//   DistanceCaster   the signed-distance octree that Demir and Westermann compare with (their Table 1): the same
-//                    blocks and the same bytes as theirs, sphere tracing (Hart 1996) by the trilinear distance; hit
-//                    where it changes sign, or falls below kHitDistance
+//   DistanceCaster   the signed-distance octree that Demir and Westermann compare with. Their Table 1 gives both the
+//                    same bytes at the same resolution, so it is the same tree, merged alike, with distances for
+//                    vectors. Sphere tracing (Hart 1996) by the trilinear distance; hit where it changes sign, or
+//                    falls below kHitDistance
 //   AnalyticCaster   leaves only where the corners differ in sign; inside a leaf the ray meets the trilinear distance
 //                    as a cubic, whose coefficients and first root are computed (Hansson-Soderlund, Evans and
 //                    Akenine-Moller 2022; the root between the closed-form extrema, as in Marmitt et al. 2004)
@@ -18,7 +19,7 @@
 
 namespace vcp {
 
-/// a trilinear function of x, y and z from 0 to 1.
+/// A trilinear function of x, y and z from 0 to 1.
 struct Trilinear {
     float k, x, y, z, xy, xz, yz, xyz;
 

@@ -59,7 +59,7 @@ public:
     [[nodiscard]] float mergeThreshold() const override { return options_.mergeThreshold; }
     [[nodiscard]] float mergeError(const CornerSamples& corners, float size, glm::vec3 at,
                                    const CornerSample& exact) const override {
-        return glm::distance(interpolateVectors(vectorsAt(corners), size, at, options_.scheme), exact.toSurface);
+        return vectorMergeError(corners, size, at, exact, options_.scheme);
     }
     [[nodiscard]] uint32_t pack(const CornerSample& sample, float largest) const override {
         return packPaperVector(sample.toSurface, largest, options_.packing);
@@ -106,6 +106,10 @@ glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 a
     return glm::dot(trilinear, trilinear) > nearest ? trilinear : plane;
 }
 
+float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact, PaperScheme scheme) {
+    return glm::distance(interpolateVectors(vectorsAt(corners), size, at, scheme), exact.toSurface);
+}
+
 uint32_t packPaperVector(glm::vec3 v, float longest, PaperPacking packing) {
     return packing == PaperPacking::Spherical ? packVectorSpherical(glm::dvec3(v), longest) : packOctahedral(v, longest);
 }
@@ -128,7 +132,7 @@ glm::vec3 PaperDecoder::octahedral(uint32_t code) {
 }
 
 LeafVectors PaperCaster::vectorsOf(int32_t leaf) const {
-    const uint32_t* codes = tree_.leafCodes(leaf);
+    const uint32_t* codes = tree_->leafCodes(leaf);
     LeafVectors vectors;
     for (int k = 0; k < 8; ++k) {
         const glm::vec3 v = decode_(codes[k]);

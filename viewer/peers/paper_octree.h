@@ -15,6 +15,8 @@
 // tabulated, one entry a code.
 #pragma once
 
+#include <memory>
+
 #include "viewer/peers/corner_octree.h"
 #include "viewer/peers/node_finder.h"
 
@@ -41,6 +43,9 @@ struct LeafVectors {
 
 /// The vector at `at` (0 to 1 an axis) of a leaf of edge `size` cells.
 glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 at, PaperScheme scheme);
+/// Euclidean distance of that vector to the exact one (section 3), cells.
+float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact,
+                       PaperScheme scheme = PaperScheme::Longer);
 
 uint32_t packPaperVector(glm::vec3 v, float longest, PaperPacking packing);
 /// Decodes what packPaperVector packed.
@@ -64,9 +69,9 @@ class PaperCaster {
 public:
     static Result<PaperCaster> create(const MeshBvh& mesh, const PaperOptions& options, const CornerOctreeOptions& build);
 
-    [[nodiscard]] const GridFrame& frame() const { return tree_.frame; }
-    [[nodiscard]] const CornerOctree& tree() const { return tree_; }
-    [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
+    [[nodiscard]] const GridFrame& frame() const { return tree_->frame; }
+    [[nodiscard]] const CornerOctree& tree() const { return *tree_; }
+    [[nodiscard]] uint64_t bytes() const { return tree_->bytes(); }
     /// The march's options may change; those of the structure (band, threshold, packing) may not.
     void setEpsilon(float cells) { options_.epsilon = cells; }
     void setScheme(PaperScheme scheme) { options_.scheme = scheme; }
@@ -80,22 +85,22 @@ private:
     static constexpr int kMaxSteps = 4096;
 
     PaperCaster(CornerOctree tree, const PaperOptions& options)
-        : tree_(std::move(tree)), options_(options), decode_(tree_.largest, options.packing) {}
+        : tree_(std::make_shared<const CornerOctree>(std::move(tree))), options_(options), decode_(tree_->largest, options.packing) {}
     [[nodiscard]] LeafVectors vectorsOf(int32_t leaf) const;
     [[nodiscard]] float stepFrom(float d, glm::vec3 v, glm::vec3 direction) const;
 
-    CornerOctree tree_;
+    std::shared_ptr<const CornerOctree> tree_;  // shared by copies that march otherwise
     PaperOptions options_;
     PaperDecoder decode_;
 };
 
 template <class Work>
 GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
-    NodeFinder finder(tree_);
+    NodeFinder finder(*tree_);
     LeafVectors corners;
     int32_t known = 0;
     float t = 0, lastT = 0, lastDistance = 0;
-    const glm::ivec3 last = tree_.frame.cells() - 1;
+    const glm::ivec3 last = tree_->frame.cells() - 1;
     for (int step = 0; step < kMaxSteps && t <= ray.tMax; ++step) {
         work.step();
         const glm::vec3 p = ray.origin + t * ray.direction;
@@ -116,7 +121,7 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
             }
             advance = stepFrom(d, v, ray.direction);
         } else {
-            d = tree_.emptyDistance(word);
+            d = tree_->emptyDistance(word);
             advance = std::max(d, options_.epsilon);
         }
         lastT = t;
