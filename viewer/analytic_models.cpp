@@ -49,7 +49,8 @@ IndexedMesh torus() {
 
 /// Turned about an axis through the middle (Rodrigues).
 glm::dvec3 turned(glm::dvec3 p, glm::dvec3 axis, double angle) {
-    return p * std::cos(angle) + glm::cross(axis, p) * std::sin(angle) + axis * (glm::dot(axis, p) * (1 - std::cos(angle)));
+    return p * std::cos(angle) + glm::cross(axis, p) * std::sin(angle) +
+           axis * (glm::dot(axis, p) * (1 - std::cos(angle)));
 }
 
 IndexedMesh plate() {
@@ -57,7 +58,8 @@ IndexedMesh plate() {
     const glm::dvec3 axis = glm::normalize(glm::dvec3(1, 2, 0.5));
     IndexedMesh mesh;
     for (int corner = 0; corner < 8; ++corner)
-        mesh.positions.push_back(turned(half * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1), axis, 0.6));
+        mesh.positions.push_back(
+            turned(half * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1), axis, 0.6));
     for (uint32_t axisBit : {1u, 2u, 4u}) {
         const uint32_t next = axisBit == 4 ? 1 : axisBit * 2, last = 7 - axisBit - next;
         for (const uint32_t side : {0u, axisBit}) {

@@ -30,7 +30,8 @@ const std::vector<Method> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
 
 template <class Caster>
 std::unique_ptr<RayTracer> tracerOf(Caster caster, std::string knob, unsigned threads) {
-    return std::make_unique<PeerTracer<Caster>>(std::make_shared<const Caster>(std::move(caster)), std::move(knob), threads);
+    return std::make_unique<PeerTracer<Caster>>(std::make_shared<const Caster>(std::move(caster)), std::move(knob),
+                                                threads);
 }
 
 std::string cellKnob(double cells) { return fmt::format("cell {:g}", cells); }
@@ -68,7 +69,7 @@ Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, d
 
 Result<std::unique_ptr<RayTracer>> RayMethods::makePaper(double epsilon) {
     if (!paper_) {
-        auto made = PaperCaster::create(in_.bvh, {}, {.cell = in_.cell, .threads = in_.threads});
+        auto made = PaperCaster::create(in_.bvh, in_.paper, {.cell = in_.cell, .threads = in_.threads});
         if (!made) return made.error();
         paper_ = std::move(*made);
     }

@@ -41,7 +41,8 @@ public:
         std::filesystem::path vcp;
         std::string device;
         unsigned threads = 0;
-        double cell = 1;  ///< finest edge of the .vcp, world units
+        double cell = 1;          ///< finest edge of the .vcp, world units
+        PaperOptions paper = {};  ///< of `paper`; its epsilon is the knob
     };
     explicit RayMethods(Inputs inputs) : in_(std::move(inputs)) {}
 

@@ -166,13 +166,13 @@ private:
             peer = std::move(*made);
         }
         RayMethods methods({m.mesh, *m.bvh, *m.cache, m.files.vcp, options_.device, options_.threads,
-                            m.cache->dataset().header.cell});
+                            m.cache->dataset().header.cell, options_.paper});
         size_t runs = 0, done = 0;
         for (const std::string& method : options_.methods)
-            runs += rayMethodKnobs(method, options_.sweep).size() * options_.cameras.size();
+            runs += knobsOf(method).size() * options_.cameras.size();
         const auto fraction = [&] { return 0.1 + 0.9 * static_cast<double>(done) / static_cast<double>(runs); };
         for (const std::string& method : options_.methods)
-            for (const double knob : rayMethodKnobs(method, options_.sweep)) {
+            for (const double knob : knobsOf(method)) {
                 VCP_TRY(report(fmt::format("{}: making {}", m.files.name, method), fraction()));
                 auto tracer = methods.make(method, knob);
                 if (!tracer) return tracer.error();
@@ -183,6 +183,11 @@ private:
                 }
             }
         return {};
+    }
+
+    [[nodiscard]] std::vector<double> knobsOf(const std::string& method) const {
+        if (method == "paper" && !options_.sweep) return {options_.paper.epsilon};
+        return rayMethodKnobs(method, options_.sweep);
     }
 
     Result<void> runCamera(const BenchModel& model, const std::string& method, const std::string& name,

@@ -17,6 +17,7 @@
 
 #include "builder/ray_classes.h"
 #include "octree/result.h"
+#include "viewer/peers/paper_octree.h"
 #include "viewer/work_histogram.h"
 
 namespace vcp {
@@ -34,6 +35,7 @@ struct BenchRaysOptions {
     std::string device;         ///< of `certified`, as for --device; empty: the best
     std::filesystem::path out;  ///< .vcp files are kept here and used again; empty: a temporary folder
     double cell = 0;            ///< as for vcp build
+    PaperOptions paper;         ///< the rules of the method `paper`
     int judgeEvery = 1;         ///< 1: every ray is compared with the mesh; n: every nth row and column
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;

@@ -59,8 +59,8 @@ Json rowsOf(const BenchRaysReport& report) {
 }
 
 double wrongRays(const RaySummary& classes) {
-    return classes.fraction(RayClass::Missed) + classes.fraction(RayClass::False) + classes.fraction(RayClass::WrongSheet) +
-           classes.fraction(RayClass::Unresolved);
+    return classes.fraction(RayClass::Missed) + classes.fraction(RayClass::False) +
+           classes.fraction(RayClass::WrongSheet) + classes.fraction(RayClass::Unresolved);
 }
 
 struct PlottedValue {
@@ -72,7 +72,9 @@ const std::array<PlottedValue, 4> kPlotted = {
      {"p95", "Hit error, p95", "cells", [](const BenchRaysRow& row) { return row.classes.distanceCells.p95; }},
      {"p99", "Hit error, p99", "cells", [](const BenchRaysRow& row) { return row.classes.distanceCells.p99; }},
      {"wrong", "Rays missed, false, on the wrong sheet or unresolved", "fraction of all rays; none: half a ray",
-      [](const BenchRaysRow& row) { return std::max(wrongRays(row.classes), 0.5 / static_cast<double>(std::max<uint64_t>(row.classes.judged, 1))); }}}};
+      [](const BenchRaysRow& row) {
+          return std::max(wrongRays(row.classes), 0.5 / static_cast<double>(std::max<uint64_t>(row.classes.judged, 1)));
+      }}}};
 
 /// One series a method, one point a value of its knob: means over the rows, which differ by camera.
 std::string plotOf(const std::vector<const BenchRaysRow*>& rows, const PlottedValue& value, bool againstTime) {
@@ -111,20 +113,25 @@ std::string benchRaysCsv(const BenchRaysReport& report) { return csvOf(rowsOf(re
 std::string benchRaysMarkdown(const BenchRaysReport& report) {
     std::string text =
         "| model | camera | method | knob | Mray/s | of Embree | hit % | missed % | false % | wrong sheet % | "
-        "unresolved % | holes | beyond certified | p50 | p95 | p99 | max cells | normal p50 | steps | p99 | fetches | p99 | MB |\n"
+        "unresolved % | holes | beyond certified | p50 | p95 | p99 | max cells | normal p50 | steps | p99 | fetches | "
+        "p99 | MB |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    const auto tail = [](const WorkHistogram& rays) { return rays.empty() ? std::string() : fmt::format("{}", rays.quantile(0.99)); };
+    const auto tail = [](const WorkHistogram& rays) {
+        return rays.empty() ? std::string() : fmt::format("{}", rays.quantile(0.99));
+    };
     for (const BenchRaysRow& row : report.rows) {
         const RaySummary& classes = row.classes;
         const Quantiles& distance = classes.distanceCells;
         const auto percent = [&](RayClass rayClass) { return 100 * classes.fraction(rayClass); };
-        text += fmt::format("| {} | {} | {} | {} | {:.2f} | {:.3f} | {:.2f} | {:.5f} | {:.5f} | {:.5f} | {:.5f} | {} | {} ",
-                            row.model, row.camera, row.method, row.knob, 1e3 / row.nsPerRay, row.ratioToEmbree,
-                            percent(RayClass::Hit), percent(RayClass::Missed), percent(RayClass::False),
-                            percent(RayClass::WrongSheet), percent(RayClass::Unresolved), classes.holes, classes.beyondCertified);
-        text += fmt::format("| {:.5f} | {:.5f} | {:.5f} | {:.4f} | {:.1f}\u00b0 | {:.1f} | {} | {:.1f} | {} | {:.1f} |\n", distance.p50,
-                            distance.p95, distance.p99, distance.max, classes.normalDegrees.p50, row.stepsMean,
-                            tail(row.steps), row.fetchesMean, tail(row.fetches), static_cast<double>(row.bytes) * 1e-6);
+        text += fmt::format(
+            "| {} | {} | {} | {} | {:.2f} | {:.3f} | {:.2f} | {:.5f} | {:.5f} | {:.5f} | {:.5f} | {} | {} ", row.model,
+            row.camera, row.method, row.knob, 1e3 / row.nsPerRay, row.ratioToEmbree, percent(RayClass::Hit),
+            percent(RayClass::Missed), percent(RayClass::False), percent(RayClass::WrongSheet),
+            percent(RayClass::Unresolved), classes.holes, classes.beyondCertified);
+        text += fmt::format(
+            "| {:.5f} | {:.5f} | {:.5f} | {:.4f} | {:.1f}\u00b0 | {:.1f} | {} | {:.1f} | {} | {:.1f} |\n", distance.p50,
+            distance.p95, distance.p99, distance.max, classes.normalDegrees.p50, row.stepsMean, tail(row.steps),
+            row.fetchesMean, tail(row.fetches), static_cast<double>(row.bytes) * 1e-6);
     }
     return text + besidePaperMarkdown(report);
 }
@@ -140,8 +147,9 @@ std::vector<std::pair<std::string, std::string>> benchRaysPlots(const BenchRaysR
             if (row.model == model) rows.push_back(&row);
         for (const PlottedValue& value : kPlotted)
             for (const bool againstTime : {true, false})
-                plots.emplace_back(fmt::format("bench_rays_{}_{}_{}", model, value.name, againstTime ? "time" : "bytes"),
-                                   plotOf(rows, value, againstTime));
+                plots.emplace_back(
+                    fmt::format("bench_rays_{}_{}_{}", model, value.name, againstTime ? "time" : "bytes"),
+                    plotOf(rows, value, againstTime));
     }
     return plots;
 }

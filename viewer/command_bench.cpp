@@ -1,5 +1,6 @@
 // vcp bench: run time against error, beside Embree measured in the same run.
 #include <fstream>
+#include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -49,6 +50,7 @@ struct RaysCommand : BenchCommand {
     int views = 1;
     int judgeEvery = 1;
     bool sweep = false;
+    PaperOptions paper;
 };
 
 Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
@@ -145,6 +147,7 @@ Result<int> runRays(const RaysCommand& command) {
     options.cell = command.cellLength();
     options.judgeEvery = command.judgeEvery;
     options.sweep = command.sweep;
+    options.paper = command.paper;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = progressTo(display);
@@ -203,6 +206,30 @@ RunCommand addBenchBuild(CLI::App& bench) {
     return [command] { return runBuild(*command); };
 }
 
+/// The rules of the method `paper`, in finest cells where they are lengths.
+void addPaperOptions(CLI::App& app, PaperOptions& paper) {
+    const auto length = [&](const char* name, float& value, const char* what) {
+        app.add_option(name, value, what)->type_name("CELLS")->capture_default_str();
+    };
+    length("--paper-eps", paper.epsilon, "paper: a ray hits nearer than this; --sweep has its own values");
+    length("--paper-band", paper.band, "paper: vectors are kept in blocks nearer than this");
+    length("--paper-merge", paper.mergeThreshold, "paper: cells are merged where their vectors err by less; negative: never");
+    const auto choice = [&]<class Value>(const char* name, Value& value, const char* what, const std::map<std::string, Value>& values) {
+        std::vector<std::string> names;
+        for (const auto& [key, ignored] : values) names.push_back(key);
+        app.add_option_function<std::string>(name, [&value, values](const std::string& key) { value = values.at(key); }, what)
+            ->type_name(fmt::format("{}", fmt::join(names, "|")))
+            ->check(CLI::IsMember(names));
+    };
+    choice("--paper-scheme", paper.scheme, "paper: interpolation of the vectors [longer]",
+           std::map<std::string, PaperScheme>{
+               {"longer", PaperScheme::Longer}, {"min-plane", PaperScheme::MinPlane}, {"trilinear", PaperScheme::Trilinear}});
+    choice("--paper-step", paper.step, "paper: steps near the surface [planar]",
+           std::map<std::string, PaperStep>{{"distance", PaperStep::Distance}, {"planar", PaperStep::Planar}});
+    choice("--paper-packing", paper.packing, "paper: directions of the vectors [spherical]",
+           std::map<std::string, PaperPacking>{{"octahedral", PaperPacking::Octahedral}, {"spherical", PaperPacking::Spherical}});
+}
+
 RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
@@ -221,6 +248,7 @@ RunCommand addBenchRays(CLI::App& bench) {
         ->capture_default_str()
         ->check(CLI::Range(1, 16384));
     app->add_option("--device", command->device, "Vulkan device of the method certified, see `vcp devices` [the best one]")->type_name("DEVICE");
+    addPaperOptions(*app, command->paper);
     return [command] { return runRays(*command); };
 }
 

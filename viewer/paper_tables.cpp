@@ -24,7 +24,8 @@ struct Published {
     FourMethods values;
 };
 /// Table 1, MiB. Voxels have half the cell, but for Sponza, which is left out here: there they have the same.
-constexpr std::array<Published, 2> kMebibytes = {{{"Thai statue", {1075, 1075, 1096, 860}}, {"David", {980, 980, 960, 770}}}};
+constexpr std::array<Published, 2> kMebibytes = {
+    {{"Thai statue", {1075, 1075, 1096, 860}}, {"David", {980, 980, 960, 770}}}};
 /// Table 2, milliseconds a frame.
 constexpr std::array<Published, 7> kMilliseconds = {{{"Thai 1", {8.6, 8.2, 8.0, 8.1}},
                                                      {"Thai 2", {11.7, 11.1, 10.6, 11.0}},
@@ -37,7 +38,8 @@ constexpr std::array<Published, 7> kMilliseconds = {{{"Thai 1", {8.6, 8.2, 8.0, 
 struct OurMethod {
     const char *method, *knob;
 };
-constexpr std::array<OurMethod, 4> kOurs = {{{"paper", "eps 0.25"}, {"sdf", "cell 1"}, {"voxel", "cell 0.5"}, {"svo-contours", "cell 1"}}};
+constexpr std::array<OurMethod, 4> kOurs = {
+    {{"paper", "eps 0.25"}, {"sdf", "cell 1"}, {"voxel", "cell 0.5"}, {"svo-contours", "cell 1"}}};
 
 /// Means over a model's rows of the four methods.
 struct OurModel {
@@ -59,7 +61,8 @@ std::optional<OurModel> modelOf(const BenchRaysReport& report, const std::string
             ++rows;
         }
         // No rows: not a number, which is printed as nothing.
-        for (FourMethods* values : {&model.bytes, &model.nanoseconds, &model.p50, &model.p99, &model.normal}) (*values)[i] /= rows;
+        for (FourMethods* values : {&model.bytes, &model.nanoseconds, &model.p50, &model.p99, &model.normal})
+            (*values)[i] /= rows;
     }
     const auto known = [&](size_t i) { return std::isfinite(model.bytes[i]); };
     if (!known(0) || !known(1) || !(known(2) || known(3))) return {};
@@ -74,7 +77,8 @@ FourMethods ratios(const FourMethods& values) {
 
 std::string line(const std::string& name, const FourMethods& values, const char* format = "{:.2f}") {
     std::string text = "| " + name + " |";
-    for (const double value : values) text += std::isfinite(value) ? " " + fmt::format(fmt::runtime(format), value) + " |" : " |";
+    for (const double value : values)
+        text += std::isfinite(value) ? " " + fmt::format(fmt::runtime(format), value) + " |" : " |";
     return text + "\n";
 }
 
@@ -127,7 +131,8 @@ std::string besidePaperMarkdown(const BenchRaysReport& report) {
     }
     if (models.empty()) return "";
     std::string text =
-        "\n## Beside Demir and Westermann 2015\n\nRatios to their method (`paper`, eps 0.25) at the resolutions of their Table "
+        "\n## Beside Demir and Westermann 2015\n\nRatios to their method (`paper`, eps 0.25) at the resolutions of "
+        "their Table "
         "1: signed distances and contours at the same cell, voxels at half of it.\n\n### Bytes (Table 1)\n\n";
     text += ratioTable(kMebibytes, models, &OurModel::bytes);
     text += "\n### Time (Table 2)\n\nTheirs on a GTX 580, these on this machine's processor; means over cameras.\n\n";

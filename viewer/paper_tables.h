@@ -8,8 +8,8 @@ namespace vcp {
 
 struct BenchRaysReport;
 
-/// A Markdown section; empty where no model has the rows for it: paper at eps 0.25, sdf at cell 1, and voxel at cell 0.5
-/// or svo-contours at cell 1, the resolutions of their Table 1.
+/// A Markdown section; empty where no model has the rows for it: paper at eps 0.25, sdf at cell 1, and voxel at cell
+/// 0.5 or svo-contours at cell 1, the resolutions of their Table 1.
 std::string besidePaperMarkdown(const BenchRaysReport& report);
 
 }  // namespace vcp

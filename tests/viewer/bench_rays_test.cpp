@@ -6,8 +6,8 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <sys/wait.h>
+#include <nlohmann/json.hpp>
 
 #include "../builder/test_meshes.h"
 #include "test_folder.h"
@@ -56,12 +56,14 @@ protected:
 /// What DESIGN and docs/measuring.md promise, and that a row agrees with itself.
 void expectRow(const Json& row) {
     for (const char* field :
-         {"model", "camera", "method", "knob", "device", "rays", "ns_per_ray", "ratio_to_embree", "hit", "miss", "missed", "false",
-          "wrong_sheet", "unresolved", "p50_cells", "p95_cells", "p99_cells", "max_cells", "steps_mean", "steps_p95", "steps_p99",
-          "fetches_mean", "fetches_p95", "fetches_p99", "bytes"})
+         {"model",           "camera",      "method",      "knob",      "device",     "rays",        "ns_per_ray",
+          "ratio_to_embree", "hit",         "miss",        "missed",    "false",      "wrong_sheet", "unresolved",
+          "p50_cells",       "p95_cells",   "p99_cells",   "max_cells", "steps_mean", "steps_p95",   "steps_p99",
+          "fetches_mean",    "fetches_p95", "fetches_p99", "bytes"})
         ASSERT_TRUE(row.contains(field)) << field;
     double sum = 0;
-    for (const char* part : {"hit", "miss", "missed", "false", "wrong_sheet", "unresolved"}) sum += row[part].get<double>();
+    for (const char* part : {"hit", "miss", "missed", "false", "wrong_sheet", "unresolved"})
+        sum += row[part].get<double>();
     EXPECT_NEAR(sum, 1, 1e-9);
     EXPECT_EQ(row["rays"], 48 * 32);
     EXPECT_GT(row["ns_per_ray"], 0);
@@ -79,7 +81,8 @@ void expectRow(const Json& row) {
 }
 
 TEST_F(BenchRays, EveryPeerWithItsOwnError) {
-    const Ran ran = run(ball_ + " --cameras whole --methods reference,paper,sdf,sdf-analytic,voxel,svo-contours" + kQuick);
+    const Ran ran =
+        run(ball_ + " --cameras whole --methods reference,paper,sdf,sdf-analytic,voxel,svo-contours" + kQuick);
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json rows = Json::parse(ran.out)["rows"];
     ASSERT_EQ(rows.size(), 6u);
@@ -101,7 +104,8 @@ TEST_F(BenchRays, EveryPeerWithItsOwnError) {
 
 TEST_F(BenchRays, ASweepHasARowForEachValueAndPlots) {
     const std::string out = (folder_ / "out").string();
-    const Ran ran = run(ball_ + " --cameras close --sweep --methods paper,sdf,voxel,svo-contours --out " + out + kQuick);
+    const Ran ran =
+        run(ball_ + " --cameras close --sweep --methods paper,sdf,voxel,svo-contours --out " + out + kQuick);
     ASSERT_EQ(ran.status, 0) << ran.err;
     std::map<std::string, std::set<std::string>> knobs;
     std::map<std::string, double> bytes, p50;
@@ -120,12 +124,31 @@ TEST_F(BenchRays, ASweepHasARowForEachValueAndPlots) {
     EXPECT_GT(p50["paper eps 0.5"], p50["paper eps 0.1"]);
     EXPECT_GT(bytes["sdf cell 0.5"], bytes["sdf cell 2"]);
     EXPECT_GT(p50["voxel cell 1"], p50["voxel cell 0.25"]);
-    for (const char* file : {"bench_rays.json", "bench_rays.csv", "bench_rays.md", "bench_rays_ball_p50_time.svg", "bench_rays_ball_p99_bytes.svg",
-                             "bench_rays_ball_wrong_time.svg"})
+    for (const char* file : {"bench_rays.json", "bench_rays.csv", "bench_rays.md", "bench_rays_ball_p50_time.svg",
+                             "bench_rays_ball_p99_bytes.svg", "bench_rays_ball_wrong_time.svg"})
         EXPECT_TRUE(fs::exists(fs::path(out) / file)) << file;
     // The rows that the paper's tables need are there.
     const std::string markdown = contentOf(out + "/bench_rays.md");
     EXPECT_NE(markdown.find("| here: ball | 1.00 | 1.00 |"), std::string::npos) << markdown;
+}
+
+TEST_F(BenchRays, ThePapersRulesAreOptions) {
+    const auto row = [&](const std::string& options) {
+        const Ran ran = run(ball_ + " --cameras whole --methods paper " + options + kQuick);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        const Json report = Json::parse(ran.out, nullptr, false);
+        return report.is_discarded() ? Json() : report["rows"][0];
+    };
+    const Json plain = row(""), nearer = row("--paper-eps 0.1"),
+               unmerged = row("--paper-merge -1 --paper-packing octahedral"),
+               slow = row("--paper-step distance --paper-scheme trilinear"),
+               thin = row("--paper-merge -1 --paper-band 1.5");
+    EXPECT_EQ(nearer["knob"], "eps 0.1");
+    EXPECT_LT(nearer["p50_cells"], plain["p50_cells"]);
+    EXPECT_GT(unmerged["bytes"], plain["bytes"]);
+    EXPECT_LT(thin["bytes"], unmerged["bytes"]);
+    EXPECT_NE(slow["steps_mean"], plain["steps_mean"]);
+    EXPECT_EQ(run(ball_ + " --methods paper --paper-scheme cubic" + kQuick).status, 2);
 }
 
 TEST_F(BenchRays, UnknownMethodsAndCamerasAreNamed) {

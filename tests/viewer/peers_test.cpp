@@ -81,7 +81,7 @@ Outcome judge(const Caster& caster, const MeshBvh& mesh, double reach, double fr
 
 class PeersOnASphere : public testing::Test {
 protected:
-    PeersOnASphere() : mesh_(test::sphereMesh({0.31, -0.17, 0.23}, kRadius, 96)), bvh_(mesh_), sides_(mesh_) {}
+    PeersOnASphere() : mesh_(test::sphereMesh({0.31, -0.17, 0.23}, kRadius, 64)), bvh_(mesh_), sides_(mesh_) {}
 
     IndexedMesh mesh_;
     MeshBvh bvh_;
@@ -145,7 +145,8 @@ TEST_F(PeersOnASphere, CountersAndHitsAreTheSameOnAnyThreads) {
     EXPECT_EQ(caster->bytes(), again->bytes());
     const glm::ivec2 size(60, 40);
     const Camera camera = *benchCamera("whole", bvh_, 1, size, 0, 1);
-    PeerTracer<AnalyticCaster> one(std::make_shared<AnalyticCaster>(*caster), "cell 1", 1), four(std::make_shared<AnalyticCaster>(*again), "cell 1", 4);
+    PeerTracer<AnalyticCaster> one(std::make_shared<AnalyticCaster>(*caster), "cell 1", 1),
+        four(std::make_shared<AnalyticCaster>(*again), "cell 1", 4);
     const auto a = one.trace(camera, size, 1), b = four.trace(camera, size, 2);
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->steps.rays(), 2400u);
@@ -189,7 +190,8 @@ TEST_F(PeersOnASphere, MergingSavesBytesAndEveryRuleCanBeSwitched) {
         RayWork work;
         for (int i = 0; i < 1000; ++i) {
             const TestRay ray = randomRay(random, 12, 60);
-            (void)caster.cast(GridRays::along(caster.frame().gridFromWorld(ray.origin), ray.direction, caster.frame().cells()), work);
+            (void)caster.cast(
+                GridRays::along(caster.frame().gridFromWorld(ray.origin), ray.direction, caster.frame().cells()), work);
         }
         return work.steps;
     };
@@ -209,7 +211,8 @@ TEST(Peers, EmptyNodesStoreTheLeastDistanceOnTheirBoundary) {
     int checked = 0;
     std::mt19937_64 random(11);
     for (int i = 0; i < 40; ++i) {
-        std::uniform_int_distribution<int> x(0, tree.frame.cells().x - 1), y(0, tree.frame.cells().y - 1), z(0, tree.frame.cells().z - 1);
+        std::uniform_int_distribution<int> x(0, tree.frame.cells().x - 1), y(0, tree.frame.cells().y - 1),
+            z(0, tree.frame.cells().z - 1);
         NodeFinder finder(tree);
         NoWork work;
         const int32_t word = finder.find({x(random), y(random), z(random)}, work);
@@ -221,7 +224,9 @@ TEST(Peers, EmptyNodesStoreTheLeastDistanceOnTheirBoundary) {
             for (int b = 0; b <= size; ++b)
                 for (int a = 0; a <= size; ++a) {
                     if (std::min({a, b, c}) > 0 && std::max({a, b, c}) < size) continue;
-                    least = std::min(least, bvh.nearestPoint(tree.frame.worldFromGrid(glm::dvec3(low + glm::ivec3(a, b, c))))->distance);
+                    least = std::min(
+                        least,
+                        bvh.nearestPoint(tree.frame.worldFromGrid(glm::dvec3(low + glm::ivec3(a, b, c))))->distance);
                 }
         EXPECT_NEAR(tree.emptyDistance(word), least / 0.02, 1e-4 * least / 0.02) << "level " << finder.level();
         ++checked;
@@ -371,7 +376,8 @@ TEST(Trilinear, AlongARayIsItsCubic) {
         const float root = firstRoot(cubic, 1);
         float walked = std::numeric_limits<float>::infinity();
         for (int step = 0; step < 2000 && std::isinf(walked); ++step)
-            if ((cubic.at(float(step) / 2000) < 0) != (cubic.at(float(step + 1) / 2000) < 0)) walked = float(step) / 2000;
+            if ((cubic.at(float(step) / 2000) < 0) != (cubic.at(float(step + 1) / 2000) < 0))
+                walked = float(step) / 2000;
         if (std::isinf(walked)) continue;
         EXPECT_LE(root, walked + 6e-4f) << i;
         EXPECT_NEAR(cubic.at(root), 0, 2e-6) << i;
@@ -388,7 +394,8 @@ TEST(Contour, HoldsItsPoints) {
         for (int k = 0; k < 6; ++k) {
             const glm::dvec3 p(unit(random), unit(random), unit(random));
             const glm::dvec3 onPlane = p - (glm::dot(p, n) - offset) * n;
-            if (std::max({std::abs(onPlane.x), std::abs(onPlane.y), std::abs(onPlane.z)}) <= 0.5) points.push_back(onPlane);
+            if (std::max({std::abs(onPlane.x), std::abs(onPlane.y), std::abs(onPlane.z)}) <= 0.5)
+                points.push_back(onPlane);
         }
         if (points.empty()) continue;
         const Contour slab = unpackContour(packContour(points, {n, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}));

@@ -22,9 +22,9 @@ constexpr float kPointToBoundary = 0.70712f;
 enum class Kind : uint8_t { Inner, Empty, Leaf };
 
 struct BuildNode {
-    glm::ivec3 low{0};    ///< lowest cell
-    uint32_t first = 0;   ///< of the eight children, one level below; of inner nodes
-    uint32_t word = 0;    ///< where its word goes
+    glm::ivec3 low{0};   ///< lowest cell
+    uint32_t first = 0;  ///< of the eight children, one level below; of inner nodes
+    uint32_t word = 0;   ///< where its word goes
     Kind kind = Kind::Empty;
 };
 
@@ -132,7 +132,8 @@ private:
         forEachIndex(blocks.size(), options_.threads, [&](size_t i) {
             if (blocks[i].kind != Kind::Inner) return;
             float least = std::numeric_limits<float>::infinity();
-            forPoints(blocks[i], [&](glm::ivec3 point) { least = std::min(least, std::abs(points_.find(point)->distance)); });
+            forPoints(blocks[i],
+                      [&](glm::ivec3 point) { least = std::min(least, std::abs(points_.find(point)->distance)); });
             if (least > field_.band()) blocks[i].kind = Kind::Empty;
         });
     }
@@ -174,8 +175,8 @@ private:
                 const bool touches = std::min({from.x, from.y, from.z}) >= 0 && std::max({from.x, from.y, from.z}) <= 1;
                 ofLeaf = ofLeaf || (touches && levels_[level - 1][node.first + k].kind == Kind::Leaf);
             }
-            if (ofLeaf && field_.mergeError(corners, static_cast<float>(size), 0.5f * glm::vec3(at), sampled(node.low + half * at)) >
-                              field_.mergeThreshold())
+            if (ofLeaf && field_.mergeError(corners, static_cast<float>(size), 0.5f * glm::vec3(at),
+                                            sampled(node.low + half * at)) > field_.mergeThreshold())
                 return false;
         }
         return true;
@@ -234,7 +235,8 @@ private:
             // Where the way from the centre to the surface leaves the cube.
             const glm::dvec3 way = (nearest->point - centre) / options_.cell;
             const double longest = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z), 1e-30});
-            start = glm::clamp(glm::ivec3(glm::round(glm::dvec3(low) + 0.5 * size + way * (0.5 * size / longest))), low, low + size);
+            start = glm::clamp(glm::ivec3(glm::round(glm::dvec3(low) + 0.5 * size + way * (0.5 * size / longest))), low,
+                               low + size);
         }
         float least = std::abs(sampled(start).distance);
         for (int axis = 0; axis < 3; ++axis)
@@ -273,7 +275,8 @@ private:
         uint32_t slices = 0;
         for (size_t i = 0; i < leaves_.size(); ++i) {
             const glm::ivec3 along(1 << leaves_[i].level, 0, 0);
-            adjoins[i] = i > 0 && leaves_[i - 1].level == leaves_[i].level && at(leaves_[i - 1]).low + along == at(leaves_[i]).low;
+            adjoins[i] = i > 0 && leaves_[i - 1].level == leaves_[i].level &&
+                         at(leaves_[i - 1]).low + along == at(leaves_[i]).low;
             slice[i] = adjoins[i] ? slices - 1 : slices;
             slices = slice[i] + 2;
             tree_.nodes[at(leaves_[i]).word] = -static_cast<int32_t>(slice[i]) - 1;
@@ -284,7 +287,8 @@ private:
             const CornerSamples corners = cornersOf(at(leaves_[i]).low, 1 << leaves_[i].level);
             // A shared slice is written once, by the leaf before.
             for (uint32_t x = adjoins[i] ? 1 : 0; x < 2; ++x)
-                for (uint32_t k = 0; k < 4; ++k) tree_.slices[slice[i] + x][k] = field_.pack(corners[x + 2 * k], tree_.largest);
+                for (uint32_t k = 0; k < 4; ++k)
+                    tree_.slices[slice[i] + x][k] = field_.pack(corners[x + 2 * k], tree_.largest);
         });
     }
     [[nodiscard]] float largestDistance() const {

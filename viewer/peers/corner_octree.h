@@ -53,7 +53,7 @@ public:
 class CornerOctree {
 public:
     GridFrame frame;
-    std::vector<int32_t> nodes;                   ///< the roots first, x lowest
+    std::vector<int32_t> nodes;  ///< the roots first, x lowest
     std::vector<std::array<uint32_t, 4>> slices;
     float cutoff = 1;   ///< D, cells
     float largest = 0;  ///< distance stored in a leaf, cells

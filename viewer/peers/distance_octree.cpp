@@ -100,14 +100,15 @@ float firstRoot(const Cubic& f, float end) {
     return std::numeric_limits<float>::infinity();
 }
 
-Result<DistanceCaster> DistanceCaster::create(const MeshBvh& mesh, const MeshSides& sides, const DistanceOptions& options,
-                                              const CornerOctreeOptions& build) {
+Result<DistanceCaster> DistanceCaster::create(const MeshBvh& mesh, const MeshSides& sides,
+                                              const DistanceOptions& options, const CornerOctreeOptions& build) {
     auto tree = buildCornerOctree(mesh, &sides, BandField(options), build);
     if (!tree) return tree.error();
     return DistanceCaster(std::move(*tree));
 }
 
-Result<AnalyticCaster> AnalyticCaster::create(const MeshBvh& mesh, const MeshSides& sides, const CornerOctreeOptions& build) {
+Result<AnalyticCaster> AnalyticCaster::create(const MeshBvh& mesh, const MeshSides& sides,
+                                              const CornerOctreeOptions& build) {
     // Empty nodes are left at their exit, and farther by what may be stepped from there.
     CornerOctreeOptions safe = build;
     safe.safeEmpty = true;

@@ -25,8 +25,14 @@ struct Trilinear {
 
     /// Values at corners 4 x + 2 z + y.
     explicit Trilinear(const std::array<float, 8>& v)
-        : k(v[0]), x(v[4] - v[0]), y(v[1] - v[0]), z(v[2] - v[0]), xy(v[5] - v[4] - y), xz(v[6] - v[4] - z),
-          yz(v[3] - v[1] - z), xyz(v[7] - v[6] - v[5] + v[4] - yz) {}
+        : k(v[0]),
+          x(v[4] - v[0]),
+          y(v[1] - v[0]),
+          z(v[2] - v[0]),
+          xy(v[5] - v[4] - y),
+          xz(v[6] - v[4] - z),
+          yz(v[3] - v[1] - z),
+          xyz(v[7] - v[6] - v[5] + v[4] - yz) {}
     [[nodiscard]] float at(glm::vec3 p) const {
         return k + x * p.x + (y + xy * p.x) * p.y + (z + xz * p.x + (yz + xyz * p.x) * p.y) * p.z;
     }
@@ -104,7 +110,7 @@ GridHit DistanceCaster::cast(const GridRay& ray, Work& work) const {
     for (int step = 0; step < kMaxSteps && t <= ray.tMax; ++step) {
         work.step();
         const glm::vec3 p = ray.origin + t * ray.direction;
-        const int32_t word = finder.find(glm::clamp(glm::ivec3(glm::floor(p)), glm::ivec3(0), last), work);
+        const int32_t word = finder.find(cellAt(p, last), work);
         if (!CornerOctree::isLeaf(word)) {
             lastValue = 0;
             t += std::max(tree_.emptyDistance(word), kLeastStep);

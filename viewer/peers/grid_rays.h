@@ -74,7 +74,9 @@ public:
     }
 
     /// Through the centre of pixel (x, y).
-    [[nodiscard]] GridRay ray(int x, int y) const { return along(eye_, glm::normalize(corner_ + double(x) * perX_ + double(y) * perY_), high_); }
+    [[nodiscard]] GridRay ray(int x, int y) const {
+        return along(eye_, glm::normalize(corner_ + double(x) * perX_ + double(y) * perY_), high_);
+    }
 
     /// From `eye` along the unit vector `d`, cut to the box from 0 to `high`.
     static GridRay along(glm::dvec3 eye, glm::dvec3 d, glm::dvec3 high) {

@@ -33,7 +33,8 @@ std::vector<uint32_t> firstAtSamePlace(const std::vector<glm::dvec3>& positions)
         const glm::dvec3& p = positions[i];
         return std::array<double, 3>{p.x, p.y, p.z};
     };
-    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
+    std::sort(order.begin(), order.end(),
+              [&](uint32_t a, uint32_t b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
     for (size_t i = 0; i < order.size(); ++i)
         joined[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? joined[order[i - 1]] : order[i];
     return joined;
@@ -62,7 +63,9 @@ glm::dvec3 MeshSides::pseudonormal(const NearestPoint& nearest) const {
     const double area2 = glm::dot(n, n);
     std::array<double, 3> weight{};
     for (int k = 0; k < 3; ++k)
-        weight[k] = area2 > 0 ? glm::dot(n, glm::cross(v[(k + 2) % 3] - v[(k + 1) % 3], nearest.point - v[(k + 1) % 3])) / area2 : 0;
+        weight[k] =
+            area2 > 0 ? glm::dot(n, glm::cross(v[(k + 2) % 3] - v[(k + 1) % 3], nearest.point - v[(k + 1) % 3])) / area2
+                      : 0;
     const auto zero = [&](int k) { return weight[k] <= kOnEdge; };
     for (int k = 0; k < 3; ++k)
         if (zero((k + 1) % 3) && zero((k + 2) % 3)) return vertexNormals_[joined_[triangle[k]]];

@@ -34,6 +34,9 @@ struct WalkedNode {
 
 inline constexpr float kStopWalk = std::numeric_limits<float>::infinity();
 
+/// The cell that holds p. Truncation is enough: what rounding leaves below 0 belongs to cell 0.
+inline glm::ivec3 cellAt(glm::vec3 p, glm::ivec3 last) { return glm::clamp(glm::ivec3(p), glm::ivec3(0), last); }
+
 inline int octantOf(glm::ivec3 c, int level) {
     return (c.x >> level & 1) | (c.y >> level & 1) << 1 | (c.z >> level & 1) << 2;
 }
@@ -46,7 +49,7 @@ void walkOctree(const Tree& tree, const GridRay& ray, Work& work, const Visit& v
     const glm::ivec3 last = tree.frame.cells() - 1;
     const glm::ivec3 forward(ray.direction.x >= 0, ray.direction.y >= 0, ray.direction.z >= 0);
     std::array<int32_t, 32> stack;
-    glm::ivec3 c = glm::clamp(glm::ivec3(glm::floor(ray.origin)), glm::ivec3(0), last);
+    glm::ivec3 c = cellAt(ray.origin, last);
     float t = 0;
     int level = tree.frame.rootLevel;
     int32_t word = tree.rootWord(c);
@@ -62,21 +65,26 @@ void walkOctree(const Tree& tree, const GridRay& ray, Work& work, const Visit& v
         const int size = 1 << level;
         const glm::ivec3 low = c & glm::ivec3(-size);
         const glm::vec3 exits = (glm::vec3(low + size * forward) - ray.origin) * ray.inverse;
-        int axis = exits.x < exits.y ? 0 : 1;
-        if (exits.z < exits[axis]) axis = 2;
-        const float tExit = std::max(exits[axis], t);
+        const bool xFirst = exits.x <= exits.y && exits.x <= exits.z, yFirst = !xFirst && exits.y <= exits.z;
+        const float tExit = std::max(xFirst ? exits.x : yFirst ? exits.y : exits.z, t);
         const float jump = visit(WalkedNode{word, level, low, t, tExit});
         if (jump >= ray.tMax || tExit >= ray.tMax) return;
         const glm::ivec3 old = c;
         if (jump > tExit) {
             t = jump;
-            c = glm::clamp(glm::ivec3(glm::floor(ray.origin + t * ray.direction)), glm::ivec3(0), last);
+            c = cellAt(ray.origin + t * ray.direction, last);
         } else {
             t = tExit;
-            const glm::vec3 p = ray.origin + t * ray.direction;
-            c = glm::clamp(glm::ivec3(glm::floor(p)), low, low + (size - 1));
-            c[axis] = forward[axis] ? low[axis] + size : low[axis] - 1;
-            if (c[axis] < 0 || c[axis] > last[axis]) return;
+            const glm::ivec3 next = low - 1 + (size + 1) * forward;
+            c = glm::clamp(glm::ivec3(ray.origin + t * ray.direction), low, low + (size - 1));
+            if (xFirst)
+                c.x = next.x;
+            else if (yFirst)
+                c.y = next.y;
+            else
+                c.z = next.z;
+            const glm::ivec3 room = last - c;
+            if ((c.x | c.y | c.z | room.x | room.y | room.z) < 0) return;
         }
         const auto changed = static_cast<unsigned>((old.x ^ c.x) | (old.y ^ c.y) | (old.z ^ c.z));
         const int common = std::max(static_cast<int>(std::bit_width(changed)), level + 1);

@@ -72,7 +72,8 @@ private:
 }  // namespace
 
 glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 at, PaperScheme scheme) {
-    const float wx[2] = {1 - at.x, at.x}, wyz[4] = {(1 - at.y) * (1 - at.z), at.y * (1 - at.z), (1 - at.y) * at.z, at.y * at.z};
+    const float wx[2] = {1 - at.x, at.x},
+                wyz[4] = {(1 - at.y) * (1 - at.z), at.y * (1 - at.z), (1 - at.y) * at.z, at.y * at.z};
     float weight[8], along[8], squared[8];
     for (int k = 0; k < 8; ++k) weight[k] = wx[k >> 2] * wyz[k & 3];
     for (int k = 0; k < 8; ++k) {
@@ -106,15 +107,18 @@ glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 a
     return glm::dot(trilinear, trilinear) > nearest ? trilinear : plane;
 }
 
-float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact, PaperScheme scheme) {
+float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact,
+                       PaperScheme scheme) {
     return glm::distance(interpolateVectors(vectorsAt(corners), size, at, scheme), exact.toSurface);
 }
 
 uint32_t packPaperVector(glm::vec3 v, float longest, PaperPacking packing) {
-    return packing == PaperPacking::Spherical ? packVectorSpherical(glm::dvec3(v), longest) : packOctahedral(v, longest);
+    return packing == PaperPacking::Spherical ? packVectorSpherical(glm::dvec3(v), longest)
+                                              : packOctahedral(v, longest);
 }
 
-PaperDecoder::PaperDecoder(float longest, PaperPacking packing) : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
+PaperDecoder::PaperDecoder(float longest, PaperPacking packing)
+    : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
 
 glm::vec3 PaperDecoder::spherical(uint32_t code) const {
     const uint32_t theta = code >> 13 & 511u, phi = code >> 22;
@@ -123,7 +127,8 @@ glm::vec3 PaperDecoder::spherical(uint32_t code) const {
 }
 
 glm::vec3 PaperDecoder::octahedral(uint32_t code) {
-    const glm::vec2 o(static_cast<float>(code >> 13 & 1023u) * (2.0f / 1023) - 1, static_cast<float>(code >> 23) * (2.0f / 511) - 1);
+    const glm::vec2 o(static_cast<float>(code >> 13 & 1023u) * (2.0f / 1023) - 1,
+                      static_cast<float>(code >> 23) * (2.0f / 511) - 1);
     glm::vec3 n(o.x, o.y, 1 - std::abs(o.x) - std::abs(o.y));
     const float fold = std::max(-n.z, 0.0f);
     n.x += n.x >= 0 ? -fold : fold;
@@ -141,7 +146,8 @@ LeafVectors PaperCaster::vectorsOf(int32_t leaf) const {
     return vectors;
 }
 
-Result<PaperCaster> PaperCaster::create(const MeshBvh& mesh, const PaperOptions& options, const CornerOctreeOptions& build) {
+Result<PaperCaster> PaperCaster::create(const MeshBvh& mesh, const PaperOptions& options,
+                                        const CornerOctreeOptions& build) {
     auto tree = buildCornerOctree(mesh, nullptr, VectorField(options), build);
     if (!tree) return tree.error();
     return PaperCaster(std::move(*tree), options);

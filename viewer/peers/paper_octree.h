@@ -9,9 +9,9 @@
 //                   is epsilon between the last two samples (2.1)
 //   memory traffic  the parent of the last node and the vectors of the last leaf are remembered (4.2)
 //
-// Where the paper is silent: epsilon, the merging threshold and the longest vector (we take the longest that is stored).
-// Where we deviate: closest points are exact, of the whole mesh, instead of found by k rounds of region growing
-// (3.1), so there is no k; a vector of length 0 has no plane (their formula divides 0 by 0); trigonometry is
+// Where the paper is silent: epsilon, the merging threshold and the longest vector (we take the longest that is
+// stored). Where we deviate: closest points are exact, of the whole mesh, instead of found by k rounds of region
+// growing (3.1), so there is no k; a vector of length 0 has no plane (their formula divides 0 by 0); trigonometry is
 // tabulated, one entry a code.
 #pragma once
 
@@ -67,7 +67,8 @@ private:
 
 class PaperCaster {
 public:
-    static Result<PaperCaster> create(const MeshBvh& mesh, const PaperOptions& options, const CornerOctreeOptions& build);
+    static Result<PaperCaster> create(const MeshBvh& mesh, const PaperOptions& options,
+                                      const CornerOctreeOptions& build);
 
     [[nodiscard]] const GridFrame& frame() const { return tree_->frame; }
     [[nodiscard]] const CornerOctree& tree() const { return *tree_; }
@@ -85,7 +86,9 @@ private:
     static constexpr int kMaxSteps = 4096;
 
     PaperCaster(CornerOctree tree, const PaperOptions& options)
-        : tree_(std::make_shared<const CornerOctree>(std::move(tree))), options_(options), decode_(tree_->largest, options.packing) {}
+        : tree_(std::make_shared<const CornerOctree>(std::move(tree))),
+          options_(options),
+          decode_(tree_->largest, options.packing) {}
     [[nodiscard]] LeafVectors vectorsOf(int32_t leaf) const;
     [[nodiscard]] float stepFrom(float d, glm::vec3 v, glm::vec3 direction) const;
 
@@ -104,7 +107,7 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
     for (int step = 0; step < kMaxSteps && t <= ray.tMax; ++step) {
         work.step();
         const glm::vec3 p = ray.origin + t * ray.direction;
-        const int32_t word = finder.find(glm::clamp(glm::ivec3(glm::floor(p)), glm::ivec3(0), last), work);
+        const int32_t word = finder.find(cellAt(p, last), work);
         float d, advance;
         if (CornerOctree::isLeaf(word)) {
             if (word != known) {
@@ -113,10 +116,12 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
                 work.fetch(2);
             }
             const auto size = static_cast<float>(1 << finder.level());
-            const glm::vec3 v = interpolateVectors(corners, size, (p - glm::vec3(finder.low())) / size, options_.scheme);
+            const glm::vec3 v =
+                interpolateVectors(corners, size, (p - glm::vec3(finder.low())) / size, options_.scheme);
             d = glm::length(v);
             if (d < options_.epsilon) {
-                const float back = lastDistance > options_.epsilon ? (lastDistance - options_.epsilon) / (lastDistance - d) : 1;
+                const float back =
+                    lastDistance > options_.epsilon ? (lastDistance - options_.epsilon) / (lastDistance - d) : 1;
                 return {lastT + back * (t - lastT), v};
             }
             advance = stepFrom(d, v, ray.direction);

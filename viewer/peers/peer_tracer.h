@@ -28,9 +28,11 @@ public:
             const auto start = std::chrono::steady_clock::now();
             forEachRow(size.y, threads_, [&](int y) {
                 NoWork work;
-                for (int x = 0; x < size.x; ++x) hits[static_cast<size_t>(y) * size.x + x] = caster_->cast(rays.ray(x, y), work);
+                for (int x = 0; x < size.x; ++x)
+                    hits[static_cast<size_t>(y) * size.x + x] = caster_->cast(rays.ray(x, y), work);
             });
-            if (repetition > 0) seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+            if (repetition > 0)
+                seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
         }
         TracedPicture picture;
         picture.seconds = medianOf(seconds);

@@ -30,7 +30,8 @@ struct OpenLevel {
 
 class VoxelBuilder {
 public:
-    VoxelBuilder(const IndexedMesh& mesh, double cell, bool contours, unsigned threads) : mesh_(mesh), threads_(threads) {
+    VoxelBuilder(const IndexedMesh& mesh, double cell, bool contours, unsigned threads)
+        : mesh_(mesh), threads_(threads) {
         tree_.hasContours = contours;
         glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
         for (const auto& triangle : mesh.triangles)
@@ -48,7 +49,8 @@ public:
             return limit("the cells are too small for this mesh: more than 2^19 would lie across it");
         OpenLevel open = rootLevel();
         for (int level = tree_.frame.rootLevel; level > 0; --level) {
-            if (open.nodes.size() > 1u << 24) return limit("a level of the voxel octree would have more than 2^24 nodes");
+            if (open.nodes.size() > 1u << 24)
+                return limit("a level of the voxel octree would have more than 2^24 nodes");
             tree_.levelStart[level] = static_cast<uint32_t>(tree_.nodes.size());
             open = split(open, level);
         }
@@ -70,8 +72,10 @@ private:
         std::vector<std::vector<uint32_t>> bins(static_cast<size_t>(frame.roots.x) * frame.roots.y * frame.roots.z);
         for (uint32_t i = 0; i < mesh_.triangles.size(); ++i) {
             const BoxOverlap overlap(inGrid(i));
-            const glm::ivec3 low = glm::clamp(glm::ivec3(glm::floor((overlap.lower() - kTouch) / double(size))), glm::ivec3(0), frame.roots - 1);
-            const glm::ivec3 high = glm::clamp(glm::ivec3(glm::floor((overlap.upper() + kTouch) / double(size))), glm::ivec3(0), frame.roots - 1);
+            const glm::ivec3 low = glm::clamp(glm::ivec3(glm::floor((overlap.lower() - kTouch) / double(size))),
+                                              glm::ivec3(0), frame.roots - 1);
+            const glm::ivec3 high = glm::clamp(glm::ivec3(glm::floor((overlap.upper() + kTouch) / double(size))),
+                                               glm::ivec3(0), frame.roots - 1);
             for (int z = low.z; z <= high.z; ++z)
                 for (int y = low.y; y <= high.y; ++y)
                     for (int x = low.x; x <= high.x; ++x)
@@ -82,7 +86,8 @@ private:
         for (size_t i = 0; i < bins.size(); ++i) {
             tree_.roots.push_back(bins[i].empty() ? VoxelOctree::kEmptyWord : static_cast<int32_t>(level.nodes.size()));
             if (bins[i].empty()) continue;
-            const glm::ivec3 at(static_cast<int>(i) % frame.roots.x, static_cast<int>(i) / frame.roots.x % frame.roots.y,
+            const glm::ivec3 at(static_cast<int>(i) % frame.roots.x,
+                                static_cast<int>(i) / frame.roots.x % frame.roots.y,
                                 static_cast<int>(i) / (frame.roots.x * frame.roots.y));
             const uint64_t first = level.triangles.size();
             level.triangles.insert(level.triangles.end(), bins[i].begin(), bins[i].end());
@@ -102,7 +107,8 @@ private:
         std::vector<SplitRow> rows((open.nodes.size() + kRow - 1) / kRow);
         forEachRow(static_cast<int>(rows.size()), threads_, [&](int row) {
             const size_t first = static_cast<size_t>(row) * kRow;
-            for (size_t i = first; i < open.nodes.size() && i < first + kRow; ++i) splitNode(open, open.nodes[i], level, rows[row]);
+            for (size_t i = first; i < open.nodes.size() && i < first + kRow; ++i)
+                splitNode(open, open.nodes[i], level, rows[row]);
         });
         OpenLevel children;
         for (SplitRow& row : rows) {
@@ -121,7 +127,8 @@ private:
                 node.end += firstTriangle;
                 children.nodes.push_back(node);
             }
-            children.triangles.insert(children.triangles.end(), row.children.triangles.begin(), row.children.triangles.end());
+            children.triangles.insert(children.triangles.end(), row.children.triangles.begin(),
+                                      row.children.triangles.end());
             row = {};
         }
         return children;
@@ -178,16 +185,6 @@ private:
 };
 
 }  // namespace
-
-Contour unpackContour(uint32_t code) {
-    const auto component = [&](int shift) { return static_cast<float>(static_cast<int>(code >> shift & 63u) - 31); };
-    Contour contour;
-    contour.normal = {component(14), component(20), component(26)};
-    const float extent = extentAlong(contour.normal);
-    contour.low = (static_cast<float>(code & 127u) * (2.0f / 127) - 1) * extent;
-    contour.high = (static_cast<float>(code >> 7 & 127u) * (2.0f / 127) - 1) * extent;
-    return contour;
-}
 
 uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<glm::dvec3>& normals) {
     // The whole voxel, where there is nothing to enclose.

@@ -25,10 +25,27 @@ struct Contour {
     glm::vec3 normal{0};  ///< integers from -31 to 31
     float low = 0, high = 0;
 };
-Contour unpackContour(uint32_t code);
+inline Contour unpackContour(uint32_t code) {
+    const auto component = [&](int shift) { return static_cast<float>(static_cast<int>(code >> shift & 63u) - 31); };
+    const auto plane = [&](int shift) { return static_cast<float>(code >> shift & 127u) * (2.0f / 127) - 1; };
+    const glm::vec3 normal(component(14), component(20), component(26));
+    // How far the voxel reaches along the normal.
+    const float extent = 0.5f * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z));
+    return {normal, plane(0) * extent, plane(7) * extent};
+}
 /// The narrowest of a few slabs that hold the points, which lie in the unit voxel about 0; rounded outwards.
 /// `normals`: directions that are tried, of any length.
 uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<glm::dvec3>& normals);
+
+/// How many of the children below `octant` exist. A table: not every processor that we compile for counts bits.
+inline uint32_t childrenBefore(uint32_t mask, int octant) {
+    static constexpr std::array<uint8_t, 128> kBits = [] {
+        std::array<uint8_t, 128> bits{};
+        for (uint32_t i = 0; i < 128; ++i) bits[i] = static_cast<uint8_t>(std::popcount(i));
+        return bits;
+    }();
+    return kBits[mask & ((1u << octant) - 1)];
+}
 
 class VoxelOctree {
 public:
@@ -55,13 +72,12 @@ public:
         }
         const uint32_t descriptor = nodes[node], mask = descriptor >> 24;
         if (!(mask >> octant & 1)) return kEmptyWord;
-        const int before = std::popcount(mask & ((1u << octant) - 1));
-        return static_cast<int32_t>(levelStart[levelOfChild] + (descriptor & 0xFFFFFFu) + before);
+        return static_cast<int32_t>(levelStart[levelOfChild] + (descriptor & 0xFFFFFFu) + childrenBefore(mask, octant));
     }
     [[nodiscard]] Contour contourOf(int32_t leaf) const {
         const auto number = static_cast<uint32_t>(-2 - leaf);
-        const uint32_t mask = masks[number >> 3];
-        return unpackContour(contours[firstContour[number >> 3] + std::popcount(mask & ((1u << (number & 7)) - 1))]);
+        return unpackContour(
+            contours[firstContour[number >> 3] + childrenBefore(masks[number >> 3], static_cast<int>(number & 7))]);
     }
     [[nodiscard]] uint64_t bytes() const {
         return roots.size() * 4 + nodes.size() * 4 + masks.size() + firstContour.size() * 4 + contours.size() * 4;
