@@ -139,14 +139,12 @@ TEST_F(BenchRays, ThePapersRulesAreOptions) {
         const Json report = Json::parse(ran.out, nullptr, false);
         return report.is_discarded() ? Json() : report["rows"][0];
     };
-    const Json plain = row(""), nearer = row("--paper-eps 0.1"),
-               unmerged = row("--paper-merge -1 --paper-packing octahedral"),
-               slow = row("--paper-step distance --paper-scheme trilinear"),
-               thin = row("--paper-merge -1 --paper-band 1.5");
+    const Json plain = row(""), nearer = row("--paper-eps 0.1 --paper-merge 0.5");
+    const Json slow = row("--paper-step distance --paper-scheme trilinear --paper-packing octahedral --paper-band 1.5");
     EXPECT_EQ(nearer["knob"], "eps 0.1");
     EXPECT_LT(nearer["p50_cells"], plain["p50_cells"]);
-    EXPECT_GT(unmerged["bytes"], plain["bytes"]);
-    EXPECT_LT(thin["bytes"], unmerged["bytes"]);
+    EXPECT_LT(nearer["bytes"], plain["bytes"]);
+    EXPECT_LT(slow["bytes"], plain["bytes"]);
     EXPECT_NE(slow["steps_mean"], plain["steps_mean"]);
     EXPECT_EQ(run(ball_ + " --methods paper --paper-scheme cubic" + kQuick).status, 2);
 }
