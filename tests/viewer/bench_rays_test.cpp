@@ -1,32 +1,26 @@
 // vcp bench rays from the outside: the rows that programs rely on, methods and knobs, and the report's other forms.
-#include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <nlohmann/json.hpp>
 
 #include "../builder/test_meshes.h"
-#include "test_folder.h"
+#include "vcp_program.h"
 #include "viewer/analytic_models.h"
 #include "viewer/bench_methods.h"
-#include "viewer/paper_tables.h"
-
 #include "viewer/bench_rays.h"
+#include "viewer/paper_tables.h"
 
 namespace vcp {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-struct Ran {
-    int status = -1;
-    std::string out, err;
-};
 
 class BenchRays : public testing::Test {
 protected:
@@ -35,16 +29,8 @@ protected:
     }
 
     [[nodiscard]] Ran run(const std::string& arguments) const {
-        const std::string err = (folder_ / "err").string();
-        const std::string command = std::string(VCP_EXECUTABLE) + " bench rays " + arguments + " 2>" + err;
-        Ran ran;
-        std::FILE* pipe = ::popen(command.c_str(), "r");
-        if (!pipe) return ran;
-        char buffer[4096];
-        while (const size_t count = std::fread(buffer, 1, sizeof(buffer), pipe)) ran.out.append(buffer, count);
-        ran.status = WEXITSTATUS(::pclose(pipe));
-        ran.err = contentOf(err);
-        return ran;
+        std::istringstream words("bench rays " + arguments);
+        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
     }
 
     static constexpr const char* kQuick = " --repetitions 1 --size 48x32 --cell 0.1 --json";
