@@ -133,7 +133,9 @@ std::string besidePaperMarkdown(const BenchRaysReport& report) {
     std::string text =
         "\n## Beside Demir and Westermann 2015\n\nRatios to their method (`paper`, eps 0.25) at the resolutions of "
         "their Table "
-        "1: signed distances and contours at the same cell, voxels at half of it.\n\n### Bytes (Table 1)\n\n";
+        "1: signed distances and contours at the same cell, voxels at half of it.\n\n### Bytes (Table 1)\n\nHere "
+        "voxels and contours are only those that triangles touch, without colours and normals, 4 bytes or less a node "
+        "and contour. What theirs held is not published.\n\n";
     text += ratioTable(kMebibytes, models, &OurModel::bytes);
     text += "\n### Time (Table 2)\n\nTheirs on a GTX 580, these on this machine's processor; means over cameras.\n\n";
     text += ratioTable(kMilliseconds, models, &OurModel::nanoseconds);
