@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "viewer/bench_tracer.h"
+#include "viewer/peers/parallel_rows.h"
 
 #ifdef VCP_HAVE_EMBREE
 #include <embree3/rtcore.h>

@@ -1,20 +1,21 @@
 #include "viewer/bench_rays.h"
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "builder/build.h"
+#include "viewer/analytic_models.h"
 #include "viewer/bench_cameras.h"
-#include "viewer/bench_tracer.h"
+#include "viewer/bench_methods.h"
+#include "viewer/peers/parallel_rows.h"
 
 namespace vcp {
 
 namespace {
-
-const std::vector<std::string> kMethods = {"certified", "reference", "embree", "embree-single"};
 
 /// A folder for what is built: the caller's, or one that goes with this object.
 class BenchFolder {
@@ -79,13 +80,14 @@ class RaysBench {
 public:
     explicit RaysBench(const BenchRaysOptions& options) : options_(options), folder_(options.out) {
         if (options_.methods.empty())
-            for (const std::string& method : kMethods)
+            for (const std::string& method : rayMethodNames())
                 if (benchHasEmbree() || !method.starts_with("embree")) options_.methods.push_back(method);
     }
 
     Result<BenchRaysReport> run() {
         VCP_TRY(checkNames());
         VCP_TRY(folder_.make());
+        if (options_.models.empty()) VCP_TRY(writeAnalyticModels());
         for (size_t i = 0; i < options_.models.size(); ++i) {
             modelFrom_ = static_cast<double>(i) / static_cast<double>(options_.models.size());
             modelShare_ = 1.0 / static_cast<double>(options_.models.size());
@@ -96,18 +98,27 @@ public:
 
 private:
     Result<void> checkNames() const {
+        const auto& methods = rayMethodNames();
         for (const std::string& method : options_.methods)
-            if (std::find(kMethods.begin(), kMethods.end(), method) == kMethods.end())
+            if (std::find(methods.begin(), methods.end(), method) == methods.end())
                 return Error{
                     .code = ErrorCode::Usage,
-                    .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(kMethods, ", "))};
+                    .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(methods, ", "))};
         const auto& cameras = benchCameraNames();
         for (const std::string& camera : options_.cameras)
             if (std::find(cameras.begin(), cameras.end(), camera) == cameras.end())
                 return Error{
                     .code = ErrorCode::Usage,
                     .message = fmt::format("unknown camera \"{}\"; there are {}", camera, fmt::join(cameras, ", "))};
-        if (options_.models.empty()) return Error{.code = ErrorCode::Usage, .message = "no model to measure"};
+        return {};
+    }
+
+    Result<void> writeAnalyticModels() {
+        for (const AnalyticModel& model : analyticModels()) {
+            options_.models.push_back(folder_.path() / (model.name + ".ply"));
+            VCP_TRY(writePly(model.mesh, options_.models.back()));
+        }
+        if (!(options_.cell > 0)) options_.cell = kAnalyticModelCell;
         return {};
     }
 
@@ -154,23 +165,29 @@ private:
             if (!made) return made.error();
             peer = std::move(*made);
         }
-        const double runs = static_cast<double>(options_.methods.size() * options_.cameras.size());
-        double done = 0;
-        for (const std::string& method : options_.methods) {
-            auto tracer = makeTracer(method, m);
-            if (!tracer) return tracer.error();
-            for (const std::string& camera : options_.cameras) {
-                VCP_TRY(report(fmt::format("{}: {}, {}", m.files.name, method, camera), 0.1 + 0.9 * done++ / runs));
-                VCP_TRY(runCamera(m, method, camera, **tracer, peer.get()));
+        RayMethods methods({m.mesh, *m.bvh, *m.cache, m.files.vcp, options_.device, options_.threads,
+                            m.cache->dataset().header.cell, options_.paper});
+        size_t runs = 0, done = 0;
+        for (const std::string& method : options_.methods)
+            runs += knobsOf(method).size() * options_.cameras.size();
+        const auto fraction = [&] { return 0.1 + 0.9 * static_cast<double>(done) / static_cast<double>(runs); };
+        for (const std::string& method : options_.methods)
+            for (const double knob : knobsOf(method)) {
+                VCP_TRY(report(fmt::format("{}: making {}", m.files.name, method), fraction()));
+                auto tracer = methods.make(method, knob);
+                if (!tracer) return tracer.error();
+                for (const std::string& camera : options_.cameras) {
+                    VCP_TRY(report(fmt::format("{}: {} {}, {}", m.files.name, method, (*tracer)->knob(), camera), fraction()));
+                    VCP_TRY(runCamera(m, method, camera, **tracer, peer.get()));
+                    ++done;
+                }
             }
-        }
         return {};
     }
 
-    Result<std::unique_ptr<RayTracer>> makeTracer(const std::string& method, const BenchModel& model) const {
-        if (method == "reference") return makeReferenceTracer(*model.cache, options_.threads);
-        if (method == "certified") return makeCertifiedTracer(model.files.vcp, options_.device);
-        return makeEmbreeTracer(model.mesh, method == "embree", options_.threads);
+    [[nodiscard]] std::vector<double> knobsOf(const std::string& method) const {
+        if (method == "paper" && !options_.sweep) return {options_.paper.epsilon};
+        return rayMethodKnobs(method, options_.sweep);
     }
 
     Result<void> runCamera(const BenchModel& model, const std::string& method, const std::string& name,
@@ -183,6 +200,7 @@ private:
         row.knob = tracer.knob();
         row.device = tracer.device();
         row.cell = header.cell;
+        RayClassTable classes;
         double seconds = 0, peerSeconds = 0;
         for (int view = 0; view < options_.views; ++view) {
             const Camera camera = *benchCamera(name, *model.bvh, header.cell, options_.size, view, options_.views);
@@ -192,16 +210,19 @@ private:
             row.rays += traced->hits.size();
             row.stepsMean += traced->stepsMean / options_.views;
             row.fetchesMean += traced->fetchesMean / options_.views;
+            row.steps.merge(traced->steps);
+            row.fetches.merge(traced->fetches);
             if (peer) {
                 const auto ofPeer = peer->trace(camera, options_.size, options_.repetitions);
                 if (!ofPeer) return ofPeer.error();
                 peerSeconds += ofPeer->seconds;
             }
-            judge(model, camera, *traced, row.classes);
+            judge(model, camera, *traced, classes);
         }
         row.nsPerRay = 1e9 * seconds / static_cast<double>(row.rays);
         row.ratioToEmbree = peer ? peerSeconds / seconds : 0;
         row.bytes = tracer.bytes();
+        row.classes = RaySummary(classes, row.cell);
         report_.rows.push_back(std::move(row));
         return {};
     }
@@ -210,8 +231,9 @@ private:
                RayClassTable& classes) const {
         // Of a picture with coarser pages, what is excused near silhouettes is the largest error allowed.
         double error = model.cache->dataset().header.certifiedErrorMax;
+        // Peers promise nothing; they are excused as much as ours.
         for (const auto& hit : traced.hits)
-            if (hit) error = std::max(error, hit->certifiedError);
+            if (hit && std::isfinite(hit->certifiedError)) error = std::max(error, hit->certifiedError);
         const RayJudge judge(*model.bvh, model.cache->dataset().header.cell, error);
         std::mutex mutex;
         const int every = std::max(options_.judgeEvery, 1);
@@ -236,6 +258,17 @@ private:
 };
 
 }  // namespace
+
+RaySummary::RaySummary(const RayClassTable& table, double cell)
+    : judged(table.rays()),
+      holes(table.holes()),
+      beyondCertified(table.tooFar()),
+      maxOverCertified(table.overCertifiedMax()),
+      distanceCells(table.distanceCells(cell)),
+      depthCells(table.depthCells(cell)),
+      normalDegrees(table.normalDegrees()) {
+    for (size_t i = 0; i < fractions.size(); ++i) fractions[i] = table.fraction(static_cast<RayClass>(i));
+}
 
 bool benchHasEmbree() {
 #ifdef VCP_HAVE_EMBREE

@@ -1,27 +1,32 @@
 // vcp bench rays: run time against error of ray-casters on the same meshes and cameras, each beside Embree's
 // coherent packets measured in the same run (docs/measuring.md).
 //
-// Methods: `certified` (the renderer on a Vulkan device), `reference` (the reference ray-caster in double: the
-// surface that `certified` must show), `embree` (packets of 8 coherent rays), `embree-single` (one ray at a
-// time). Times are the median of the repetitions after a warm-up; all methods get the same rays.
+// The methods and their knobs are in viewer/bench_methods.h. Times are the median of the repetitions after a warm-up;
+// all methods get the same rays.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "builder/ray_classes.h"
 #include "octree/result.h"
+#include "viewer/peers/paper_octree.h"
+#include "viewer/work_histogram.h"
 
 namespace vcp {
 
 struct BenchRaysOptions {
-    std::vector<std::filesystem::path> models;  ///< meshes, or .vcp files beside which the mesh of the same name lies
-    std::vector<std::string> methods;           ///< empty: all that this build has
+    /// Meshes, or .vcp files beside which the mesh of the same name lies; none: viewer/analytic_models.h.
+    std::vector<std::filesystem::path> models;
+    std::vector<std::string> methods;  ///< empty: all that this build has
+    bool sweep = false;                ///< each method at several values of its knob, instead of its default alone
     std::vector<std::string> cameras = {"whole", "half", "close", "cells"};
     glm::ivec2 size{1920, 1200};
     int views = 1;  ///< directions each camera looks from, spread over the sphere; 8 for a survey
@@ -30,9 +35,23 @@ struct BenchRaysOptions {
     std::string device;         ///< of `certified`, as for --device; empty: the best
     std::filesystem::path out;  ///< .vcp files are kept here and used again; empty: a temporary folder
     double cell = 0;            ///< as for vcp build
+    PaperOptions paper;         ///< the rules of the method `paper`
     int judgeEvery = 1;         ///< 1: every ray is compared with the mesh; n: every nth row and column
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
+};
+
+/// What became of the rays that were judged; of each hit its distance to the mesh and its error along the ray in
+/// cells, and the angle between the normals.
+struct RaySummary {
+    std::array<double, kRayClassNames.size()> fractions{};
+    uint64_t judged = 0, holes = 0, beyondCertified = 0;
+    double maxOverCertified = 0;
+    Quantiles distanceCells, depthCells, normalDegrees;
+
+    RaySummary() = default;
+    RaySummary(const RayClassTable& table, double cell);
+    [[nodiscard]] double fraction(RayClass rayClass) const { return fractions[static_cast<size_t>(rayClass)]; }
 };
 
 /// One row of the table: field names are those of the JSON (docs/measuring.md).
@@ -41,11 +60,12 @@ struct BenchRaysRow {
     uint64_t rays = 0;
     double nsPerRay = 0;
     double ratioToEmbree = 0;  ///< rays per second over those of Embree's packets on the same rays; 0 without Embree
-    RayClassTable classes;     ///< of `judged` rays
-    double cell = 0;           ///< finest edge, world units
-    double stepsMean = 0;      ///< nodes visited a ray, where the method counts
-    double fetchesMean = 0;    ///< leaves and triangles fetched a ray, where the method counts
-    uint64_t bytes = 0;        ///< of what is traced: pages, or Embree's tree and buffers
+    RaySummary classes;
+    double cell = 0;           ///< the model's finest edge, world units: that of all methods' rows
+    double stepsMean = 0;      ///< nodes and samples a ray, where the method counts
+    double fetchesMean = 0;    ///< reads a ray, where the method counts
+    WorkHistogram steps, fetches;  ///< empty where the method does not count ray by ray
+    uint64_t bytes = 0;        ///< of what is traced: pages, a peer's octree, or Embree's tree and buffers
 };
 
 struct BenchRaysReport {
@@ -59,9 +79,13 @@ bool benchHasEmbree();
 /// report, Cancelled.
 Result<BenchRaysReport> benchRays(const BenchRaysOptions& options);
 
-/// The report as one JSON object {"rows": [...]}, as CSV with a header line, and as a Markdown table.
+/// The report as one JSON object {"rows": [...]}, as CSV with a header line, and as Markdown: the table, and beside the
+/// paper's Tables 1 and 2 where the rows for it are there.
 std::string benchRaysJson(const BenchRaysReport& report);
 std::string benchRaysCsv(const BenchRaysReport& report);
 std::string benchRaysMarkdown(const BenchRaysReport& report);
+/// Of each model error quantiles and wrong rays against time and against bytes, SVG by file name without extension;
+/// a point is a method at one value of its knob, the mean over cameras.
+std::vector<std::pair<std::string, std::string>> benchRaysPlots(const BenchRaysReport& report);
 
 }  // namespace vcp

@@ -2,14 +2,15 @@
 #include "viewer/bench_tracer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <mutex>
-#include <thread>
+
+#include <fmt/format.h>
 
 #include "render/renderer.h"
 #include "streaming/page_source.h"
+#include "viewer/peers/parallel_rows.h"
 
 namespace vcp {
 
@@ -25,28 +26,28 @@ public:
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int) override {
         TracedPicture picture;
         picture.hits.resize(static_cast<size_t>(size.x) * size.y);
-        CastCounters sum;
         std::mutex mutex;
         const auto start = std::chrono::steady_clock::now();
         forEachRow(size.y, threads_, [&](int y) {
-            CastCounters counters;
+            WorkHistogram steps, fetches;
             for (int x = 0; x < size.x; ++x) {
+                CastCounters counters;
                 const CameraRay ray =
                     cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, y + 0.5);
                 const auto hit = caster_.cast({ray.origin, ray.direction}, &counters);
                 if (hit)
                     picture.hits[static_cast<size_t>(y) * size.x + x] =
                         SurfaceHit{hit->t, hit->normal, hit->certifiedError};
+                steps.add(static_cast<uint32_t>(counters.nodes));
+                fetches.add(static_cast<uint32_t>(counters.softLeaves + counters.triangles));
             }
             const std::lock_guard lock(mutex);
-            sum.nodes += counters.nodes;
-            sum.softLeaves += counters.softLeaves;
-            sum.triangles += counters.triangles;
+            picture.steps.merge(steps);
+            picture.fetches.merge(fetches);
         });
         picture.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        const auto rays = static_cast<double>(picture.hits.size());
-        picture.stepsMean = static_cast<double>(sum.nodes) / rays;
-        picture.fetchesMean = static_cast<double>(sum.softLeaves + sum.triangles) / rays;
+        picture.stepsMean = picture.steps.mean();
+        picture.fetchesMean = picture.fetches.mean();
         return picture;
     }
 
@@ -57,11 +58,11 @@ private:
 
 class CertifiedTracer final : public RayTracer {
 public:
-    CertifiedTracer(std::unique_ptr<Renderer> renderer, double certifiedError)
-        : renderer_(std::move(renderer)), certifiedError_(certifiedError) {}
+    CertifiedTracer(std::unique_ptr<Renderer> renderer, double certifiedError, double errorPixels)
+        : renderer_(std::move(renderer)), certifiedError_(certifiedError), errorPixels_(errorPixels) {}
 
     [[nodiscard]] std::string device() const override { return renderer_->device().name; }
-    [[nodiscard]] std::string knob() const override { return "error-pixels 0.5"; }
+    [[nodiscard]] std::string knob() const override { return fmt::format("error-pixels {:g}", errorPixels_); }
     [[nodiscard]] uint64_t bytes() const override { return residentBytes_; }
 
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
@@ -69,6 +70,7 @@ public:
         request.camera = camera;
         request.width = static_cast<uint32_t>(size.x);
         request.height = static_cast<uint32_t>(size.y);
+        request.errorPixels = errorPixels_;
         const auto settled = renderer_->settle(request);
         if (!settled) return settled.error();
         residentBytes_ = settled->residentBytes;
@@ -115,7 +117,7 @@ private:
     }
 
     std::unique_ptr<Renderer> renderer_;
-    double certifiedError_;
+    double certifiedError_, errorPixels_;
     uint64_t residentBytes_ = 0;
 };
 
@@ -128,7 +130,8 @@ Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, u
     return std::unique_ptr<RayTracer>(std::make_unique<ReferenceTracer>(std::move(*caster), threads));
 }
 
-Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device) {
+Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device,
+                                                       double errorPixels) {
     const auto reader = openFile(file);
     if (!reader) return reader.error();
     auto dataset = readDataset(**reader);
@@ -141,19 +144,7 @@ Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::pa
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(shared, std::make_shared<FilePageSource>(*reader, shared)));
     return std::unique_ptr<RayTracer>(
-        std::make_unique<CertifiedTracer>(std::move(*renderer), shared->header.certifiedErrorMax));
-}
-
-void forEachRow(int rows, unsigned threads, const std::function<void(int)>& work) {
-    const unsigned count = threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
-    std::atomic<int> next{0};
-    const auto loop = [&] {
-        for (int row = next++; row < rows; row = next++) work(row);
-    };
-    std::vector<std::thread> others;
-    for (unsigned t = 1; t < count; ++t) others.emplace_back(loop);
-    loop();
-    for (std::thread& thread : others) thread.join();
+        std::make_unique<CertifiedTracer>(std::move(*renderer), shared->header.certifiedErrorMax, errorPixels));
 }
 
 double medianOf(std::vector<double> seconds) {

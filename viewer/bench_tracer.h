@@ -15,6 +15,7 @@
 #include "builder/ray_classes.h"
 #include "octree/reference_caster.h"
 #include "render/camera.h"
+#include "viewer/work_histogram.h"
 
 namespace vcp {
 
@@ -23,6 +24,7 @@ struct TracedPicture {
     std::vector<std::optional<SurfaceHit>> hits;
     double seconds = 0;                     ///< median of the repetitions
     double stepsMean = 0, fetchesMean = 0;  ///< a ray; 0 where the method does not count
+    WorkHistogram steps, fetches;           ///< ray by ray; empty where the method does not count them so
 };
 
 class RayTracer {
@@ -39,16 +41,14 @@ public:
 Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, unsigned threads);
 
 /// The renderer at `errorPixels`. The file is opened again. Errors: Device, what opening a dataset reports.
-Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device);
+Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device,
+                                                       double errorPixels = 0.5);
 
 /// Embree over the mesh, relative to its box's middle, in floats. Errors: Usage where this build has no Embree.
 Result<std::unique_ptr<RayTracer>> makeEmbreeTracer(const IndexedMesh& mesh, bool packets, unsigned threads);
 
 /// Seconds that Embree takes to build its tree. Errors: as above.
 Result<double> timeEmbreeBuild(const IndexedMesh& mesh, unsigned threads);
-
-/// Runs work(row) for all rows on `threads` threads (0: one a processor).
-void forEachRow(int rows, unsigned threads, const std::function<void(int)>& work);
 
 /// Middle of the repetitions' times.
 double medianOf(std::vector<double> seconds);

@@ -1,10 +1,14 @@
 // vcp bench: run time against error, beside Embree measured in the same run.
 #include <fstream>
+#include <map>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include "builder/memory_plan.h"
 #include "viewer/bench_build.h"
+#include "viewer/bench_methods.h"
 #include "viewer/bench_rays.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
@@ -45,6 +49,8 @@ struct RaysCommand : BenchCommand {
     std::string device;
     int views = 1;
     int judgeEvery = 1;
+    bool sweep = false;
+    PaperOptions paper;
 };
 
 Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
@@ -140,13 +146,16 @@ Result<int> runRays(const RaysCommand& command) {
     options.out = command.out;
     options.cell = command.cellLength();
     options.judgeEvery = command.judgeEvery;
+    options.sweep = command.sweep;
+    options.paper = command.paper;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = progressTo(display);
     const auto report = benchRays(options);
     display.finish();
     if (!report) return report.error();
-    return publish(command, "bench_rays", {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report)});
+    return publish(command, "bench_rays",
+                   {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
 }
 
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
@@ -197,12 +206,37 @@ RunCommand addBenchBuild(CLI::App& bench) {
     return [command] { return runBuild(*command); };
 }
 
+/// The rules of the method `paper`, in finest cells where they are lengths.
+void addPaperOptions(CLI::App& app, PaperOptions& paper) {
+    const auto length = [&](const char* name, float& value, const char* what) {
+        app.add_option(name, value, what)->type_name("CELLS")->capture_default_str();
+    };
+    length("--paper-eps", paper.epsilon, "paper: a ray hits nearer than this; --sweep has its own values");
+    length("--paper-band", paper.band, "paper: vectors are kept in blocks nearer than this");
+    length("--paper-merge", paper.mergeThreshold, "paper: cells are merged where their vectors err by less; negative: never");
+    const auto choice = [&]<class Value>(const char* name, Value& value, const char* what, const std::map<std::string, Value>& values) {
+        std::vector<std::string> names;
+        for (const auto& [key, ignored] : values) names.push_back(key);
+        app.add_option_function<std::string>(name, [&value, values](const std::string& key) { value = values.at(key); }, what)
+            ->type_name(fmt::format("{}", fmt::join(names, "|")))
+            ->check(CLI::IsMember(names));
+    };
+    choice("--paper-scheme", paper.scheme, "paper: interpolation of the vectors [longer]",
+           std::map<std::string, PaperScheme>{
+               {"longer", PaperScheme::Longer}, {"min-plane", PaperScheme::MinPlane}, {"trilinear", PaperScheme::Trilinear}});
+    choice("--paper-step", paper.step, "paper: steps near the surface [planar]",
+           std::map<std::string, PaperStep>{{"distance", PaperStep::Distance}, {"planar", PaperStep::Planar}});
+    choice("--paper-packing", paper.packing, "paper: directions of the vectors [spherical]",
+           std::map<std::string, PaperPacking>{{"octahedral", PaperPacking::Octahedral}, {"spherical", PaperPacking::Spherical}});
+}
+
 RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
-    addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from");
-    app->get_option("MODEL")->required();
-    app->add_option("--methods", command->methods, "certified, reference, embree, embree-single [all]")->type_name("A,B")->delimiter(',');
+    addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
+    app->add_option("--methods", command->methods, fmt::format("{} [all]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_flag("--sweep", command->sweep,
+                  "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the other octrees");
     app->add_option("--cameras", command->cameras, "whole, half, close, cells [all]")->type_name("A,B")->delimiter(',');
     app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(
         CLI::Range(1, 1000));
@@ -214,6 +248,7 @@ RunCommand addBenchRays(CLI::App& bench) {
         ->capture_default_str()
         ->check(CLI::Range(1, 16384));
     app->add_option("--device", command->device, "Vulkan device of the method certified, see `vcp devices` [the best one]")->type_name("DEVICE");
+    addPaperOptions(*app, command->paper);
     return [command] { return runRays(*command); };
 }
 

@@ -1,4 +1,4 @@
-// The benchmarks' reports as JSON, CSV and Markdown.
+// The report of the build benchmark as JSON, CSV, Markdown and plots.
 #include <algorithm>
 #include <optional>
 
@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "viewer/bench_build.h"
-#include "viewer/bench_rays.h"
+#include "viewer/csv_text.h"
 #include "viewer/plot_svg.h"
 
 namespace vcp {
@@ -14,37 +14,6 @@ namespace vcp {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json toJson(const BenchRaysRow& row) {
-    const Quantiles distance = row.classes.distanceCells(row.cell), depth = row.classes.depthCells(row.cell);
-    const Quantiles normal = row.classes.normalDegrees();
-    Json json = {{"model", row.model},         {"camera", row.camera},
-                 {"method", row.method},       {"knob", row.knob},
-                 {"device", row.device},       {"rays", row.rays},
-                 {"ns_per_ray", row.nsPerRay}, {"ratio_to_embree", row.ratioToEmbree}};
-    for (size_t i = 0; i < kRayClassNames.size(); ++i)
-        json[std::string(kRayClassNames[i])] = row.classes.fraction(static_cast<RayClass>(i));
-    json["p50_cells"] = distance.p50;
-    json["p95_cells"] = distance.p95;
-    json["p99_cells"] = distance.p99;
-    json["max_cells"] = distance.max;
-    json["steps_mean"] = row.stepsMean;
-    json["fetches_mean"] = row.fetchesMean;
-    json["bytes"] = row.bytes;
-    json["judged_rays"] = row.classes.rays();
-    json["holes"] = row.classes.holes();
-    json["beyond_certified"] = row.classes.tooFar();
-    json["max_over_certified"] = row.classes.overCertifiedMax();
-    json["depth_p50_cells"] = depth.p50;
-    json["depth_p95_cells"] = depth.p95;
-    json["depth_p99_cells"] = depth.p99;
-    json["depth_max_cells"] = depth.max;
-    json["normal_p50_degrees"] = normal.p50;
-    json["normal_p95_degrees"] = normal.p95;
-    json["normal_p99_degrees"] = normal.p99;
-    json["cell"] = row.cell;
-    return json;
-}
 
 Json toJson(const BenchBuildRow& row) {
     Json json = {{"model", row.model},
@@ -82,58 +51,16 @@ Json toJson(const BenchBuildRow& row) {
     return json;
 }
 
-template <class Row>
-Json rowsOf(const std::vector<Row>& rows) {
+Json rowsOf(const BenchBuildReport& report) {
     Json json = Json::array();
-    for (const Row& row : rows) json.push_back(toJson(row));
+    for (const BenchBuildRow& row : report.rows) json.push_back(toJson(row));
     return json;
-}
-
-std::string quoted(const Json& value) {
-    if (value.is_null()) return "";
-    if (!value.is_string()) return value.dump();
-    std::string text = "\"";
-    for (const char c : value.get<std::string>()) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return text + "\"";
-}
-
-/// One column a field, in the order of the JSON.
-std::string csvOf(const Json& rows) {
-    std::string text;
-    if (rows.empty()) return text;
-    const auto line = [&](const Json& row, bool names) {
-        for (const auto& [name, value] : row.items()) text += (names ? name : quoted(value)) + ',';
-        text.back() = '\n';
-    };
-    line(rows.front(), true);
-    for (const Json& row : rows) line(row, false);
-    return text;
 }
 
 }  // namespace
 
-std::string benchRaysJson(const BenchRaysReport& report) { return Json{{"rows", rowsOf(report.rows)}}.dump(); }
-std::string benchRaysCsv(const BenchRaysReport& report) { return csvOf(rowsOf(report.rows)); }
-std::string benchBuildJson(const BenchBuildReport& report) { return Json{{"rows", rowsOf(report.rows)}}.dump(); }
-std::string benchBuildCsv(const BenchBuildReport& report) { return csvOf(rowsOf(report.rows)); }
-
-std::string benchRaysMarkdown(const BenchRaysReport& report) {
-    std::string text =
-        "| model | camera | method | Mray/s | of Embree | hit % | missed % | false % | wrong sheet % | holes | beyond "
-        "certified | p50 | p99 | max cells | normal p50 |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    for (const BenchRaysRow& row : report.rows) {
-        const Quantiles distance = row.classes.distanceCells(row.cell);
-        const auto percent = [&](RayClass rayClass) { return 100 * row.classes.fraction(rayClass); };
-        text += fmt::format(
-            "| {} | {} | {} | {:.2f} | {:.3f} | {:.2f} | {:.5f} | {:.5f} | {:.5f} | {} | {} | {:.5f} | {:.5f} | {:.4f} "
-            "| {:.1f}\u00b0 |\n",
-            row.model, row.camera, row.method, 1e3 / row.nsPerRay, row.ratioToEmbree, percent(RayClass::Hit),
-            percent(RayClass::Missed), percent(RayClass::False), percent(RayClass::WrongSheet), row.classes.holes(),
-            row.classes.tooFar(), distance.p50, distance.p99, distance.max, row.classes.normalDegrees().p50);
-    }
-    return text;
-}
+std::string benchBuildJson(const BenchBuildReport& report) { return Json{{"rows", rowsOf(report)}}.dump(); }
+std::string benchBuildCsv(const BenchBuildReport& report) { return csvOf(rowsOf(report)); }
 
 std::string benchBuildMarkdown(const BenchBuildReport& report) {
     std::string text =

@@ -1,0 +1,179 @@
+// vcp bench rays from the outside: the rows that programs rely on, methods and knobs, and the report's other forms.
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "../builder/test_meshes.h"
+#include "vcp_program.h"
+#include "viewer/analytic_models.h"
+#include "viewer/bench_methods.h"
+#include "viewer/bench_rays.h"
+#include "viewer/paper_tables.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+class BenchRays : public testing::Test {
+protected:
+    BenchRays() : folder_("vcp_bench_rays_test"), ball_((folder_ / "ball.ply").string()) {
+        EXPECT_TRUE(writePly(test::sphereMesh({3, 4, 5}, 1, 48), ball_));
+    }
+
+    [[nodiscard]] Ran run(const std::string& arguments) const {
+        std::istringstream words("bench rays " + arguments);
+        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
+    }
+
+    static constexpr const char* kQuick = " --repetitions 1 --size 48x32 --cell 0.1 --json";
+
+    TestFolder folder_;
+    std::string ball_;
+};
+
+/// What DESIGN and docs/measuring.md promise, and that a row agrees with itself.
+void expectRow(const Json& row) {
+    for (const char* field :
+         {"model",           "camera",      "method",      "knob",      "device",     "rays",        "ns_per_ray",
+          "ratio_to_embree", "hit",         "miss",        "missed",    "false",      "wrong_sheet", "unresolved",
+          "p50_cells",       "p95_cells",   "p99_cells",   "max_cells", "steps_mean", "steps_p95",   "steps_p99",
+          "fetches_mean",    "fetches_p95", "fetches_p99", "bytes"})
+        ASSERT_TRUE(row.contains(field)) << field;
+    double sum = 0;
+    for (const char* part : {"hit", "miss", "missed", "false", "wrong_sheet", "unresolved"})
+        sum += row[part].get<double>();
+    EXPECT_NEAR(sum, 1, 1e-9);
+    EXPECT_EQ(row["rays"], 48 * 32);
+    EXPECT_GT(row["ns_per_ray"], 0);
+    EXPECT_GT(row["bytes"], 0);
+    EXPECT_LE(row["p50_cells"], row["p95_cells"]);
+    EXPECT_LE(row["p95_cells"], row["p99_cells"]);
+    EXPECT_LE(row["p99_cells"], row["max_cells"]);
+    const bool counts = !row["method"].get<std::string>().starts_with("embree");
+    EXPECT_EQ(row["steps_p99"].is_null(), !counts) << row["method"];
+    if (counts) {
+        EXPECT_GT(row["steps_mean"], 0);
+        EXPECT_LE(row["steps_p95"], row["steps_p99"]);
+        EXPECT_LE(row["fetches_p95"], row["fetches_p99"]);
+    }
+}
+
+TEST_F(BenchRays, EveryPeerWithItsOwnError) {
+    const Ran ran =
+        run(ball_ + " --cameras whole --methods reference,paper,sdf,sdf-analytic,voxel,svo-contours" + kQuick);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json rows = Json::parse(ran.out)["rows"];
+    ASSERT_EQ(rows.size(), 6u);
+    std::map<std::string, double> p50, hit;
+    for (const Json& row : rows) {
+        expectRow(row);
+        p50[row["method"]] = row["p50_cells"];
+        hit[row["method"]] = row["hit"];
+        EXPECT_EQ(row["unresolved"], 0);
+    }
+    EXPECT_NEAR(p50["paper"], 0.24, 0.05);
+    EXPECT_LT(p50["sdf"], 0.1);
+    EXPECT_LT(p50["sdf-analytic"], 0.02);
+    EXPECT_GT(p50["voxel"], 0.3);
+    EXPECT_LT(p50["svo-contours"], 0.1);
+    EXPECT_LT(p50["reference"], 0.02);
+    for (const auto& [method, part] : hit) EXPECT_GT(part, 0.15) << method;
+}
+
+TEST_F(BenchRays, ASweepHasARowForEachValueAndPlots) {
+    const std::string out = (folder_ / "out").string();
+    const Ran ran =
+        run(ball_ + " --cameras close --sweep --methods paper,sdf,voxel,svo-contours --out " + out + kQuick);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    std::map<std::string, std::set<std::string>> knobs;
+    std::map<std::string, double> bytes, p50;
+    const Json report = Json::parse(ran.out);
+    for (const Json& row : report["rows"]) {
+        expectRow(row);
+        knobs[row["method"]].insert(row["knob"]);
+        const std::string key = row["method"].get<std::string>() + " " + row["knob"].get<std::string>();
+        bytes[key] = row["bytes"];
+        p50[key] = row["p50_cells"];
+    }
+    EXPECT_EQ(knobs["paper"], (std::set<std::string>{"eps 0.5", "eps 0.25", "eps 0.1"}));
+    EXPECT_EQ(knobs["sdf"], (std::set<std::string>{"cell 2", "cell 1", "cell 0.5"}));
+    EXPECT_EQ(knobs["voxel"], (std::set<std::string>{"cell 1", "cell 0.5", "cell 0.25"}));
+    EXPECT_EQ(bytes["paper eps 0.1"], bytes["paper eps 0.5"]);
+    EXPECT_GT(p50["paper eps 0.5"], p50["paper eps 0.1"]);
+    EXPECT_GT(bytes["sdf cell 0.5"], bytes["sdf cell 2"]);
+    EXPECT_GT(p50["voxel cell 1"], p50["voxel cell 0.25"]);
+    for (const char* file : {"bench_rays.json", "bench_rays.csv", "bench_rays.md", "bench_rays_ball_p50_time.svg",
+                             "bench_rays_ball_p99_bytes.svg", "bench_rays_ball_wrong_time.svg"})
+        EXPECT_TRUE(fs::exists(fs::path(out) / file)) << file;
+    // The rows that the paper's tables need are there.
+    const std::string markdown = contentOf(out + "/bench_rays.md");
+    EXPECT_NE(markdown.find("| here: ball | 1.00 | 1.00 |"), std::string::npos) << markdown;
+}
+
+TEST_F(BenchRays, ThePapersRulesAreOptions) {
+    const auto row = [&](const std::string& options) {
+        const Ran ran = run(ball_ + " --cameras whole --methods paper " + options + kQuick);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        const Json report = Json::parse(ran.out, nullptr, false);
+        return report.is_discarded() ? Json() : report["rows"][0];
+    };
+    const Json plain = row(""), nearer = row("--paper-eps 0.1 --paper-merge 0.5");
+    const Json slow = row("--paper-step distance --paper-scheme trilinear --paper-packing octahedral --paper-band 1.5");
+    EXPECT_EQ(nearer["knob"], "eps 0.1");
+    EXPECT_LT(nearer["p50_cells"], plain["p50_cells"]);
+    EXPECT_LT(nearer["bytes"], plain["bytes"]);
+    EXPECT_LT(slow["bytes"], plain["bytes"]);
+    EXPECT_NE(slow["steps_mean"], plain["steps_mean"]);
+    EXPECT_EQ(run(ball_ + " --methods paper --paper-scheme cubic" + kQuick).status, 2);
+}
+
+TEST_F(BenchRays, UnknownMethodsAndCamerasAreNamed) {
+    const Ran method = run(ball_ + " --methods magic" + kQuick);
+    EXPECT_EQ(method.status, 2);
+    EXPECT_NE(method.err.find("sdf-analytic"), std::string::npos) << method.err;
+    EXPECT_EQ(run(ball_ + " --cameras nowhere" + kQuick).status, 2);
+    EXPECT_NE(run("--help").out.find("svo-contours"), std::string::npos);
+}
+
+TEST(RayMethods, KnobsAreSweptAboutTheDefault) {
+    for (const std::string& method : rayMethodNames()) {
+        const auto one = rayMethodKnobs(method, false), all = rayMethodKnobs(method, true);
+        ASSERT_EQ(one.size(), 1u) << method;
+        EXPECT_NE(std::find(all.begin(), all.end(), one[0]), all.end()) << method;
+    }
+}
+
+TEST(PaperTables, RatiosToThePaper) {
+    BenchRaysReport report;
+    const auto add = [&](const std::string& method, const std::string& knob, uint64_t bytes, double ns) {
+        BenchRaysRow row;
+        row.model = "shape";
+        row.method = method;
+        row.knob = knob;
+        row.bytes = bytes;
+        row.nsPerRay = ns;
+        report.rows.push_back(row);
+    };
+    add("paper", "eps 0.25", 1000, 100);
+    EXPECT_EQ(besidePaperMarkdown(report), "");
+    add("sdf", "cell 1", 500, 50);
+    add("sdf", "cell 1", 500, 70);
+    add("voxel", "cell 1", 1, 1);
+    EXPECT_EQ(besidePaperMarkdown(report), "");
+    add("voxel", "cell 0.5", 250, 90);
+    const std::string text = besidePaperMarkdown(report);
+    EXPECT_NE(text.find("| here: shape | 1.00 | 0.50 | 0.25 | |"), std::string::npos) << text;
+    EXPECT_NE(text.find("| here: shape | 1.00 | 0.60 | 0.90 | |"), std::string::npos) << text;
+    EXPECT_NE(text.find("| published: David | 1.00 | 1.00 | 0.98 | 0.79 |"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,51 @@
+// How much work rays took: how many rays took 0, 1, 2, ... steps.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace vcp {
+
+/// Exact up to kLast; rays with more count as kLast.
+class WorkHistogram {
+public:
+    static constexpr uint32_t kLast = 65535;
+
+    void add(uint32_t work) {
+        work = std::min(work, kLast);
+        if (work >= rays_.size()) rays_.resize(work + 1);
+        ++rays_[work];
+    }
+    void merge(const WorkHistogram& other) {
+        rays_.resize(std::max(rays_.size(), other.rays_.size()));
+        for (size_t work = 0; work < other.rays_.size(); ++work) rays_[work] += other.rays_[work];
+    }
+    [[nodiscard]] bool empty() const { return rays_.empty(); }
+    [[nodiscard]] uint64_t rays() const {
+        uint64_t sum = 0;
+        for (const uint64_t count : rays_) sum += count;
+        return sum;
+    }
+    [[nodiscard]] double mean() const {
+        double sum = 0;
+        for (size_t work = 0; work < rays_.size(); ++work) sum += static_cast<double>(work * rays_[work]);
+        return empty() ? 0 : sum / static_cast<double>(rays());
+    }
+    /// The least work that this part of the rays does not exceed.
+    [[nodiscard]] uint32_t quantile(double part) const {
+        const auto wanted = static_cast<uint64_t>(std::ceil(part * static_cast<double>(rays())));
+        uint64_t sum = 0;
+        for (size_t work = 0; work < rays_.size(); ++work) {
+            sum += rays_[work];
+            if (sum >= wanted) return static_cast<uint32_t>(work);
+        }
+        return 0;
+    }
+
+private:
+    std::vector<uint64_t> rays_;
+};
+
+}  // namespace vcp
