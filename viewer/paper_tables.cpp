@@ -76,9 +76,9 @@ FourMethods ratios(const FourMethods& values) {
 }
 
 std::string line(const std::string& name, const FourMethods& values, const char* format = "{:.2f}") {
-    std::string text = "| " + name + " |";
+    std::string text = fmt::format("| {} |", name);
     for (const double value : values)
-        text += std::isfinite(value) ? " " + fmt::format(fmt::runtime(format), value) + " |" : " |";
+        text += std::isfinite(value) ? fmt::format(" {} |", fmt::format(fmt::runtime(format), value)) : " |";
     return text + "\n";
 }
 
@@ -113,7 +113,7 @@ std::string ratioTable(const Rows& published, const std::vector<OurModel>& model
         theirs.add(ratios(row.values));
     }
     for (const OurModel& model : models) {
-        text += line("here: " + model.name, ratios(model.*values));
+        text += line(fmt::format("here: {}", model.name), ratios(model.*values));
         ours.add(ratios(model.*values));
     }
     FourMethods quotient = ours.mean();
