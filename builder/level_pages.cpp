@@ -34,8 +34,11 @@ EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh
     return encodePage(tree, geometry, mesh);
 }
 
-BuiltPage buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
+Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
+    // A page that cannot be read back must not cost the whole file.
+    if (const auto view = parsePage(encoded.geometry); encoded.leaves > 0 && !view)
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller --cell", triangles.size(), encoded.leaves)};
     BuiltPage page;
     page.entry.morton = code;
     page.entry.level = static_cast<uint8_t>(settings.grid.level);
@@ -123,7 +126,9 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
                          .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a smaller --cell or a larger --memory", bins.of(i).size(),
                                                 ((work[i] - most) * 3 / 2 >> 20) + 1)};
         VCP_TRY(settings.makeRoom());
-        VCP_TRY(inOrder.put(i, buildPage(settings, mesh, bins.pages[i], bins.of(i))));
+        auto page = buildPage(settings, mesh, bins.pages[i], bins.of(i));
+        if (!page) return page.error();
+        VCP_TRY(inOrder.put(i, std::move(*page)));
         isBuilt[i] = true;
     }
     Admission admission(left(settings.pageBytes));
@@ -135,7 +140,8 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
         Result<void> put;
         if (!isBuilt[i]) {
             admission.enter(work[i]);
-            put = inOrder.put(i, buildPage(settings, mesh, bins.pages[i], bins.of(i)));
+            auto page = buildPage(settings, mesh, bins.pages[i], bins.of(i));
+            put = page ? inOrder.put(i, std::move(*page)) : Result<void>(page.error());
             admission.leave(work[i]);
         }
         if (put && !progress(double(++done) / double(bins.pages.size()))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};

@@ -24,6 +24,9 @@ constexpr double kMergeTolerance = 0.5;
 // Merging is tried only while the leaves' own error is below this part of the tolerance.
 constexpr double kMergeTrial = 0.2;
 
+// Leaves are split below a cell only while a page has fewer triangle records.
+constexpr size_t kMostSplitRecords = 1 << 20;
+
 // Leaves are merged only while their colours stay so close to what the larger leaf blends, of 255.
 constexpr double kColourTolerance = 10;
 
@@ -33,7 +36,11 @@ double errorOf(const SoftLeaf& leaf) {
 
 class TreeBuilder {
 public:
-    TreeBuilder(PageGeometry& geometry, double tolerance) : geometry_(geometry), tolerance_(tolerance), mostLeaves_(mostSplitLeaves(geometry.triangleCount())) { fillOccupancy(); }
+    /// `hardEdge`: of the boxes, in cells, that become leaves without a try for less; 1: none do.
+    TreeBuilder(PageGeometry& geometry, double tolerance, int hardEdge)
+        : geometry_(geometry), tolerance_(tolerance), hardEdge_(hardEdge), mostLeaves_(mostSplitLeaves(geometry.triangleCount())) {
+        fillOccupancy();
+    }
 
     PageTree run() {
         tree_.nodes.emplace_back();
@@ -73,6 +80,11 @@ private:
     void build(uint32_t index, const NodeBox& box) {
         tree_.nodes[index].box = box;
         if (!occupied(box)) return;
+        if (hardEdge_ > 1 && box.edge <= hardEdge_ * kSubcells) {
+            std::vector<uint32_t> around, inside;
+            geometry_.trianglesOf(box, around, inside);
+            return makeHard(index, inside);
+        }
         if (box.edge == kSubcells) {
             const PageGeometry::CellTriangles triangles = geometry_.trianglesOf(box.lower / kSubcells);
             return fillCell(index, box, triangles.around, triangles.inside, 0);
@@ -87,7 +99,8 @@ private:
         tree_.nodes[index].box = box;
         if (inside.empty()) return;
         if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
-        if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth || tree_.soft.size() + tree_.hard.size() >= mostLeaves_) return makeHard(index, inside);
+        const bool isFull = tree_.soft.size() + tree_.hard.size() >= mostLeaves_ || records_ >= kMostSplitRecords;
+        if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth || isFull) return makeHard(index, inside);
         PageGeometry::ChildTriangles& children = children_[depth];
         geometry_.split(box, around, children);
         size_t together = 0;
@@ -127,6 +140,7 @@ private:
         tree_.nodes[index].kind = Kind::Hard;
         tree_.nodes[index].index = static_cast<uint32_t>(tree_.hard.size());
         tree_.hard.push_back({tree_.nodes[index].box, {triangles.begin(), triangles.end()}});
+        records_ += triangles.size();
     }
 
     /// The merging rule (Demir and Westermann 2015, section 3, with a true bound): eight siblings become one
@@ -158,6 +172,7 @@ private:
         // The children and their leaves are the last ones made.
         tree_.nodes.resize(first);
         tree_.soft.resize(tree_.soft.size() - soft);
+        for (size_t i = tree_.hard.size() - hard; i < tree_.hard.size(); ++i) records_ -= tree_.hard[i].triangles.size();
         tree_.hard.resize(tree_.hard.size() - hard);
         tree_.nodes[index].kind = Kind::Empty;
         if (certificate) makeSoft(index, *certificate);
@@ -197,7 +212,8 @@ private:
 
     PageGeometry& geometry_;
     double tolerance_;
-    size_t mostLeaves_;
+    int hardEdge_;
+    size_t mostLeaves_, records_ = 0;  ///< records: triangles of hard leaves, leaf by leaf
     PageTree tree_;
     std::vector<std::vector<uint8_t>> occupancy_;
     std::vector<CertifiedTriangle> triangles_;
@@ -208,7 +224,19 @@ private:
 
 }  // namespace
 
-PageTree buildPageTree(PageGeometry& geometry, double tolerance) { return TreeBuilder(geometry, tolerance).run(); }
+size_t PageTree::records() const {
+    size_t count = 0;
+    for (const HardLeaf& leaf : hard) count += leaf.triangles.size() + (leaf.triangles.size() >= kHardCountLong ? 1 : 0);
+    return count;
+}
+
+PageTree buildPageTree(PageGeometry& geometry, double tolerance, size_t mostRecords) {
+    // Many long triangles, each in many leaves, may be more than a page can name: larger leaves repeat them less.
+    for (int hardEdge = 1;; hardEdge *= 2) {
+        PageTree tree = TreeBuilder(geometry, tolerance, hardEdge).run();
+        if (tree.records() <= mostRecords || hardEdge >= geometry.cells()) return tree;
+    }
+}
 
 double PageTree::certifiedError() const {
     double error = 0;

@@ -8,6 +8,7 @@
 
 #include "builder/lattice_mesh.h"
 #include "builder/page_geometry.h"
+#include "octree/page.h"
 
 namespace vcp {
 
@@ -44,9 +45,12 @@ struct PageTree {
     std::vector<HardLeaf> hard;
     /// Largest distance of the rendered surface from this level's mesh, in cells.
     [[nodiscard]] double certifiedError() const;
+    /// Triangle records of the hard leaves: a triangle has one in each leaf that it touches.
+    [[nodiscard]] size_t records() const;
 };
 
-/// `tolerance`: cells, for soft leaves.
-PageTree buildPageTree(PageGeometry& geometry, double tolerance);
+/// `tolerance`: cells, for soft leaves. `mostRecords`: what a page can name; where there would be more, leaves are
+/// larger. With more triangles than that there is no such tree.
+PageTree buildPageTree(PageGeometry& geometry, double tolerance, size_t mostRecords = kLeafIndexMask);
 
 }  // namespace vcp

@@ -384,6 +384,28 @@ TEST(PageBuilder, PagesAreStoredCoded) {
     }
 }
 
+TEST(PageBuilder, LongTrianglesStayWithinWhatAPageCanName) {
+    // Each crosses the whole page.
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> unit(1, 31);
+    IndexedMesh mesh;
+    for (uint32_t k = 0; k < 300; ++k) {
+        const double x = unit(random), y = unit(random);
+        for (const glm::dvec3 p : {glm::dvec3(x, y, 1), glm::dvec3(unit(random), unit(random), 31), glm::dvec3(x + 0.01, y, 1)}) mesh.positions.push_back(p);
+        mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    Page page(test::onLattice(mesh), {0, 0, 0});
+    const size_t free = buildPageTree(*page.geometry, kTolerance).records();
+    for (const size_t most : {free, free - 1, free / 4, size_t{600}, size_t{301}}) {
+        const PageTree tree = buildPageTree(*page.geometry, kTolerance, most);
+        EXPECT_LE(tree.records(), most);
+        std::vector<bool> seen(300);
+        for (const HardLeaf& leaf : tree.hard)
+            for (const uint32_t t : leaf.triangles) seen[t] = true;
+        EXPECT_EQ(std::count(seen.begin(), seen.end(), true), 300) << most;
+    }
+}
+
 TEST(PageBuilder, EmptyPage) {
     Page page(test::onLattice(test::sphereMesh({12, 12, 12}, 6, 12)), {1, 1, 1});
     PageTree tree = buildPageTree(*page.geometry, kTolerance);
