@@ -24,9 +24,6 @@ constexpr double kMergeTolerance = 0.5;
 // Merging is tried only while the leaves' own error is below this part of the tolerance.
 constexpr double kMergeTrial = 0.2;
 
-// Leaves are split below a cell only while a page has fewer triangle records.
-constexpr size_t kMostSplitRecords = 1 << 20;
-
 // Leaves are merged only while their colours stay so close to what the larger leaf blends, of 255.
 constexpr double kColourTolerance = 10;
 
@@ -38,7 +35,7 @@ class TreeBuilder {
 public:
     /// `hardEdge`: of the boxes, in cells, that become leaves without a try for less; 1: none do.
     TreeBuilder(PageGeometry& geometry, double tolerance, int hardEdge)
-        : geometry_(geometry), tolerance_(tolerance), hardEdge_(hardEdge), mostLeaves_(mostSplitLeaves(geometry.triangleCount())) {
+        : geometry_(geometry), tolerance_(tolerance), hardEdge_(hardEdge), mostLeaves_(mostSplitLeaves(geometry.triangleCount())), mostRecords_(mostSplitRecords(geometry.triangleCount())) {
         fillOccupancy();
     }
 
@@ -99,7 +96,7 @@ private:
         tree_.nodes[index].box = box;
         if (inside.empty()) return;
         if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
-        const bool isFull = tree_.soft.size() + tree_.hard.size() >= mostLeaves_ || records_ >= kMostSplitRecords;
+        const bool isFull = tree_.soft.size() + tree_.hard.size() >= mostLeaves_ || records_ >= mostRecords_;
         if (inside.size() <= kHardLeafTriangles || depth == kMaxSubcellDepth || isFull) return makeHard(index, inside);
         PageGeometry::ChildTriangles& children = children_[depth];
         geometry_.split(box, around, children);
@@ -213,7 +210,7 @@ private:
     PageGeometry& geometry_;
     double tolerance_;
     int hardEdge_;
-    size_t mostLeaves_, records_ = 0;  ///< records: triangles of hard leaves, leaf by leaf
+    size_t mostLeaves_, mostRecords_, records_ = 0;  ///< records: triangles of hard leaves, leaf by leaf
     PageTree tree_;
     std::vector<std::vector<uint8_t>> occupancy_;
     std::vector<CertifiedTriangle> triangles_;
