@@ -68,13 +68,14 @@ public:
         glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
         glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).mustPresent_ = true; });
         glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int b, int action, int mods) { of(w).button(b, action, mods); });
-        glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).viewer_->move(of(w).pixelAt({x, y})); });
+        glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).moveCursor({x, y}); });
         glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double steps) { of(w).scroll(steps); });
         glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) { of(w).key(key, action); });
         glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float, float) { of(w).rescale(); });
         int width = 0, height = 0;
         glfwGetFramebufferSize(window_, &width, &height);
         resize({width, height});
+        glfwGetCursorPos(window_, &cursor_.x, &cursor_.y);
     }
 
     /// Until the window is closed.
@@ -125,10 +126,9 @@ private:
         return cursor * glm::dvec2(framebuffer_) / glm::max(glm::dvec2(width, height), glm::dvec2(1));
     }
 
-    [[nodiscard]] glm::dvec2 cursorPixel() const {
-        glm::dvec2 cursor(0);
-        glfwGetCursorPos(window_, &cursor.x, &cursor.y);
-        return pixelAt(cursor);
+    void moveCursor(glm::dvec2 cursor) {
+        cursor_ = cursor;
+        viewer_->move(pixelAt(cursor));
     }
 
     void button(int glfwButton, int action, int mods) {
@@ -137,12 +137,12 @@ private:
                                   : glfwButton == GLFW_MOUSE_BUTTON_RIGHT ? MouseButton::Right
                                                                           : MouseButton::Middle;
         if (action == GLFW_PRESS)
-            viewer_->press(which, cursorPixel(), (mods & GLFW_MOD_SHIFT) != 0);
+            viewer_->press(which, pixelAt(cursor_), (mods & GLFW_MOD_SHIFT) != 0);
         else
             viewer_->release(which);
     }
 
-    void scroll(double steps) { viewer_->scroll(cursorPixel(), steps); }
+    void scroll(double steps) { viewer_->scroll(pixelAt(cursor_), steps); }
 
     void key(int key, int action) {
         if (action != GLFW_PRESS) return;
@@ -191,6 +191,8 @@ private:
     Viewer* viewer_;
     TextStrip strip_;
     glm::ivec2 framebuffer_{0};
+    // Where the cursor was at the event in hand: asked for, it would be where it is by now, and a quick drag be lost.
+    glm::dvec2 cursor_{0};
     std::string shownStatus_;
     bool mustPresent_ = true;
 };
