@@ -13,7 +13,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/bin_triangles.h"
-#include "builder/memory_plan.h"
 #include "builder/page_builder.h"
 #include "builder/page_encoder.h"
 

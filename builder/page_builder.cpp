@@ -6,7 +6,6 @@
 
 #include <glm/common.hpp>
 
-#include "builder/memory_plan.h"
 #include "octree/leaf_math.h"
 
 namespace vcp {

@@ -50,8 +50,6 @@ TEST(MemoryPlan, TooLittleSaysWhatIsEnough) {
 
 TEST(MemoryPlan, DefaultIsPartOfTheMachine) {
     EXPECT_GT(defaultMemoryBytes(), 64 * kMiB);
-    EXPECT_LT(pageWorkBytes(0, 0), 16 * kMiB);
-    EXPECT_GE(pageWorkBytes(1000000, 2000000), 400u * 1000000);
 }
 
 }  // namespace

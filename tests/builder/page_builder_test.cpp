@@ -406,6 +406,11 @@ TEST(PageBuilder, LongTrianglesStayWithinWhatAPageCanName) {
     }
 }
 
+TEST(PageBuilder, WorkGrowsWithTheTriangles) {
+    EXPECT_LT(pageWorkBytes(0, 0), 16u << 20);
+    EXPECT_GE(pageWorkBytes(1000000, 2000000), 400u * 1000000);
+}
+
 TEST(PageBuilder, EmptyPage) {
     Page page(test::onLattice(test::sphereMesh({12, 12, 12}, 6, 12)), {1, 1, 1});
     PageTree tree = buildPageTree(*page.geometry, kTolerance);
