@@ -66,16 +66,28 @@ void codePage(Coder& coder, CodecPage& page) {
     std::memcpy(page.block.data(), &page.header, sizeof page.header);
 }
 
-std::vector<std::byte> packColour(std::span<const std::byte> colour, const CodecPage& page, const PageView& view) {
-    std::vector<uint4> faces(page.faceSource.size());
-    std::vector<uint32_t> vertices(page.vertexSource.size());
+/// The colour page of a page in canonical order.
+std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& page) {
+    std::vector<uint4> block(colour.size() / 16);
+    const size_t faces = page.faceSource.size();
     const auto* oldFaces = reinterpret_cast<const uint4*>(colour.data());
-    const auto* oldVertices = reinterpret_cast<const uint32_t*>(colour.data() + 16 * faces.size());
-    for (size_t i = 0; i < faces.size(); ++i) faces[i] = oldFaces[page.faceSource[i]];
-    for (size_t i = 0; i < vertices.size(); ++i) vertices[i] = oldVertices[page.vertexSource[i]];
-    RangeEncoder coder;
-    std::make_unique<ColourCodec<RangeEncoder>>(coder, view, faces, vertices)->run();
-    return coded(coder);
+    const auto* oldVertices = reinterpret_cast<const uint32_t*>(oldFaces + faces);
+    auto* vertices = reinterpret_cast<uint32_t*>(block.data() + faces);
+    for (size_t i = 0; i < faces; ++i) block[i] = oldFaces[page.faceSource[i]];
+    for (size_t i = 0; i < page.vertexSource.size(); ++i) vertices[i] = oldVertices[page.vertexSource[i]];
+    return block;
+}
+
+/// Codes a colour page, or reads it into `block`. False when not all of it has a place in the page.
+template <class Coder>
+bool codeColour(Coder& coder, const PageView& page, std::span<uint4> block) {
+    const std::span vertices(reinterpret_cast<uint32_t*>(block.data() + page.header.faces), page.header.vertices);
+    return std::make_unique<ColourCodec<Coder>>(coder, page, block.first(page.header.faces), vertices)->run();
+}
+
+/// Whether stored bytes decode to `block`.
+bool isBlock(const Result<std::vector<uint4>>& decoded, const std::vector<uint4>& block) {
+    return decoded && std::memcmp(decoded->data(), block.data(), block.size() * sizeof(uint4)) == 0;
 }
 
 }  // namespace
@@ -96,13 +108,14 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
     if (page.wrong) return plainly();
     PackedPage packed{coded(coder), {}};
     // What does not come back as it was is not written: a day's build is worth more than the time to look.
-    const auto again = unpackGeometry(packed.geometry, geometry.size());
-    if (!again || std::memcmp(again->data(), page.block.data(), geometry.size()) != 0) return plainly();
+    if (!isBlock(unpackGeometry(packed.geometry, geometry.size()), page.block)) return plainly();
     if (colour.empty()) return packed;
     const auto view = parsePage(std::as_bytes(std::span(page.block)));
-    packed.colour = packColour(colour, page, *view);
-    const auto colourAgain = unpackColour(packed.colour, colour.size(), *view);
-    return colourAgain ? packed : plainly();
+    std::vector<uint4> block = inOrder(colour, page);
+    RangeEncoder colourCoder;
+    codeColour(colourCoder, *view, block);
+    packed.colour = coded(colourCoder);
+    return isBlock(unpackColour(packed.colour, colour.size(), *view), block) ? packed : plainly();
 }
 
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {
@@ -126,8 +139,7 @@ Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint6
     if (colourPageBytes(page.header) != colourBytes) return broken("colour page does not decode to its size");
     std::vector<uint4> block(colourBytes / 16);
     RangeDecoder coder(packed.subspan(1));
-    auto* vertices = reinterpret_cast<uint32_t*>(block.data() + page.header.faces);
-    const bool all = std::make_unique<ColourCodec<RangeDecoder>>(coder, page, std::span(block.data(), page.header.faces), std::span(vertices, page.header.vertices))->run();
+    const bool all = codeColour(coder, page, block);
     if (!all || !coder.complete()) return broken("colour page does not decode to its size");
     return block;
 }
