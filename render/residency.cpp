@@ -94,10 +94,8 @@ Result<bool> Residency::place(const LoadedPage& page) {
 }
 
 uint64_t Residency::colourBytes() const {
-    if (!hasColour()) return 0;
     uint64_t bytes = 0;
-    for (uint64_t page = 0; page < dataset_->pages.size(); ++page)
-        if (policy_->isResident(page)) bytes += dataset_->pages[page].colourBytes;
+    if (hasColour()) policy_->forEachResident([&](uint64_t page) { bytes += dataset_->pages[page].colourBytes; });
     return bytes;
 }
 

@@ -56,7 +56,7 @@ private:
     std::unique_ptr<ResidencyPolicy> policy_;
     std::unique_ptr<PagePool> pool_;
     std::unique_ptr<PageLoader> loader_;
-    std::unordered_map<uint64_t, PageHeader> headers_;  // of resident pages
+    std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
     std::vector<uint64_t> cut_;
 };
 

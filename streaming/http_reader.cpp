@@ -153,7 +153,7 @@ Result<void> HttpReader::State::readAhead() {
     // A server may answer with the first range alone.
     if (const auto only = parts.empty() ? parseContentRange(answer->range) : std::nullopt; only && only->range.size() == answer->body.size())
         parts.push_back({only->range, answer->body});
-    if (answer->entityTag != entityTag || answer->lastModified != lastModified) return changedNow();
+    VCP_TRY(checkVersion(*answer, size));
     for (const BodyPart& part : parts) {
         if (part.range == wanted[0]) {
             auto longer = *head;
@@ -186,7 +186,7 @@ bool HttpReader::State::copyHeld(uint64_t offset, std::span<std::byte> bytes) {
 
 Result<void> HttpReader::State::readRange(ByteRange range, std::byte* bytes) {
     auto answer = get(rangeText(range), range.size());
-    if (!answer) return Error{answer.error().code, answer.error().message, url, {}, range.first};
+    if (!answer) return fail(answer.error().code, answer.error().message, range.first);
     if (answer->status == 412) return changedNow();
     if (answer->status != 206) {
         Error error = refused(*answer);

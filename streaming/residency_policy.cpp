@@ -157,12 +157,11 @@ Placement ResidencyPolicy::place(uint64_t page) {
     const uint64_t units = pageUnits_[page];
     const Rank rank = rankOf(page);
     placement.slot = allocator_.allocate(units);
-    while (!placement.slot) {
-        // What nobody wants any more takes no work.
-        if (rank == Rank::Stale) break;
-        if (allocator_.unitsFree() >= units && gather(units, placement.moves)) placement.slot = allocator_.allocate(units);
-        else if (!evictOne(rank)) break;
-        else placement.slot = allocator_.allocate(units);
+    // What nobody wants any more takes no work.
+    while (!placement.slot && rank != Rank::Stale) {
+        const bool gathered = allocator_.unitsFree() >= units && gather(units, placement.moves);
+        if (!gathered && !evictOne(rank)) break;
+        placement.slot = allocator_.allocate(units);
     }
     if (!placement.slot) {
         ++counts_.refused;

@@ -93,6 +93,11 @@ public:
     [[nodiscard]] PoolSlot slotOf(uint64_t page) const { return slots_.at(page).slot; }
     [[nodiscard]] uint64_t unitsTaken() const { return allocator_.unitsTaken(); }
     [[nodiscard]] size_t pagesResident() const { return slots_.size(); }
+    /// Calls visit(page) for every resident page, ascending.
+    template <class Visit>
+    void forEachResident(Visit&& visit) const {
+        for (const auto& [page, resident] : slots_) visit(page);
+    }
     [[nodiscard]] const PolicyCounts& counts() const { return counts_; }
 
 private:
