@@ -9,7 +9,11 @@
 
 namespace vcp {
 
+static_assert(kMostSections == frame::kMaxSections);
+
 namespace {
+
+constexpr uint32_t kMostOcclusionRays = 64;
 
 glm::vec4 toVec4(glm::dvec3 v) { return glm::vec4(glm::vec3(v), 0); }
 
@@ -20,8 +24,12 @@ frame::uint shadingMode(ShadingMode mode) {
     switch (mode) {
         case ShadingMode::Lit: return frame::kShadeLit;
         case ShadingMode::Clay: return frame::kShadeClay;
+        case ShadingMode::Unlit: return frame::kShadeUnlit;
         case ShadingMode::Normals: return frame::kShadeNormals;
         case ShadingMode::Steps: return frame::kShadeSteps;
+        case ShadingMode::Fetches: return frame::kShadeFetches;
+        case ShadingMode::Level: return frame::kShadeLevel;
+        case ShadingMode::Error: return frame::kShadeError;
     }
     return frame::kShadeLit;
 }
@@ -48,9 +56,46 @@ void setOrigin(frame::FrameConstants& c, glm::dvec3 eye, double rootCells) {
     c.origin += toVec4(eye);
 }
 
+void setSections(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header) {
+    const glm::dvec3 corner(header.origin[0], header.origin[1], header.origin[2]);
+    const glm::dvec3 origin = corner + header.cell / double(c.lattice.x) * glm::dvec3(c.originLattice);
+    for (const SectionPlane& plane : request.sections) {
+        const double length = glm::length(plane.normal);
+        const double off = (glm::dot(plane.normal, origin) - plane.offset) / (length * header.cell);
+        c.sections[c.extra.y++] = glm::vec4(glm::vec3(plane.normal / length), static_cast<float>(off));
+    }
+}
+
+// Rays of light begin so many pixels above the surface, beside the error of what is drawn.
+constexpr double kLiftPixels = 0.5;
+
+void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header, const CameraBasis& basis, double errorPixels) {
+    const double pixel = 2 * basis.halfHeight / request.height;
+    const bool perspective = request.camera.projection == Projection::Perspective;
+    const double diagonal = glm::distance(glm::dvec3(header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]),
+                                          glm::dvec3(header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]));
+    const Shading& s = request.shading;
+    const double radius = s.occlusionRadius > 0 ? s.occlusionRadius : 0.1 * diagonal;
+    const double lift = kLiftPixels + (std::isfinite(errorPixels) ? errorPixels : 0);
+    c.pixel = glm::dvec4(perspective ? 0 : pixel / header.cell, perspective ? pixel : 0, radius / header.cell, lift);
+    if (!hasLight(s)) return;
+    c.extra.z = s.occlusionRays;
+    c.extra.w = s.shadows ? 1 : 0;
+}
+
+bool isFalseColour(ShadingMode mode) { return shadingMode(mode) >= frame::kShadeSteps; }
+
 }  // namespace
 
-frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes) {
+bool hasLight(const Shading& shading) {
+    return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) && (shading.shadows || shading.occlusionRays > 0);
+}
+
+uint32_t hitPlanes(const FrameRequest& request, bool colour) {
+    return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || isFalseColour(request.shading.mode) ? 1 : 0);
+}
+
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels) {
     frame::FrameConstants c{};
     const FileHeader header = dataset != nullptr ? dataset->header : FileHeader{.cell = 1, .levels = 1, .log2Cells = 5};
     const CameraBasis basis = cameraBasis(request.camera, request.width, request.height);
@@ -78,6 +123,10 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.lightDirection = toVec4(s.lightFollowsCamera ? basis.right * light.x + basis.up * light.y - basis.forward * light.z : light);
     c.upDirection = toVec4(s.lightFollowsCamera ? basis.up : glm::normalize(request.camera.up));
     c.clay = encoded(s.clay);
+    c.cap = encoded(s.cap);
+    c.extra.x = hitPlanes(request, colour) - 1;
+    setSections(c, request, header);
+    setLight(c, request, header, basis, errorPixels);
     return c;
 }
 
@@ -116,6 +165,11 @@ Result<void> checkRequest(const FrameRequest& request) {
     if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
     const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up)) return usage("the camera has coordinates that are not numbers");
+    if (request.sections.size() > kMostSections) return usage("at most 6 section planes at once");
+    for (const SectionPlane& plane : request.sections)
+        if (!finite(plane.normal) || !std::isfinite(plane.offset) || !(glm::length(plane.normal) > 0)) return usage("a section plane's normal is zero or not a number");
+    if (request.shading.occlusionRays > kMostOcclusionRays) return usage("at most 64 occlusion rays a pixel");
+    if (!(request.shading.occlusionRadius >= 0) || !std::isfinite(request.shading.occlusionRadius)) return usage("the occlusion radius must not be negative");
     const double sine = glm::length(glm::cross(camera.forward, camera.up));
     if (!(sine > 1e-9 * glm::length(camera.forward) * glm::length(camera.up))) return usage("the camera's forward and up directions are parallel or zero");
     if (camera.projection == Projection::Perspective && !(camera.verticalFov > 0 && camera.verticalFov < 3.1))

@@ -8,7 +8,14 @@
 namespace vcp {
 
 /// `dataset` may be null: a picture of the background. `stripes`: see stripedIndex in tiles.glsl.
-frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes);
+/// `colour`: whether hits have colours. `errorPixels`: of what is drawn (UpdateResult).
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels);
+
+/// Whether rays of light are traced: where shading asks for them and shows light.
+bool hasLight(const Shading& shading);
+
+/// Words that a pixel's hit takes: depth, normal, and where wanted colour and light or the value of a false colour.
+uint32_t hitPlanes(const FrameRequest& request, bool colour);
 
 /// The picture's background, one RGBA8 word a row.
 std::vector<uint32_t> backgroundRows(const Shading& shading, uint32_t height);

@@ -22,12 +22,12 @@ std::vector<Part> partsOf(const Dataset& dataset, std::span<const uint64_t> cut)
     return parts;
 }
 
-void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry) {
+void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, float errorCells) {
     const PageSections sections = pageSections(page.header);
     const auto texelOf = [&](uint64_t byte) { return page.texel + static_cast<uint32_t>(byte / 16); };
     record[0] = {frame::kRecordInCut, 0, page.header.root, page.texel};
     record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices), texelOf(sections.normals)};
-    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), 0};
+    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), std::bit_cast<uint32_t>(errorCells)};
 }
 
 }  // namespace
@@ -43,7 +43,7 @@ std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64
         const uint64_t page = order[next];
         glm::uvec4 record[frame::kRecordTexels] = {};
         if (parts[page] == Part::Cut) {
-            writePage(record, pageOf(page), page);
+            writePage(record, pageOf(page), page, static_cast<float>(double(dataset.pages[page].certifiedError) / dataset.header.cell));
         } else {
             const PageEntry& entry = dataset.pages[page];
             record[0].y = static_cast<uint32_t>(order.size());

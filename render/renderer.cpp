@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -13,6 +14,7 @@
 
 #include "render/frame_setup.h"
 #include "render/passes/beam.h"
+#include "render/passes/light.h"
 #include "render/passes/readback.h"
 #include "render/passes/shade.h"
 #include "render/passes/trace.h"
@@ -29,7 +31,7 @@ constexpr uint64_t kLeastBudget = 1ull << 20;
 /// GPU clock readings between passes.
 class PassTimer {
 public:
-    static constexpr uint32_t kMarks = 4;
+    static constexpr uint32_t kMarks = 5;
 
     Result<void> create(const Device& device) {
         device_ = &device;
@@ -88,10 +90,12 @@ struct Renderer::State {
     std::unique_ptr<FrameResources> resources;
     BeamPass beam;
     TracePass trace;
+    LightPass light;
     ShadePass shade;
     PassTimer timer;
     PassConstants constants;
     bool tableStale = true;
+    double errorPixels = 0;  // of the cut
     std::optional<FrameRequest> drawn;
     bool drawnColour = false;
 
@@ -169,6 +173,7 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     if (!s.residency) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
     auto result = s.residency->update(selectionView(request));
     if (result) s.tableStale = s.tableStale || result->changed;
+    if (result) s.errorPixels = result->errorPixels;
     return result;
 }
 
@@ -202,17 +207,17 @@ PassConstants Renderer::State::constantsFor(const FrameRequest& request) const {
         c.chunkShift = residency->pages().chunkShift();
         c.colour = residency->hasColour();
     }
-    c.countSteps = request.countSteps || request.shading.mode == ShadingMode::Steps;
+    c.countSteps = request.countSteps || request.shading.mode == ShadingMode::Steps || request.shading.mode == ShadingMode::Fetches;
     return c;
 }
 
 Result<void> Renderer::State::checkLimits(const FrameRequest& request) const {
-    const uint64_t words = uint64_t{request.width} * request.height * 3;
+    const uint64_t words = uint64_t{request.width} * request.height * hitPlanes(request, residency && residency->hasColour());
     const VkPhysicalDeviceLimits& limits = device->limits();
     if (words * 4 <= limits.maxStorageBufferRange && words <= limits.maxTexelBufferElements) return {};
     return Error{.code = ErrorCode::Limit,
                  .message = fmt::format("{} x {} pixels are more than '{}' can address at once; at most {} pixels", request.width, request.height,
-                                        device->info().name, std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) / 3)};
+                                        device->info().name, std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) / (words / (uint64_t{request.width} * request.height)))};
 }
 
 Result<void> Renderer::State::prepare(const FrameRequest& request) {
@@ -222,29 +227,35 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     if (wanted.poolChunks != constants.poolChunks || wanted.chunkShift != constants.chunkShift) {
         beam.clear();
         trace.clear();
+        light.clear();
         shade.clear();
     }
     constants = wanted;
-    VCP_TRY(resources->resize({request.width, request.height}, constants.colour));
+    VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
     resources->setBackground(backgroundRows(request.shading, request.height));
     if (tableStale && residency) VCP_TRY(resources->setTable(residency->table()));
     if (tableStale && !residency) VCP_TRY(resources->setTable(std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0))));
     tableStale = false;
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
-    VCP_TRY(trace.prepare(*resources, constants));
-    return shade.prepare(*resources, constants);
+    const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
+    VCP_TRY(trace.prepare(*resources, constants, sections));
+    const bool traceLight = hasLight(request.shading);
+    if (traceLight) VCP_TRY(light.prepare(*resources, constants));
+    return shade.prepare(*resources, constants, traceLight);
 }
 
 void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& request) {
     timer.reset(commands);
-    resources->begin(commands, frameConstants(request, residency ? &residency->dataset() : nullptr, stripes));
+    resources->begin(commands, frameConstants(request, residency ? &residency->dataset() : nullptr, stripes, constants.colour, errorPixels));
     timer.mark(commands, 0);
     beam.record(commands, *resources);
     timer.mark(commands, 1);
     trace.record(commands, *resources);
     timer.mark(commands, 2);
-    shade.record(commands, *resources);
+    if (hasLight(request.shading)) light.record(commands, *resources);
     timer.mark(commands, 3);
+    shade.record(commands, *resources);
+    timer.mark(commands, 4);
 }
 
 Result<FrameStats> Renderer::render(const FrameRequest& request) {
@@ -276,7 +287,8 @@ Result<FrameStats> Renderer::State::collectStats(const FrameRequest& request) co
     if (!ms) return ms.error();
     stats.msBeam = (*ms)[0];
     stats.msTrace = (*ms)[1];
-    stats.msShade = (*ms)[2];
+    stats.msLight = (*ms)[2];
+    stats.msShade = (*ms)[3];
     stats.pipelines = resources->pipelinesMade();
     if (residency) {
         stats.colourBytes = residency->colourBytes();
@@ -318,7 +330,7 @@ Result<std::vector<float>> Renderer::readDepth() {
     const double cell = state_->residency ? state_->residency->dataset().header.cell : 1;
     std::vector<float> depth(words->size());
     std::transform(words->begin(), words->end(), depth.begin(), [&](uint32_t word) {
-        const float cells = std::bit_cast<float>(word);
+        const float cells = std::abs(std::bit_cast<float>(word));
         return cells >= frame::kNoHit ? std::numeric_limits<float>::infinity() : static_cast<float>(double(cells) * cell);
     });
     return depth;
@@ -349,7 +361,7 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
         if (!word) return word.error();
         words[i] = word->front();
     }
-    const float cells = std::bit_cast<float>(words[1]);
+    const float cells = std::abs(std::bit_cast<float>(words[1]));
     if (std::bit_cast<float>(words[0]) >= frame::kTileEmpty || cells >= frame::kNoHit) return std::optional<PixelHit>{};
     PixelHit hit;
     hit.depth = double(cells) * s.residency->dataset().header.cell;

@@ -74,10 +74,25 @@ struct RendererOptions {
 
 enum class ShadingMode {
     Lit,     ///< vertex colours where there are any, else clay; light and hemisphere
-    Clay,    ///< one colour
+    Clay,    ///< one colour, with light
+    Unlit,   ///< vertex colours where there are any, else clay, as they are
     Normals, ///< normal as colour
-    Steps,   ///< false colour: traversal steps per ray (compiles the counting variant on first use)
+    // False colours, blue through green to red (Demir and Westermann 2015, Figures 8 and 9).
+    Steps,   ///< node visits of the ray, 0 to 64 (compiles the counting variant on first use)
+    Fetches, ///< 16-byte reads of the ray, 0 to 128 (the same)
+    Level,   ///< level of the page that was hit, coarsest to finest
+    Error,   ///< certified error of the page that was hit, 0 to 1 pixel
 };
+
+/// Cuts away what lies on the plane's far side: kept is where dot(normal, x) >= offset, world units.
+struct SectionPlane {
+    glm::dvec3 normal{1, 0, 0};  ///< of any length but 0
+    double offset = 0;
+
+    bool operator==(const SectionPlane&) const = default;
+};
+/// At most so many planes at once (kMaxSections in frame_layout.h).
+constexpr size_t kMostSections = 6;
 
 struct Shading {
     ShadingMode mode = ShadingMode::Lit;
@@ -85,6 +100,10 @@ struct Shading {
     glm::vec3 lightDirection{-0.35f, 0.55f, 0.75f};  ///< towards the light: in camera axes (right, up, back)
                                                      ///< where it follows the camera, else in world axes
     glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
+    glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; of cut solids
+    bool shadows = false;         ///< hard shadows: a further ray a pixel
+    uint32_t occlusionRays = 0;   ///< ambient occlusion: so many further rays a pixel, at most 64; 0: off
+    double occlusionRadius = 0;   ///< how far they look, world units; 0: a tenth of the box's diagonal
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};    ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
 
@@ -97,6 +116,8 @@ struct FrameRequest {
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
+    std::vector<SectionPlane> sections;   ///< at most kMostSections
+    bool sectionCaps = false;  ///< fills what the planes cut open; right for closed surfaces
     bool beam = true;          ///< beam pass; the picture is the same without it, only later
     bool countSteps = false;   ///< fills FrameStats::steps and fetches (a slower variant)
 
@@ -126,7 +147,7 @@ struct FrameStats {
     uint64_t rays = 0;        ///< pixels
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
     uint64_t hitPixels = 0;
-    double msBeam = 0, msTrace = 0, msShade = 0;  ///< GPU timestamps; 0 where the device has none
+    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0;  ///< GPU timestamps; 0 where the device has none
     double msFrame = 0;       ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
     uint64_t poolBytes = 0;     ///< allocated for the pool

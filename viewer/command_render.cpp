@@ -100,6 +100,7 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"first_frame_ms", drawing.firstFrameMs},
             {"ms_beam", stats.msBeam},
             {"ms_trace", stats.msTrace},
+            {"ms_light", stats.msLight},
             {"ms_shade", stats.msShade},
             {"rays_per_second", drawing.raysPerSecond()},
             {"rays", stats.rays},
@@ -143,6 +144,8 @@ Result<int> run(const RenderCommand& command) {
     request.height = static_cast<uint32_t>(size.y);
     request.errorPixels = command.render.errorPixels;
     request.shading = command.render.shadingChosen();
+    request.sections = command.render.sectionPlanes(open->bounds());
+    request.sectionCaps = command.render.caps;
     const InterruptScope catching;
     const auto drawing = draw(**renderer, request, command);
     if (!drawing) return drawing.error();

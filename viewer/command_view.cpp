@@ -75,6 +75,7 @@ Command addView(CLI::App& vcp) {
     addJsonOption(*app, command->report);
     app->footer("Mouse: left drag orbits about the point under the cursor; right or middle drag, or shift and left, pans;\n"
                 "the wheel zooms to the cursor. Keys: F fit; R or Home reset; L light follows the camera or stays;\n"
+                "M shading mode; S shadows; O ambient occlusion; X section through the middle, shift and wheel move it;\n"
                 "P perspective or orthographic; 1 3 7 9 front, right, top, isometric; Esc or Q quit.");
     return {app, [command] { return run(*command); }};
 }

@@ -1,5 +1,6 @@
 #include "viewer/option_values.h"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -28,7 +29,45 @@ bool takeNumber(std::string_view& text, Number& number) {
     return true;
 }
 
+/// Numbers between commas: all of `text`, `count` of them.
+template <size_t count>
+std::optional<std::array<double, count>> takeList(std::string_view text) {
+    std::array<double, count> list{};
+    for (size_t i = 0; i < count; ++i) {
+        if (!takeNumber(text, list[i]) || !std::isfinite(list[i])) return std::nullopt;
+        if (i + 1 == count) break;
+        if (!text.starts_with(',')) return std::nullopt;
+        text.remove_prefix(1);
+    }
+    return text.empty() ? std::optional(list) : std::nullopt;
+}
+
 }  // namespace
+
+std::optional<PlaneText> parsePlane(std::string_view text) {
+    PlaneText plane;
+    if (const auto list = takeList<4>(text)) {
+        plane.normal = {(*list)[0], (*list)[1], (*list)[2]};
+        plane.offset = (*list)[3];
+        return plane.normal == glm::dvec3(0) ? std::nullopt : std::optional(plane);
+    }
+    if (text.size() < 3 || text[0] < 'x' || text[0] > 'z' || (text[1] != '<' && text[1] != '>')) return std::nullopt;
+    const double sign = text[1] == '>' ? 1 : -1;
+    plane.normal[text[0] - 'x'] = sign;
+    text.remove_prefix(2);
+    if (!takeNumber(text, plane.offset) || !std::isfinite(plane.offset)) return std::nullopt;
+    plane.isRelative = text == "%";
+    if (!plane.isRelative && !text.empty()) return std::nullopt;
+    plane.offset *= plane.isRelative ? sign / 100 : sign;
+    return plane;
+}
+
+std::optional<glm::dvec3> parseDirection(std::string_view text) {
+    const auto list = takeList<3>(text);
+    if (!list) return std::nullopt;
+    const glm::dvec3 direction((*list)[0], (*list)[1], (*list)[2]);
+    return direction == glm::dvec3(0) ? std::nullopt : std::optional(direction);
+}
 
 std::optional<Length> parseLength(std::string_view text) {
     Length length;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 namespace vcp {
 
@@ -32,6 +33,20 @@ std::optional<uint64_t> parseCount(std::string_view text);
 
 /// "1920x1200": each from 1 to 16384.
 std::optional<glm::ivec2> parseSize(std::string_view text);
+
+/// A plane that cuts: kept is where dot(normal, x) >= offset.
+struct PlaneText {
+    glm::dvec3 normal{0};
+    double offset = 0;        ///< world units, or a part of the bounding box along its axis
+    bool isRelative = false;  ///< then the normal is an axis
+};
+
+/// What to keep: "x<0.2", "z>50%" (of the bounding box), or four numbers "a,b,c,d" for ax + by + cz >= d. Nothing
+/// when malformed.
+std::optional<PlaneText> parsePlane(std::string_view text);
+
+/// Three numbers, "1,0,-0.5", not all zero. Nothing when malformed.
+std::optional<glm::dvec3> parseDirection(std::string_view text);
 
 /// "1 087 716".
 std::string formatCount(uint64_t count);

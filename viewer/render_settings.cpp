@@ -1,10 +1,43 @@
 #include "viewer/render_settings.h"
 
+#include <algorithm>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
 #include "viewer/option_values.h"
 
 namespace vcp {
 
 namespace {
+
+struct NamedShading {
+    const char* name;
+    ShadingMode mode;
+};
+constexpr NamedShading kShadings[] = {
+    {"lit", ShadingMode::Lit},         {"unlit", ShadingMode::Unlit}, {"clay", ShadingMode::Clay},
+    {"normals", ShadingMode::Normals}, {"steps", ShadingMode::Steps}, {"fetches", ShadingMode::Fetches},
+    {"level", ShadingMode::Level},     {"error", ShadingMode::Error},
+};
+constexpr const char* kDefaultOcclusionRays = "8";
+
+// From the left, almost along a surface that faces the camera: relief of a millimetre casts its shade.
+constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
+
+std::vector<std::string> shadingNames() {
+    std::vector<std::string> names;
+    for (const NamedShading& each : kShadings) names.emplace_back(each.name);
+    return names;
+}
+
+std::string checkPlane(const std::string& text) {
+    return parsePlane(text) ? std::string() : "must be like \"x<0.2\", \"z>50%\" or \"a,b,c,d\", not \"" + text + "\"";
+}
+
+std::string checkDirection(const std::string& text) {
+    return parseDirection(text) ? std::string() : "must be like 1,0,0.5, not \"" + text + "\"";
+}
 
 std::string checkBudget(const std::string& text) {
     constexpr uint64_t kLeast = 1 << 20;
@@ -21,18 +54,31 @@ RendererOptions RenderSettings::rendererOptions(const OpenDataset& open) const {
     options.ramBytes = parseBytes(ram).value_or(options.ramBytes);
     options.loaderThreads = open.loaderThreads();
     // Colour pages are neither read nor kept when nothing would show them.
-    options.colour = shading == "lit";
+    options.colour = shading == "lit" || shading == "unlit";
     return options;
 }
 
 Shading RenderSettings::shadingChosen() const {
     Shading chosen;
-    chosen.mode = shading == "clay"      ? ShadingMode::Clay
-                  : shading == "normals" ? ShadingMode::Normals
-                  : shading == "steps"   ? ShadingMode::Steps
-                                         : ShadingMode::Lit;
-    chosen.lightFollowsCamera = light == "camera";
+    chosen.mode = std::find_if(std::begin(kShadings), std::end(kShadings), [&](const auto& each) { return shading == each.name; })->mode;
+    chosen.lightFollowsCamera = light != "fixed";
+    if (light == "raking") chosen.lightDirection = kRakingLight;
+    if (!lightDirection.empty()) chosen.lightDirection = parseDirection(lightDirection).value();
+    chosen.shadows = shadows;
+    chosen.occlusionRays = occlusionRays;
     return chosen;
+}
+
+std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const {
+    std::vector<SectionPlane> planes;
+    for (const std::string& text : sections) {
+        const PlaneText plane = parsePlane(text).value();
+        // An axis' own offset: from the box's lower side on, whichever side is kept.
+        const glm::dvec3 axis = glm::abs(plane.normal);
+        const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) + plane.offset * glm::dot(axis, bounds.high - bounds.low) : plane.offset;
+        planes.push_back({plane.normal, offset});
+    }
+    return planes;
 }
 
 Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size) const {
@@ -52,14 +98,31 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("AXIS")
         ->capture_default_str()
         ->check(CLI::IsMember({"y", "z"}));
-    app.add_option("--light", settings.light, "camera: the light follows it; fixed: it stays in the world")
+    app.add_option("--light", settings.light, "camera: the light follows it; raking: so, and falls from the side; fixed: it stays in the world")
         ->type_name("WHICH")
         ->capture_default_str()
-        ->check(CLI::IsMember({"camera", "fixed"}));
-    app.add_option("--shading", settings.shading, "lit (with colour where there is any), clay, normals, or steps (work of each ray)")
+        ->check(CLI::IsMember({"camera", "raking", "fixed"}));
+    app.add_option("--shading", settings.shading, "lit or unlit (with colour where there is any), clay, normals; false colours: steps, fetches (work of each ray), level, "
+                                               "error (certified, up to a pixel)")
         ->type_name("MODE")
         ->capture_default_str()
-        ->check(CLI::IsMember({"lit", "clay", "normals", "steps"}));
+        ->check(CLI::IsMember(shadingNames()));
+    app.add_option("--light-direction", settings.lightDirection, "Towards the light: right, up, back of the camera; with --light fixed x, y, z of the world")
+        ->type_name("X,Y,Z")
+        ->check(checkDirection);
+    app.add_flag("--shadows", settings.shadows, "Hard shadows: a further ray a pixel");
+    app.add_option("--occlusion", settings.occlusionRays, "Ambient occlusion, by so many further rays a pixel [0]")
+        ->type_name("N")
+        ->expected(0, 1)
+        ->default_str(kDefaultOcclusionRays)
+        ->check(CLI::Range(0, 64));
+    app.add_option("--section", settings.sections, "Keep one side of a plane: x<0.2, z>50% (of the bounding box), or a,b,c,d for ax + by + cz >= d; up to 6 times")
+        ->type_name("PLANE")
+        ->take_all()
+        ->expected(1, static_cast<int>(kMostSections))
+        ->allow_extra_args(false)
+        ->check(checkPlane);
+    app.add_flag("--caps", settings.caps, "Fill what sections cut open (for closed surfaces)");
     app.add_option("--error-pixels", settings.errorPixels, "Error that a picture may have, in pixels: finer levels are loaded until then")
         ->type_name("PIXELS")
         ->capture_default_str()

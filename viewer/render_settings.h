@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "octree/result.h"
 #include "render/renderer.h"
@@ -19,11 +20,17 @@ struct RenderSettings {
     std::string camera = "fit";
     std::string up = "y";
     std::string light = "camera";
+    std::string lightDirection;
     std::string shading = "lit";
+    bool shadows = false;
+    uint32_t occlusionRays = 0;
+    std::vector<std::string> sections;
+    bool caps = false;
     SourceSettings source;
 
     [[nodiscard]] RendererOptions rendererOptions(const OpenDataset& open) const;
     [[nodiscard]] Shading shadingChosen() const;
+    [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
     /// The view or the camera file. Errors: those of readCamera.

@@ -25,8 +25,14 @@ constexpr double kRefineFrames = 3;
 
 constexpr int kLargestReduction = 4;
 constexpr double kZoomPerNotch = 0.85;
+constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
+constexpr uint32_t kOcclusionRays = 8;
 // A dataset smaller than this part of the picture's height is far enough away.
 constexpr double kSmallestInView = 1e-3;
+
+ShadingMode next(ShadingMode mode) {
+    return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(static_cast<int>(mode) + 1);
+}
 
 bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
     return a.position == b.position && a.orientation == b.orientation && a.focusDistance == b.focusDistance &&
@@ -59,7 +65,7 @@ Result<std::unique_ptr<Viewer>> Viewer::create(const ViewerOptions& options) {
 }
 
 Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
-    : options_(options), renderer_(std::move(renderer)), shading_(options.shading) {
+    : options_(options), renderer_(std::move(renderer)), shading_(options.shading), sections_(options.sections), sectionCaps_(options.sectionCaps) {
     status_.device = renderer_->device().name;
     status_.software = renderer_->device().software;
     status_.budgetBytes = options.renderer.budgetBytes;
@@ -134,8 +140,9 @@ void Viewer::release(MouseButton button) {
     if (button == dragButton_) drag_ = Drag::None;
 }
 
-void Viewer::scroll(glm::dvec2 pixel, double steps) {
+void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
     if (!hasSize() || !dataset_ || steps == 0) return;
+    if (shift && !sections_.empty()) return moveSections(steps);
     const double factor = std::pow(kZoomPerNotch, std::clamp(steps, -20.0, 20.0));
     if (factor > 1 && kSmallestInView * camera_.viewHeight() > bounds_.diagonal()) return;
     camera_.zoomAbout(pointOfInterest(pixel), factor);
@@ -155,12 +162,31 @@ void Viewer::toggleProjection() {
         camera_.projection == Projection::Perspective ? Projection::Orthographic : Projection::Perspective;
 }
 
+void Viewer::toggleSection() {
+    if (sections_.empty()) {
+        const glm::dvec3 ahead = camera_.forwardVector();
+        sections_ = {{ahead, glm::dot(ahead, bounds_.centre())}};
+        sectionCaps_ = true;
+    } else {
+        sections_.clear();
+    }
+}
+
+void Viewer::moveSections(double steps) {
+    const double by = kSectionPerNotch * bounds_.diagonal() * std::clamp(steps, -20.0, 20.0);
+    for (SectionPlane& plane : sections_) plane.offset += by * glm::length(plane.normal);
+}
+
 void Viewer::act(ViewerAction action) {
     if (!dataset_ || !hasSize()) return;
     switch (action) {
         case ViewerAction::Fit: camera_.fit(bounds_, size_); break;
         case ViewerAction::Reset: camera_ = home_; break;
         case ViewerAction::ToggleLight: toggleLight(); break;
+        case ViewerAction::ToggleShadows: shading_.shadows = !shading_.shadows; break;
+        case ViewerAction::ToggleOcclusion: shading_.occlusionRays = shading_.occlusionRays > 0 ? 0 : kOcclusionRays; break;
+        case ViewerAction::ToggleSection: toggleSection(); break;
+        case ViewerAction::NextShading: shading_.mode = next(shading_.mode); break;
         case ViewerAction::ToggleProjection: toggleProjection(); break;
         case ViewerAction::ViewFront: look(View::Front); break;
         case ViewerAction::ViewRight: look(View::Right); break;
@@ -184,6 +210,9 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.height = static_cast<uint32_t>(std::max(1, size_.y / reduction));
     request.errorPixels = options_.errorPixels;
     request.shading = shading_;
+    if (isMoving(now_)) request.shading.occlusionRays = 0;
+    request.sections = sections_;
+    request.sectionCaps = sectionCaps_;
     return request;
 }
 
@@ -214,7 +243,8 @@ NextStep Viewer::nextStep(double now) const {
     const bool canDraw = status_.update.drawable || !status_.problem.empty();
     next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now));
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
-    if (requestReduction_ > 1)
+    const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
+    if (isCheaper)
         next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
     return next;
 }
@@ -225,7 +255,8 @@ Result<void> Viewer::draw() {
     status_.frame = *stats;
     status_.reduction = requestReduction_;
     // The first frame also compiles; it says nothing about the next.
-    if (requestReduction_ == 1 && framesDrawn_ > 0) fullFrameMs_ = stats->msFrame;
+    if (requestReduction_ == 1 && framesDrawn_ > 0)
+        fullFrameMs_ = stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0);
     ++framesDrawn_;
     drawn_ = request_;
     drawnAt_ = now_;

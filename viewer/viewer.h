@@ -20,6 +20,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -37,6 +38,10 @@ enum class ViewerAction {
     Fit,               ///< all of the dataset into the picture, from the same side
     Reset,             ///< the camera the dataset opened with
     ToggleLight,       ///< the light follows the camera, or stays where it is in the world
+    ToggleShadows,
+    ToggleOcclusion,   ///< ambient occlusion; left out while the camera moves
+    ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
+    NextShading,       ///< lit, unlit, clay, normals, steps, fetches, level, error
     ToggleProjection,  ///< perspective or orthographic, same size at the point of interest
     ViewFront,
     ViewRight,
@@ -48,6 +53,8 @@ struct ViewerOptions {
     RendererOptions renderer;
     double errorPixels = 0.5;
     Shading shading;
+    std::vector<SectionPlane> sections;
+    bool sectionCaps = false;
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
     double movingFrameMs = 66;
 };
@@ -93,8 +100,9 @@ public:
     void press(MouseButton button, glm::dvec2 pixel, bool shift);
     void move(glm::dvec2 pixel);
     void release(MouseButton button);
-    /// Zooms in on the point under the cursor by `steps` notches of a wheel; out when negative.
-    void scroll(glm::dvec2 pixel, double steps);
+    /// Zooms in on the point under the cursor by `steps` notches of a wheel; out when negative. With shift: moves the
+    /// section planes, deeper into what they keep.
+    void scroll(glm::dvec2 pixel, double steps, bool shift = false);
     void act(ViewerAction action);
 
     /// Errors: those of Renderer::update; problems of single pages go to the status instead.
@@ -125,6 +133,8 @@ private:
     glm::dvec3 pointOfInterest(glm::dvec2 pixel);
     void toggleLight();
     void toggleProjection();
+    void toggleSection();
+    void moveSections(double steps);
     void look(View view);
 
     ViewerOptions options_;
@@ -133,6 +143,8 @@ private:
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;
+    std::vector<SectionPlane> sections_;
+    bool sectionCaps_ = false;
     glm::ivec2 size_{0};
 
     Drag drag_ = Drag::None;

@@ -142,7 +142,10 @@ private:
             viewer_->release(which);
     }
 
-    void scroll(double steps) { viewer_->scroll(pixelAt(cursor_), steps); }
+    void scroll(double steps) {
+        const bool shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS || glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+        viewer_->scroll(pixelAt(cursor_), steps, shift);
+    }
 
     void key(int key, int action) {
         if (action != GLFW_PRESS) return;
@@ -153,6 +156,10 @@ private:
             case GLFW_KEY_R:
             case GLFW_KEY_HOME: viewer_->act(ViewerAction::Reset); break;
             case GLFW_KEY_L: viewer_->act(ViewerAction::ToggleLight); break;
+            case GLFW_KEY_S: viewer_->act(ViewerAction::ToggleShadows); break;
+            case GLFW_KEY_O: viewer_->act(ViewerAction::ToggleOcclusion); break;
+            case GLFW_KEY_X: viewer_->act(ViewerAction::ToggleSection); break;
+            case GLFW_KEY_M: viewer_->act(ViewerAction::NextShading); break;
             case GLFW_KEY_P: viewer_->act(ViewerAction::ToggleProjection); break;
             case GLFW_KEY_1: viewer_->act(ViewerAction::ViewFront); break;
             case GLFW_KEY_3: viewer_->act(ViewerAction::ViewRight); break;
@@ -213,6 +220,8 @@ Result<WindowReport> showWindow(const OpenDataset& open, const RenderSettings& s
     viewerOptions.renderer.surface = system.surfaceSource();
     viewerOptions.errorPixels = settings.errorPixels;
     viewerOptions.shading = settings.shadingChosen();
+    viewerOptions.sections = settings.sectionPlanes(open.bounds());
+    viewerOptions.sectionCaps = settings.caps;
     auto viewer = Viewer::create(viewerOptions);
     if (!viewer) return viewer.error();
     VCP_TRY((*viewer)->open(open.dataset, open.source, *camera, options.title));

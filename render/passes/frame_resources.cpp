@@ -97,14 +97,14 @@ Result<WordBuffer> FrameResources::wordBuffer(uint64_t words, VkBufferUsageFlags
     return made;
 }
 
-Result<void> FrameResources::resize(PictureSize size, bool colour) {
-    if (size == size_ && (colourPlane_ || !colour)) return {};
+Result<void> FrameResources::resize(PictureSize size, uint32_t hitPlanes) {
+    if (size == size_ && hitPlanes <= hitPlanes_) return {};
     const uint64_t tiles = uint64_t{size.tilesX()} * size.tilesY();
     auto starts = wordBuffer(tiles, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
     if (!starts) return starts.error();
     auto list = wordBuffer(frame::kTileListHeader + tiles, VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT);
     if (!list) return list.error();
-    auto hits = wordBuffer(size.pixels() * (colour ? 3 : 2), VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+    auto hits = wordBuffer(size.pixels() * hitPlanes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
     if (!hits) return hits.error();
     auto picture = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
     if (!picture) return picture.error();
@@ -117,7 +117,7 @@ Result<void> FrameResources::resize(PictureSize size, bool colour) {
     hits_ = std::move(*hits);
     picture_ = std::move(*picture);
     size_ = size;
-    colourPlane_ = colour;
+    hitPlanes_ = hitPlanes;
     setStale_ = true;
     return {};
 }

@@ -2,12 +2,12 @@
 //
 // binding   what                           written by        read by
 //  0        frame constants                CPU (upload)      all
-//  1, 2     page pool, texels and storage  page_pool         beam, trace
+//  1, 2     page pool, texels and storage  page_pool         beam, trace, light
 //  3, 4     page pool, for colour          page_pool         trace with kColour
-//  5, 6     page table                     CPU (upload)      beam, trace
+//  5, 6     page table                     CPU (upload)      beam, trace, light
 //  7, 8     tile starts                    beam              trace, shade
-//  9, 10    tile list, indirect dispatch   beam              trace
-// 11, 12    hits                           trace             shade, readback
+//  9, 10    tile list, indirect dispatch   beam              trace, light, shade
+// 11, 12    hits                           trace, light      light, shade, readback
 // 13        picture                        begin, shade      readback, present
 // 14        counters                       trace             readback
 #pragma once
@@ -52,8 +52,8 @@ public:
     FrameResources(const FrameResources&) = delete;
     FrameResources& operator=(const FrameResources&) = delete;
 
-    /// Makes the buffers fit. `colour`: whether hits have a plane for colours. Errors: Device.
-    Result<void> resize(PictureSize size, bool colour);
+    /// Makes the buffers fit. `hitPlanes`: words that a pixel's hit takes. Errors: Device.
+    Result<void> resize(PictureSize size, uint32_t hitPlanes);
     /// Writes the table for the next frame; grows its buffer. Errors: Device.
     Result<void> setTable(std::span<const glm::uvec4> table);
     /// What the picture shows where nothing is hit: a word a row. Precondition: resize(), and a row each.
@@ -89,7 +89,7 @@ private:
     VkDescriptorSet set_ = VK_NULL_HANDLE;
 
     PictureSize size_;
-    bool colourPlane_ = false;
+    uint32_t hitPlanes_ = 0;
     Buffer constants_, picture_, counters_;
     Buffer background_;  // as large as the picture, copied over it before each frame
     std::vector<uint32_t> backgroundRows_;

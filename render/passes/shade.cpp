@@ -4,12 +4,13 @@
 
 namespace vcp {
 
-Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants) {
-    ComputePipeline& variant = variants_[{constants.colour, false, false}];
+Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants, bool light) {
+    ComputePipeline& variant = variants_[{constants.colour, false, light ? 1 : 0}];
     if (variant.handle() == VK_NULL_HANDLE) {
         PassConstants plain = constants;
         plain.countSteps = false;
-        auto made = resources.pipeline(kShadeSpirv, plain);
+        const uint32_t more[] = {light ? 1u : 0u};
+        auto made = resources.pipeline(kShadeSpirv, plain, more);
         if (!made) return made.error();
         variant = std::move(*made);
     }

@@ -1,5 +1,5 @@
 // The picture from the hits (shaders/shade.comp).
-// Reads constants, tile list, hits. Writes the picture's hit pixels. Before: the trace pass. After:
+// Reads constants, tile list and starts, hits. Writes the picture's hit pixels. Before: the trace pass, with `light` also the light pass. After:
 // barrierComputeToReadback, recorded here.
 #pragma once
 
@@ -13,14 +13,14 @@ namespace vcp {
 class ShadePass {
 public:
     /// Makes the variant's pipeline on first use. Errors: Device.
-    Result<void> prepare(FrameResources& resources, const PassConstants& constants);
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool light);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
     /// Forgets all variants: pools with another layout are to come.
     void clear() { variants_.clear(); }
 
 private:
-    std::map<std::tuple<bool, bool, bool>, ComputePipeline> variants_;
+    std::map<std::tuple<bool, bool, uint32_t>, ComputePipeline> variants_;
     const ComputePipeline* current_ = nullptr;
 };
 

@@ -4,10 +4,11 @@
 
 namespace vcp {
 
-Result<void> TracePass::prepare(FrameResources& resources, const PassConstants& constants) {
-    ComputePipeline& variant = variants_[{constants.colour, constants.countSteps, false}];
+Result<void> TracePass::prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections) {
+    ComputePipeline& variant = variants_[{constants.colour, constants.countSteps, static_cast<uint32_t>(sections)}];
     if (variant.handle() == VK_NULL_HANDLE) {
-        auto made = resources.pipeline(kTraceSpirv, constants);
+        const uint32_t more[] = {static_cast<uint32_t>(sections)};
+        auto made = resources.pipeline(kTraceSpirv, constants, more);
         if (!made) return made.error();
         variant = std::move(*made);
     }

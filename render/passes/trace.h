@@ -10,17 +10,20 @@
 
 namespace vcp {
 
+/// Whether section planes cut, and whether what they cut open is filled.
+enum class SectionKind : uint32_t { None, Open, Capped };
+
 class TracePass {
 public:
     /// Makes the variant's pipeline on first use. Errors: Device.
-    Result<void> prepare(FrameResources& resources, const PassConstants& constants);
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
     /// Forgets all variants: pools with another layout are to come.
     void clear() { variants_.clear(); }
 
 private:
-    std::map<std::tuple<bool, bool, bool>, ComputePipeline> variants_;
+    std::map<std::tuple<bool, bool, uint32_t>, ComputePipeline> variants_;
     const ComputePipeline* current_ = nullptr;
 };
 

@@ -28,8 +28,9 @@ layout(set = 0, binding = 7, std430) buffer TileStartBlock { uint tileStarts[]; 
 layout(set = 0, binding = 8) uniform utextureBuffer tileStartTexels;
 layout(set = 0, binding = 9, std430) buffer TileListBlock { uint tileList[]; };
 layout(set = 0, binding = 10) uniform utextureBuffer tileListTexels;
-// A pixel's record: depth (float bits), normal (octahedral, 16 + 16 bits), colour (RGBA8); planes of
-// width * height words.
+// A pixel's record: depth (float bits; negative on the cap of a section), normal (octahedral, 16 + 16 bits), colour (RGBA8), and at
+// frame.extra.x light (8 bits sun, 8 bits sky) or the value of a false colour (float bits, 0 to 1); planes
+// of width * height words.
 layout(set = 0, binding = 11, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
 layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint picturePixels[]; };

@@ -1,30 +1,41 @@
-// Colours of hit pixels from their records. Reads the tile list and hits; writes those pixels of the picture,
+// Colours of hit pixels from their records. Reads tile list, tile starts and hits; writes those pixels of the picture,
 // which is the background before.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/tiles.glsl"
+#include "render/shaders/hit_records.glsl"
 
+layout(constant_id = 5) const uint kLight = 0u;  // 1: the hits have a plane of light
 layout(local_size_x = 8, local_size_y = 8) in;
-
-vec3 unpackHitNormal(uint code) {
-    vec2 e = unpackUnorm2x16(code) * 2.0 - 1.0;
-    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-    float fold = max(-n.z, 0.0);
-    n.x += n.x >= 0.0 ? -fold : fold;
-    n.y += n.y >= 0.0 ? -fold : fold;
-    return n * inversesqrt(dot(n, n));
-}
 
 // Blue through green to red.
 vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
 // Light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
 // colours come encoded, so that one power a pixel is enough.
-float encodedLight(vec3 n) {
+float encodedLight(vec3 n, float sunSeen, float skySeen) {
     float sun = max(dot(n, frame.lightDirection.xyz), 0.0);
     float sky = 0.5 + 0.5 * dot(n, frame.upDirection.xyz);
-    return pow(0.72 * sun + 0.10 + 0.18 * sky, 1.0 / 2.2);
+    // Hollows are darker than the sun alone would have them: they see less of what it lights.
+    return pow(0.72 * sun * sunSeen * (0.5 + 0.5 * skySeen) + (0.10 + 0.18 * sky) * skySeen, 1.0 / 2.2);
+}
+
+// Sky seen, averaged over the pixels about that show the same surface: light.comp gives each pixel of a square of
+// 4 x 4 its own directions.
+float skyAbout(uvec2 pixel, float depth, uint plane) {
+    float reach = 8.0 * (frame.pixel.x + frame.pixel.y * depth);
+    float sum = 0.0, count = 0.0;
+    for (int i = 0; i < 16; i++) {
+        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), ivec2(frame.picture.xy) - 1);
+        uint at = uint(p.y) * frame.picture.x + uint(p.x);
+        // Tiles that were not traced have no depths.
+        bool traced = fetchTileStart(uint(p.y) / kTileSize * frame.picture.z + uint(p.x) / kTileSize) < kTileEmpty;
+        bool same = traced && abs(fetchPixelHit(at).depth - depth) <= reach;
+        sum += same ? unpackUnorm4x8(fetchHit(frame.extra.x * plane + at)).y : 0.0;
+        count += same ? 1.0 : 0.0;
+    }
+    return sum / max(count, 1.0);
 }
 
 void main() {
@@ -33,15 +44,27 @@ void main() {
     if (!listedPixel(tile, pixel)) return;
     uint at = pixel.y * frame.picture.x + pixel.x;
     uint plane = frame.picture.x * frame.picture.y;
-    uint code = fetchHit(plane + at);
-    if (frame.mode.w == kShadeSteps) {
-        picturePixels[at] = packUnorm4x8(vec4(heat(float(code) / 64.0), 1.0));
+    PixelHit hit = fetchPixelHit(at);
+    float depth = hit.depth;
+    bool ofWork = frame.mode.w == kShadeSteps || frame.mode.w == kShadeFetches;
+    if (depth >= kNoHit && !ofWork) return;
+    if (frame.mode.w >= kShadeSteps) {
+        float value = uintBitsToFloat(fetchHit(frame.extra.x * plane + at));
+        picturePixels[at] = packUnorm4x8(vec4(heat(value), 1.0));
         return;
     }
-    if (uintBitsToFloat(fetchHit(at)) >= kNoHit) return;
-    vec3 n = unpackHitNormal(code);
+    vec3 n = unpackHitNormal(fetchHit(plane + at));
+    bool coloured = frame.mode.w == kShadeLit || frame.mode.w == kShadeUnlit;
     vec3 albedo = frame.clay.xyz;
-    if (kColour != 0u && frame.mode.w == kShadeLit) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
-    vec3 colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5 : albedo * encodedLight(n);
+    if (kColour != 0u && coloured) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
+    if (hit.onCap) albedo = frame.cap.xyz;
+    float sunSeen = 1.0, skySeen = 1.0;
+    if (kLight != 0u) {
+        sunSeen = unpackUnorm4x8(fetchHit(frame.extra.x * plane + at)).x;
+        if (frame.extra.z > 0u) skySeen = skyAbout(pixel, depth, plane);
+    }
+    vec3 colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5
+                : frame.mode.w == kShadeUnlit   ? albedo
+                                                : albedo * encodedLight(n, sunSeen, skySeen);
     picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

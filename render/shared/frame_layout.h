@@ -18,7 +18,14 @@ const uint kTileRow = 256u;
 const uint kShadeLit = 0u;
 const uint kShadeClay = 1u;
 const uint kShadeNormals = 2u;
-const uint kShadeSteps = 3u;
+const uint kShadeUnlit = 3u;
+// False colours, from here on.
+const uint kShadeSteps = 4u;
+const uint kShadeFetches = 5u;
+const uint kShadeLevel = 6u;
+const uint kShadeError = 7u;
+
+const uint kMaxSections = 6u;
 
 struct FrameConstants {
     // Ray of the picture's point x, y (pixels): origin + x originX + y originY, in finest cells relative to
@@ -35,12 +42,21 @@ struct FrameConstants {
     vec4 lightDirection;  // unit, world axes, towards the light
     vec4 upDirection;     // unit: where the hemisphere's light comes from
     vec4 clay;            // encoded for the screen
+    vec4 cap;             // of cut solids, encoded for the screen
+    // A pixel's edge in finest cells: x + y depth. z: how far occlusion reaches, finest cells. w: how far above
+    // the surface rays of light begin, in pixels.
+    vec4 pixel;
+    // The hits' plane of light or false colours (0: none), section planes, occlusion rays a pixel, shadows.
+    uvec4 extra;
+    // Kept is where dot(xyz, p) + w >= 0, p in finest cells relative to originLattice.
+    vec4 sections[kMaxSections];
 };
 
 // A node of the frame's page tree: three texels of the table.
 //   0: flags, first child (number in the table), root word of the page, texel of the page in the pool
 //   1: texels of faces, triangles, vertices, normals
-//   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory, 0
+//   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory, certified
+//      error in finest cells (float bits)
 // flags: bits 0..7 octants that have a child; bit 8: this page is in the cut.
 const uint kRecordTexels = 3u;
 const uint kRecordInCut = 256u;

@@ -8,48 +8,15 @@
 #include <gtest/gtest.h>
 
 #include "render/frame_setup.h"
-#include "tests/render/test_scene.h"
+#include "tests/render/renderer_fixture.h"
 
 namespace vcp {
 namespace {
 
+using test::requestOf;
 using test::Scene;
 
-class RendererTest : public testing::Test {
-protected:
-    void start(RendererOptions options = {}) {
-        options.validation = true;
-        auto made = Renderer::create(options);
-        ASSERT_TRUE(made) << made.error().line();
-        renderer_ = std::move(*made);
-    }
-    void show(const Scene& scene) {
-        const auto opened = renderer_->open(scene.dataset, scene.source);
-        ASSERT_TRUE(opened) << opened.error().line();
-    }
-    /// Settles and draws.
-    FrameStats draw(const FrameRequest& request) {
-        const auto update = renderer_->settle(request);
-        EXPECT_TRUE(update) << update.error().line();
-        const auto stats = renderer_->render(request);
-        EXPECT_TRUE(stats) << stats.error().line();
-        return *stats;
-    }
-    void TearDown() override {
-        if (!renderer_) return;
-        for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
-    }
-    std::unique_ptr<Renderer> renderer_;
-};
-
-FrameRequest requestOf(const Camera& camera, uint32_t width = 160, uint32_t height = 120) {
-    FrameRequest request;
-    request.camera = camera;
-    request.width = width;
-    request.height = height;
-    request.errorPixels = 0.2;
-    return request;
-}
+class RendererTest : public test::RendererFixture {};
 
 struct NamedCamera {
     const char* name;

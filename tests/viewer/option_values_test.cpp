@@ -45,6 +45,21 @@ TEST(OptionValues, Sizes) {
         EXPECT_FALSE(parseSize(wrong)) << wrong;
 }
 
+TEST(OptionValues, PlanesAndDirections) {
+    EXPECT_EQ(parsePlane("x<0.2")->normal, glm::dvec3(-1, 0, 0));
+    EXPECT_EQ(parsePlane("x<0.2")->offset, -0.2);
+    EXPECT_EQ(parsePlane("z>-3")->normal, glm::dvec3(0, 0, 1));
+    EXPECT_EQ(parsePlane("z>-3")->offset, -3);
+    EXPECT_TRUE(parsePlane("y<25%")->isRelative);
+    EXPECT_EQ(parsePlane("y<25%")->offset, -0.25);
+    EXPECT_EQ(parsePlane("1,0,-2.5,7")->normal, glm::dvec3(1, 0, -2.5));
+    EXPECT_EQ(parsePlane("1,0,-2.5,7")->offset, 7);
+    for (const char* wrong : {"", "x", "x<", "x=1", "w<1", "x<1cm", "x<nan", "1,2,3", "0,0,0,1", "1,2,3,4,5", "1,2,3,", "1,2,3,inf"})
+        EXPECT_FALSE(parsePlane(wrong)) << wrong;
+    EXPECT_EQ(*parseDirection("1,0,-0.5"), glm::dvec3(1, 0, -0.5));
+    for (const char* wrong : {"", "1,2", "0,0,0", "1,2,3,4", "1 2 3"}) EXPECT_FALSE(parseDirection(wrong)) << wrong;
+}
+
 TEST(OptionValues, NumbersForPeople) {
     EXPECT_EQ(formatCount(0), "0");
     EXPECT_EQ(formatCount(999), "999");

@@ -109,6 +109,54 @@ TEST_F(ViewerTest, DrawsOnlyWhenSomethingChanged) {
     EXPECT_FALSE(turn(0.1));
 }
 
+TEST_F(ViewerTest, LooksAreSwitchedAndSwitchedBack) {
+    openViewer();
+    settle();
+    const Picture plain = viewer_->renderer().readPicture().value();
+    for (const ViewerAction action : {ViewerAction::ToggleShadows, ViewerAction::ToggleOcclusion, ViewerAction::ToggleSection}) {
+        viewer_->act(action);
+        EXPECT_TRUE(turn(0.5));
+        const Picture with = viewer_->renderer().readPicture().value();
+        viewer_->act(action);
+        EXPECT_TRUE(turn(0.5));
+        EXPECT_EQ(viewer_->renderer().readPicture().value(), plain);
+        if (action == ViewerAction::ToggleSection) {
+            EXPECT_NE(with, plain);
+        }
+    }
+    for (int mode = 0; mode < 8; ++mode) {
+        viewer_->act(ViewerAction::NextShading);
+        EXPECT_TRUE(turn(0.5));
+    }
+    EXPECT_EQ(viewer_->renderer().readPicture().value(), plain);
+}
+
+TEST_F(ViewerTest, ShiftAndTheWheelMoveTheSection) {
+    openViewer();
+    viewer_->act(ViewerAction::ViewFront);
+    viewer_->act(ViewerAction::ToggleSection);
+    settle();
+    const double before = glm::length(*viewer_->pointAt(glm::dvec2(kSize) / 2.0) - viewer_->camera().position);
+    viewer_->scroll(glm::dvec2(kSize) / 2.0, 5, true);
+    settle();
+    const double after = glm::length(*viewer_->pointAt(glm::dvec2(kSize) / 2.0) - viewer_->camera().position);
+    EXPECT_GT(after, before * 1.01);
+}
+
+// Occlusion is left out while the camera moves, and comes back at rest.
+TEST_F(ViewerTest, OcclusionWaitsForRest) {
+    openViewer();
+    viewer_->act(ViewerAction::ToggleOcclusion);
+    settle();
+    viewer_->press(MouseButton::Left, {160, 120}, false);
+    viewer_->move({170, 120});
+    EXPECT_TRUE(turn(0.01));
+    EXPECT_FALSE(std::isinf(next_.waitSeconds));
+    viewer_->release(MouseButton::Left);
+    EXPECT_TRUE(turn(0.5)) << "once more, with occlusion";
+    EXPECT_FALSE(turn(0.1));
+}
+
 TEST_F(ViewerTest, PictureShowsTheDatasetAndBackground) {
     openViewer();
     settle();

@@ -1,0 +1,23 @@
+// Shadows and ambient occlusion of the hits (shaders/light.comp).
+// Reads constants, pools, table, tile list, hits. Writes the hits' plane of light. Before: the trace pass. After:
+// barrierComputeToCompute, recorded here. A frame without both has no such pass.
+#pragma once
+
+#include "render/passes/frame_resources.h"
+
+namespace vcp {
+
+class LightPass {
+public:
+    /// Makes the pipeline on first use. Errors: Device.
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants);
+    /// Precondition: prepare().
+    void record(VkCommandBuffer commands, const FrameResources& resources) const;
+    /// Forgets the pipeline: pools with another layout are to come.
+    void clear() { pipeline_ = {}; }
+
+private:
+    ComputePipeline pipeline_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,266 @@
+// Casting a ray through the pages of the frame's cut: first hit with depth, normal and colour.
+//
+// Control flow is laid out for devices that run eight rays in lock step and skip nothing: what is rare
+// (triangles, changing the page) stands outside of the loops that are not.
+#include "octree/shared/leaf_math.h"
+#include "render/shaders/page_walk.glsl"
+
+const int kIllinoisSteps = 8;
+const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
+const float kIntervalSlack = 1e-4;
+
+struct Hit {
+    float depth;  // finest cells; kNoHit
+    vec3 normal;  // towards the ray's origin, not normalized
+    vec4 colour;
+    uint record;  // of the page, in the table
+    int pageBits; // log2 of the page's edge on the lattice
+};
+
+// Work of a ray; filled with kCountSteps only.
+struct Work {
+    uint steps, fetches;
+};
+
+// A page of the cut, as the walk needs it.
+struct Page {
+    uint nodesTexel, root;
+    uvec4 sections;  // texels: faces, triangles, vertices, normals
+    uvec2 colours;   // texels in the colour pool: faces, vertices
+    ivec3 corner;    // lattice
+    int bits;        // log2 of its edge on the lattice
+    float cell;      // finest cells
+    uint record;     // number in the table
+};
+
+// Exact powers of two.
+float powerOfTwo(int exponent) { return uintBitsToFloat(uint(127 + exponent) << 23); }
+
+// Steps from a box of the lattice to its neighbour across the face that the ray leaves by.
+ivec3 stepAcross(Ray ray, ivec3 corner, int bits, inout float s) {
+    ivec3 edge = ivec3(1 << bits);
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
+    vec3 t = planeDistances(ray, mix(corner, corner + edge, ahead));
+    float nearest = minOf(t);
+    s = max(s, nearest);
+    ivec3 sideways = clamp(latticePoint(ray, s), corner, corner + edge - 1);
+    return mix(sideways, mix(corner - 1, corner + edge, ahead), equal(t, vec3(nearest)));
+}
+
+bool outsideRoot(ivec3 p) { return ((p.x | p.y | p.z) >> kLatticeBits) != 0; }
+
+// Goes down the frame's page tree to the page at `place`, stepping over octants without one. False: the ray
+// leaves the root.
+bool findPage(Ray ray, inout ivec3 place, inout float s, out Page page, inout uint steps) {
+    uint node = 0u;
+    uvec4 record = uvec4(0u);
+    bool inside = true;
+    while (inside && (record.x & kRecordInCut) == 0u) {
+        // Down to a page of the cut or an octant without one.
+        node = 0u;
+        page.bits = int(kLatticeBits);
+        bool exists = true;
+        record.x = 0u;
+        while (exists && (record.x & kRecordInCut) == 0u) {
+            record = fetchTable(node * kRecordTexels);
+            if (kCountSteps != 0u) steps++;
+            if ((record.x & kRecordInCut) == 0u) {
+                page.bits--;
+                uint octant = octantAt(place, page.bits);
+                exists = (record.x >> octant & 1u) != 0u;
+                node = record.y + bitCount(record.x & ((1u << octant) - 1u));
+            }
+        }
+        if (!exists) {
+            place = stepAcross(ray, place >> page.bits << page.bits, page.bits, s);
+            inside = !outsideRoot(place);
+        }
+    }
+    page.root = record.z;
+    page.nodesTexel = record.w + kPageHeaderBytes / 16u;
+    page.sections = fetchTable(node * kRecordTexels + 1u);
+    page.colours = kColour != 0u ? fetchTable(node * kRecordTexels + 2u).xy : uvec2(0u);
+    page.record = node;
+    page.corner = place >> page.bits << page.bits;
+    page.cell = powerOfTwo(int(frame.mode.y) + page.bits - int(kLatticeBits));
+    return inside;
+}
+
+// The ray in page space. Both points at the page's walls come from the lattice, as its neighbours see them.
+PageRay enterPage(Ray ray, Page page, out float sStart) {
+    ivec3 edge = ivec3(1 << page.bits);
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
+    ivec3 nearWalls = mix(page.corner + edge, page.corner, ahead), farWalls = mix(page.corner, page.corner + edge, ahead);
+    vec3 t0 = planeDistances(ray, nearWalls), t1 = planeDistances(ray, farWalls);
+    float first = maxOf(t0), last = max(minOf(t1), first);
+    sStart = max(first, 0.0);
+    ivec3 from = clamp(latticePoint(ray, sStart), page.corner, page.corner + edge);
+    ivec3 to = clamp(latticePoint(ray, last), page.corner, page.corner + edge);
+    if (first > 0.0) from = mix(from, nearWalls, equal(t0, vec3(first)));
+    to = mix(to, farWalls, equal(t1, vec3(last)));
+    float toCells = powerOfTwo(int(frame.mode.x) - page.bits);
+    PageRay local;
+    local.start = vec3(from - page.corner) * toCells;
+    local.exit = vec3(to - page.corner) * toCells;
+    local.direction = ray.direction;
+    local.inverse = ray.inverse;
+    local.cells = float(1u << frame.mode.x);
+    local.farWalls = mix(vec3(0.0), vec3(local.cells), ahead);
+    local.tauExit = (last - sStart) / page.cell;
+    local.beginsHere = first <= 0.0;
+    return local;
+}
+
+vec4 blendColours(uvec4 face0, uvec4 face1, vec3 x) {
+    vec4 w = faceWeights(x.y, x.z);
+    vec4 c0 = w.x * unpackUnorm4x8(face0.x) + w.y * unpackUnorm4x8(face0.y) + w.z * unpackUnorm4x8(face0.z) + w.w * unpackUnorm4x8(face0.w);
+    vec4 c1 = w.x * unpackUnorm4x8(face1.x) + w.y * unpackUnorm4x8(face1.y) + w.z * unpackUnorm4x8(face1.z) + w.w * unpackUnorm4x8(face1.w);
+    return mix(c0, c1, x.x);
+}
+
+// Distance along the page's ray of the crossing in a soft leaf, or -1.
+float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout uint fetches) {
+    uint axis = node >> kSoftAxisShift & 3u;
+    uint face = page.sections.x + (node & kLeafIndexMask);
+    LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), axis);
+    if (kCountSteps != 0u) fetches += 2u;
+    float scale = 1.0 / edge;  // a power of two: exact
+    vec3 p = (s.from - lo) * scale;
+    vec3 d = (s.to - s.from) * scale;
+    float wall = wallTolerance(node);
+    RayField ray = restrictToRay(leaf, p, d);
+    float u = firstCrossing(ray, s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
+    vec3 x = p + u * d;
+    hit.normal = facingNormal(leafNormal(leaf, x), d, rayValue(ray, 0.0));
+    if (kColour != 0u) {
+        uint colours = page.colours.x + (node & kLeafIndexMask);
+        hit.colour = blendColours(fetchColour(colours), fetchColour(colours + 1u), rotateToAxis(x, axis));
+    }
+    return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
+}
+
+// The triangles of a hard leaf. Distance, or -1.
+float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout uint fetches) {
+    uint first = node & kLeafIndexMask;
+    uint count = node >> kHardCountShift & kHardCountMask;
+    if (count == kHardCountLong) {
+        count = fetchPair(page.sections.y, first).x;
+        first++;
+    }
+    float lowest = s.fromWall ? -kIntervalSlack : 0.0;
+    float best = s.tauTo - s.tauFrom + kIntervalSlack;
+    vec2 weights = vec2(0.0);
+    uvec3 corners = uvec3(0u);
+    bool found = false;
+    for (uint i = 0u; i < count; i++) {
+        uvec2 record = fetchPair(page.sections.y, first + i);
+        uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
+        uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y), c = fetchPair(page.sections.z, v.z);
+        if (kCountSteps != 0u) fetches += 4u;
+        vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y), decodeVertex(c.x, c.y), kTriangleSlack);
+        if (t.x >= lowest && t.x <= best) {
+            best = t.x;
+            weights = t.yz;
+            corners = v;
+            found = true;
+        }
+    }
+    uvec2 a = fetchPair(page.sections.z, corners.x), b = fetchPair(page.sections.z, corners.y), c = fetchPair(page.sections.z, corners.z);
+    vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
+    vec3 flatNormal = cross(pb - pa, pc - pa);
+    flatNormal *= inversesqrt(max(dot(flatNormal, flatNormal), 1e-30));
+    flatNormal = turnedTo(flatNormal, -direction);
+    vec3 w = vec3(1.0 - weights.x - weights.y, weights);
+    vec3 normal = vec3(0.0);
+    vec4 colour = vec4(0.0);
+    for (int i = 0; i < 3; i++) {
+        uint code = fetchWord(page.sections.w, corners[i]);
+        normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
+        if (kColour != 0u)
+            colour += w[i] * unpackUnorm4x8(texelWord(fetchColour(page.colours.y + (corners[i] >> 2)), corners[i] & 3u));
+    }
+    if (found) {
+        hit.normal = normal;
+        hit.colour = colour;
+    }
+    return found ? max(s.tauFrom + best, 0.0) : -1.0;
+}
+
+// First hit in a page from distance `s` on, or kNoHit.
+float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, inout uint fetches) {
+    float sStart;
+    PageRay local = enterPage(ray, page, sStart);
+    Place at;
+    at.tau = max(0.0, (s - sStart) / page.cell);
+    at.subcell = clamp(ivec3(floor((local.start + at.tau * local.direction) * kSubcells)), ivec3(0), ivec3(int(local.cells * kSubcells) - 1));
+    at.inPage = true;
+
+    int rootBits = int(frame.mode.x + kMaxSubcellDepth);
+    uint rootOnly = page.root >> kNodeTypeShift == kNodeInternal ? 0u : 1u;
+    uint rootGroup = page.nodesTexel + (rootOnly != 0u ? 0u : 2u * (page.root & kNodePayloadMask));
+    if (rootOnly != 0u) rootBits++;
+    Descent descent = Descent(rootGroup, kNoGroup, kNoGroup, rootBits, page.root);
+
+    float found = -1.0;
+    vec3 lo = vec3(0.0), boxLo = vec3(0.0), boxHi = vec3(0.0);  // of the node, and what is to be left of it
+    float edge = 0.0;
+    bool leave = false;
+    LeafSegment segment;
+    while (at.inPage && found < 0.0) {
+        // Soft leaves, until a hit or a hard leaf.
+        while (true) {
+            // Empty nodes, until a leaf.
+            while (true) {
+                if (leave) {
+                    Place next = leaveBox(local, at, boxLo, boxHi);
+                    ascend(descent, at.subcell, next.subcell, rootGroup, rootBits);
+                    at = next;
+                    if (!at.inPage) break;
+                }
+                descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, steps);
+                int bits = descent.bits - 1;
+                lo = vec3(at.subcell >> bits << bits) * (1.0 / kSubcells);
+                edge = float(1 << bits) * (1.0 / kSubcells);
+                bool isEmpty = descent.node >> kNodeTypeShift == kNodeEmpty;
+                float clearance = isEmpty ? float(descent.node & kNodePayloadMask) / kClearancePerCell : 0.0;
+                boxLo = max(lo - clearance, vec3(0.0));
+                boxHi = min(lo + (edge + clearance), vec3(local.cells));
+                leave = true;
+                if (!isEmpty) break;
+            }
+            if (!at.inPage) break;
+            segment = segmentInLeaf(local, lo, edge);
+            if (descent.node >> kNodeTypeShift == kNodeHard) break;
+            found = castSoft(page, descent.node, lo, edge, segment, hit, fetches);
+            if (found >= 0.0) break;
+        }
+        if (!at.inPage || found >= 0.0) break;
+        found = castHard(page, descent.node, segment, local.direction, hit, fetches);
+    }
+    return found >= 0.0 ? sStart + found * page.cell : kNoHit;
+}
+
+// First hit of the ray in the dataset at distance `from` or farther. Pages from `until` on are not looked at.
+Hit castRay(Ray ray, float from, float until, inout Work work) {
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
+    ivec3 edge = ivec3(1 << kLatticeBits);
+    float first = maxOf(planeDistances(ray, mix(edge, ivec3(0), ahead)));
+    float last = minOf(planeDistances(ray, mix(ivec3(0), edge, ahead)));
+    float s = max(max(first, 0.0), from);
+    ivec3 place = clamp(latticePoint(ray, s), ivec3(0), edge - 1);
+
+    Hit hit = Hit(kNoHit, vec3(0.0, 0.0, 1.0), vec4(0.0), 0u, 0);
+    last = min(last, until);
+    bool inside = s <= last;
+    while (inside) {
+        Page page;
+        if (!findPage(ray, place, s, page, work.steps)) break;
+        hit.record = page.record;
+        hit.pageBits = page.bits;
+        hit.depth = castPage(ray, page, s, hit, work.steps, work.fetches);
+        if (hit.depth < kNoHit) break;
+        place = stepAcross(ray, page.corner, page.bits, s);
+        inside = !outsideRoot(place) && s <= last;
+    }
+    return hit;
+}

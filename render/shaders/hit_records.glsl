@@ -1,0 +1,20 @@
+// What the trace pass left of a pixel.
+
+struct PixelHit {
+    float depth;  // finest cells along the ray; kNoHit
+    bool onCap;   // of a section
+};
+
+PixelHit fetchPixelHit(uint pixel) {
+    float depth = uintBitsToFloat(fetchHit(pixel));
+    return PixelHit(abs(depth), depth < 0.0);
+}
+
+vec3 unpackHitNormal(uint code) {
+    vec2 e = unpackUnorm2x16(code) * 2.0 - 1.0;
+    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+    float fold = max(-n.z, 0.0);
+    n.x += n.x >= 0.0 ? -fold : fold;
+    n.y += n.y >= 0.0 ? -fold : fold;
+    return n * inversesqrt(dot(n, n));
+}
