@@ -83,13 +83,13 @@ void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileH
     c.extra.w = s.shadows ? 1 : 0;
 }
 
-bool isFalseColour(ShadingMode mode) { return shadingMode(mode) >= frame::kShadeSteps; }
-
 }  // namespace
 
 bool hasLight(const Shading& shading) {
     return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) && (shading.shadows || shading.occlusionRays > 0);
 }
+
+bool isFalseColour(ShadingMode mode) { return shadingMode(mode) >= frame::kShadeSteps; }
 
 uint32_t hitPlanes(const FrameRequest& request, bool colour) {
     return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || isFalseColour(request.shading.mode) ? 1 : 0);

@@ -14,6 +14,9 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
 /// Whether rays of light are traced: where shading asks for them and shows light.
 bool hasLight(const Shading& shading);
 
+/// Whether pixels show a number of their ray.
+bool isFalseColour(ShadingMode mode);
+
 /// Words that a pixel's hit takes: depth, normal, and where wanted colour and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 

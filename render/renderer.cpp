@@ -207,6 +207,7 @@ PassConstants Renderer::State::constantsFor(const FrameRequest& request) const {
         c.chunkShift = residency->pages().chunkShift();
         c.colour = residency->hasColour();
     }
+    c.falseColour = isFalseColour(request.shading.mode);
     c.countSteps = request.countSteps || request.shading.mode == ShadingMode::Steps || request.shading.mode == ShadingMode::Fetches;
     return c;
 }

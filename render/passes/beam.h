@@ -3,25 +3,22 @@
 // barrierComputeToCompute, recorded here.
 #pragma once
 
-#include <map>
-#include <tuple>
-
 #include "render/passes/frame_resources.h"
 
 namespace vcp {
 
 class BeamPass {
 public:
+    BeamPass();
     /// Makes the variant's pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool beam);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Forgets all variants: pools with another layout are to come.
-    void clear() { variants_.clear(); }
+    /// Pools with another layout are to come.
+    void clear() { pipelines_.clear(); }
 
 private:
-    std::map<std::tuple<bool, bool, bool>, ComputePipeline> variants_;
-    const ComputePipeline* current_ = nullptr;
+    PipelineVariants pipelines_;
 };
 
 }  // namespace vcp

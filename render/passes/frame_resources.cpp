@@ -210,11 +210,22 @@ void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set_, 0, nullptr);
 }
 
-Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv, const PassConstants& c, std::span<const uint32_t> more) {
-    std::vector<uint32_t> values{c.access == PageAccess::TexelBuffer, c.poolChunks, c.chunkShift, c.colour, c.countSteps};
-    values.insert(values.end(), more.begin(), more.end());
+Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants) {
     ++pipelinesMade_;
-    return ComputePipeline::create(device_, layout_, spirv, values);
+    return ComputePipeline::create(device_, layout_, spirv, constants);
+}
+
+Result<void> PipelineVariants::choose(FrameResources& resources, const PassConstants& c, std::initializer_list<uint32_t> more) {
+    std::vector<uint32_t> values{c.access == PageAccess::TexelBuffer, c.poolChunks, c.chunkShift, c.colour, c.countSteps, c.falseColour};
+    values.insert(values.end(), more.begin(), more.end());
+    ComputePipeline& variant = variants_[values];
+    if (variant.handle() == VK_NULL_HANDLE) {
+        auto made = resources.pipeline(spirv_, values);
+        if (!made) return made.error();
+        variant = std::move(*made);
+    }
+    current_ = variant.handle();
+    return {};
 }
 
 }  // namespace vcp

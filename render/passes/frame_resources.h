@@ -12,6 +12,8 @@
 // 14        counters                       trace             readback
 #pragma once
 
+#include <initializer_list>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -35,8 +37,27 @@ struct PictureSize {
 struct PassConstants {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t poolChunks = 1, chunkShift = 26;
-    bool colour = false, countSteps = false;
+    bool colour = false, countSteps = false, falseColour = false;
     bool operator==(const PassConstants&) const = default;
+};
+
+class FrameResources;
+
+/// The pipelines of one shader, one for each choice of its specialization constants, made on first use.
+class PipelineVariants {
+public:
+    explicit PipelineVariants(std::span<const uint32_t> spirv) : spirv_(spirv) {}
+    /// Makes a variant the current one. `more`: values of the constants that this shader alone has. Errors: Device.
+    Result<void> choose(FrameResources& resources, const PassConstants& constants, std::initializer_list<uint32_t> more = {});
+    /// Precondition: choose().
+    [[nodiscard]] VkPipeline current() const { return current_; }
+    /// Forgets all variants: pools with another layout are to come.
+    void clear() { variants_.clear(); }
+
+private:
+    std::span<const uint32_t> spirv_;
+    std::map<std::vector<uint32_t>, ComputePipeline> variants_;
+    VkPipeline current_ = VK_NULL_HANDLE;
 };
 
 /// A buffer that shaders read as 32-bit texels as well.
@@ -73,7 +94,7 @@ public:
     [[nodiscard]] const Buffer& counters() const { return counters_; }
 
     /// One pipeline of this layout; counts it.
-    Result<ComputePipeline> pipeline(std::span<const uint32_t> spirv, const PassConstants& constants, std::span<const uint32_t> more = {});
+    Result<ComputePipeline> pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants);
     [[nodiscard]] uint32_t pipelinesMade() const { return pipelinesMade_; }
 
 private:

@@ -4,18 +4,16 @@
 
 namespace vcp {
 
+LightPass::LightPass() : pipelines_(kLightSpirv) {}
+
 Result<void> LightPass::prepare(FrameResources& resources, const PassConstants& constants) {
-    if (pipeline_.handle() != VK_NULL_HANDLE) return {};
     PassConstants plain = constants;
-    plain.colour = plain.countSteps = false;
-    auto made = resources.pipeline(kLightSpirv, plain);
-    if (!made) return made.error();
-    pipeline_ = std::move(*made);
-    return {};
+    plain.colour = plain.countSteps = plain.falseColour = false;
+    return pipelines_.choose(resources, plain);
 }
 
 void LightPass::record(VkCommandBuffer commands, const FrameResources& resources) const {
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_.handle());
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
     vkCmdDispatchIndirect(commands, resources.tileList().handle(), 0);
     barrierComputeToCompute(commands);
 }

@@ -9,15 +9,16 @@ namespace vcp {
 
 class LightPass {
 public:
+    LightPass();
     /// Makes the pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Forgets the pipeline: pools with another layout are to come.
-    void clear() { pipeline_ = {}; }
+    /// Pools with another layout are to come.
+    void clear() { pipelines_.clear(); }
 
 private:
-    ComputePipeline pipeline_;
+    PipelineVariants pipelines_;
 };
 
 }  // namespace vcp

@@ -4,22 +4,16 @@
 
 namespace vcp {
 
+ShadePass::ShadePass() : pipelines_(kShadeSpirv) {}
+
 Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants, bool light) {
-    ComputePipeline& variant = variants_[{constants.colour, false, light ? 1 : 0}];
-    if (variant.handle() == VK_NULL_HANDLE) {
-        PassConstants plain = constants;
-        plain.countSteps = false;
-        const uint32_t more[] = {light ? 1u : 0u};
-        auto made = resources.pipeline(kShadeSpirv, plain, more);
-        if (!made) return made.error();
-        variant = std::move(*made);
-    }
-    current_ = &variant;
-    return {};
+    PassConstants plain = constants;
+    plain.countSteps = false;
+    return pipelines_.choose(resources, plain, {light ? 1u : 0u});
 }
 
 void ShadePass::record(VkCommandBuffer commands, const FrameResources& resources) const {
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, current_->handle());
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
     vkCmdDispatchIndirect(commands, resources.tileList().handle(), 0);
     barrierComputeToReadback(commands);
 }

@@ -1,10 +1,7 @@
 // The picture from the hits (shaders/shade.comp).
-// Reads constants, tile list and starts, hits. Writes the picture's hit pixels. Before: the trace pass, with `light` also the light pass. After:
-// barrierComputeToReadback, recorded here.
+// Reads constants, tile list and starts, hits. Writes the picture's hit pixels. Before: the trace pass, with
+// `light` also the light pass. After: barrierComputeToReadback, recorded here.
 #pragma once
-
-#include <map>
-#include <tuple>
 
 #include "render/passes/frame_resources.h"
 
@@ -12,16 +9,16 @@ namespace vcp {
 
 class ShadePass {
 public:
+    ShadePass();
     /// Makes the variant's pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool light);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Forgets all variants: pools with another layout are to come.
-    void clear() { variants_.clear(); }
+    /// Pools with another layout are to come.
+    void clear() { pipelines_.clear(); }
 
 private:
-    std::map<std::tuple<bool, bool, uint32_t>, ComputePipeline> variants_;
-    const ComputePipeline* current_ = nullptr;
+    PipelineVariants pipelines_;
 };
 
 }  // namespace vcp

@@ -4,20 +4,14 @@
 
 namespace vcp {
 
+TracePass::TracePass() : pipelines_(kTraceSpirv) {}
+
 Result<void> TracePass::prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections) {
-    ComputePipeline& variant = variants_[{constants.colour, constants.countSteps, static_cast<uint32_t>(sections)}];
-    if (variant.handle() == VK_NULL_HANDLE) {
-        const uint32_t more[] = {static_cast<uint32_t>(sections)};
-        auto made = resources.pipeline(kTraceSpirv, constants, more);
-        if (!made) return made.error();
-        variant = std::move(*made);
-    }
-    current_ = &variant;
-    return {};
+    return pipelines_.choose(resources, constants, {static_cast<uint32_t>(sections)});
 }
 
 void TracePass::record(VkCommandBuffer commands, const FrameResources& resources) const {
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, current_->handle());
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
     vkCmdDispatchIndirect(commands, resources.tileList().handle(), 0);
     barrierComputeToCompute(commands);
 }

@@ -3,9 +3,6 @@
 // barrierComputeToCompute, recorded here.
 #pragma once
 
-#include <map>
-#include <tuple>
-
 #include "render/passes/frame_resources.h"
 
 namespace vcp {
@@ -15,16 +12,16 @@ enum class SectionKind : uint32_t { None, Open, Capped };
 
 class TracePass {
 public:
+    TracePass();
     /// Makes the variant's pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Forgets all variants: pools with another layout are to come.
-    void clear() { variants_.clear(); }
+    /// Pools with another layout are to come.
+    void clear() { pipelines_.clear(); }
 
 private:
-    std::map<std::tuple<bool, bool, uint32_t>, ComputePipeline> variants_;
-    const ComputePipeline* current_ = nullptr;
+    PipelineVariants pipelines_;
 };
 
 }  // namespace vcp

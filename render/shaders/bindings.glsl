@@ -15,6 +15,7 @@ layout(constant_id = 1) const uint kPoolChunks = 1u;
 layout(constant_id = 2) const uint kChunkShift = 26u;  // log2 of 16-byte texels a chunk
 layout(constant_id = 3) const uint kColour = 0u;
 layout(constant_id = 4) const uint kCountSteps = 0u;
+layout(constant_id = 5) const uint kFalseColour = 0u;
 
 layout(set = 0, binding = 0, std140) uniform FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1) uniform utextureBuffer poolTexels[kMaxPoolChunks];

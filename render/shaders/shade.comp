@@ -6,7 +6,7 @@
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/hit_records.glsl"
 
-layout(constant_id = 5) const uint kLight = 0u;  // 1: the hits have a plane of light
+layout(constant_id = 6) const uint kLight = 0u;  // 1: the hits have a plane of light
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // Blue through green to red.
@@ -46,9 +46,9 @@ void main() {
     uint plane = frame.picture.x * frame.picture.y;
     PixelHit hit = fetchPixelHit(at);
     float depth = hit.depth;
-    bool ofWork = frame.mode.w == kShadeSteps || frame.mode.w == kShadeFetches;
+    bool ofWork = kFalseColour != 0u && (frame.mode.w == kShadeSteps || frame.mode.w == kShadeFetches);
     if (depth >= kNoHit && !ofWork) return;
-    if (frame.mode.w >= kShadeSteps) {
+    if (kFalseColour != 0u) {
         float value = uintBitsToFloat(fetchHit(frame.extra.x * plane + at));
         picturePixels[at] = packUnorm4x8(vec4(heat(value), 1.0));
         return;

@@ -10,7 +10,7 @@
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
 
-layout(constant_id = 5) const uint kSections = 0u;  // 0: none; 1: planes that cut; 2: with filled caps
+layout(constant_id = 6) const uint kSections = 0u;  // 0: none; 1: planes that cut; 2: with filled caps
 layout(local_size_x = 8, local_size_y = 8) in;
 
 const uint kMostCrossings = 64u;
@@ -104,7 +104,7 @@ void main() {
     hits[at] = floatBitsToUint(onCap ? -hit.depth : hit.depth);
     hits[plane + at] = packHitNormal(hit.normal);
     if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(hit.colour);
-    if (frame.mode.w >= kShadeSteps) hits[frame.extra.x * plane + at] = floatBitsToUint(falseColour(hit, work));
+    if (kFalseColour != 0u) hits[frame.extra.x * plane + at] = floatBitsToUint(falseColour(hit, work));
 
     uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
     if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);
