@@ -147,10 +147,12 @@ private:
     }
 
     static bool overlap(const TrianglePrism& prism, const Triangle3& t) {
-        for (int s = 0; s < 3; ++s) {
-            const double a = glm::dot(prism.side[s], t[0]), b = glm::dot(prism.side[s], t[1]), c = glm::dot(prism.side[s], t[2]);
-            if (std::min(a, std::min(b, c)) >= prism.sideOffset[s]) return false;
-        }
+        TrianglePrism::Heights a, b, c;
+        prism.heights(t[0], a);
+        prism.heights(t[1], b);
+        prism.heights(t[2], c);
+        for (int s = 0; s < 3; ++s)
+            if (std::min(a[s], std::min(b[s], c[s])) >= 0) return false;
         return true;
     }
 
@@ -187,7 +189,7 @@ private:
         ownPrisms_.clear();
         for (size_t i = first; i < pieces_.size(); ++i) {
             double away = pieces_[i].stray;
-            for (const glm::dvec3& p : pieces_[i].corners) away = std::max(away, pieces_[i].stray + std::abs(glm::dot(prism.normal, p) - prism.offset));
+            for (const glm::dvec3& p : pieces_[i].corners) away = std::max(away, pieces_[i].stray + prism.away(p));
             order_.push_back({away, static_cast<uint32_t>(ownPrisms_.size())});
             ownPrisms_.emplace_back(pieces_[i].corners, pieces_[i].stray);
         }
@@ -251,7 +253,7 @@ void StrayBound::boundFine(size_t k) {
     order_.clear();
     for (const uint32_t c : near_) {
         double away = 0;
-        for (const glm::dvec3& p : t) away = std::max(away, std::abs(glm::dot(prisms_[c].normal, p) - prisms_[c].offset));
+        for (const glm::dvec3& p : t) away = std::max(away, prisms_[c].away(p));
         order_.push_back({away, c});
     }
     std::sort(order_.begin(), order_.end());

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "builder/wider_clones.h"
+
 namespace vcp {
 
 namespace {
@@ -32,38 +34,47 @@ struct TriangleCover::Polygon {
     int count = 0;
     std::array<glm::dvec3, kMost> p;
 
-    Polygon() = default;
-    // Only the corners that there are: most polygons have three to six.
-    Polygon(const Polygon& o) : count(o.count) { std::copy_n(o.p.begin(), count, p.begin()); }
-    Polygon& operator=(const Polygon& o) {
-        count = o.count;
-        std::copy_n(o.p.begin(), count, p.begin());
-        return *this;
-    }
-
     void add(glm::dvec3 q) { p[count++] = q; }
-    /// Whether it has a part inside of all sides of a prism, each taken alone.
-    [[nodiscard]] bool reachesInto(const TrianglePrism& prism) const {
-        for (int s = 0; s < 3; ++s) {
-            double least = std::numeric_limits<double>::infinity();
-            for (int i = 0; i < count; ++i) least = std::min(least, glm::dot(prism.side[s], p[i]) - prism.sideOffset[s]);
-            if (least >= -kThin) return false;
+};
+
+/// Heights of a polygon's corners over a prism's planes, with the least and the largest over each plane.
+struct TriangleCover::PolygonHeights {
+    TrianglePrism::Heights of[Polygon::kMost], low, high;
+
+    void measure(const TrianglePrism& prism, const Polygon& polygon) {
+        prism.heights(polygon.p[0], of[0]);
+        low = high = of[0];
+        for (int i = 1; i < polygon.count; ++i) {
+            prism.heights(polygon.p[i], of[i]);
+            low = of[i] < low ? of[i] : low;
+            high = of[i] > high ? of[i] : high;
         }
-        return true;
     }
+    /// Whether the polygon has a part inside of all sides, each taken alone.
+    [[nodiscard]] bool reachInto() const { return low[0] < -kThin && low[1] < -kThin && low[2] < -kThin; }
+    /// Least and largest distance from the triangle's own plane.
+    [[nodiscard]] double nearest() const { return low[TrianglePrism::kOwn] > 0 ? low[TrianglePrism::kOwn] : high[TrianglePrism::kOwn] < 0 ? -high[TrianglePrism::kOwn] : 0; }
+    [[nodiscard]] double farthest() const { return std::max(high[TrianglePrism::kOwn], -low[TrianglePrism::kOwn]); }
+};
+
+/// What a prism's sides, one after the other, cut a polygon into.
+struct TriangleCover::Pieces {
+    std::array<Polygon, 3> inside, outside;
+    double beside = 0;  ///< how far what is left at the end is outside of a side
 };
 
 TrianglePrism::TrianglePrism(const Triangle3& t, double more) : corners(t), extra(more) {
-    normal = glm::normalize(glm::cross(t[1] - t[0], t[2] - t[0]));
-    offset = glm::dot(normal, t[0]);
-    for (int i = 0; i < 3; ++i) {
-        side[i] = glm::normalize(glm::cross(t[(i + 1) % 3] - t[i], normal));
-        sideOffset[i] = glm::dot(side[i], t[i]);
+    std::array<glm::dvec3, kPlanes> plane;
+    plane[kOwn] = glm::normalize(glm::cross(t[1] - t[0], t[2] - t[0]));
+    for (int i = 0; i < 3; ++i) plane[i] = glm::normalize(glm::cross(t[(i + 1) % 3] - t[i], plane[kOwn]));
+    for (int i = 0; i < kPlanes; ++i) {
+        x[i] = plane[i].x, y[i] = plane[i].y, z[i] = plane[i].z;
+        offset[i] = glm::dot(plane[i], t[i % 3]);
     }
     // The sides moved out by x meet x / sin(half the angle) from the corner; the sine of a whole angle is the
     // length of the cross product.
     double sine = 1;
-    for (int i = 0; i < 3; ++i) sine = std::min(sine, glm::length(glm::cross(side[i], side[(i + 1) % 3])));
+    for (int i = 0; i < 3; ++i) sine = std::min(sine, glm::length(glm::cross(plane[i], plane[(i + 1) % 3])));
     isNeedle = sine < kNeedle;
     cornerFactor = isNeedle ? 2 / kNeedle : 2 / sine;
 }
@@ -84,8 +95,10 @@ double TriangleCover::bound(const Triangle3& triangle, std::span<const TriangleP
         double distance = 0;
         bool inside = !o.isNeedle;
         for (int c = 0; c < 3 && inside; ++c) {
-            for (int s = 0; s < 3; ++s) inside = inside && glm::dot(o.side[s], triangle[c]) - o.sideOffset[s] <= kThin;
-            distance = std::max(distance, std::abs(glm::dot(o.normal, triangle[c]) - o.offset));
+            TrianglePrism::Heights h;
+            o.heights(triangle[c], h);
+            inside = h[0] <= kThin && h[1] <= kThin && h[2] <= kThin;
+            distance = std::max(distance, std::abs(h[TrianglePrism::kOwn]));
         }
         if (inside && distance + o.extra <= enough_) return record({distance + o.extra, i});
     }
@@ -94,66 +107,54 @@ double TriangleCover::bound(const Triangle3& triangle, std::span<const TriangleP
     return cover(whole, 0, {});
 }
 
-double TriangleCover::cover(const Polygon& polygon, size_t first, Match best) {
+WIDER_CLONES double TriangleCover::cover(const Polygon& polygon, size_t first, Match best) {
+    PolygonHeights heights;
     for (size_t j = first; j < others_.size(); ++j) {
         const TrianglePrism& o = *others_[j];
         if (o.isNeedle || o.extra >= best.distance || polygon.count + 3 > Polygon::kMost) continue;
-        double low = std::numeric_limits<double>::infinity(), high = -low;
-        for (int i = 0; i < polygon.count; ++i) {
-            const double d = glm::dot(o.normal, polygon.p[i]) - o.offset;
-            low = std::min(low, d);
-            high = std::max(high, d);
-        }
-        const double nearest = low > 0 ? low : high < 0 ? -high : 0, farthest = std::max(high, -low);
-        if (nearest + o.extra >= best.distance) continue;
-        if (!polygon.reachesInto(o)) continue;
+        heights.measure(o, polygon);
+        if (heights.nearest() + o.extra >= best.distance || !heights.reachInto()) continue;
         // Over a ridge the prisms leave a wedge: what is little outside counts as inside, with its distance.
-        const double room = std::max(kThin, std::min(kMostBeside, kBeside * farthest) / o.cornerFactor);
-        Polygon rest = polygon;
-        std::array<Polygon, 3> outside;
-        double beside = 0;
-        if (!split(o, room, rest, outside, beside)) continue;
+        const double room = std::max(kThin, std::min(kMostBeside, kBeside * heights.farthest()) / o.cornerFactor);
+        Pieces pieces;
+        const Polygon* rest = split(o, room, polygon, heights, pieces);
+        if (!rest) continue;
         double most = 0;
-        for (const Polygon& out : outside)
+        for (const Polygon& out : pieces.outside)
             if (out.count > 0) most = std::max(most, cover(out, j + 1, best));
-        double above = 0;
-        for (int i = 0; i < rest.count; ++i) above = std::max(above, std::abs(glm::dot(o.normal, rest.p[i]) - o.offset));
-        beside = beside > kThin ? beside * o.cornerFactor : 0;
+        const double above = heights.farthest();
+        const double beside = pieces.beside > kThin ? pieces.beside * o.cornerFactor : 0;
         const double distance = std::sqrt(above * above + beside * beside) + o.extra;
         if (distance < best.distance) best = {distance, j};
-        return std::max(most, best.distance <= enough_ ? record(best) : cover(rest, j + 1, best));
+        return std::max(most, best.distance <= enough_ ? record(best) : cover(*rest, j + 1, best));
     }
     return settle(polygon, best, kHalvings);
 }
 
-/// Cuts off what is farther than `room` outside the prism, side by side; false where nothing is left in it.
-/// `most`: how far what is left is outside of a side.
-bool TriangleCover::split(const TrianglePrism& o, double room, Polygon& inside, std::array<Polygon, 3>& outside, double& most) const {
-    std::array<double, Polygon::kMost> v;
+/// Cuts off what is farther than `room` outside the prism, side by side. What is left; null where that is nothing.
+/// `heights`: of the polygon, then of what is left.
+WIDER_CLONES const TriangleCover::Polygon* TriangleCover::split(const TrianglePrism& o, double room, const Polygon& polygon, PolygonHeights& heights, Pieces& pieces) {
+    const Polygon* left = &polygon;
     for (int s = 0; s < 3; ++s) {
-        double largest = -std::numeric_limits<double>::infinity();
-        for (int i = 0; i < inside.count; ++i) {
-            v[i] = glm::dot(o.side[s], inside.p[i]) - o.sideOffset[s];
-            largest = std::max(largest, v[i]);
-        }
-        if (largest <= room) {
-            most = std::max(most, largest);
+        if (heights.high[s] <= room) {
+            pieces.beside = std::max(pieces.beside, heights.high[s]);
             continue;
         }
-        Polygon in;
-        Polygon& out = outside[s];
-        for (int i = 0; i < inside.count; ++i) {
-            const int next = i + 1 < inside.count ? i + 1 : 0;
-            (v[i] > 0 ? out : in).add(inside.p[i]);
-            if ((v[i] > 0) == (v[next] > 0)) continue;
-            const glm::dvec3 cut = inside.p[i] + (inside.p[next] - inside.p[i]) * (v[i] / (v[i] - v[next]));
+        Polygon &in = pieces.inside[s], &out = pieces.outside[s];
+        for (int i = 0; i < left->count; ++i) {
+            const int next = i + 1 < left->count ? i + 1 : 0;
+            const double value = heights.of[i][s], after = heights.of[next][s];
+            (value > 0 ? out : in).add(left->p[i]);
+            if ((value > 0) == (after > 0)) continue;
+            const glm::dvec3 cut = left->p[i] + (left->p[next] - left->p[i]) * (value / (value - after));
             in.add(cut);
             out.add(cut);
         }
-        inside = in;
-        if (inside.count == 0) return false;
+        if (in.count == 0) return nullptr;
+        left = &in;
+        heights.measure(o, in);
     }
-    return true;
+    return left;
 }
 
 /// No prism is left to try: the convex bound, and where that is poor, that of halves.
@@ -162,11 +163,16 @@ double TriangleCover::settle(const Polygon& polygon, Match best, int halvings) {
         const TrianglePrism& o = *others_[j];
         const double limit = best.distance - o.extra;
         if (limit <= 0) continue;
+        // A corner is at least as far from the triangle as from the prism's planes.
+        const auto isBeyond = [&](glm::dvec3 p) {
+            TrianglePrism::Heights h;
+            o.heights(p, h);
+            const double beside = std::max(std::max(h[0], h[1]), std::max(h[2], 0.0)), farther = limit + kThin;
+            return std::abs(h[TrianglePrism::kOwn]) >= limit || h[TrianglePrism::kOwn] * h[TrianglePrism::kOwn] + beside * beside >= farther * farther;
+        };
         double squared = 0;
-        for (int i = 0; i < polygon.count && squared < limit * limit; ++i) {
-            const double above = glm::dot(o.normal, polygon.p[i]) - o.offset;
-            squared = std::abs(above) < limit ? std::max(squared, closestOnTriangle(polygon.p[i], o.corners).squared) : limit * limit;
-        }
+        for (int i = 0; i < polygon.count && squared < limit * limit; ++i)
+            squared = isBeyond(polygon.p[i]) ? limit * limit : std::max(squared, closestOnTriangle(polygon.p[i], o.corners).squared);
         if (squared < limit * limit) best = {std::sqrt(squared) + o.extra, j};
     }
     if (best.distance <= enough_ || halvings == 0 || polygon.count + 1 > Polygon::kMost) return record(best);

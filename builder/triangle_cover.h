@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -19,11 +20,13 @@ namespace vcp {
 
 /// A triangle with its plane and, upright on it, a plane through each edge (positive outside).
 struct TrianglePrism {
+    static constexpr int kPlanes = 4, kOwn = 3;  ///< the sides come first
+    /// One value a plane, in a vector register. Passed by reference only: by value it would depend on the processor,
+    /// as the alignment would if it were not given.
+    using Heights = double __attribute__((vector_size(kPlanes * sizeof(double)), aligned(kPlanes * sizeof(double))));
+
     Triangle3 corners;
-    glm::dvec3 normal{0};
-    double offset = 0;
-    std::array<glm::dvec3, 3> side;
-    std::array<double, 3> sideOffset{};
+    Heights x{}, y{}, z{}, offset{};  ///< the planes' unit normals, by axis, and their offsets
     double extra = 0;         ///< added to distances to it
     double cornerFactor = 1;  ///< a point x outside all of its sides at once is at most x times this off
     bool isNeedle = false;    ///< too thin for its prism to be certain; measured by the convex bound alone
@@ -31,6 +34,11 @@ struct TrianglePrism {
     TrianglePrism() = default;
     /// `corners` must span an area.
     explicit TrianglePrism(const Triangle3& corners, double extra = 0);
+
+    /// Of a point, over each plane.
+    void heights(glm::dvec3 p, Heights& h) const { h = x * p.x + y * p.y + z * p.z - offset; }
+    /// Distance of a point from the triangle's own plane.
+    [[nodiscard]] double away(glm::dvec3 p) const { return std::abs(x[kOwn] * p.x + y[kOwn] * p.y + z[kOwn] * p.z - offset[kOwn]); }
 };
 
 class TriangleCover {
@@ -45,12 +53,14 @@ public:
 
 private:
     struct Polygon;
+    struct PolygonHeights;
     struct Match {
         double distance = std::numeric_limits<double>::infinity();
         size_t other = 0;
     };
     double cover(const Polygon& polygon, size_t first, Match best);
-    bool split(const TrianglePrism& other, double room, Polygon& inside, std::array<Polygon, 3>& outside, double& most) const;
+    struct Pieces;
+    static const Polygon* split(const TrianglePrism& other, double room, const Polygon& polygon, PolygonHeights& heights, Pieces& pieces);
     double settle(const Polygon& polygon, Match best, int halvings);
     double record(const Match& match);
 
