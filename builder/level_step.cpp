@@ -15,6 +15,8 @@
 namespace vcp {
 
 Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
+    // Where all pages are one bin's, none needs to be looked for.
+    if (sink_.partition_.bins() == 1) return batch_.add(0, t);
     // A triangle seldom spans more than two bins: the list of those seen is short.
     touched_.clear();
     sink_.grid_.forPagesNear(t.corner, kStepMarginCells, [&](uint64_t page) {
