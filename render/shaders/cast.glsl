@@ -1,4 +1,4 @@
-// Casting a ray through the pages of the frame's cut: first hit with depth, normal and colour.
+// Casting a ray through the pages of the frame's cut: the first hit, and what is seen of it.
 //
 // Control flow is laid out for devices that run eight rays in lock step and skip nothing: what is rare
 // (triangles, changing the page) stands outside of the loops that are not.
@@ -11,10 +11,17 @@ const float kIntervalSlack = 1e-4;
 
 struct Hit {
     float depth;  // finest cells; kNoHit
-    vec3 normal;  // towards the ray's origin, not normalized
-    vec4 colour;
     uint record;  // of the page, in the table
     int pageBits; // log2 of the page's edge on the lattice
+    uint leaf;    // its node
+    vec4 at;      // soft: the point in leaf space, and f where the ray entered; hard: weights of the second and third vertex
+    uint triangle; // hard: its record
+};
+
+// What is seen of a hit.
+struct Surface {
+    vec3 normal;  // towards the ray's origin, not normalized
+    vec4 colour;
 };
 
 // Work of a ray; filled with kCountSteps only.
@@ -111,18 +118,10 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
     return local;
 }
 
-vec4 blendColours(uvec4 face0, uvec4 face1, vec3 x) {
-    vec4 w = faceWeights(x.y, x.z);
-    vec4 c0 = w.x * unpackUnorm4x8(face0.x) + w.y * unpackUnorm4x8(face0.y) + w.z * unpackUnorm4x8(face0.z) + w.w * unpackUnorm4x8(face0.w);
-    vec4 c1 = w.x * unpackUnorm4x8(face1.x) + w.y * unpackUnorm4x8(face1.y) + w.z * unpackUnorm4x8(face1.z) + w.w * unpackUnorm4x8(face1.w);
-    return mix(c0, c1, x.x);
-}
-
 // Distance along the page's ray of the crossing in a soft leaf, or -1.
 float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout uint fetches) {
-    uint axis = node >> kSoftAxisShift & 3u;
     uint face = page.sections.x + (node & kLeafIndexMask);
-    LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), axis);
+    LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), node >> kSoftAxisShift & 3u);
     if (kCountSteps != 0u) fetches += 2u;
     float scale = 1.0 / edge;  // a power of two: exact
     vec3 p = (s.from - lo) * scale;
@@ -130,12 +129,7 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     float wall = wallTolerance(node);
     RayField ray = restrictToRay(leaf, p, d);
     float u = firstCrossing(ray, s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
-    vec3 x = p + u * d;
-    hit.normal = facingNormal(leafNormal(leaf, x), d, rayValue(ray, 0.0));
-    if (kColour != 0u) {
-        uint colours = page.colours.x + (node & kLeafIndexMask);
-        hit.colour = blendColours(fetchColour(colours), fetchColour(colours + 1u), rotateToAxis(x, axis));
-    }
+    hit.at = vec4(p + u * d, rayValue(ray, 0.0));
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 
@@ -149,8 +143,6 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
     }
     float lowest = s.fromWall ? -kIntervalSlack : 0.0;
     float best = s.tauTo - s.tauFrom + kIntervalSlack;
-    vec2 weights = vec2(0.0);
-    uvec3 corners = uvec3(0u);
     bool found = false;
     for (uint i = 0u; i < count; i++) {
         uvec2 record = fetchPair(page.sections.y, first + i);
@@ -160,30 +152,70 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
         vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y), decodeVertex(c.x, c.y), kTriangleSlack);
         if (t.x >= lowest && t.x <= best) {
             best = t.x;
-            weights = t.yz;
-            corners = v;
+            hit.at.xy = t.yz;
+            hit.triangle = first + i;
             found = true;
         }
     }
-    uvec2 a = fetchPair(page.sections.z, corners.x), b = fetchPair(page.sections.z, corners.y), c = fetchPair(page.sections.z, corners.z);
+    return found ? max(s.tauFrom + best, 0.0) : -1.0;
+}
+
+vec4 blendColours(uvec4 face0, uvec4 face1, vec3 x) {
+    vec4 w = faceWeights(x.y, x.z);
+    vec4 c0 = w.x * unpackUnorm4x8(face0.x) + w.y * unpackUnorm4x8(face0.y) + w.z * unpackUnorm4x8(face0.z) + w.w * unpackUnorm4x8(face0.w);
+    vec4 c1 = w.x * unpackUnorm4x8(face1.x) + w.y * unpackUnorm4x8(face1.y) + w.z * unpackUnorm4x8(face1.z) + w.w * unpackUnorm4x8(face1.w);
+    return mix(c0, c1, x.x);
+}
+
+Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
+    uint axis = hit.leaf >> kSoftAxisShift & 3u;
+    uint face = hit.leaf & kLeafIndexMask;
+    LeafField leaf = decodeLeaf(fetchTexel(faces + face), fetchTexel(faces + face + 1u), axis);
+    Surface surface;
+    surface.normal = facingNormal(leafNormal(leaf, hit.at.xyz), direction, hit.at.w);
+    surface.colour = vec4(0.0);
+    if (kColour != 0u)
+        surface.colour = blendColours(fetchColour(colourFaces + face), fetchColour(colourFaces + face + 1u), rotateToAxis(hit.at.xyz, axis));
+    return surface;
+}
+
+Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction) {
+    uvec2 record = fetchPair(sections.y, hit.triangle);
+    uvec3 corners = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
+    uvec2 a = fetchPair(sections.z, corners.x), b = fetchPair(sections.z, corners.y), c = fetchPair(sections.z, corners.z);
     vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
     vec3 flatNormal = cross(pb - pa, pc - pa);
     flatNormal *= inversesqrt(max(dot(flatNormal, flatNormal), 1e-30));
     flatNormal = turnedTo(flatNormal, -direction);
-    vec3 w = vec3(1.0 - weights.x - weights.y, weights);
-    vec3 normal = vec3(0.0);
-    vec4 colour = vec4(0.0);
+    vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
+    Surface surface = Surface(vec3(0.0), vec4(0.0));
     for (int i = 0; i < 3; i++) {
-        uint code = fetchWord(page.sections.w, corners[i]);
-        normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
+        uint code = fetchWord(sections.w, corners[i]);
+        surface.normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
         if (kColour != 0u)
-            colour += w[i] * unpackUnorm4x8(texelWord(fetchColour(page.colours.y + (corners[i] >> 2)), corners[i] & 3u));
+            surface.colour += w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (corners[i] >> 2)), corners[i] & 3u));
     }
-    if (found) {
-        hit.normal = normal;
-        hit.colour = colour;
+    return surface;
+}
+
+// Normal and colour of a hit. The page is looked up again: see descend() on what is loaded in a loop. A kind of
+// leaf that none of the rays in lock step has hit is skipped, which only a loop does everywhere.
+Surface surfaceAt(Hit hit, vec3 direction) {
+    Surface surface = Surface(vec3(0.0, 0.0, 1.0), vec4(0.0));
+    bool found = hit.depth < kNoHit;
+    uvec4 sections = fetchTable(hit.record * kRecordTexels + 1u);
+    uvec2 colours = kColour != 0u ? fetchTable(hit.record * kRecordTexels + 2u).xy : uvec2(0u);
+    bool soft = found && hit.leaf >> kNodeTypeShift == kNodeSoft;
+    while (soft) {
+        surface = softSurface(hit, sections.x, colours.x, direction);
+        soft = false;
     }
-    return found ? max(s.tauFrom + best, 0.0) : -1.0;
+    bool hard = found && hit.leaf >> kNodeTypeShift == kNodeHard;
+    while (hard) {
+        surface = hardSurface(hit, sections, colours.y, direction);
+        hard = false;
+    }
+    return surface;
 }
 
 // First hit in a page from distance `s` on, or kNoHit.
@@ -237,6 +269,7 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
         if (!at.inPage || found >= 0.0) break;
         found = castHard(page, descent.node, segment, local.direction, hit, fetches);
     }
+    hit.leaf = descent.node;
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
 }
 
@@ -249,7 +282,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
     float s = max(max(first, 0.0), from);
     ivec3 place = clamp(latticePoint(ray, s), ivec3(0), edge - 1);
 
-    Hit hit = Hit(kNoHit, vec3(0.0, 0.0, 1.0), vec4(0.0), 0u, 0);
+    Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), 0u);
     last = min(last, until);
     bool inside = s <= last;
     while (inside) {

@@ -42,8 +42,7 @@ bool isInside(Ray ray, inout Work work) {
 }
 
 // The first hit of what the section planes leave, and the caps.
-Hit castCut(Ray ray, float from, inout bool onCap, inout Work work) {
-    Interval kept = keptInterval(ray);
+Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work work) {
     Ray rest = movedAlong(ray, kept.first);
     float last = kept.last - kept.first;
     Hit hit = castRay(rest, max(from - kept.first, 0.0), last, work);
@@ -55,10 +54,7 @@ Hit castCut(Ray ray, float from, inout bool onCap, inout Work work) {
             onCap = isInside(rest, work);
             entering = false;
         }
-        if (onCap) {
-            hit.depth = 0.0;
-            hit.normal = kept.plane;
-        }
+        if (onCap) hit.depth = 0.0;
     }
     if (hit.depth < kNoHit) hit.depth += kept.first;
     return hit;
@@ -92,18 +88,26 @@ void main() {
     float from = fetchTileStart(tile);
     bool onCap = false;
     Hit hit;
-    if (kSections == 0u) hit = castRay(ray, from, kNoHit, work);
-    else hit = castCut(ray, from, onCap, work);
+    Surface surface;
+    if (kSections == 0u) {
+        hit = castRay(ray, from, kNoHit, work);
+        surface = surfaceAt(hit, ray.direction);
+    } else {
+        Interval kept = keptInterval(ray);
+        hit = castCut(ray, kept, from, onCap, work);
+        surface = surfaceAt(hit, ray.direction);
+        if (onCap) surface.normal = kept.plane;
+    }
 
     bool found = hit.depth < kNoHit;
     // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
-    hit.normal *= inversesqrt(max(dot(hit.normal, hit.normal), 1e-30));
-    hit.normal -= max(dot(hit.normal, ray.direction), 0.0) * ray.direction;
+    vec3 normal = surface.normal * inversesqrt(max(dot(surface.normal, surface.normal), 1e-30));
+    normal -= max(dot(normal, ray.direction), 0.0) * ray.direction;
     uint at = pixel.y * frame.picture.x + pixel.x;
     uint plane = frame.picture.x * frame.picture.y;
     hits[at] = floatBitsToUint(onCap ? -hit.depth : hit.depth);
-    hits[plane + at] = packHitNormal(hit.normal);
-    if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(hit.colour);
+    hits[plane + at] = packHitNormal(normal);
+    if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(surface.colour);
     if (kFalseColour != 0u) hits[frame.extra.x * plane + at] = floatBitsToUint(falseColour(hit, work));
 
     uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
