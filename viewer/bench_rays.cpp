@@ -203,7 +203,7 @@ private:
         RayClassTable classes;
         double seconds = 0, peerSeconds = 0;
         for (int view = 0; view < options_.views; ++view) {
-            const Camera camera = *benchCamera(name, *model.bvh, header.cell, options_.size, view, options_.views);
+            const Camera camera = *benchCamera(name, *model.bvh, {glm::dvec3(header.origin[0], header.origin[1], header.origin[2]), header.cell}, options_.size, view, options_.views);
             const auto traced = tracer.trace(camera, options_.size, options_.repetitions);
             if (!traced) return traced.error();
             seconds += traced->seconds;

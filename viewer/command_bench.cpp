@@ -237,7 +237,7 @@ RunCommand addBenchRays(CLI::App& bench) {
     app->add_option("--methods", command->methods, fmt::format("{} [all]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
     app->add_flag("--sweep", command->sweep,
                   "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the other octrees");
-    app->add_option("--cameras", command->cameras, "whole, half, close, cells [all]")->type_name("A,B")->delimiter(',');
+    app->add_option("--cameras", command->cameras, "whole, half, close, cells [these four]; lattice and grazing, which look for holes")->type_name("A,B")->delimiter(',');
     app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(
         CLI::Range(1, 1000));
     app->add_option("--size", command->size, "Rays across and down")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {

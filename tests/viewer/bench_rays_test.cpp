@@ -12,6 +12,7 @@
 #include "../builder/test_meshes.h"
 #include "vcp_program.h"
 #include "viewer/analytic_models.h"
+#include "viewer/bench_cameras.h"
 #include "viewer/bench_methods.h"
 #include "viewer/bench_rays.h"
 #include "viewer/paper_tables.h"
@@ -173,6 +174,28 @@ TEST(PaperTables, RatiosToThePaper) {
     EXPECT_NE(text.find("| here: shape | 1.00 | 0.50 | 0.25 | |"), std::string::npos) << text;
     EXPECT_NE(text.find("| here: shape | 1.00 | 0.60 | 0.90 | |"), std::string::npos) << text;
     EXPECT_NE(text.find("| published: David | 1.00 | 1.00 | 0.98 | 0.79 |"), std::string::npos) << text;
+}
+
+TEST(BenchCameras, RaysOfTheLatticeCameraRunThroughCorners) {
+    const MeshBvh bvh(test::sphereMesh({3, 4, 5}, 1, 24));
+    const CellGrid grid{{0.3, -0.2, 0.7}, 0.0625};
+    for (const glm::ivec2 size : {glm::ivec2(64, 40), glm::ivec2(33, 17)})
+        for (int view = 0; view < 26; ++view) {
+            const Camera camera = *benchCamera("lattice", bvh, grid, size, view, 26);
+            int throughCorners = 0;
+            for (int x = 0; x < size.x; ++x) {
+                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, size.y / 2 + 0.5);
+                // The corner nearest to the mesh's middle, moved sideways by whole cells, lies on every fourth ray.
+                const double t = glm::dot(glm::dvec3(3, 4, 5) - ray.origin, ray.direction);
+                double nearest = 1;
+                for (double s = t - 2 * grid.cell; s < t + 2 * grid.cell; s += grid.cell / 256) {
+                    const glm::dvec3 p = (ray.origin + s * ray.direction - grid.origin) / grid.cell;
+                    nearest = std::min(nearest, glm::distance(p, glm::round(p)));
+                }
+                throughCorners += nearest < 0.005 ? 1 : 0;
+            }
+            EXPECT_GE(throughCorners, size.x / 8) << view;
+        }
 }
 
 }  // namespace

@@ -144,7 +144,7 @@ TEST_F(PeersOnASphere, CountersAndHitsAreTheSameOnAnyThreads) {
     ASSERT_TRUE(caster && again);
     EXPECT_EQ(caster->bytes(), again->bytes());
     const glm::ivec2 size(60, 40);
-    const Camera camera = *benchCamera("whole", bvh_, 1, size, 0, 1);
+    const Camera camera = *benchCamera("whole", bvh_, {}, size, 0, 1);
     PeerTracer<AnalyticCaster> one(std::make_shared<AnalyticCaster>(*caster), "cell 1", 1),
         four(std::make_shared<AnalyticCaster>(*again), "cell 1", 4);
     const auto a = one.trace(camera, size, 1), b = four.trace(camera, size, 2);
