@@ -95,13 +95,14 @@ private:
         if (!normals) return normals.error();
         // A coarser page's error projects to at most errorPixels where the page is nearest: no more than this
         // many world units at the hit.
+        const bool parallel = camera.projection == Projection::Orthographic;
         const double perPixel =
             2 * cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y)).halfHeight / size.y;
         picture.hits.resize(depth->size());
         for (size_t i = 0; i < depth->size(); ++i) {
             const double t = (*depth)[i];
             if (!std::isfinite(t)) continue;
-            const double allowed = std::max(certifiedError_, errorPixels * perPixel * t);
+            const double allowed = std::max(certifiedError_, errorPixels * perPixel * (parallel ? 1 : t));
             picture.hits[i] = SurfaceHit{t, glm::dvec3((*normals)[i]), allowed};
         }
         return {};

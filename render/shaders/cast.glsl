@@ -8,6 +8,7 @@
 const int kIllinoisSteps = 8;
 const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
 const float kIntervalSlack = 1e-4;
+const float kLastBelowOne = 0.99999994;
 
 struct Hit {
     float depth;  // finest cells; kNoHit
@@ -43,28 +44,33 @@ struct Page {
 // Exact powers of two.
 float powerOfTwo(int exponent) { return uintBitsToFloat(uint(127 + exponent) << 23); }
 
-// Steps from a box of the lattice to its neighbour across the face that the ray leaves by.
-ivec3 stepAcross(Ray ray, ivec3 corner, int bits, inout float s) {
-    ivec3 edge = ivec3(1 << bits);
-    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
-    vec3 t = planeDistances(ray, mix(corner, corner + edge, ahead));
-    float nearest = minOf(t);
-    s = max(s, nearest);
-    ivec3 sideways = clamp(latticePoint(ray, s), corner, corner + edge - 1);
-    return mix(sideways, mix(corner - 1, corner + edge, ahead), equal(t, vec3(nearest)));
+// How far the ray has come: along each axis, planes up to this distance are behind it. The three differ by the last
+// bit at most: a ray through an edge or a corner crosses one plane after the other, so that it meets the pages beside
+// the edge too (as leaveBox does with leaves).
+vec3 reachedBehind(float s, vec3 crossed) {
+    float before = s > 0.0 ? uintBitsToFloat(floatBitsToUint(s) - 1u) : -1e-30;
+    bvec3 first = equal(crossed, vec3(s));
+    return vec3(s, first.x ? before : s, first.x || first.y ? before : s);
 }
 
-bool outsideRoot(ivec3 p) { return ((p.x | p.y | p.z) >> kLatticeBits) != 0; }
+// Beyond the wall by which the ray leaves a box of the lattice.
+vec3 leaveLatticeBox(Ray ray, ivec3 corner, int bits) {
+    vec3 t = planeDistances(ray, mix(corner, corner + (1 << bits), greaterThan(ray.direction, vec3(0.0))));
+    return reachedBehind(minOf(t), t);
+}
 
-// Goes down the frame's page tree to the page at `place`, stepping over octants without one. False: the ray
-// leaves the root.
-bool findPage(Ray ray, inout ivec3 place, inout float s, out Page page, inout uint steps) {
+// Goes down the frame's page tree to the page that the ray has reached, stepping over octants without one. False:
+// nothing before `last`. The side of a plane that the ray is on is told by the distance to the plane, never by
+// a rounded place: a ray in a wall, or nearly parallel to it, would be sent to a page that it enters much later.
+bool findPage(Ray ray, inout vec3 reached, float last, out Page page, inout uint steps) {
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     uint node = 0u;
     uvec4 record = uvec4(0u);
     bool inside = true;
     while (inside && (record.x & kRecordInCut) == 0u) {
         // Down to a page of the cut or an octant without one.
         node = 0u;
+        page.corner = ivec3(0);
         page.bits = int(kLatticeBits);
         bool exists = true;
         record.x = 0u;
@@ -73,14 +79,16 @@ bool findPage(Ray ray, inout ivec3 place, inout float s, out Page page, inout ui
             if (kCountSteps != 0u) steps++;
             if ((record.x & kRecordInCut) == 0u) {
                 page.bits--;
-                uint octant = octantAt(place, page.bits);
+                ivec3 upper = ivec3(equal(ahead, lessThanEqual(planeDistances(ray, page.corner + (1 << page.bits)), reached)));
+                page.corner += upper << page.bits;
+                uint octant = uint(upper.x | upper.y << 1 | upper.z << 2);
                 exists = (record.x >> octant & 1u) != 0u;
                 node = record.y + bitCount(record.x & ((1u << octant) - 1u));
             }
         }
         if (!exists) {
-            place = stepAcross(ray, place >> page.bits << page.bits, page.bits, s);
-            inside = !outsideRoot(place);
+            reached = leaveLatticeBox(ray, page.corner, page.bits);
+            inside = reached.x < last;
         }
     }
     page.root = record.z;
@@ -88,12 +96,12 @@ bool findPage(Ray ray, inout ivec3 place, inout float s, out Page page, inout ui
     page.sections = fetchTable(node * kRecordTexels + 1u);
     page.colours = kColour != 0u ? fetchTable(node * kRecordTexels + 2u).xy : uvec2(0u);
     page.record = node;
-    page.corner = place >> page.bits << page.bits;
     page.cell = powerOfTwo(int(frame.mode.y) + page.bits - int(kLatticeBits));
     return inside;
 }
 
-// The ray in page space. Both points at the page's walls come from the lattice, as its neighbours see them.
+// The ray in page space. Both points at the page's walls come from the lattice, as its neighbours see them. No point
+// is rounded onto a wall that the ray leaves by elsewhere: there its walk would end.
 PageRay enterPage(Ray ray, Page page, out float sStart) {
     ivec3 edge = ivec3(1 << page.bits);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
@@ -103,16 +111,18 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
     sStart = max(first, 0.0);
     ivec3 from = clamp(latticePoint(ray, sStart), page.corner, page.corner + edge);
     ivec3 to = clamp(latticePoint(ray, last), page.corner, page.corner + edge);
-    if (first > 0.0) from = mix(from, nearWalls, equal(t0, vec3(first)));
-    to = mix(to, farWalls, equal(t1, vec3(last)));
     float toCells = powerOfTwo(int(frame.mode.x) - page.bits);
     PageRay local;
-    local.start = vec3(from - page.corner) * toCells;
-    local.exit = vec3(to - page.corner) * toCells;
-    local.direction = ray.direction;
-    local.inverse = ray.inverse;
     local.cells = float(1u << frame.mode.x);
     local.farWalls = mix(vec3(0.0), vec3(local.cells), ahead);
+    float inward = kLastBelowOne * local.cells;
+    vec3 low = mix(vec3(local.cells - inward), vec3(0.0), ahead), high = mix(vec3(local.cells), vec3(inward), ahead);
+    local.start = clamp(vec3(from - page.corner) * toCells, low, high);
+    if (first > 0.0) local.start = mix(local.start, local.cells - local.farWalls, equal(t0, vec3(first)));
+    local.exit = clamp(vec3(to - page.corner) * toCells, low, high);
+    local.exit = mix(local.exit, local.farWalls, equal(t1, vec3(last)));
+    local.direction = ray.direction;
+    local.inverse = ray.inverse;
     local.tauExit = (last - sStart) / page.cell;
     local.beginsHere = first <= 0.0;
     return local;
@@ -261,7 +271,7 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
                 if (!isEmpty) break;
             }
             if (!at.inPage) break;
-            segment = segmentInLeaf(local, lo, edge);
+            segment = segmentInLeaf(local, lo, edge, at.tau);
             if (descent.node >> kNodeTypeShift == kNodeHard) break;
             found = castSoft(page, descent.node, lo, edge, segment, hit, fetches);
             if (found >= 0.0) break;
@@ -276,24 +286,22 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
 // First hit of the ray in the dataset at distance `from` or farther. Pages from `until` on are not looked at.
 Hit castRay(Ray ray, float from, float until, inout Work work) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
-    ivec3 edge = ivec3(1 << kLatticeBits);
-    float first = maxOf(planeDistances(ray, mix(edge, ivec3(0), ahead)));
-    float last = minOf(planeDistances(ray, mix(ivec3(0), edge, ahead)));
-    float s = max(max(first, 0.0), from);
-    ivec3 place = clamp(latticePoint(ray, s), ivec3(0), edge - 1);
+    ivec3 root = ivec3(1 << kLatticeBits);
+    float first = maxOf(planeDistances(ray, mix(root, ivec3(0), ahead)));
+    float last = min(minOf(planeDistances(ray, mix(ivec3(0), root, ahead))), until);
+    vec3 reached = vec3(max(max(first, 0.0), from));
 
     Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), 0u);
-    last = min(last, until);
-    bool inside = s <= last;
+    bool inside = reached.x < last;
     while (inside) {
         Page page;
-        if (!findPage(ray, place, s, page, work.steps)) break;
+        if (!findPage(ray, reached, last, page, work.steps)) break;
         hit.record = page.record;
         hit.pageBits = page.bits;
-        hit.depth = castPage(ray, page, s, hit, work.steps, work.fetches);
+        hit.depth = castPage(ray, page, reached.x, hit, work.steps, work.fetches);
         if (hit.depth < kNoHit) break;
-        place = stepAcross(ray, page.corner, page.bits, s);
-        inside = !outsideRoot(place) && s <= last;
+        reached = leaveLatticeBox(ray, page.corner, page.bits);
+        inside = reached.x < last;
     }
     return hit;
 }

@@ -71,13 +71,16 @@ void ascend(inout Descent at, ivec3 from, ivec3 to, uint rootGroup, int rootBits
     at.bits = lost ? rootBits : at.bits + max(up, 0);
 }
 
-// Leaves the box lo..hi, which the ray is in, by the wall it meets first.
+// Leaves the box lo..hi, which the ray is in, by the wall it meets first; by one wall where it meets several at once:
+// what bridges the difference between two leaves at their common wall is in these two, so a ray through an edge has
+// to meet a leaf beside it.
 Place leaveBox(PageRay ray, Place from, vec3 lo, vec3 hi) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     vec3 walls = mix(lo, hi, ahead);
     vec3 t = (walls - ray.start) * ray.inverse;
     float nearest = minOf(t);
     bvec3 through = equal(t, vec3(nearest));
+    through = bvec3(through.x, through.y && !through.x, through.z && !through.y && !through.x);
     Place to;
     to.tau = max(from.tau, nearest);
     vec3 p = clamp(ray.start + to.tau * ray.direction, lo, hi);
@@ -90,19 +93,21 @@ Place leaveBox(PageRay ray, Place from, vec3 lo, vec3 hi) {
 }
 
 // The part of the ray inside a leaf. A function of ray, page and leaf alone: however the walk came here, the
-// same leaf gives the same answer; neighbours evaluate the same points at the wall between them.
+// same leaf gives the same answer; neighbours evaluate the same points at the wall between them. Only where
+// rounding has sent a ray along a wall to the wrong side of it does the leaf begin where the walk is (`tau`), not
+// where the ray crosses that wall, far ahead.
 struct LeafSegment {
     vec3 from, to;  // page space
     float tauFrom, tauTo;
     bool fromWall;  // false where the ray begins inside the leaf
 };
 
-LeafSegment segmentInLeaf(PageRay ray, vec3 lo, float edge) {
+LeafSegment segmentInLeaf(PageRay ray, vec3 lo, float edge, float tau) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     vec3 hi = lo + edge;
     vec3 nearWalls = mix(hi, lo, ahead), farWalls = mix(lo, hi, ahead);
     vec3 t0 = (nearWalls - ray.start) * ray.inverse, t1 = (farWalls - ray.start) * ray.inverse;
-    float first = maxOf(t0), last = minOf(t1);
+    float first = min(maxOf(t0), tau), last = minOf(t1);
     LeafSegment s;
     s.fromWall = first > 0.0 || !ray.beginsHere;
     s.tauFrom = max(first, 0.0);

@@ -23,12 +23,16 @@ Ray rayAt(vec2 point) {
 
 // Lattice plane minus the ray's origin, in finest cells: one rounding of an exact difference.
 vec3 fromOrigin(Ray ray, ivec3 planes) {
-    return vec3(planes - frame.originLattice.xyz) * frame.lattice.y - ray.origin;
+    precise vec3 difference = vec3(planes - frame.originLattice.xyz) * frame.lattice.y - ray.origin;
+    return difference;
 }
 
 // Distances to three lattice planes. Depends on nothing but the ray and the planes, so that all who ask get
 // the same answer.
-vec3 planeDistances(Ray ray, ivec3 planes) { return fromOrigin(ray, planes) * ray.inverse; }
+vec3 planeDistances(Ray ray, ivec3 planes) {
+    precise vec3 distances = fromOrigin(ray, planes) * ray.inverse;
+    return distances;
+}
 
 // The lattice point next to the ray's point at distance s.
 ivec3 latticePoint(Ray ray, float s) {
