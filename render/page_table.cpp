@@ -25,7 +25,7 @@ std::vector<Part> partsOf(const Dataset& dataset, std::span<const uint64_t> cut)
 void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, float errorCells) {
     const PageSections sections = pageSections(page.header);
     const auto texelOf = [&](uint64_t byte) { return page.texel + static_cast<uint32_t>(byte / 16); };
-    record[0] = {frame::kRecordInCut, 0, page.header.root, page.texel};
+    record[0] = {frame::kRecordResident, 0, page.header.root, page.texel};
     record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices), texelOf(sections.normals)};
     record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), std::bit_cast<uint32_t>(errorCells)};
 }
@@ -33,7 +33,7 @@ void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, flo
 }  // namespace
 
 std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
-                                  const std::function<ResidentPage(uint64_t)>& pageOf) {
+                                  const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf) {
     if (cut.empty()) return std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
     const std::vector<Part> parts = partsOf(dataset, cut);
     // Breadth first, so that the children of a page stand together.
@@ -42,10 +42,12 @@ std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64
     for (size_t next = 0; next < order.size(); ++next) {
         const uint64_t page = order[next];
         glm::uvec4 record[frame::kRecordTexels] = {};
+        const PageEntry& entry = dataset.pages[page];
+        if (const auto resident = pageOf(page))
+            writePage(record, *resident, page, static_cast<float>(double(entry.certifiedError) / dataset.header.cell));
         if (parts[page] == Part::Cut) {
-            writePage(record, pageOf(page), page, static_cast<float>(double(dataset.pages[page].certifiedError) / dataset.header.cell));
+            record[0].x |= frame::kRecordInCut;
         } else {
-            const PageEntry& entry = dataset.pages[page];
             record[0].y = static_cast<uint32_t>(order.size());
             uint64_t child = entry.firstChild;
             for (uint32_t octant = 0; octant < 8; ++octant) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,8 +22,9 @@ struct ResidentPage {
 };
 
 /// Texels of the table, three a record, the root's first. `cut`: numbers of pages, none above another;
-/// `pageOf(page)`: of a page of the cut. An empty cut gives a root without children.
+/// `pageOf(page)`: of a page of the cut, or of one above it if it is resident. An empty cut gives a root without
+/// children.
 std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
-                                  const std::function<ResidentPage(uint64_t)>& pageOf);
+                                  const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf);
 
 }  // namespace vcp

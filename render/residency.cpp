@@ -100,7 +100,8 @@ uint64_t Residency::colourBytes() const {
 }
 
 std::vector<glm::uvec4> Residency::table() const {
-    return pageTable(*dataset_, cut_, [&](uint64_t page) {
+    return pageTable(*dataset_, cut_, [&](uint64_t page) -> std::optional<ResidentPage> {
+        if (!policy_->isResident(page)) return {};
         const uint32_t texel = pool_->texel(policy_->slotOf(page));
         const bool colour = hasColour() && dataset_->pages[page].colourBytes > 0;
         return ResidentPage{headers_.at(page), texel, colour ? texel + dataset_->pages[page].pageBytes / 16 : 0};

@@ -9,6 +9,7 @@ const int kIllinoisSteps = 8;
 const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
 const float kIntervalSlack = 1e-4;
 const float kLastBelowOne = 0.99999994;
+const float kSeamErrors = 8.0;  // how far a coarser surface goes on beyond its page, in its certified errors
 
 struct Hit {
     float depth;  // finest cells; kNoHit
@@ -34,7 +35,6 @@ struct Work {
 struct Page {
     uint nodesTexel, root;
     uvec4 sections;  // texels: faces, triangles, vertices, normals
-    uvec2 colours;   // texels in the colour pool: faces, vertices
     ivec3 corner;    // lattice
     int bits;        // log2 of its edge on the lattice
     float cell;      // finest cells
@@ -59,45 +59,91 @@ vec3 leaveLatticeBox(Ray ray, ivec3 corner, int bits) {
     return reachedBehind(minOf(t), t);
 }
 
-// Goes down the frame's page tree to the page that the ray has reached, stepping over octants without one. False:
-// nothing before `last`. The side of a plane that the ray is on is told by the distance to the plane, never by
-// a rounded place: a ray in a wall, or nearly parallel to it, would be sent to a page that it enters much later.
-bool findPage(Ray ray, inout vec3 reached, float last, out Page page, inout uint steps) {
+// A box of the page tree: a page of the cut, or an octant without one.
+struct Region {
+    ivec3 corner;
+    int bits;
+    bool isPage;
+};
+const int kNoRegion = 64;  // bits before the first one
+
+// Whether the surface steps from one level to another between two regions, one after the other on a ray.
+bool levelChanges(Region before, Region after) {
+    return before.bits != kNoRegion && ((before.isPage && after.bits < before.bits) || (after.isPage && after.bits > before.bits));
+}
+
+void usePage(uint node, uvec4 record, inout Page page) {
+    page.root = record.z;
+    page.nodesTexel = record.w + kPageHeaderBytes / 16u;
+    page.sections = fetchTable(node * kRecordTexels + 1u);
+    page.record = node;
+    page.cell = powerOfTwo(int(frame.mode.y) + page.bits - int(kLatticeBits));
+}
+
+// Goes down the frame's page tree to the page that the ray has reached, stepping over octants without one, but not
+// where such a one follows on a coarser page. False: nothing before `last`. The side of a plane that the ray is on is
+// told by the distance to the plane, never by a rounded place: a ray in a wall, or nearly parallel to it, would be
+// sent to a page that it enters much later.
+bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out Region region, out Page page, inout uint steps) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     uint node = 0u;
     uvec4 record = uvec4(0u);
-    bool inside = true;
-    while (inside && (record.x & kRecordInCut) == 0u) {
+    bool inside = true, found = false;
+    while (inside && !found) {
         // Down to a page of the cut or an octant without one.
         node = 0u;
-        page.corner = ivec3(0);
-        page.bits = int(kLatticeBits);
+        region.corner = ivec3(0);
+        region.bits = int(kLatticeBits);
         bool exists = true;
         record.x = 0u;
         while (exists && (record.x & kRecordInCut) == 0u) {
             record = fetchTable(node * kRecordTexels);
             if (kCountSteps != 0u) steps++;
             if ((record.x & kRecordInCut) == 0u) {
-                page.bits--;
-                ivec3 upper = ivec3(equal(ahead, lessThanEqual(planeDistances(ray, page.corner + (1 << page.bits)), reached)));
-                page.corner += upper << page.bits;
+                region.bits--;
+                ivec3 upper = ivec3(equal(ahead, lessThanEqual(planeDistances(ray, region.corner + (1 << region.bits)), reached)));
+                region.corner += upper << region.bits;
                 uint octant = uint(upper.x | upper.y << 1 | upper.z << 2);
                 exists = (record.x >> octant & 1u) != 0u;
                 node = record.y + bitCount(record.x & ((1u << octant) - 1u));
             }
         }
-        if (!exists) {
-            reached = leaveLatticeBox(ray, page.corner, page.bits);
+        region.isPage = exists;
+        found = exists || levelChanges(before, region);
+        if (!found) {
+            before = region;
+            reached = leaveLatticeBox(ray, region.corner, region.bits);
             inside = reached.x < last;
         }
     }
-    page.root = record.z;
-    page.nodesTexel = record.w + kPageHeaderBytes / 16u;
-    page.sections = fetchTable(node * kRecordTexels + 1u);
-    page.colours = kColour != 0u ? fetchTable(node * kRecordTexels + 2u).xy : uvec2(0u);
-    page.record = node;
-    page.cell = powerOfTwo(int(frame.mode.y) + page.bits - int(kLatticeBits));
+    page.corner = region.corner;
+    page.bits = region.bits;
+    usePage(node, record, page);
     return inside;
+}
+
+// The page of the coarser of two regions' level that holds the finer one; it is above pages of the cut, or there is
+// none. False: not resident.
+bool coarserPage(Region before, Region after, inout Page page, inout uint steps) {
+    ivec3 place = before.isPage && after.bits < before.bits ? after.corner : before.corner;
+    int bits = max(before.bits, after.bits);
+    uint node = 0u;
+    uvec4 record = uvec4(0u);
+    bool exists = true;
+    page.bits = int(kLatticeBits) + 1;
+    while (exists && page.bits > bits) {
+        record = fetchTable(node * kRecordTexels);
+        if (kCountSteps != 0u) steps++;
+        page.bits--;
+        if (page.bits > bits) {
+            uint octant = octantAt(place, page.bits - 1);
+            exists = (record.x >> octant & 1u) != 0u;
+            node = record.y + bitCount(record.x & ((1u << octant) - 1u));
+        }
+    }
+    page.corner = place >> bits << bits;
+    usePage(node, record, page);
+    return exists && (record.x & kRecordResident) != 0u;
 }
 
 // The ray in page space. Both points at the page's walls come from the lattice, as its neighbours see them. No point
@@ -228,14 +274,15 @@ Surface surfaceAt(Hit hit, vec3 direction) {
     return surface;
 }
 
-// First hit in a page from distance `s` on, or kNoHit.
-float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, inout uint fetches) {
+// First hit in a page from distance `s` on, or kNoHit. Leaves that begin after `until` are not looked at.
+float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout uint steps, inout uint fetches) {
     float sStart;
     PageRay local = enterPage(ray, page, sStart);
     Place at;
     at.tau = max(0.0, (s - sStart) / page.cell);
     at.subcell = clamp(ivec3(floor((local.start + at.tau * local.direction) * kSubcells)), ivec3(0), ivec3(int(local.cells * kSubcells) - 1));
     at.inPage = true;
+    float tauUntil = (until - sStart) / page.cell;
 
     int rootBits = int(frame.mode.x + kMaxSubcellDepth);
     uint rootOnly = page.root >> kNodeTypeShift == kNodeInternal ? 0u : 1u;
@@ -257,6 +304,7 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
                     Place next = leaveBox(local, at, boxLo, boxHi);
                     ascend(descent, at.subcell, next.subcell, rootGroup, rootBits);
                     at = next;
+                    at.inPage = at.inPage && at.tau <= tauUntil;
                     if (!at.inPage) break;
                 }
                 descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, steps);
@@ -292,16 +340,40 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
     vec3 reached = vec3(max(max(first, 0.0), from));
 
     Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), 0u);
-    bool inside = reached.x < last;
+    Region before = Region(ivec3(0), kNoRegion, false), region;
+    bool inside = reached.x < last, seam = true;
     while (inside) {
         Page page;
-        if (!findPage(ray, reached, last, page, work.steps)) break;
-        hit.record = page.record;
-        hit.pageBits = page.bits;
-        hit.depth = castPage(ray, page, reached.x, hit, work.steps, work.fetches);
-        if (hit.depth < kNoHit) break;
-        reached = leaveLatticeBox(ray, page.corner, page.bits);
-        inside = reached.x < last;
+        if (!findPage(ray, reached, last, before, region, page, work.steps)) break;
+        // Between two levels the surfaces are apart by as much as their errors, and a ray could pass between them. So the
+        // coarser one goes on for a while beyond the wall, in the finer one's region.
+        seam = seam && levelChanges(before, region);
+        float start = reached.x, until = kNoHit;
+        bool look = region.isPage;
+        if (seam) {
+            look = coarserPage(before, region, page, work.steps);
+            float reach = kSeamErrors * uintBitsToFloat(fetchTable(page.record * kRecordTexels + 2u).w);
+            bool behind = region.isPage && region.bits > before.bits;
+            until = behind ? start : start + reach;
+            start = behind ? max(start - reach, 0.0) : start;
+        }
+        if (look) {
+            Hit found = hit;
+            found.record = page.record;
+            found.pageBits = page.bits;
+            found.depth = castPage(ray, page, start, until, found, work.steps, work.fetches);
+            if (found.depth < hit.depth && found.depth <= until + kIntervalSlack * page.cell) hit = found;
+        }
+        if (seam) {
+            // The region itself is next.
+            seam = false;
+            inside = hit.depth > reached.x;
+        } else {
+            before = region;
+            reached = leaveLatticeBox(ray, region.corner, region.bits);
+            inside = reached.x < last && hit.depth > reached.x;
+            seam = true;
+        }
     }
     return hit;
 }

@@ -57,9 +57,11 @@ struct FrameConstants {
 //   1: texels of faces, triangles, vertices, normals
 //   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory, certified
 //      error in finest cells (float bits)
-// flags: bits 0..7 octants that have a child; bit 8: this page is in the cut.
+// flags: bits 0..7 octants that have a child; bit 8: this page is in the cut; bit 9: it is resident, so that its
+// fields are there.
 const uint kRecordTexels = 3u;
 const uint kRecordInCut = 256u;
+const uint kRecordResident = 512u;
 
 // The list of tiles to trace. Three words of an indirect dispatch, the count, then tile numbers.
 const uint kTileListHeader = 4u;

@@ -31,7 +31,7 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
         std::memcpy(&resident[page].header, made.pages[page].geometryBytes().data(), sizeof(PageHeader));
         resident[page].texel = static_cast<uint32_t>(1000 * page);
     }
-    const auto table = pageTable(dataset, cut, [&](uint64_t page) -> const ResidentPage& { return resident[page]; });
+    const auto table = pageTable(dataset, cut, [&](uint64_t page) { return std::optional(resident[page]); });
 
     std::vector<uint64_t> found;
     const std::function<void(uint32_t, uint64_t)> walk = [&](uint32_t node, uint64_t page) {
@@ -57,7 +57,7 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
 }
 
 TEST(PageTable, WithoutACutTheRootIsEmpty) {
-    const auto table = pageTable(sphereDataset().dataset, {}, [](uint64_t) -> const ResidentPage& { std::abort(); });
+    const auto table = pageTable(sphereDataset().dataset, {}, [](uint64_t) -> std::optional<ResidentPage> { std::abort(); });
     ASSERT_EQ(table.size(), frame::kRecordTexels);
     EXPECT_EQ(table[0].x, 0u);
 }
