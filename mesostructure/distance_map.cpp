@@ -91,7 +91,12 @@ int coneOf(Cones cones, glm::vec3 d) {
     int azimuth = 0, elevation = 0;
     if (cones.azimuth == 2) azimuth = d.y < 0;
     else if (cones.azimuth == 4) azimuth = d.y < 0 ? (d.x < 0 ? 2 : 3) : (d.x < 0 ? 1 : 0);
-    else if (cones.azimuth > 1) {
+    else if (cones.azimuth % 4 == 0) {
+        // The quarter by signs, turned to the first one.
+        const int quarter = d.y < 0 ? (d.x < 0 ? 2 : 3) : (d.x < 0 ? 1 : 0), most = cones.azimuth / 4;
+        const float x = std::abs(quarter % 2 == 0 ? d.x : d.y), y = std::abs(quarter % 2 == 0 ? d.y : d.x);
+        azimuth = quarter * most + std::min(int(std::atan2(y, x) * float(2 / kPi) * float(most)), most - 1);
+    } else if (cones.azimuth > 1) {
         float turn = std::atan2(d.y, d.x) * float(0.5 / kPi);
         if (turn < 0) turn += 1;
         azimuth = std::min(int(turn * float(cones.azimuth)), cones.azimuth - 1);
@@ -181,19 +186,19 @@ struct Offset {
 std::vector<Offset> offsetsInCone(const TileGrid& grid, Cones cones, int cone, double cap) {
     const double wedge = 2 * kPi / cones.azimuth, band = kPi / cones.elevation;
     const int azimuth = cone % cones.azimuth, elevation = cone / cones.azimuth;
-    // Where signs decide, a ray's cone is exact.
-    const double slack = cones.azimuth == 2 || cones.azimuth == 4 ? 0 : kConeSlack;
-    const double from = azimuth * wedge - slack, to = (azimuth + 1) * wedge + slack;
-    const double low = -kPi / 2 + elevation * band - kConeSlack, high = low + band + 2 * kConeSlack;
+    // At the axes signs decide, and a ray's cone is exact.
+    const auto slackAt = [&](int border) { return cones.azimuth == 2 || (cones.azimuth % 4 == 0 && border % (cones.azimuth / 4) == 0) ? 0 : kConeSlack; };
+    const double from = azimuth * wedge - slackAt(azimuth), to = (azimuth + 1) * wedge + slackAt(azimuth + 1);
+    const double slackZ = cones.elevation == 2 ? 0 : kConeSlack, low = -kPi / 2 + elevation * band - slackZ, high = low + band + 2 * slackZ;
     const glm::ivec3 reach = glm::ivec3(glm::ceil(glm::dvec3(cap) / grid.cell)) + 1;
     std::vector<Offset> offsets;
     // Cells that only touch along a wall are left out: the surface there is in the widened cell on the other side.
-    constexpr double kOpen = 1 - 1e-6;
+    constexpr double kOpen = 1 - 0.5 * kCellSlack;
     for (int j = -reach.y; j <= reach.y; ++j)
         for (int i = -reach.x; i <= reach.x; ++i) {
             const auto polygon = cutToWedge(glm::dvec2(i - kOpen, j - kOpen) * glm::dvec2(grid.cell), glm::dvec2(i + kOpen, j + kOpen) * glm::dvec2(grid.cell), from, cones.azimuth == 1 ? from + 7 : to);
             if (polygon.empty()) continue;
-            const double near = std::max(0.0, leastRadius(polygon) - 2e-6 * std::max(grid.cell.x, grid.cell.y));
+            const double near = std::max(0.0, leastRadius(polygon) - 1.5 * kCellSlack * std::max(grid.cell.x, grid.cell.y));
             if (near >= cap) continue;
             double far = 0;
             for (const glm::dvec2 p : polygon) far = std::max(far, glm::length(p));

