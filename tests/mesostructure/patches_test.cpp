@@ -103,13 +103,15 @@ TEST(Patches, AreContinuousAcrossFaces) {
                 return found;
             };
             const auto a = crossings(left, 1, y), b = crossings(right, 0, y);
-            // Not at the end of a line, which either side may find or not.
-            if (a.empty() || crossings(left, 1, y - 1e-3f).empty() || crossings(left, 1, y + 1e-3f).empty()) continue;
+            // Not at the end of a line, which either side may find or not, nor where it is steep.
+            const auto before = crossings(left, 1, y - 1e-3f), after = crossings(left, 1, y + 1e-3f);
+            if (a.size() != 1 || before.size() != 1 || after.size() != 1 || std::abs(before[0] - after[0]) > 0.01f) continue;
             ++met;
             broken += b.empty() || std::abs(a.front() - b.front()) > 2e-3;
         }
         EXPECT_GT(met, 300) << name;
-        EXPECT_LE(broken, met / 200) << name << " of " << met;
+        // Beside the ends of short lines, one in a thousand or so.
+        EXPECT_LE(broken, met / 500) << name << " of " << met;
     }
 }
 
