@@ -92,8 +92,8 @@ std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions
 /// Maxima of the bilinear cells in a pyramid (Tevs et al. 2008), each texel cell solved in closed form.
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map);
 
-/// Sphere tracing on a plain distance map: distances at the cells' centres, a byte each, rounded to nearest, trilinear
-/// between them; the hit is where the distance is below `threshold` cells (Donnelly 2005). No bound holds.
+/// Sphere tracing on a plain distance map: signed distances at the cells' centres, 16 bits each, trilinear between them
+/// (the published ones are 0 inside, which pulls hits into the solid); the hit is where the distance is below `threshold` cells (Donnelly 2005). No bound holds.
 struct SphereOptions {
     glm::ivec3 cells{64, 64, 16};
     float threshold = 0.05f;  ///< in cells

@@ -20,7 +20,7 @@ public:
         threshold_ = options.threshold * float(std::min({grid_.cell.x, grid_.cell.y, grid_.cell.z}));
         for (size_t i = 0; i < steps_.size(); ++i) {
             const glm::dvec3 centre = grid_.centre(grid_.at(i));
-            if (shape.field(centre) > 0) steps_[i] = uint8_t(std::lround(255 * shape.distance(centre, cap_) / double(cap_)));
+            steps_[i] = int16_t(std::lround((shape.field(centre) > 0 ? 32767 : -32767) * shape.distance(centre, cap_) / double(cap_)));
         }
     }
 
@@ -49,7 +49,7 @@ public:
         }
         return result;
     }
-    uint64_t bytes() const override { return steps_.size(); }
+    uint64_t bytes() const override { return steps_.size() * sizeof(int16_t); }
     bool isConservative() const override { return false; }
 
 private:
@@ -64,13 +64,13 @@ private:
             const vec3 part = glm::mix(1.0f - w, w, vec3(bit));
             sum += part.x * part.y * part.z * float(steps_[grid_.index(cell)]);
         }
-        return sum * (cap_ / 255);
+        return sum * (cap_ / 32767);
     }
 
     SphereOptions options_;
     TileGrid grid_;
     float cap_ = 0, threshold_ = 0;
-    std::vector<uint8_t> steps_;
+    std::vector<int16_t> steps_;
 };
 
 }  // namespace
