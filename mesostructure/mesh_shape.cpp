@@ -218,6 +218,23 @@ private:
     std::vector<Item> items_, columnItems_;
 };
 
+/// Entered minus left by a horizontal line along x (or y) in one period: each triangle counts once for every tile across
+/// in which the line meets it.
+int crossingsAlong(int axis, const std::vector<TileTriangle>& triangles, double across, double z, double period) {
+    const int other = 1 - axis;
+    int sum = 0;
+    for (const TileTriangle& tri : triangles) {
+        if (std::min({tri[0].z, tri[1].z, tri[2].z}) > z || std::max({tri[0].z, tri[1].z, tri[2].z}) < z) continue;
+        const double low = std::min({tri[0][other], tri[1][other], tri[2][other]}), high = std::max({tri[0][other], tri[1][other], tri[2][other]});
+        for (double shift = std::ceil((across - high) / period) * period; shift <= across - low; shift += period) {
+            const dvec2 at(across - shift, z), a(tri[0][other], tri[0].z), b(tri[1][other], tri[1].z), c(tri[2][other], tri[2].z);
+            const bool ab = edgeSide(a, b, at) > 0, bc = edgeSide(b, c, at) > 0, ca = edgeSide(c, a, at) > 0;
+            if (ab == bc && bc == ca) sum += ab ? 1 : -1;
+        }
+    }
+    return sum;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triangles, dvec3 extent) {
@@ -228,7 +245,7 @@ Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triang
                 return Error{.message = "a corner lies outside the slab or far outside the tile", .element = fmt::format("triangle {}", i)};
         }
     auto shape = std::make_unique<MeshShape>(triangles, extent);
-    // Vertical lines enter as often as they leave where the mesh is closed; at odd places, off its symmetries.
+    // Lines enter as often as they leave where the mesh is closed; at odd places, off its symmetries.
     constexpr int kLines = 61;
     int open = 0, inverted = 0;
     for (int j = 0; j < kLines; ++j)
@@ -238,10 +255,15 @@ Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triang
             const int winding = shape->windingAt(p);
             inverted += (winding < 0) - (winding > 0);
         }
+    for (int axis = 0; axis < 2; ++axis)
+        for (int i = 0; i < kLines; ++i) {
+            const double period = axis == 0 ? extent.y : 1.0;
+            open += crossingsAlong(axis, triangles, (i + 0.4142) / kLines * period, std::fmod((i + 0.7321) * 0.6180339887, 1.0) * extent.z, period) != 0;
+        }
     if (open > 0)
-        return Error{.message = fmt::format("the repeated mesh is not closed: {} of {} vertical lines leave it more or less often than they enter it; it must enclose "
+        return Error{.message = fmt::format("the repeated mesh is not closed: {} of {} lines through it leave it more or less often than they enter it; it must enclose "
                                             "solids and, where it crosses the tile's border, go on on the other side",
-                                            open, kLines * kLines)};
+                                            open, kLines * (kLines + 2))};
     if (inverted > 0) return Error{.message = "the mesh's normals point inwards; reverse its faces"};
     return std::unique_ptr<Shape>(std::move(shape));
 }

@@ -61,8 +61,8 @@ using TileTriangle = std::array<glm::dvec3, 3>;  ///< tile space; it may reach i
 Result<std::unique_ptr<Shape>> heightShape(const HeightMap& map);
 /// mesostructure/solids.h has the names.
 Result<std::unique_ptr<Shape>> solidShape(const std::string& name, uint32_t seed);
-/// The repeated triangles must enclose solids: along every vertical line they are entered as often as they are left
-/// (nonzero winding counts as inside, so parts may overlap). Normals point outwards by the right-hand rule.
+/// The repeated triangles must enclose solids: lines enter them as often as they leave them, which a few thousand
+/// lines are asked (nonzero winding along the vertical counts as inside, so parts may overlap). Normals point outwards by the right-hand rule.
 Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triangles, glm::dvec3 extent);
 
 }  // namespace vcp::meso
