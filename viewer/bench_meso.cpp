@@ -90,7 +90,7 @@ std::vector<MarchRay> raysOf(const Subject& subject, const View& view, int count
             if (!hit.hit) continue;
             const glm::dvec3 from = ray.origin + hit.t * glm::normalize(glm::dvec3(0.1, 0.2, -1)) + 1.5 * subject.texel * hit.normal;
             ray = {from, -ray.direction, 64};
-            if (from.z >= extent.z || subject.shape->field(from) < 0.5 * subject.texel) continue;
+            if (from.z >= extent.z || subject.shape->field(from) <= 0) continue;
         }
         rays.push_back(ray);
     }

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <set>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -46,7 +48,7 @@ protected:
 TEST_F(MesoCommands, BuildsAndTellsWhatIsInIt) {
     writeRamp("ramp.png", false);
     writeRamp("flat.png", true);
-    for (const std::string source : {"beads", "cobble", path("ramp.png").c_str(), path("flat.png").c_str()}) {
+    for (const std::string& source : std::vector<std::string>{"beads", "cobble", path("ramp.png"), path("flat.png")}) {
         const std::string out = path("a.meso");
         const Ran built = run("meso build " + source + " -o " + out + " --grid 16 --texels 64 --blocks 4,2 --json");
         ASSERT_EQ(built.status, 0) << built.err;
@@ -108,7 +110,7 @@ TEST_F(MesoCommands, SaysWhatIsWrong) {
 }
 
 TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
-    const Ran ran = run("bench meso beads needle --methods boxes,ddm-quadric,relief-secant,sphere --views 45,shadow --rays 200 --repetitions 1 --check-rays 300 --progress none --json --out " +
+    const Ran ran = run("bench meso beads needle --methods boxes,ddm-quadric,relief-secant --views 45,shadow --rays 100 --repetitions 1 --check-rays 100 --progress none --json --out " +
                         path("report"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json report = Json::parse(ran.out);
@@ -127,7 +129,7 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
         EXPECT_EQ(isOurs && row["asset"] == "beads" ? row["solver_missed"] : Json(0.0), 0) << row;
         methods.insert(row["method"]);
     }
-    EXPECT_EQ(methods.size(), 4u);
+    EXPECT_EQ(methods.size(), 3u);
     for (const Json& check : report["checks"])
         EXPECT_TRUE(check["map"] == "4x2 paper" || check["oversteps"] == 0) << check;
     for (const char* file : {"bench_meso.json", "bench_meso.csv", "bench_meso.md", "bench_meso_beads_p95_time.svg"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
