@@ -8,6 +8,7 @@
 
 #include "builder/memory_plan.h"
 #include "viewer/bench_build.h"
+#include "viewer/bench_meso.h"
 #include "viewer/bench_methods.h"
 #include "viewer/bench_rays.h"
 #include "viewer/commands.h"
@@ -51,6 +52,11 @@ struct RaysCommand : BenchCommand {
     int judgeEvery = 1;
     bool sweep = false;
     PaperOptions paper;
+};
+
+struct MesoCommand {
+    BenchMesoOptions options;
+    BenchCommand bench;
 };
 
 Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
@@ -158,6 +164,18 @@ Result<int> runRays(const RaysCommand& command) {
                    {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
 }
 
+Result<int> runMeso(const MesoCommand& command) {
+    VCP_TRY(makeFolder(command.bench.out));
+    BenchMesoOptions options = command.options;
+    const InterruptScope catching;
+    ProgressDisplay display(command.bench.report.progressStyle(), stderr);
+    options.progress = progressTo(display);
+    const auto report = benchMeso(options);
+    display.finish();
+    if (!report) return report.error();
+    return publish(command.bench, "bench_meso", {benchMesoJson(*report), benchMesoCsv(*report), benchMesoMarkdown(*report), benchMesoPlots(*report)});
+}
+
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
     app.add_option("MODEL", command.models, models)->type_name("");
     app.add_option("--out", command.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
@@ -252,14 +270,32 @@ RunCommand addBenchRays(CLI::App& bench) {
     return [command] { return runRays(*command); };
 }
 
+RunCommand addBenchMeso(CLI::App& bench) {
+    auto command = std::make_shared<MesoCommand>();
+    BenchMesoOptions& options = command->options;
+    CLI::App* app = bench.add_subcommand("meso", "Time and judge the mesostructure marchers");
+    app->add_option("ASSET", options.assets, "Procedural ones by name, or assets (.meso) [eleven procedural ones]")->type_name("");
+    app->add_option("--methods", options.methods, fmt::format("{} [all]", fmt::join(mesoMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_option("--views", options.views, fmt::format("{} [all]", fmt::join(mesoViewNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
+    app->add_option("--rays", options.rays, "Rays a view")->type_name("N")->capture_default_str()->check(CLI::Range(1, 10'000'000));
+    app->add_option("--repetitions", options.repetitions, "Runs whose median is reported")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1000));
+    app->add_option("--check-rays", options.checkRays, "Rays of the test that no distance passes the surface; 0: not made")->type_name("N")->capture_default_str()->check(
+        CLI::Range(0, 1'000'000'000));
+    app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots")->type_name("DIR");
+    addProgressOption(*app, command->bench.report);
+    addJsonOption(*app, command->bench.report);
+    return [command] { return runMeso(*command); };
+}
+
 }  // namespace
 
 Command addBench(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("bench", "Measure run time against error, beside Embree");
     app->require_subcommand(1);
-    const RunCommand build = addBenchBuild(*app), rays = addBenchRays(*app);
-    const CLI::App* buildApp = app->get_subcommand("build");
-    return {app, [=] { return buildApp->parsed() ? build() : rays(); }};
+    const RunCommand build = addBenchBuild(*app), rays = addBenchRays(*app), meso = addBenchMeso(*app);
+    const CLI::App *buildApp = app->get_subcommand("build"), *mesoApp = app->get_subcommand("meso");
+    return {app, [=] { return buildApp->parsed() ? build() : mesoApp->parsed() ? meso() : rays(); }};
 }
 
 }  // namespace vcp

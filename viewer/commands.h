@@ -35,6 +35,7 @@ Command addView(CLI::App& vcp);
 Command addStress(CLI::App& vcp);
 Command addBench(CLI::App& vcp);
 Command addDevices(CLI::App& vcp);
+Command addMeso(CLI::App& vcp);
 
 /// Options that many commands have.
 struct ReportOptions {

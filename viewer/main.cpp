@@ -72,8 +72,8 @@ int runCommandLine(int argc, char** argv) {
     vcp.get_formatter()->column_width(28);
     vcp.footer("`vcp help CMD` says how a command is used.");
     const std::vector<Command> commands = {addBuild(vcp),  addInfo(vcp),    addVerify(vcp), addRender(vcp),
-                                           addView(vcp),   addStress(vcp),  addBench(vcp),  addDevices(vcp),
-                                           addHelp(vcp)};
+                                           addView(vcp),   addStress(vcp),  addBench(vcp),  addMeso(vcp),
+                                           addDevices(vcp), addHelp(vcp)};
     try {
         vcp.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

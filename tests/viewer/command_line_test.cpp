@@ -62,7 +62,7 @@ protected:
 };
 std::unique_ptr<TestFolder> CommandLine::folder_;
 
-constexpr const char* kCommands[] = {"build", "info", "verify", "render", "view", "stress", "devices", "bench"};
+constexpr const char* kCommands[] = {"build", "info", "verify", "render", "view", "stress", "devices", "bench", "meso"};
 
 TEST_F(CommandLine, HelpOfEveryCommandBothWays) {
     const Ran all = run({"--help"});

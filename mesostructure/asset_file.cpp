@@ -1,0 +1,406 @@
+#include "mesostructure/asset_file.h"
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "mesostructure/solids.h"
+#include "octree/durable_file.h"
+#include "octree/vcp_file.h"
+
+namespace vcp::meso {
+
+namespace {
+
+constexpr uint64_t kAlignment = 64;
+constexpr uint32_t kMaxChunks = 64;
+constexpr uint64_t kMaxFileBytes = uint64_t{1} << 34;
+
+using Bytes = std::vector<std::byte>;
+
+class Out {
+public:
+    template <class T>
+    void one(const T& value) { raw(&value, sizeof value); }
+    template <class T>
+    void all(const std::vector<T>& values) { raw(values.data(), values.size() * sizeof(T)); }
+    void grid(const TileGrid& g) { one(g.cells); }
+    Bytes bytes;
+
+private:
+    void raw(const void* from, size_t count) {
+        const auto* first = static_cast<const std::byte*>(from);
+        bytes.insert(bytes.end(), first, first + count);
+    }
+};
+
+/// Reads what must fit exactly; after the first thing that does not, nothing more.
+class In {
+public:
+    explicit In(std::span<const std::byte> bytes) : left_(bytes) {}
+    template <class T>
+    T one() {
+        T value{};
+        if (left_.size() < sizeof value) ok_ = false;
+        else std::memcpy(&value, left_.data(), sizeof value), left_ = left_.subspan(sizeof value);
+        return value;
+    }
+    template <class T>
+    std::vector<T> all(uint64_t count) {
+        if (!ok_ || count > left_.size() / sizeof(T)) {
+            ok_ = false;
+            return {};
+        }
+        std::vector<T> values(count);
+        if (count != 0) std::memcpy(values.data(), left_.data(), count * sizeof(T));
+        left_ = left_.subspan(count * sizeof(T));
+        return values;
+    }
+    TileGrid grid(glm::dvec3 extent) {
+        const auto cells = one<glm::ivec3>();
+        for (int axis = 0; axis < 3; ++axis) ok_ = ok_ && cells[axis] >= 1 && cells[axis] <= kMaxGridEdge;
+        if (!ok_) return {};
+        const TileGrid made(cells, extent);
+        ok_ = made.count() <= kMaxGridCells;
+        return made;
+    }
+    [[nodiscard]] bool done() const { return ok_ && left_.empty(); }
+    void require(bool holds) { ok_ = ok_ && holds; }
+    [[nodiscard]] bool ok() const { return ok_; }
+
+private:
+    std::span<const std::byte> left_;
+    bool ok_ = true;
+};
+
+std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
+    std::vector<std::pair<ChunkKind, Bytes>> chunks;
+    const auto add = [&](ChunkKind kind, const auto& write) {
+        Out out;
+        write(out);
+        chunks.emplace_back(kind, std::move(out.bytes));
+    };
+    if (a.heights) add(ChunkKind::Heights, [&](Out& o) { o.one(a.heights->size), o.one(a.heights->range), o.all(a.heights->texels); });
+    if (!a.solid.empty())
+        add(ChunkKind::Solid, [&](Out& o) { o.one(a.seed), o.one(uint32_t(a.solid.size())), o.all(std::vector<char>(a.solid.begin(), a.solid.end())); });
+    if (!a.triangles.empty()) add(ChunkKind::Triangles, [&](Out& o) { o.all(a.triangles); });
+    if (a.field) add(ChunkKind::Field, [&](Out& o) { o.grid(a.field->grid), o.one(a.field->unit), o.all(a.field->steps); });
+    if (a.occupancy) add(ChunkKind::Occupancy, [&](Out& o) { o.grid(a.occupancy->grid), o.all(a.occupancy->cells); });
+    if (a.distances)
+        add(ChunkKind::Distances, [&](Out& o) {
+            o.grid(a.distances->grid), o.one(a.distances->cones.azimuth), o.one(a.distances->cones.elevation), o.one(a.distances->unit), o.all(a.distances->steps);
+        });
+    if (!a.factors.empty()) add(ChunkKind::Compressed, [&](Out& o) { o.one(int32_t(a.factors.size())), o.all(a.factors); });
+    if (a.boxes) add(ChunkKind::Boxes, [&](Out& o) { o.grid(a.boxes->grid), o.all(a.boxes->boxes); });
+    if (a.patches)
+        add(ChunkKind::Patches, [&](Out& o) {
+            const PatchSet& p = *a.patches;
+            o.grid(p.grid), o.one(uint32_t(p.ranks.size())), o.one(uint32_t(p.rows.size())), o.one(uint32_t(p.patches.size())), o.one(p.cellsWithout);
+            o.all(p.ranks), o.all(p.rows), o.all(p.patches);
+        });
+    return chunks;
+}
+
+bool arePatchesSound(const PatchSet& p) {
+    if (p.ranks.size() != (p.grid.count() + 31) / 32) return false;
+    uint32_t rows = 0;
+    for (size_t i = 0; i < p.ranks.size(); ++i) {
+        if (p.ranks[i].base != rows) return false;
+        rows += uint32_t(std::popcount(p.ranks[i].mask));
+        if (i + 1 == p.ranks.size() && p.grid.count() % 32 != 0 && p.ranks[i].mask >> (p.grid.count() % 32) != 0) return false;
+    }
+    if (rows != p.rows.size()) return false;
+    for (const uint32_t row : p.rows)
+        if ((row & 15) == 0 || (row >> 4) + (row & 15) > p.patches.size()) return false;
+    for (const Patch& patch : p.patches) {
+        for (const float c : patch.quadric)
+            if (!std::isfinite(c)) return false;
+        for (int i = 0; i < 4; ++i)
+            if (!std::isfinite(patch.u[i]) || !std::isfinite(patch.v[i])) return false;
+        if (patch.isTriangle > 1) return false;
+    }
+    return true;
+}
+
+/// False: the chunk is not what its kind says.
+bool readChunk(ChunkKind kind, In& in, Asset& a) {
+    const auto extent = a.extent;
+    switch (kind) {
+        case ChunkKind::Heights: {
+            a.heights.emplace();
+            a.heights->size = in.one<glm::ivec2>(), a.heights->range = in.one<double>();
+            const glm::ivec2 size = a.heights->size;
+            in.require(size.x >= 1 && size.y >= 1 && size.x <= kMaxGridEdge && size.y <= kMaxGridEdge && a.heights->extent() == extent);
+            a.heights->texels = in.all<uint16_t>(in.ok() ? uint64_t(size.x) * uint64_t(size.y) : 0);
+            break;
+        }
+        case ChunkKind::Solid: {
+            a.seed = in.one<uint32_t>();
+            const std::vector<char> name = in.all<char>(in.one<uint32_t>());
+            a.solid.assign(name.begin(), name.end());
+            in.require(makeSolid(a.solid, a.seed).ok());
+            break;
+        }
+        case ChunkKind::Triangles:
+            while (in.ok() && !in.done()) a.triangles.push_back(in.one<TileTriangle>());
+            for (const TileTriangle& triangle : a.triangles)
+                for (const glm::dvec3& p : triangle) in.require(std::abs(p.x) <= 64 && std::abs(p.y) <= 64 && p.z >= 0 && p.z <= extent.z);
+            break;
+        case ChunkKind::Field: {
+            a.field.emplace();
+            a.field->grid = in.grid(extent), a.field->unit = in.one<float>();
+            in.require(a.field->unit > 0 && std::isfinite(a.field->unit));
+            const glm::ivec3 n = a.field->grid.cells;
+            a.field->steps = in.all<int16_t>(uint64_t(n.x) * uint64_t(n.y) * uint64_t(n.z + 1));
+            break;
+        }
+        case ChunkKind::Occupancy:
+            a.occupancy.emplace();
+            a.occupancy->grid = in.grid(extent);
+            a.occupancy->cells = in.all<uint8_t>(a.occupancy->grid.count());
+            break;
+        case ChunkKind::Distances: {
+            a.distances.emplace();
+            a.distances->grid = in.grid(extent);
+            a.distances->cones.azimuth = in.one<int>(), a.distances->cones.elevation = in.one<int>(), a.distances->unit = in.one<float>();
+            const Cones cones = a.distances->cones;
+            in.require(cones.azimuth >= 1 && cones.azimuth <= 32 && cones.elevation >= 1 && cones.elevation <= 16 && a.distances->unit > 0 && std::isfinite(a.distances->unit));
+            a.distances->steps = in.all<uint8_t>(in.ok() ? a.distances->grid.count() * uint64_t(cones.count()) : 0);
+            break;
+        }
+        case ChunkKind::Compressed: {
+            const auto count = in.one<int32_t>();
+            in.require(count >= 1 && count <= 6);
+            a.factors = in.all<int>(in.ok() ? uint64_t(count) : 0);
+            break;
+        }
+        case ChunkKind::Boxes:
+            a.boxes.emplace();
+            a.boxes->grid = in.grid(extent);
+            a.boxes->boxes = in.all<uint16_t>(8 * a.boxes->grid.count());
+            break;
+        case ChunkKind::Patches: {
+            a.patches.emplace();
+            a.patches->grid = in.grid(extent);
+            const auto ranks = in.one<uint32_t>(), rows = in.one<uint32_t>(), patches = in.one<uint32_t>();
+            a.patches->cellsWithout = in.one<uint32_t>();
+            a.patches->ranks = in.all<PatchSet::Rank>(ranks), a.patches->rows = in.all<uint32_t>(rows), a.patches->patches = in.all<Patch>(patches);
+            in.require(in.ok() && arePatchesSound(*a.patches));
+            break;
+        }
+        default: return false;
+    }
+    return in.done();
+}
+
+/// Chunks that belong together: one source, grids that divide each other, maps that agree on the occupied cells.
+bool belongTogether(Asset& a) {
+    if (a.heights.has_value() + !a.solid.empty() + !a.triangles.empty() != 1) return false;
+    if (!a.solid.empty() && makeSolid(a.solid, a.seed)->extent != a.extent) return false;
+    const glm::ivec3 cells = a.occupancy ? a.occupancy->grid.cells : glm::ivec3(0);
+    for (const TileGrid* grid : {a.distances ? &a.distances->grid : nullptr, a.boxes ? &a.boxes->grid : nullptr, a.patches ? &a.patches->grid : nullptr})
+        if (grid != nullptr && grid->cells != cells) return false;
+    if (a.occupancy && a.heights && (a.heights->size.x % cells.x != 0 || a.heights->size.y % cells.y != 0)) return false;
+    if (a.occupancy && a.field && a.field->grid.cells % cells != glm::ivec3(0)) return false;
+    const auto agrees = [&](size_t i, bool marked) { return marked == (a.occupancy->cells[i % a.occupancy->cells.size()] != 0); };
+    if (a.distances)
+        for (size_t i = 0; i < a.distances->steps.size(); ++i)
+            if (!agrees(i, a.distances->steps[i] == kOccupied)) return false;
+    if (a.boxes)
+        for (size_t i = 0; i < a.boxes->boxes.size(); ++i)
+            if (!agrees(i, a.boxes->boxes[i] >> 15)) return false;
+    if (a.factors.empty()) return true;
+    if (!a.distances) return false;
+    auto compressed = compressMap(*a.distances, a.factors);
+    if (!compressed) return false;
+    a.compressed = *std::move(compressed);
+    return true;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Shape>> shapeOf(const Asset& asset) {
+    if (asset.heights) return heightShape(*asset.heights);
+    if (!asset.solid.empty()) return solidShape(asset.solid, asset.seed);
+    return meshShape(asset.triangles, asset.extent);
+}
+
+glm::ivec3 gridFor(const Asset& asset, glm::ivec3 asked) {
+    if (asked.x > 0) return asked;
+    int x = 64, y = std::max(1, int(std::lround(64 * asset.extent.y)));
+    if (asset.heights) {
+        // The most cells up to 64 that divide the texels.
+        const auto part = [](int texels, int most) {
+            for (int n = std::min(texels, most);; --n)
+                if (texels % n == 0) return n;
+        };
+        x = part(asset.heights->size.x, 64), y = part(asset.heights->size.y, y);
+    }
+    return {x, y, std::clamp(int(std::ceil(asset.extent.z * x)), 4, 256)};
+}
+
+Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    asset.extent = (*shape)->extent();
+    const glm::ivec3 cells = gridFor(asset, options.cells);
+    if (asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels", cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
+    if (options.samples < 1 || options.samples > 16) return Error{.code = ErrorCode::Usage, .message = "samples a cell must be from 1 to 16"};
+    auto occupancy = occupy(**shape, cells);
+    if (!occupancy) return occupancy.error();
+    if (!asset.heights) {
+        auto field = sampleField(**shape, cells * options.samples);
+        if (!field) return field.error();
+        occupyField(*field, *occupancy);
+        asset.field = *std::move(field);
+    }
+    asset.occupancy = *std::move(occupancy);
+    auto distances = buildDistanceMap(*asset.occupancy, options.distances, shape->get());
+    if (!distances) return distances.error();
+    asset.distances = *std::move(distances);
+    asset.factors = options.factors;
+    if (!asset.factors.empty()) {
+        auto compressed = compressMap(*asset.distances, asset.factors);
+        if (!compressed) return compressed.error();
+        asset.compressed = *std::move(compressed);
+    }
+    if (options.withBoxes) asset.boxes = buildOctantBoxes(*asset.occupancy);
+    if (!options.withPatches) return {};
+    auto patches = buildPatches(**shape, *asset.occupancy, options.crossings);
+    if (!patches) return patches.error();
+    asset.patches = *std::move(patches);
+    return {};
+}
+
+Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset) {
+    const auto chunks = chunksOf(asset);
+    AssetHeader header;
+    header.chunks = uint32_t(chunks.size());
+    for (int axis = 0; axis < 3; ++axis) header.extent[axis] = asset.extent[axis];
+    std::memcpy(header.name, asset.name.data(), std::min(asset.name.size(), sizeof header.name - 1));
+    std::vector<AssetChunk> table(chunks.size());
+    const auto aligned = [](uint64_t at) { return (at + kAlignment - 1) / kAlignment * kAlignment; };
+    uint64_t end = aligned(sizeof header + table.size() * sizeof(AssetChunk));
+    for (size_t i = 0; i < chunks.size(); ++i) {
+        table[i] = {chunks[i].first, 0, end, chunks[i].second.size(), hashBytes(chunks[i].second)};
+        end = aligned(end + chunks[i].second.size());
+    }
+    header.fileBytes = end + sizeof(AssetCommit);
+    header.tableHash = hashBytes(std::as_bytes(std::span(table)));
+    header.hash = hashBytes(std::as_bytes(std::span(&header, 1)).first(offsetof(AssetHeader, hash)));
+    AssetCommit commit;
+    commit.fileBytes = header.fileBytes, commit.headerHash = header.hash;
+    commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(AssetCommit, hash)));
+
+    if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) return Error{.code = ErrorCode::Io, .message = "is a folder; give a file name", .file = path.string()};
+    std::filesystem::path partial = path;
+    partial += ".partial";
+    const int file = ::open(partial.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (file < 0) return systemError(path, "cannot write here", errno);
+    if (lockName(file, partial) != NameLock::Taken) {
+        ::close(file);
+        return Error{.code = ErrorCode::Io, .message = "another build is writing this file", .file = path.string()};
+    }
+    const auto write = [&]() -> Result<void> {
+        if (::ftruncate(file, 0) != 0 || ::ftruncate(file, static_cast<off_t>(header.fileBytes)) != 0) return systemError(path, "cannot write here", errno);
+        VCP_TRY(writeAll(file, sizeof header, std::as_bytes(std::span(table)), path));
+        for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(writeAll(file, table[i].offset, chunks[i].second, path));
+        VCP_TRY(writeAll(file, 0, std::as_bytes(std::span(&header, 1)), path));
+        if (::fsync(file) != 0) return systemError(path, "cannot make the file durable", errno);
+        VCP_TRY(writeAll(file, end, std::as_bytes(std::span(&commit, 1)), path));
+        if (::fsync(file) != 0) return systemError(path, "cannot make the file durable", errno);
+        if (::rename(partial.c_str(), path.c_str()) != 0) return systemError(path, "cannot rename the finished file", errno);
+        return {};
+    };
+    const auto written = write();
+    if (!written) ::unlink(partial.c_str());
+    ::close(file);
+    if (!written) return written.error();
+    VCP_TRY(syncFolder(path.parent_path()));
+    return header.fileBytes;
+}
+
+Result<Asset> readAsset(const std::filesystem::path& path) {
+    const auto reader = openFile(path);
+    if (!reader) return reader.error();
+    if ((*reader)->size() > kMaxFileBytes) return Error{.code = ErrorCode::Limit, .message = "is larger than any mesostructure asset", .file = path.string()};
+    // A header first, so that a large file of another kind is not read.
+    if ((*reader)->size() >= sizeof(AssetHeader)) {
+        AssetHeader header;
+        VCP_TRY((*reader)->read(0, std::as_writable_bytes(std::span(&header, 1))));
+        if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0)
+            return Error{.message = "not a mesostructure asset; make one with `vcp meso build`", .file = path.string(), .element = "header", .byte = 0};
+    }
+    Bytes bytes((*reader)->size());
+    VCP_TRY((*reader)->read(0, bytes));
+    return parseAsset(bytes, path.string());
+}
+
+Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& name) {
+    const auto fail = [&](const char* element, uint64_t byte, std::string message) {
+        return Error{.code = ErrorCode::InvalidInput, .message = std::move(message), .file = name, .element = element, .byte = byte};
+    };
+    AssetHeader header;
+    if (bytes.size() < sizeof header + sizeof(AssetCommit)) return fail("header", bytes.size(), bytes.empty() ? "the file is empty" : "the file is too short for a mesostructure asset");
+    std::memcpy(&header, bytes.data(), sizeof header);
+    if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0) return fail("header", 0, "not a mesostructure asset; make one with `vcp meso build`");
+    if (header.version != kAssetVersion)
+        return Error{.code = ErrorCode::Unsupported,
+                     .message = fmt::format("asset version {} is not known; this program reads version {}", header.version, kAssetVersion),
+                     .file = name,
+                     .element = "header",
+                     .byte = 8};
+    if (hashBytes(bytes.first(offsetof(AssetHeader, hash))) != header.hash || header.padding != 0) return fail("header", 0, "the header's hash does not match: the file was changed or damaged");
+    if (header.fileBytes != bytes.size()) return fail("header", 16, fmt::format("the file should have {} bytes, it has {}", header.fileBytes, bytes.size()));
+    if (header.chunks > kMaxChunks || sizeof header + header.chunks * sizeof(AssetChunk) + sizeof(AssetCommit) > bytes.size()) return fail("header", 12, "chunk count out of range");
+    for (const double edge : header.extent)
+        if (!(edge > 0) || !(edge <= 64)) return fail("header", 24, "the tile's extent is out of range");
+    if (header.name[sizeof header.name - 1] != 0) return fail("header", 56, "the name does not end");
+
+    AssetCommit commit;
+    const uint64_t commitAt = bytes.size() - sizeof commit;
+    std::memcpy(&commit, bytes.data() + commitAt, sizeof commit);
+    if (std::memcmp(commit.magic, AssetCommit{}.magic, 8) != 0 || commit.fileBytes != bytes.size() || commit.headerHash != header.hash ||
+        commit.hash != hashBytes(bytes.subspan(commitAt, offsetof(AssetCommit, hash))))
+        return fail("commit record", commitAt, "does not match the file: it was not finished, changed or damaged");
+
+    std::vector<AssetChunk> table(header.chunks);
+    const auto stored = bytes.subspan(sizeof header, table.size() * sizeof(AssetChunk));
+    if (hashBytes(stored) != header.tableHash) return fail("chunk table", sizeof header, "hash does not match: the file was changed or damaged");
+    if (!table.empty()) std::memcpy(table.data(), stored.data(), stored.size());
+    Asset asset;
+    asset.name = header.name;
+    asset.extent = {header.extent[0], header.extent[1], header.extent[2]};
+    uint64_t end = sizeof header + stored.size(), known = 0;
+    for (const AssetChunk& chunk : table) {
+        if (chunk.offset < end || chunk.offset - end >= kAlignment || chunk.offset % kAlignment != 0 || chunk.bytes > commitAt || chunk.offset > commitAt - chunk.bytes)
+            return fail("chunk table", sizeof header, "a chunk lies outside the file or overlaps another");
+        for (uint64_t i = end; i < chunk.offset; ++i)
+            if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
+        const auto content = bytes.subspan(chunk.offset, chunk.bytes);
+        if (hashBytes(content) != chunk.hash) return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
+        const auto kind = uint32_t(chunk.kind);
+        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Compressed))
+            return Error{.code = ErrorCode::Unsupported, .message = fmt::format("chunk kind {} is not known: use a newer program", kind), .file = name, .element = "chunk table", .byte = chunk.offset};
+        if (known >> kind & 1) return fail("chunk table", chunk.offset, "two chunks of one kind");
+        known |= uint64_t{1} << kind;
+        In in(content);
+        if (!readChunk(chunk.kind, in, asset)) return fail("chunk", chunk.offset, fmt::format("chunk of kind {} is not what it says", kind));
+        end = chunk.offset + chunk.bytes;
+    }
+    for (uint64_t i = end; i < commitAt; ++i)
+        if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
+    if (commitAt - end >= kAlignment) return fail("padding", end, "unexpected bytes before the commit record");
+    if (!belongTogether(asset)) return fail("chunks", 0, "the chunks do not belong together");
+    return asset;
+}
+
+}  // namespace vcp::meso

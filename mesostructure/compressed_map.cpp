@@ -1,0 +1,105 @@
+#include "mesostructure/compressed_map.h"
+
+#include <algorithm>
+
+#include <glm/common.hpp>
+
+namespace vcp::meso {
+
+namespace {
+
+/// What covers `edge` cells from `lower`: the least length of a cone, or kOccupied where a cell is occupied.
+uint8_t leastOf(const DistanceMap& map, int cone, glm::ivec3 lower, int edge) {
+    uint8_t least = kMostSteps;
+    const glm::ivec3 upper = glm::min(lower + edge, map.grid.cells);
+    for (int z = lower.z; z < upper.z; ++z)
+        for (int y = lower.y; y < upper.y; ++y)
+            for (int x = lower.x; x < upper.x; ++x) {
+                const uint8_t step = map.steps[map.slot(cone, {x, y, z})];
+                if (step == kOccupied) return kOccupied;
+                least = std::min(least, step);
+            }
+    return least;
+}
+
+/// Lowest cells of the entries of a level, bricks in the order of the entries above that have surface.
+std::vector<glm::ivec3> cornersOfBricks(const std::vector<glm::ivec3>& above, const CompressedMap::Level& upper, int edge, int factor) {
+    std::vector<glm::ivec3> corners;
+    for (uint32_t i = 0; i < upper.entries; ++i) {
+        if (upper.steps[i] != kOccupied) continue;
+        for (int k = 0; k < factor * factor * factor; ++k) corners.push_back(above[i] + edge * glm::ivec3(k % factor, k / factor % factor, k / factor / factor));
+    }
+    return corners;
+}
+
+void fill(CompressedMap::Level& level, const DistanceMap& map, const std::vector<glm::ivec3>& corners) {
+    level.entries = uint32_t(corners.size());
+    level.steps.resize(size_t(map.cones.count()) * corners.size());
+    for (int cone = 0; cone < map.cones.count(); ++cone)
+        for (size_t i = 0; i < corners.size(); ++i) level.steps[cone * corners.size() + i] = leastOf(map, cone, corners[i], level.edge);
+    if (level.edge == 1) return;
+    uint32_t bricks = 0;
+    level.brick.resize(corners.size());
+    for (size_t i = 0; i < corners.size(); ++i) level.brick[i] = level.steps[i] == kOccupied ? bricks++ : 0;
+}
+
+}  // namespace
+
+CompressedMap::Found CompressedMap::lookUp(int cone, glm::ivec3 cell) const {
+    const glm::ivec3 at(wrapped(cell.x, grid.cells.x), wrapped(cell.y, grid.cells.y), cell.z);
+    const glm::ivec3 block = at / levels[0].edge;
+    uint32_t entry = uint32_t(block.x + top.x * (block.y + top.y * block.z));
+    Found found;
+    for (size_t i = 0; i < levels.size(); ++i) {
+        const Level& level = levels[i];
+        const uint8_t step = level.steps[size_t(cone) * level.entries + entry];
+        ++found.fetches;
+        if (step != kOccupied) {
+            found.length = float(step) * unit;
+            return found;
+        }
+        if (i + 1 == levels.size()) break;
+        const Level& below = levels[i + 1];
+        const glm::ivec3 local = at % level.edge / below.edge;
+        entry = level.brick[entry] * uint32_t(below.factor * below.factor * below.factor) + uint32_t(local.x + below.factor * (local.y + below.factor * local.z));
+        ++found.fetches;
+    }
+    found.occupied = true;
+    return found;
+}
+
+uint64_t CompressedMap::bytes() const {
+    uint64_t sum = 0;
+    for (const Level& level : levels) sum += level.steps.size() + level.brick.size() * 4;
+    return sum;
+}
+
+double CompressedMap::texelRatio() const {
+    double texels = 0;
+    for (const Level& level : levels) texels += level.entries;
+    return double(grid.count()) / texels;
+}
+
+Result<CompressedMap> compressMap(const DistanceMap& map, std::span<const int> factors) {
+    int edge = 1;
+    for (const int factor : factors) edge = factor >= 2 && factor <= 16 && edge <= 64 ? edge * factor : 1 << 20;
+    if (factors.empty() || edge > 64) return Error{.code = ErrorCode::Usage, .message = "block sizes must be from 2 to 16 each, and at most 64 cells together"};
+    CompressedMap result{map.grid, map.cones, map.unit, (map.grid.cells + edge - 1) / edge, {}};
+    std::vector<glm::ivec3> corners;
+    for (int z = 0; z < result.top.z; ++z)
+        for (int y = 0; y < result.top.y; ++y)
+            for (int x = 0; x < result.top.x; ++x) corners.push_back(edge * glm::ivec3(x, y, z));
+    result.levels.resize(factors.size() + 1);
+    result.levels[0].edge = edge;
+    fill(result.levels[0], map, corners);
+    for (size_t i = 1; i < result.levels.size(); ++i) {
+        CompressedMap::Level& level = result.levels[i];
+        level.factor = factors[i - 1];
+        level.edge = result.levels[i - 1].edge / level.factor;
+        corners = cornersOfBricks(corners, result.levels[i - 1], level.edge, level.factor);
+        fill(level, map, corners);
+    }
+    return result;
+}
+
+}  // namespace vcp::meso

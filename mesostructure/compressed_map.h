@@ -1,0 +1,50 @@
+// Distance maps in a lookup grid and atlases (Mehra and Kumar, 4 and appendix A): a block without surface keeps the
+// least of its lengths, a block with surface is a brick of an atlas. One lookup is the paper's two levels; more make
+// the tree its hierarchical extension. The blocks and the places of bricks are the same for all cones and are stored
+// once.
+//
+// "Lossless" is what is rendered: lengths away from the surface become shorter, steps stay safe, hits stay the same.
+// Texels are fetched by integer coordinates; nothing is filtered, so bricks have no apron.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mesostructure/distance_map.h"
+
+namespace vcp::meso {
+
+struct CompressedMap {
+    /// Entries of one size. Level 0 is a grid over the tile; entries of a lower level are in bricks of factor^3, a
+    /// brick after the other, x fastest.
+    struct Level {
+        int edge = 1;                ///< cells an entry is wide; the last level's is 1
+        int factor = 1;              ///< entries of this level that an entry of the level above is wide
+        uint32_t entries = 0;
+        std::vector<uint8_t> steps;  ///< cone by cone; kOccupied: surface within, see the level below
+        std::vector<uint32_t> brick; ///< the entry's brick on the level below, where it has one; empty on the last level
+    };
+
+    TileGrid grid;
+    Cones cones;
+    float unit = 0;
+    glm::ivec3 top{0};  ///< entries of level 0
+    std::vector<Level> levels;
+
+    struct Found {
+        bool occupied = false;
+        float length = 0;
+        int fetches = 0;  ///< bytes and words read
+    };
+    [[nodiscard]] Found lookUp(int cone, glm::ivec3 cell) const;
+
+    [[nodiscard]] uint64_t bytes() const;
+    /// The paper's Table 3: texels of the map over texels of lookup and atlases, whatever their bytes.
+    [[nodiscard]] double texelRatio() const;
+};
+
+/// `factors`: of the levels below the grid, coarse first; {4} is the paper's way with blocks of 4^3. Errors: Usage
+/// (no factor, one below 2 or above 16, or blocks above 64 cells).
+Result<CompressedMap> compressMap(const DistanceMap& map, std::span<const int> factors);
+
+}  // namespace vcp::meso

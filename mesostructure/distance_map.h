@@ -1,0 +1,90 @@
+// Distance maps and directional distance maps (Mehra and Kumar, 3.1), conservative.
+//
+// A map holds, for each cone of directions and each cell of a grid, a length that may be travelled from any point of
+// the cell in any direction of the cone without passing the surface. DDM m x n cuts the azimuth into m intervals from
+// 0 (the x axis, towards y) and the elevation from -90 to 90 degrees into n; cones are closed, 1 x 1 is the plain
+// distance map. The paper's n = 1 is the full range here, so shadow rays find their cone as view rays do.
+//
+// Proof of the bound, for the rule AnyPoint. The surface lies in the occupied cells W, which are closed and widened
+// (kCellSlack). If v in V, m on the surface and m - v is in the cone, then m is in some W with w - v in the cone; the
+// stored value is the least |w - v| over such pairs, or less. For cones that are a sign for each of some axes (m in
+// {1, 2, 4}, n in {1, 2}: octants, quadrants and halves) the pairs are those of cells ordered by index along these
+// axes, the square of the gap is a sum over the axes, and its least value is three one-sided lower envelopes of
+// parabolas, one axis after the other: exact, in time linear in the cells (after Felzenszwalb and Huttenlocher 2012,
+// one-sided). Other cones are searched cell by cell in the order of distance, up to `cap`; they are widened by
+// kConeSlack for the rounding of a ray's azimuth.
+//
+// Lengths above the cap are cut to it (an empty cone has no least distance on a repeated tile), and values are rounded
+// down to a byte. Whether a cell is occupied is a byte of its own, kOccupied: 0 is a length, not a flag.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mesostructure/shape.h"
+
+namespace vcp::meso {
+
+/// One byte a cell: whether the surface may touch the widened closed cell.
+struct Occupancy {
+    TileGrid grid;
+    std::vector<uint8_t> cells;
+
+    [[nodiscard]] bool at(glm::ivec3 cell) const { return cell.z >= 0 && cell.z < grid.cells.z && cells[grid.index(cell)] != 0; }
+    [[nodiscard]] size_t count() const;
+};
+
+/// Errors: Limit (more than kMaxGridCells or kMaxGridEdge), Usage (no cells); InvalidInput where no cell is occupied.
+Result<Occupancy> occupy(const Shape& shape, glm::ivec3 cells);
+
+struct Cones {
+    int azimuth = 1;    ///< 1 to 32
+    int elevation = 1;  ///< 1 to 16
+
+    [[nodiscard]] int count() const { return azimuth * elevation; }
+    /// Whether each cone is a sign for each of some axes.
+    [[nodiscard]] bool areSigns() const { return (azimuth == 1 || azimuth == 2 || azimuth == 4) && elevation <= 2; }
+};
+inline constexpr double kConeSlack = 1e-6;  ///< radians
+
+/// The cone of a direction: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as shaders find it.
+int coneOf(Cones cones, glm::vec3 direction);
+
+enum class DistanceRule {
+    AnyPoint,  ///< from any point of the cell to any point of an occupied cell: conservative
+    Paper,     ///< between centres on a grid `refine` times as fine, then the least of each cell: oversteps
+    PaperSafe  ///< the same less the diagonal of a fine cell: conservative, at the paper's price
+};
+
+inline constexpr uint8_t kOccupied = 255;  ///< in place of a length
+inline constexpr int kMostSteps = 254;
+
+struct DistanceMap {
+    TileGrid grid;
+    Cones cones;
+    float unit = 0;              ///< tile units of one step
+    std::vector<uint8_t> steps;  ///< 0 to kMostSteps, or kOccupied; cone by cone, cells as in the grid
+
+    [[nodiscard]] size_t slot(int cone, glm::ivec3 cell) const { return size_t(cone) * grid.count() + grid.index(cell); }
+    /// Of a cell that is not occupied.
+    [[nodiscard]] float length(int cone, glm::ivec3 cell) const { return float(steps[slot(cone, cell)]) * unit; }
+    [[nodiscard]] uint64_t bytes() const { return steps.size(); }
+};
+
+struct DistanceOptions {
+    Cones cones;
+    DistanceRule rule = DistanceRule::AnyPoint;
+    double cap = 0.25;   ///< tile units; longer ones are cut to it
+    int refine = 2;      ///< of the paper's rules: 2 to 8
+    bool search = false; ///< also search cones that are signs (for tests)
+};
+
+/// The maps of all cones. The paper's rules need the shape, for the finer grid. Errors: Usage (cones, cap, refine out
+/// of range), Limit.
+Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceOptions& options, const Shape* shape = nullptr);
+
+/// Lengths in tile units before they are cut and rounded; infinity where the cone has no occupied cell. One cone of
+/// signs: `sign` is +1, -1 or 0 (both) for each axis.
+std::vector<float> signedConeDistances(const Occupancy& occupancy, glm::ivec3 sign, bool betweenCentres = false);
+
+}  // namespace vcp::meso

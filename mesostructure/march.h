@@ -1,0 +1,107 @@
+// Marchers: the methods that find where a ray meets a mesostructure, on the CPU, each as its shader does it: flat arrays,
+// single precision, integer cells, every fetch counted. They are the reference that a port is compared with, ray by
+// ray, and what `vcp bench meso` measures.
+//
+// A ray starts in the slab of a tile (mesostructure/tile_grid.h) and travels 0 <= t <= tMax, in tile units. It hits where
+// it enters the solid from outside. A ray that starts inside sees nothing before it has left. Rays leave by the
+// slab's top or bottom and are misses; one that used up its iterations is unresolved, never a hit or a miss.
+//
+// The state of a walk is the cell, in integers: a ray leaves a cell through the wall it meets first, by one cell along
+// that axis. There is no epsilon, and parallel rays divide by nothing. A ray meets a cell from wall to wall, whatever
+// steps brought it there, so what is hit does not depend on the lengths that were skipped.
+//
+// A fetch is one read of a word or texel, or of a footprint that a sampler reads at once (2 x 2 texels by a gather or a
+// bilinear sampler, 2 x 2 x 2 by a trilinear one; 2 gathers where the eight values themselves are needed).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <glm/vec3.hpp>
+
+#include "mesostructure/compressed_map.h"
+#include "mesostructure/octant_boxes.h"
+#include "mesostructure/patches.h"
+#include "mesostructure/sampled_field.h"
+
+namespace vcp::meso {
+
+struct MarchRay {
+    glm::dvec3 origin{0};     ///< in the slab; any tile
+    glm::dvec3 direction{0};  ///< unit vector
+    double tMax = 1e6;        ///< tile units
+};
+
+enum class MarchState : uint8_t { Hit, Miss, Unresolved };
+
+struct MarchResult {
+    MarchState state = MarchState::Miss;
+    double t = 0;                   ///< of a hit
+    glm::vec3 normal{0};            ///< unit, of a hit where the method knows it
+    uint32_t iterations = 0;        ///< steps, refinements included
+    uint32_t fetches = 0;
+    uint32_t surfaceTests = 0;      ///< cells, texels or patches that were solved
+};
+
+class Marcher {
+public:
+    virtual ~Marcher() = default;
+    /// Any thread. The ray's numbers must be finite.
+    [[nodiscard]] virtual MarchResult march(const MarchRay& ray) const = 0;
+    /// Of all arrays that a ray may read.
+    [[nodiscard]] virtual uint64_t bytes() const = 0;
+    /// Whether no ray may pass the method's own stored surface unseen.
+    [[nodiscard]] virtual bool isConservative() const = 0;
+};
+
+inline constexpr uint32_t kMostIterations = 8192;
+
+/// How a walk skips empty cells. All refer to what must outlive the marcher.
+struct Skipping {
+    const Occupancy* occupancy = nullptr;       ///< cell by cell
+    const DistanceMap* distances = nullptr;
+    const CompressedMap* compressed = nullptr;
+    const OctantBoxes* boxes = nullptr;
+};
+
+/// What a walk does in an occupied cell; none: the cell itself is the hit, where the ray enters it.
+struct Surface {
+    const PatchSet* patches = nullptr;
+    const HeightMap* heights = nullptr;   ///< bilinear texels; the grid's cells along x and y must divide the texels
+    const SampledField* field = nullptr;  ///< trilinear samples; the grid's cells must divide the field's
+};
+
+/// A walk over a grid: one of Skipping, at most one of Surface. Errors: Usage (none or several, grids that do not
+/// match).
+Result<std::unique_ptr<Marcher>> gridMarcher(const Skipping& skipping, const Surface& surface);
+
+enum class Refinement { None, Binary, Secant, SecantAsPrinted, Illinois };
+
+/// Relief mapping: `steps` uniform steps down the height field, then refinement (Policarpo et al. 2005; Risser et al.
+/// 2007). Secant is the bracketed false position that the paper describes; as printed, the listing's branch replaces the
+/// wrong end and the output is the last sample's height over the ray's slope.
+struct ReliefOptions {
+    int steps = 32;       ///< between the top and the bottom of the slab, 1 to 4096
+    Refinement refinement = Refinement::Binary;
+    int refinements = 10;          ///< at most
+    float tolerance = 0.01f;       ///< of |f| over the slab's height, as in the listing; 0: only by count
+};
+std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options);
+
+/// Maxima of the bilinear cells in a pyramid (Tevs et al. 2008), each texel cell solved in closed form.
+std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map);
+
+/// Sphere tracing on a plain distance map: signed distances at the cells' centres, 16 bits each, trilinear between them
+/// (the published ones are 0 inside, which pulls hits into the solid); the hit is where the distance is below `threshold` cells (Donnelly 2005). No bound holds.
+struct SphereOptions {
+    glm::ivec3 cells{64, 64, 16};
+    float threshold = 0.05f;  ///< in cells
+    int steps = 256;          ///< at most; then the ray is unresolved
+};
+Result<std::unique_ptr<Marcher>> sphereMarcher(const Shape& shape, const SphereOptions& options);
+
+/// Double precision, no skipping, every cell solved: what the stored data itself say (truth of a method's own data).
+TruthHit traceField(const SampledField& field, const MarchRay& ray);
+
+}  // namespace vcp::meso

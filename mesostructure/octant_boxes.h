@@ -1,0 +1,29 @@
+// Octant boxes: for each cell and each octant of directions, the extents of an empty box of cells that starts there. A
+// ray leaves the box at once, by integer cells; the step rules of spheres are not needed. (The idea of boxes in one
+// word is that of ISO-Viewer's extended anisotropic distances; grown here from the largest cube, axis by axis.)
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mesostructure/distance_map.h"
+
+namespace vcp::meso {
+
+/// Octant o is towards +x, +y, +z where its bits 0, 1, 2 are 0, and towards - where they are 1.
+inline int octantOf(glm::vec3 d) { return (d.x < 0) | (d.y < 0) << 1 | (d.z < 0) << 2; }
+
+struct OctantBoxes {
+    static constexpr int kMost = 31;  ///< cells beyond its own by which a box grows along an axis
+
+    TileGrid grid;
+    /// Octant by octant, cells as in the grid. Bits 0-4, 5-9, 10-14: further cells that are empty along x, y, z; a box
+    /// that reaches the slab's top or bottom goes on as if the outside were empty cells. Bit 15: the cell is occupied.
+    std::vector<uint16_t> boxes;
+
+    [[nodiscard]] uint64_t bytes() const { return boxes.size() * sizeof(uint16_t); }
+};
+
+OctantBoxes buildOctantBoxes(const Occupancy& occupancy);
+
+}  // namespace vcp::meso

@@ -1,0 +1,358 @@
+#include "mesostructure/patches.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace vcp::meso {
+
+namespace {
+
+using glm::dvec3, glm::ivec3;
+
+/// An edge of a cell: along an axis, from one of its corners.
+struct CellEdge {
+    int axis;
+    ivec3 from;
+};
+
+/// Four corners in order around a face, and the cell's edges between them; both (u, v) = (0,0), (1,0), (1,1), (0,1).
+struct CellFace {
+    std::array<ivec3, 4> corners;
+    std::array<int, 4> edges;
+};
+
+/// Edge number of the edge along `axis` with the given place along the other two axes, in ascending order.
+int edgeNumber(int axis, int low, int high) { return axis * 4 + low + 2 * high; }
+
+CellEdge edgeOf(int number) {
+    CellEdge edge{number / 4, ivec3(0)};
+    edge.from[edge.axis == 0 ? 1 : 0] = number & 1;
+    edge.from[edge.axis == 2 ? 1 : 2] = number >> 1 & 1;
+    return edge;
+}
+
+std::array<CellFace, 6> makeFaces() {
+    std::array<CellFace, 6> faces;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+        for (int side = 0; side < 2; ++side) {
+            CellFace& face = faces[axis * 2 + side];
+            const int us[4] = {0, 1, 1, 0}, vs[4] = {0, 0, 1, 1};
+            for (int i = 0; i < 4; ++i) {
+                face.corners[i] = ivec3(0);
+                face.corners[i][axis] = side, face.corners[i][u] = us[i], face.corners[i][v] = vs[i];
+                const bool alongU = i % 2 == 0;
+                const int along = alongU ? u : v, other = alongU ? v : u, place = alongU ? (i == 2) : (i == 1);
+                // The edge's other two axes are `axis` and `other`, in ascending order.
+                face.edges[i] = axis < other ? edgeNumber(along, side, place) : edgeNumber(along, place, side);
+            }
+        }
+    }
+    return faces;
+}
+const std::array<CellFace, 6> kFaces = makeFaces();
+
+void setLinear(float* to, dvec3 gradient, double constant) {
+    to[0] = float(gradient.x), to[1] = float(gradient.y), to[2] = float(gradient.z), to[3] = float(constant);
+}
+
+void normalise(std::array<double, 10>& q, float* to) {
+    double most = 0;
+    for (const double c : q) most = std::max(most, std::abs(c));
+    for (int i = 0; i < 10; ++i) to[i] = float(q[i] / most);
+}
+
+void appendTriangle(dvec3 a, dvec3 b, dvec3 c, std::vector<Patch>& patches) {
+    const dvec3 ab = b - a, ac = c - a, normal = glm::cross(ab, ac);
+    const double size = glm::dot(normal, normal);
+    if (!(size > 1e-18)) return;
+    Patch patch;
+    patch.isTriangle = 1;
+    std::array<double, 10> q{};
+    q[6] = normal.x, q[7] = normal.y, q[8] = normal.z, q[9] = -glm::dot(normal, a);
+    normalise(q, patch.quadric);
+    const dvec3 u = glm::cross(ac, normal) / size, v = glm::cross(normal, ab) / size;
+    setLinear(patch.u, u, -glm::dot(u, a));
+    setLinear(patch.v, v, -glm::dot(v, a));
+    patches.push_back(patch);
+}
+
+/// Appendix B: with Y = X - P1 = uv a + u b + v c, the triple product solves for u, v and uv, and uv = u * v is the
+/// quadric. Where a lies in the plane of b and c the triple product is 0: two triangles are the patch there.
+void appendBilinear(dvec3 p1, dvec3 p2, dvec3 p3, dvec3 p4, std::vector<Patch>& patches) {
+    const dvec3 a = p1 + p3 - p2 - p4, b = p2 - p1, c = p4 - p1;
+    const dvec3 bc = glm::cross(b, c), ca = glm::cross(c, a), ab = glm::cross(a, b);
+    const double det = glm::dot(a, bc);
+    if (glm::length(a) < 1e-4 || std::abs(det) < 1e-3 * glm::length(a) * glm::length(bc) || glm::length(bc) < 1e-6) {
+        appendTriangle(p1, p2, p3, patches);
+        appendTriangle(p1, p3, p4, patches);
+        return;
+    }
+    const dvec3 u = ca / det, v = ab / det, w = bc / det;
+    const double u0 = -glm::dot(u, p1), v0 = -glm::dot(v, p1), w0 = -glm::dot(w, p1);
+    Patch patch;
+    // w - u v = 0
+    std::array<double, 10> q{-u.x * v.x,
+                             -u.y * v.y,
+                             -u.z * v.z,
+                             -(u.x * v.y + u.y * v.x),
+                             -(u.y * v.z + u.z * v.y),
+                             -(u.z * v.x + u.x * v.z),
+                             w.x - u.x * v0 - u0 * v.x,
+                             w.y - u.y * v0 - u0 * v.y,
+                             w.z - u.z * v0 - u0 * v.z,
+                             w0 - u0 * v0};
+    normalise(q, patch.quadric);
+    setLinear(patch.u, u, u0);
+    setLinear(patch.v, v, v0);
+    patches.push_back(patch);
+}
+
+/// The points on the grid's edges: edge along `axis` from a grid point.
+class EdgePoints {
+public:
+    explicit EdgePoints(const TileGrid& grid) : points_({grid.cells.x, grid.cells.y, grid.cells.z + 1}, glm::dvec3(1)), sums_(3 * points_.count()), counts_(3 * points_.count()) {}
+    void add(CellEdge edge, ivec3 cell, double place) {
+        const size_t at = slot(edge, cell);
+        sums_[at] += place;
+        ++counts_[at];
+    }
+    [[nodiscard]] bool has(CellEdge edge, ivec3 cell) const { return counts_[slot(edge, cell)] != 0; }
+    /// The mean of what was added, in the cell's coordinates.
+    [[nodiscard]] dvec3 point(CellEdge edge, ivec3 cell) const {
+        const size_t at = slot(edge, cell);
+        dvec3 p(edge.from);
+        p[edge.axis] = sums_[at] / counts_[at];
+        return p;
+    }
+
+private:
+    size_t slot(CellEdge edge, ivec3 cell) const { return size_t(edge.axis) * points_.count() + points_.index(cell + edge.from); }
+    TileGrid points_;
+    std::vector<double> sums_;
+    std::vector<uint16_t> counts_;
+};
+
+/// Builds cell by cell; corners' values are asked once.
+class PatchBuilder {
+public:
+    PatchBuilder(const Shape& shape, const Occupancy& occupancy) : shape_(shape), occupancy_(occupancy), grid_(occupancy.grid), edges_(grid_) {}
+
+    void findDirect() {
+        values_.resize(size_t(grid_.cells.x) * size_t(grid_.cells.y) * size_t(grid_.cells.z + 1), std::numeric_limits<double>::quiet_NaN());
+        eachCell([&](ivec3 cell) {
+            for (int number = 0; number < 12; ++number) {
+                const CellEdge edge = edgeOf(number);
+                ivec3 to = edge.from;
+                to[edge.axis] = 1;
+                const double a = value(cell + edge.from), b = value(cell + to);
+                if ((a > 0) != (b > 0) && !edges_.has(edge, cell)) edges_.add(edge, cell, crossing(cell, edge, a > 0));
+            }
+        });
+    }
+
+    void findFitted() {
+        eachCell([&](ivec3 cell) {
+            const std::vector<dvec3> samples = samplesAround(cell);
+            if (samples.size() < 6) return;
+            const std::array<double, 10> q = fitQuadric(samples);
+            for (int number = 0; number < 12; ++number) addFitted(q, edgeOf(number), cell);
+        });
+    }
+
+    Result<PatchSet> assemble(CrossingRule rule) {
+        PatchSet set{grid_, std::vector<PatchSet::Rank>((grid_.count() + 31) / 32), {}, {}};
+        for (size_t i = 0; i < grid_.count(); ++i) {
+            PatchSet::Rank& rank = set.ranks[i / 32];
+            if (i % 32 == 0) rank.base = uint32_t(set.rows.size());
+            if (occupancy_.cells[i] == 0) continue;
+            const size_t first = set.patches.size();
+            if (rule == CrossingRule::Direct) appendLoops(grid_.at(i), set.patches);
+            else appendOrdered(grid_.at(i), set.patches);
+            const size_t count = std::min<size_t>(set.patches.size() - first, PatchSet::kMostInCell);
+            set.patches.resize(first + count);
+            if (set.patches.size() >= size_t{1} << 28) return Error{.code = ErrorCode::Limit, .message = "more than 2^28 patches; take a coarser grid"};
+            if (count == 0) {
+                ++set.cellsWithout;
+                continue;
+            }
+            rank.mask |= 1u << (i % 32);
+            set.rows.push_back(uint32_t(first << 4 | count));
+        }
+        return set;
+    }
+
+private:
+    template <class Use>
+    void eachCell(const Use& use) {
+        for (size_t i = 0; i < grid_.count(); ++i)
+            if (occupancy_.cells[i] != 0) use(grid_.at(i));
+    }
+    dvec3 position(ivec3 cell, dvec3 local) const { return (dvec3(cell) + local) * grid_.cell; }
+    double value(ivec3 point) {
+        const size_t at = size_t(wrapped(point.x, grid_.cells.x)) + size_t(grid_.cells.x) * (size_t(wrapped(point.y, grid_.cells.y)) + size_t(grid_.cells.y) * size_t(point.z));
+        if (std::isnan(values_[at])) values_[at] = shape_.field(dvec3(point) * grid_.cell);
+        return values_[at];
+    }
+    double crossing(ivec3 cell, CellEdge edge, bool isFirstOutside) const {
+        double low = 0, high = 1;
+        for (int i = 0; i < 40; ++i) {
+            dvec3 p(edge.from);
+            p[edge.axis] = 0.5 * (low + high);
+            ((shape_.field(position(cell, p)) > 0) == isFirstOutside ? low : high) = p[edge.axis];
+        }
+        return 0.5 * (low + high);
+    }
+
+    /// Points of the surface in the cell and half a cell around it: a lattice moved along the gradient.
+    std::vector<dvec3> samplesAround(ivec3 cell) const {
+        constexpr int n = 6;
+        std::vector<dvec3> samples;
+        for (int i = 0; i < n * n * n; ++i) {
+            dvec3 p = dvec3(i % n, i / n % n, i / n / n) * (2.0 / (n - 1)) - 0.5;
+            double size = 0;
+            for (int step = 0; step < 4; ++step) {
+                const double f = shape_.field(position(cell, p)), e = 1e-4;
+                const dvec3 g = dvec3(shape_.field(position(cell, p + dvec3(e, 0, 0))) - f, shape_.field(position(cell, p + dvec3(0, e, 0))) - f,
+                                      shape_.field(position(cell, p + dvec3(0, 0, e))) - f) / e;
+                size = glm::dot(g, g);
+                if (size > 0) p -= f * g / size;
+            }
+            const dvec3 off = glm::abs(p - 0.5);
+            if (size > 0 && std::max({off.x, off.y, off.z}) <= 1 && std::abs(shape_.field(position(cell, p))) < 0.02 * grid_.cell.x) samples.push_back(p);
+        }
+        return samples;
+    }
+
+    void addFitted(const std::array<double, 10>& q, CellEdge edge, ivec3 cell) {
+        const auto at = [&](double s) {
+            dvec3 p(edge.from);
+            p[edge.axis] = s;
+            return q[0] * p.x * p.x + q[1] * p.y * p.y + q[2] * p.z * p.z + q[3] * p.x * p.y + q[4] * p.y * p.z + q[5] * p.z * p.x + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
+        };
+        // A quadratic along the edge, from three values.
+        const double f0 = at(0), fh = at(0.5), f1 = at(1), a = 2 * (f1 - 2 * fh + f0), b = f1 - f0 - a, disc = b * b - 4 * a * f0;
+        if (disc < 0) return;
+        const double r = -0.5 * (b + (b >= 0 ? std::sqrt(disc) : -std::sqrt(disc)));
+        const double roots[2] = {a != 0 ? r / a : -1, r != 0 ? f0 / r : -1};
+        for (const double s : roots)
+            if (s >= 0 && s <= 1) return edges_.add(edge, cell, s);
+    }
+
+    /// Loops over the faces; each point has one line on either of its edge's faces.
+    void appendLoops(ivec3 cell, std::vector<Patch>& patches) {
+        std::array<std::array<int, 2>, 12> next;
+        std::array<int, 12> lines{};
+        const auto join = [&](int a, int b) { next[a][lines[a]++] = b, next[b][lines[b]++] = a; };
+        for (const CellFace& face : kFaces) {
+            std::array<double, 4> f;
+            for (int i = 0; i < 4; ++i) f[i] = value(cell + face.corners[i]);
+            int crossed[4], count = 0;
+            for (int i = 0; i < 4; ++i)
+                if ((f[i] > 0) != (f[(i + 1) % 4] > 0)) crossed[count++] = face.edges[i];
+            if (count == 2) join(crossed[0], crossed[1]);
+            if (count < 4) continue;
+            // The side of the saddle point is that of corners 0 and 2, or of 1 and 3.
+            const double sum = f[0] + f[2] - f[1] - f[3], saddle = (f[0] * f[2] - f[1] * f[3]) / sum;
+            const bool joins02 = (saddle > 0) == (f[0] > 0);
+            join(face.edges[0], face.edges[joins02 ? 1 : 3]);
+            join(face.edges[2], face.edges[joins02 ? 3 : 1]);
+        }
+        std::array<bool, 12> done{};
+        for (int start = 0; start < 12; ++start) {
+            if (lines[start] != 2 || done[start]) continue;
+            std::vector<dvec3> loop;
+            for (int at = start, before = -1; !done[at];) {
+                done[at] = true;
+                loop.push_back(edges_.point(edgeOf(at), cell));
+                const int to = next[at][0] != before ? next[at][0] : next[at][1];
+                before = at, at = to;
+            }
+            appendPatches(loop, patches);
+        }
+    }
+
+    void appendOrdered(ivec3 cell, std::vector<Patch>& patches) const {
+        std::vector<dvec3> points;
+        for (int number = 0; number < 12; ++number)
+            if (edges_.has(edgeOf(number), cell)) points.push_back(edges_.point(edgeOf(number), cell));
+        if (points.size() < 3) return;
+        dvec3 centre(0);
+        for (const dvec3 p : points) centre += p / double(points.size());
+        const dvec3 local = position(cell, centre);
+        const double e = 1e-3 * grid_.cell.x, f = shape_.field(local);
+        dvec3 normal = dvec3(shape_.field(local + dvec3(e, 0, 0)) - f, shape_.field(local + dvec3(0, e, 0)) - f, shape_.field(local + dvec3(0, 0, e)) - f) * grid_.cell;
+        if (!(glm::length(normal) > 0)) normal = {0, 0, 1};
+        normal = glm::normalize(normal);
+        const dvec3 x = glm::normalize(glm::cross(normal, std::abs(normal.x) < 0.7 ? dvec3(1, 0, 0) : dvec3(0, 1, 0))), y = glm::cross(normal, x);
+        std::ranges::sort(points, {}, [&](dvec3 p) { return std::atan2(glm::dot(p - centre, y), glm::dot(p - centre, x)); });
+        appendPatches(points, patches);
+    }
+
+    const Shape& shape_;
+    const Occupancy& occupancy_;
+    const TileGrid& grid_;
+    EdgePoints edges_;
+    std::vector<double> values_;
+};
+
+}  // namespace
+
+std::span<const Patch> PatchSet::of(size_t cell) const {
+    const Rank& rank = ranks[cell / 32];
+    const uint32_t bit = 1u << (cell % 32);
+    if ((rank.mask & bit) == 0) return {};
+    const uint32_t row = rows[rank.base + uint32_t(std::popcount(rank.mask & (bit - 1)))];
+    return {patches.data() + (row >> 4), row & 15};
+}
+
+void appendPatches(std::span<const glm::dvec3> loop, std::vector<Patch>& patches) {
+    const size_t n = loop.size();
+    size_t i = 1;
+    for (; i + 2 < n; i += 2) appendBilinear(loop[0], loop[i], loop[i + 1], loop[i + 2], patches);
+    if (i + 1 < n) appendTriangle(loop[0], loop[i], loop[i + 1], patches);
+}
+
+float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span) {
+    const float* q = patch.quadric;
+    const float a = q[0] * d.x * d.x + q[1] * d.y * d.y + q[2] * d.z * d.z + q[3] * d.x * d.y + q[4] * d.y * d.z + q[5] * d.z * d.x;
+    const float b = 2 * (q[0] * o.x * d.x + q[1] * o.y * d.y + q[2] * o.z * d.z) + q[3] * (o.x * d.y + o.y * d.x) + q[4] * (o.y * d.z + o.z * d.y) +
+                    q[5] * (o.z * d.x + o.x * d.z) + q[6] * d.x + q[7] * d.y + q[8] * d.z;
+    const float c = q[0] * o.x * o.x + q[1] * o.y * o.y + q[2] * o.z * o.z + q[3] * o.x * o.y + q[4] * o.y * o.z + q[5] * o.z * o.x + q[6] * o.x + q[7] * o.y + q[8] * o.z + q[9];
+    const float disc = b * b - 4 * a * c;
+    if (disc < 0) return -1;
+    // Without cancellation; for a = 0, the linear branch, the second root is that of the plane.
+    const float r = -0.5f * (b + (b >= 0 ? std::sqrt(disc) : -std::sqrt(disc)));
+    float near = a != 0 ? r / a : -1e30f, far = r != 0 ? c / r : -1e30f;
+    if (near > far) std::swap(near, far);
+    constexpr float kOn = 2e-4f;  // patches meet at their borders: a ray between two finds one of them
+    const float slack = kOn / std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+    for (const float s : {near, far}) {
+        if (!(s >= -slack && s <= span + slack)) continue;
+        const glm::vec3 p = o + s * d;
+        const float u = patch.u[0] * p.x + patch.u[1] * p.y + patch.u[2] * p.z + patch.u[3], v = patch.v[0] * p.x + patch.v[1] * p.y + patch.v[2] * p.z + patch.v[3];
+        if (u < -kOn || v < -kOn) continue;
+        if (patch.isTriangle != 0 ? u + v <= 1 + kOn : u <= 1 + kOn && v <= 1 + kOn) return std::clamp(s, 0.0f, span);
+    }
+    return -1;
+}
+
+glm::vec3 patchGradient(const Patch& patch, glm::vec3 p) {
+    const float* q = patch.quadric;
+    return {2 * q[0] * p.x + q[3] * p.y + q[5] * p.z + q[6], 2 * q[1] * p.y + q[3] * p.x + q[4] * p.z + q[7], 2 * q[2] * p.z + q[4] * p.y + q[5] * p.x + q[8]};
+}
+
+Result<PatchSet> buildPatches(const Shape& shape, const Occupancy& occupancy, CrossingRule rule) {
+    PatchBuilder builder(shape, occupancy);
+    // Corner values decide nothing in the paper's way.
+    if (rule == CrossingRule::Direct) builder.findDirect();
+    else builder.findFitted();
+    return builder.assemble(rule);
+}
+
+}  // namespace vcp::meso

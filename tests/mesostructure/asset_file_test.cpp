@@ -1,0 +1,166 @@
+// Assets: what was written is read back, and every changed, cut or lying byte is refused.
+#include "mesostructure/asset_file.h"
+
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "octree/vcp_file.h"
+#include "tests/mesostructure/meso_rays.h"
+#include "tests/viewer/test_folder.h"
+
+namespace vcp::meso {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+Bytes bytesOf(const std::filesystem::path& path) {
+    const std::string text = contentOf(path);
+    Bytes bytes(text.size());
+    std::memcpy(bytes.data(), text.data(), text.size());
+    return bytes;
+}
+
+Asset small(const std::string& solid) {
+    Asset asset;
+    asset.name = "small";
+    asset.solid = solid;
+    const auto built = buildAsset(asset, {.cells = {8, 8, 2}, .samples = 1, .distances = {.cones = {2, 1}}, .factors = {2}});
+    EXPECT_TRUE(built.ok()) << built.error().line();
+    return asset;
+}
+
+TEST(AssetFile, GivesBackWhatWasWritten) {
+    const TestFolder folder("meso_asset_test");
+    for (int kind = 0; kind < 3; ++kind) {
+        Asset asset;
+        asset.name = "one";
+        if (kind == 0) asset.heights = *makeHeightField("fbm", 32, 5);
+        if (kind == 1) asset.solid = "beads", asset.seed = 9;
+        if (kind == 2) {
+            // A box of twelve triangles, normals outwards.
+            const auto corner = [](int i) { return glm::dvec3(i & 1 ? 0.7 : 0.3, i & 2 ? 0.7 : 0.3, i & 4 ? 0.2 : 0.1); };
+            for (const auto& [a, b, c, d] : std::initializer_list<std::array<int, 4>>{{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+                asset.triangles.push_back({corner(a), corner(b), corner(c)});
+                asset.triangles.push_back({corner(a), corner(c), corner(d)});
+            }
+            asset.extent = {1, 1, 0.25};
+        }
+        const auto built = buildAsset(asset, {.cells = {16, 16, 4}});
+        ASSERT_TRUE(built.ok()) << built.error().line();
+        const auto bytes = writeAsset(folder / "a.meso", asset);
+        ASSERT_TRUE(bytes.ok()) << bytes.error().line();
+        EXPECT_EQ(*bytes, std::filesystem::file_size(folder / "a.meso"));
+        EXPECT_FALSE(std::filesystem::exists(folder / "a.meso.partial"));
+        const auto read = readAsset(folder / "a.meso");
+        ASSERT_TRUE(read.ok()) << read.error().line();
+        EXPECT_EQ(read->distances->steps, asset.distances->steps);
+        EXPECT_EQ(read->boxes->boxes, asset.boxes->boxes);
+        EXPECT_EQ(read->patches->rows, asset.patches->rows);
+        EXPECT_EQ(read->triangles, asset.triangles);
+        EXPECT_EQ(read->compressed->bytes(), asset.compressed->bytes());
+        EXPECT_EQ(read->heights ? read->heights->texels : std::vector<uint16_t>(), asset.heights ? asset.heights->texels : std::vector<uint16_t>());
+        // The same again, byte for byte.
+        ASSERT_TRUE(writeAsset(folder / "b.meso", *read).ok());
+        EXPECT_EQ(contentOf(folder / "a.meso"), contentOf(folder / "b.meso"));
+    }
+}
+
+TEST(AssetFile, EveryTruncationAndEveryFlippedBitIsRefused) {
+    const TestFolder folder("meso_asset_damage_test");
+    Asset asset = small("ball");
+    asset.boxes.reset();
+    ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
+    Bytes bytes = bytesOf(folder / "a.meso");
+    ASSERT_TRUE(parseAsset(bytes, "a").ok());
+    for (size_t size = 0; size < bytes.size(); ++size) ASSERT_FALSE(parseAsset(std::span(bytes).first(size), "a").ok()) << size;
+    for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+        ASSERT_FALSE(parseAsset(bytes, "a").ok()) << "bit " << bit;
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+    }
+    bytes.push_back(std::byte{0});
+    EXPECT_FALSE(parseAsset(bytes, "a").ok());
+}
+
+/// With right hashes all over, as a liar writes them.
+void resign(Bytes& bytes) {
+    AssetHeader header;
+    std::memcpy(&header, bytes.data(), sizeof header);
+    std::vector<AssetChunk> table(header.chunks);
+    std::memcpy(table.data(), bytes.data() + sizeof header, table.size() * sizeof(AssetChunk));
+    for (AssetChunk& chunk : table) chunk.hash = hashBytes(std::span(bytes).subspan(chunk.offset, chunk.bytes));
+    std::memcpy(bytes.data() + sizeof header, table.data(), table.size() * sizeof(AssetChunk));
+    header.tableHash = hashBytes(std::as_bytes(std::span(table)));
+    header.hash = hashBytes(std::as_bytes(std::span(&header, 1)).first(offsetof(AssetHeader, hash)));
+    std::memcpy(bytes.data(), &header, sizeof header);
+    AssetCommit commit;
+    std::memcpy(&commit, bytes.data() + bytes.size() - sizeof commit, sizeof commit);
+    commit.headerHash = header.hash;
+    commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(AssetCommit, hash)));
+    std::memcpy(bytes.data() + bytes.size() - sizeof commit, &commit, sizeof commit);
+}
+
+TEST(AssetFile, LiesBehindValidHashesAreRefusedOrHarmless) {
+    const TestFolder folder("meso_asset_lies_test");
+    const Asset asset = small("ball");
+    ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
+    const Bytes bytes = bytesOf(folder / "a.meso");
+    std::mt19937 random(6);
+    int refused = 0;
+    for (int i = 0; i < 3000; ++i) {
+        Bytes changed = bytes;
+        // Within chunks: behind the header and the table.
+        const size_t first = 256 + 48 * 7, at = first + random() % (changed.size() - first - 64);
+        const uint32_t value = i % 3 == 0 ? 0xffffffffu : uint32_t(random());
+        std::memcpy(changed.data() + at, &value, std::min<size_t>(4, changed.size() - 64 - at));
+        resign(changed);
+        const auto read = parseAsset(changed, "lie");
+        refused += !read.ok();
+        if (!read) continue;
+        // Whatever it says, walks end and stay in memory.
+        const auto marcher = gridMarcher({.compressed = &*read->compressed}, {.patches = &*read->patches});
+        ASSERT_TRUE(marcher.ok());
+        for (int k = 0; k < 5; ++k) static_cast<void>((*marcher)->march(test::rayFromTop(random, read->extent)));
+    }
+    EXPECT_GT(refused, 300);
+}
+
+TEST(AssetFile, OtherFilesAreToldApart) {
+    const TestFolder folder("meso_asset_other_test");
+    const auto says = [&](const std::string& text) {
+        std::ofstream(folder / "x", std::ios::binary) << text;
+        return readAsset(folder / "x").error();
+    };
+    EXPECT_NE(says("").message.find("empty"), std::string::npos);
+    EXPECT_NE(says("short").message.find("short"), std::string::npos);
+    EXPECT_NE(says(std::string(5000, 'x')).message.find("not a mesostructure asset"), std::string::npos);
+    EXPECT_EQ(says("").file, (folder / "x").string());
+    EXPECT_EQ(readAsset(folder / "nothing").error().code, ErrorCode::Io);
+    EXPECT_EQ(writeAsset(folder.path(), small("ball")).error().code, ErrorCode::Io);
+    EXPECT_EQ(writeAsset(folder / "no/such/place.meso", small("ball")).error().code, ErrorCode::Io);
+
+    ASSERT_TRUE(writeAsset(folder / "a.meso", small("ball")).ok());
+    Bytes bytes = bytesOf(folder / "a.meso");
+    bytes[8] = std::byte{2};
+    resign(bytes);
+    EXPECT_EQ(parseAsset(bytes, "newer").error().code, ErrorCode::Unsupported);
+}
+
+TEST(AssetFile, BuildingRefusesWhatDoesNotFit) {
+    Asset asset;
+    asset.heights = *makeHeightField("fbm", 30, 1);
+    EXPECT_EQ(buildAsset(asset, {.cells = {16, 16, 4}}).error().code, ErrorCode::Usage);
+    EXPECT_TRUE(buildAsset(asset, {}).ok()) << "a grid that divides the texels is found";
+    asset.heights->texels.clear();
+    EXPECT_FALSE(buildAsset(asset, {}).ok());
+    Asset unknown;
+    unknown.solid = "nothing";
+    EXPECT_FALSE(buildAsset(unknown, {}).ok());
+}
+
+}  // namespace
+}  // namespace vcp::meso

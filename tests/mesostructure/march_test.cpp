@@ -1,0 +1,207 @@
+// The marchers against the double-precision truths.
+#include "mesostructure/march.h"
+
+#include <random>
+
+#include <glm/geometric.hpp>
+
+#include "tests/mesostructure/meso_rays.h"
+
+namespace vcp::meso {
+namespace {
+
+struct Judged {
+    int hits = 0, missed = 0, falseHits = 0, unresolved = 0, far = 0;
+    double worst = 0;
+    uint64_t fetches = 0;
+};
+
+/// `far`: hits off by more than `tolerance`, tile units.
+template <class Truth>
+Judged judge(const Marcher& marcher, glm::dvec3 extent, const Truth& truth, double tolerance, int rays, double lowest = 5) {
+    std::mt19937 random(17);
+    Judged judged;
+    for (int i = 0; i < rays; ++i) {
+        const MarchRay ray = test::rayFromTop(random, extent, lowest);
+        const MarchResult found = marcher.march(ray);
+        const TruthHit expected = truth(ray);
+        judged.fetches += found.fetches;
+        judged.unresolved += found.state == MarchState::Unresolved;
+        judged.missed += expected.hit && found.state == MarchState::Miss;
+        judged.falseHits += !expected.hit && found.state == MarchState::Hit;
+        if (!expected.hit || found.state != MarchState::Hit) continue;
+        ++judged.hits;
+        const double error = std::abs(found.t - expected.t);
+        judged.worst = std::max(judged.worst, error);
+        judged.far += error > tolerance;
+    }
+    return judged;
+}
+
+TEST(March, ExactCellsOfHeightFieldsMissNothing) {
+    for (const auto name : heightFieldNames()) {
+        const HeightMap map = *makeHeightField(name, 64, 3);
+        const auto shape = test::heights(map);
+        const auto truth = [&](const MarchRay& ray) { return shape->trace(ray.origin, ray.direction, ray.tMax); };
+        const Occupancy occupancy = test::occupied(*shape, {32, 32, 8});
+        const OctantBoxes boxes = buildOctantBoxes(occupancy);
+        const DistanceMap distances = test::distances(occupancy, {.cones = {4, 1}});
+        uint64_t all = 0, skipped = 0;
+        for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}}) {
+            const Judged judged = judge(*test::walk(skipping, {.heights = &map}), shape->extent(), truth, 2e-3, 1500, 2);
+            EXPECT_EQ(judged.missed + judged.falseHits + judged.unresolved, 0) << name;
+            EXPECT_GT(judged.hits, 1400) << name;
+            (skipping.occupancy ? all : skipped) = judged.fetches;
+        }
+        EXPECT_LT(skipped, all) << name;
+        const Judged judged = judge(*pyramidMarcher(map), shape->extent(), truth, 2e-3, 1500, 2);
+        EXPECT_EQ(judged.missed + judged.falseHits + judged.unresolved, 0) << name;
+    }
+}
+
+TEST(March, SampledFieldsMissNothingOfThemselves) {
+    for (const auto name : solidNames()) {
+        const auto shape = test::solid(std::string(name));
+        const glm::ivec3 cells(16, 16, int(16 * shape->extent().z));
+        const SampledField field = *sampleField(*shape, cells * 2);
+        Occupancy occupancy = test::occupied(*shape, cells);
+        occupyField(field, occupancy);
+        const auto truth = [&](const MarchRay& ray) { return traceField(field, ray); };
+        const OctantBoxes boxes = buildOctantBoxes(occupancy);
+        const DistanceMap distances = test::distances(occupancy, {.cones = {8, 1}, .cap = 0.2});
+        const CompressedMap compressed = *compressMap(distances, std::vector{4});
+        for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.compressed = &compressed}, Skipping{.boxes = &boxes}}) {
+            const Judged judged = judge(*test::walk(skipping, {.field = &field}), shape->extent(), truth, 2e-3, 800);
+            EXPECT_EQ(judged.missed, 0) << name;
+            EXPECT_EQ(judged.falseHits + judged.unresolved, 0) << name;
+        }
+    }
+}
+
+TEST(March, PatchesFollowTheShape) {
+    const auto shape = test::solid("beads");
+    const Occupancy occupancy = test::occupied(*shape, {16, 16, 4});
+    const DistanceMap distances = test::distances(occupancy, {.cones = {4, 1}});
+    int far[2] = {}, wrong[2] = {};
+    for (const CrossingRule rule : {CrossingRule::Direct, CrossingRule::Fitted}) {
+        const PatchSet patches = *buildPatches(*shape, occupancy, rule);
+        const auto marcher = test::walk({.distances = &distances}, {.patches = &patches});
+        std::mt19937 random(17);
+        for (int i = 0; i < 2000; ++i) {
+            const MarchRay ray = test::rayFromTop(random, shape->extent(), 20);
+            const MarchResult found = marcher->march(ray);
+            const TruthHit truth = shape->trace(ray.origin, ray.direction, ray.tMax);
+            wrong[size_t(rule)] += (found.state == MarchState::Hit) != truth.hit;
+            far[size_t(rule)] += std::abs(found.t - truth.t) > 0.5 / 16;
+        }
+    }
+    // The floor is closed, so nothing is missed; fits across two sheets are far off, crossings are not.
+    EXPECT_EQ(wrong[0], 0);
+    EXPECT_LT(far[0], 400);
+    EXPECT_LT(2 * far[0], far[1]);
+}
+
+TEST(March, CompressionChangesNoHit) {
+    const auto shape = test::solid("chain");
+    const Occupancy occupancy = test::occupied(*shape, {32, 32, 8});
+    const DistanceMap distances = test::distances(occupancy, {.cones = {4, 2}});
+    const PatchSet patches = *buildPatches(*shape, occupancy, CrossingRule::Direct);
+    const auto plain = test::walk({.distances = &distances}, {.patches = &patches});
+    for (const std::vector<int>& factors : {std::vector<int>{2}, {4}, {4, 2}, {2, 2, 2}}) {
+        const CompressedMap compressed = *compressMap(distances, factors);
+        const auto packed = test::walk({.compressed = &compressed}, {.patches = &patches});
+        std::mt19937 random(1);
+        int hits = 0;
+        for (int i = 0; i < 3000; ++i) {
+            const MarchRay ray = test::rayFromTop(random, shape->extent());
+            const MarchResult a = plain->march(ray), b = packed->march(ray);
+            ASSERT_EQ(a.state, b.state) << i;
+            ASSERT_EQ(a.t, b.t) << i;
+            ASSERT_EQ(a.normal, b.normal) << i;
+            hits += a.state == MarchState::Hit;
+        }
+        EXPECT_GT(hits, 500);
+    }
+}
+
+TEST(March, AwkwardRays) {
+    const HeightMap map = *makeHeightField("blocks", 32, 1);
+    const auto shape = test::heights(map);
+    const Occupancy occupancy = test::occupied(*shape, {16, 16, 4});
+    const OctantBoxes boxes = buildOctantBoxes(occupancy);
+    const DistanceMap distances = test::distances(occupancy, {.cones = {4, 2}});
+    const double top = map.range;
+    const double grazing = std::sqrt(1 - 1e-12);
+    const MarchRay rays[] = {
+        {{0.5, 0.5, top}, {0, 0, -1}},                         // AxisAlignedOnGridPlanes
+        {{0.5, 0.25, top}, {-1, 0, 0}},                        // along the top
+        {{0.0, 0.0, top * 0.999}, {1, 0, 0}},                  // Horizontal
+        {{0.5, 0.5, top}, {std::sqrt(0.5), 0, -std::sqrt(0.5)}},
+        {{1e5 + 0.3, -1e5 + 0.7, top}, {0, -std::sqrt(0.5), -std::sqrt(0.5)}},  // OriginFarAway
+        {{0.1, 0.1, top}, {grazing, 0, -1e-6}},                // GrazingRays
+        {{0.3, 0.3, top}, {0, 0, 1}},                          // away
+        {{0.9, 0.9, 0.0}, {0, 0, -1}},                         // below
+    };
+    for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}}) {
+        const auto marcher = test::walk(skipping, {.heights = &map});
+        for (size_t i = 0; i < std::size(rays); ++i) {
+            MarchRay ray = rays[i];
+            ray.tMax = 20;
+            const MarchResult found = marcher->march(ray);
+            const TruthHit expected = shape->trace(ray.origin, ray.direction, ray.tMax);
+            EXPECT_EQ(found.state == MarchState::Hit, expected.hit) << "ray " << i;
+            EXPECT_NE(found.state, MarchState::Unresolved) << "ray " << i;
+            EXPECT_NEAR(found.t, expected.t, 1e-3) << "ray " << i;
+        }
+    }
+}
+
+TEST(March, CapsAreUnresolved) {
+    const HeightMap map = *makeHeightField("needle", 16, 1);
+    const auto shape = test::heights(map);
+    const auto few = *sphereMarcher(*shape, {.cells = {16, 16, 4}, .steps = 2});
+    EXPECT_EQ(few->march({{0.1, 0.1, map.range}, glm::normalize(glm::dvec3(1, 0.1, -0.05))}).state, MarchState::Unresolved);
+    // Between the needles for ever: more cells than iterations.
+    const Occupancy occupancy = test::occupied(*shape, {16, 16, 4});
+    const auto cells = test::walk({.occupancy = &occupancy}, {.heights = &map});
+    EXPECT_EQ(cells->march({{0.01, 0.03, map.range * 0.5}, {1, 0, 0}}).state, MarchState::Unresolved);
+}
+
+TEST(March, ReliefRefinementsFindTheBracketsRoot) {
+    const HeightMap map = *makeHeightField("hemispheres", 128, 1);
+    const auto shape = test::heights(map);
+    double mean[5] = {};
+    for (const Refinement refinement : {Refinement::None, Refinement::Binary, Refinement::Secant, Refinement::SecantAsPrinted, Refinement::Illinois}) {
+        const auto marcher = reliefMarcher(map, {.steps = 64, .refinement = refinement, .refinements = 20, .tolerance = refinement == Refinement::SecantAsPrinted ? 0.01f : 1e-5f});
+        std::mt19937 random(4);
+        int counted = 0;
+        for (int i = 0; i < 1000; ++i) {
+            const MarchRay ray = test::rayFromTop(random, shape->extent(), 30);
+            const TruthHit truth = shape->trace(ray.origin, ray.direction, 100);
+            const MarchResult found = marcher->march(ray);
+            ASSERT_EQ(found.state, MarchState::Hit);
+            // Where the first bracket is the right one.
+            if (std::abs(found.t - truth.t) > map.range / 64 / -ray.direction.z) continue;
+            mean[size_t(refinement)] += std::abs(found.t - truth.t) * 128;
+            ++counted;
+        }
+        EXPECT_GT(counted, 800);
+        mean[size_t(refinement)] /= counted;
+    }
+    EXPECT_LT(mean[size_t(Refinement::Binary)], 0.01);
+    EXPECT_LT(mean[size_t(Refinement::Secant)], 0.01);
+    EXPECT_LT(mean[size_t(Refinement::Illinois)], 0.01);
+    EXPECT_GT(mean[size_t(Refinement::None)], 0.05);
+    EXPECT_GT(mean[size_t(Refinement::SecantAsPrinted)], mean[size_t(Refinement::Secant)]);
+}
+
+TEST(March, RefusesWhatDoesNotFit) {
+    const HeightMap map = *makeHeightField("fbm", 30, 1);
+    const auto shape = test::heights(map);
+    const Occupancy occupancy = test::occupied(*shape, {16, 16, 4});
+    EXPECT_EQ(gridMarcher({.occupancy = &occupancy}, {.heights = &map}).error().code, ErrorCode::Usage);
+    EXPECT_EQ(gridMarcher({}, {.heights = &map}).error().code, ErrorCode::Usage);
+}
+
+}  // namespace
+}  // namespace vcp::meso

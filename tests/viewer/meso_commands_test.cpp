@@ -1,0 +1,141 @@
+// vcp meso and vcp bench meso from the outside.
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <png.h>
+
+#include "vcp_program.h"
+
+namespace vcp {
+namespace {
+
+using Json = nlohmann::json;
+
+class MesoCommands : public testing::Test {
+protected:
+    MesoCommands() : folder_("vcp_meso_test") {}
+
+    [[nodiscard]] Ran run(const std::string& arguments) const {
+        std::istringstream words(arguments);
+        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
+    }
+    [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+    /// A ramp along x, 16 x 8 texels.
+    void writeRamp(const std::string& name, bool isWide) const {
+        png_image image{};
+        image.version = PNG_IMAGE_VERSION, image.width = 16, image.height = 8;
+        std::vector<uint8_t> bytes(16 * 8);
+        for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = uint8_t(i % 16 * 17);
+        image.format = PNG_FORMAT_GRAY;
+        ASSERT_TRUE(png_image_write_to_file(&image, path(name).c_str(), 0, bytes.data(), 0, nullptr));
+        if (!isWide) return;
+        std::vector<uint16_t> values(16 * 8 * 3, 40000);
+        image.format = PNG_FORMAT_LINEAR_RGB;
+        ASSERT_TRUE(png_image_write_to_file(&image, path(name).c_str(), 0, values.data(), 0, nullptr));
+    }
+
+    TestFolder folder_;
+};
+
+TEST_F(MesoCommands, BuildsAndTellsWhatIsInIt) {
+    writeRamp("ramp.png", false);
+    writeRamp("flat.png", true);
+    for (const std::string& source : std::vector<std::string>{"beads", "cobble", path("ramp.png"), path("flat.png")}) {
+        const std::string out = path("a.meso");
+        const Ran built = run("meso build " + source + " -o " + out + " --grid 16 --texels 64 --blocks 4,2 --json");
+        ASSERT_EQ(built.status, 0) << built.err;
+        const Ran info = run("meso info " + out + " --json");
+        ASSERT_EQ(info.status, 0) << info.err;
+        Json made = Json::parse(built.out);
+        const Json told = Json::parse(info.out);
+        EXPECT_GT(made["seconds"], 0);
+        made.erase("seconds");
+        EXPECT_EQ(made, told);
+        EXPECT_GT(told["occupied_cells"], 0);
+        EXPECT_GT(told["patches"], 0);
+        EXPECT_EQ(run("meso info " + out).status, 0);
+    }
+    EXPECT_EQ(Json::parse(run("meso info " + path("a.meso") + " --json").out)["texels"], Json::array({16, 8}));
+}
+
+TEST_F(MesoCommands, MeshesMustBeClosed) {
+    // A tetrahedron, and the same without a face.
+    const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n", faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\n";
+    std::ofstream(path("closed.obj")) << corners << faces << "f 1 4 3\n";
+    std::ofstream(path("open.obj")) << corners << faces;
+    const Ran built = run("meso build " + path("closed.obj") + " -o " + path("a.meso") + " --grid 12 --json");
+    ASSERT_EQ(built.status, 0) << built.err;
+    EXPECT_EQ(Json::parse(built.out)["source"], "mesh");
+    EXPECT_EQ(run("meso build " + path("closed.obj") + " -o " + path("b.meso") + " --grid 12 --up y --period 2,1.5 --json").status, 0);
+    const Ran open = run("meso build " + path("open.obj") + " -o " + path("c.meso") + " --grid 12");
+    EXPECT_EQ(open.status, 1);
+    EXPECT_NE(open.err.find("not closed"), std::string::npos) << open.err;
+    EXPECT_NE(open.err.find("open.obj"), std::string::npos) << open.err;
+    EXPECT_FALSE(std::filesystem::exists(path("c.meso")));
+}
+
+TEST_F(MesoCommands, SaysWhatIsWrong) {
+    std::ofstream(path("empty.png")) << "";
+    std::ofstream(path("text.png")) << "not a picture";
+    std::ofstream(path("a.exr"), std::ios::binary) << "\x76\x2f\x31\x01 and more";
+    writeRamp("cut.png", false);
+    std::filesystem::resize_file(path("cut.png"), 60);
+    const struct {
+        std::string arguments;
+        int status;
+        std::string says;
+    } cases[] = {{"meso build " + path("empty.png"), 1, "empty"},       {"meso build " + path("text.png"), 1, "not a PNG"},
+                 {"meso build " + path("cut.png"), 1, "damaged"},       {"meso build " + path("a.exr"), 1, "EXR"},
+                 {"meso build " + path("none.png"), 1, "none.png"},     {"meso build nothing", 2, "no procedural one"},
+                 {"meso build fbm --texels 60 --grid 7", 2, "divide"},  {"meso build beads --cones 0x1", 2, "--cones"},
+                 {"meso build beads --cones 99x1", 2, "cones"},         {"meso build beads --blocks 1", 2, "block"},
+                 {"meso build beads --grid 5000", 2, "grid"}};
+    for (const auto& c : cases) {
+        const Ran ran = run(c.arguments + " -o " + path("x.meso"));
+        EXPECT_EQ(ran.status, c.status) << c.arguments << ": " << ran.err;
+        EXPECT_NE(ran.err.find(c.says), std::string::npos) << c.arguments << ": " << ran.err;
+        EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+        EXPECT_FALSE(std::filesystem::exists(path("x.meso"))) << c.arguments;
+    }
+    EXPECT_EQ(run("meso info " + path("text.png")).status, 1);
+    EXPECT_EQ(run("meso").status, 2);
+}
+
+TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
+    const Ran ran = run("bench meso beads needle --methods boxes,ddm-quadric,relief-secant --views 45,shadow --rays 100 --repetitions 1 --check-rays 100 --progress none --json --out " +
+                        path("report"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json report = Json::parse(ran.out);
+    std::set<std::string> methods;
+    for (const Json& row : report["rows"]) {
+        for (const char* field : {"asset", "view", "method", "knob", "ns_per_ray", "fetches_mean", "iterations_mean", "missed", "false", "wrong_feature", "unresolved", "p50_texels", "p95_texels",
+                                  "p99_texels", "bytes", "preprocess_seconds"})
+            ASSERT_TRUE(row.contains(field)) << field;
+        double sum = 0;
+        for (const char* part : {"hit", "miss", "missed", "false", "wrong_feature", "unresolved"}) sum += row[part].get<double>();
+        EXPECT_NEAR(sum, 1, 1e-9);
+        EXPECT_GT(row["bytes"], 0);
+        EXPECT_LE(row["p50_texels"], row["p99_texels"]);
+        const bool isOurs = row["method"] == "boxes";
+        EXPECT_EQ(isOurs && row["asset"] == "needle" ? row["missed"] : Json(0.0), 0) << row;
+        EXPECT_EQ(isOurs && row["asset"] == "beads" ? row["solver_missed"] : Json(0.0), 0) << row;
+        methods.insert(row["method"]);
+    }
+    EXPECT_EQ(methods.size(), 3u);
+    for (const Json& check : report["checks"])
+        EXPECT_TRUE(check["map"] == "4x2 paper" || check["oversteps"] == 0) << check;
+    for (const char* file : {"bench_meso.json", "bench_meso.csv", "bench_meso.md", "bench_meso_beads_p95_time.svg"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
+    EXPECT_EQ(run("bench meso beads --methods nothing").status, 2);
+    EXPECT_EQ(run("bench meso nothing").status, 2);
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,87 @@
+// vcp bench meso: run time and work against error of the mesostructure marchers, on the CPU, all with the same rays
+// (docs/mesostructure.md).
+//
+// Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes and
+// the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the solving
+// alone costs. Rays go one by one in one thread; times are the median of the repetitions after a warm-up.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mesostructure/asset_file.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+struct BenchMesoOptions {
+    /// Names of procedural height fields and solids, or asset files; empty: a set of eleven.
+    std::vector<std::string> assets;
+    std::vector<std::string> methods;  ///< empty: all that fit the asset
+    std::vector<std::string> views;    ///< empty: all
+    bool sweep = false;                ///< each method at several values of its knob
+    int rays = 2000;                   ///< a view
+    int repetitions = 3;
+    uint64_t checkRays = 0;            ///< rays of the conservative test an asset; 0: not made
+    /// Called with what is being done; false cancels. May be empty.
+    std::function<bool(const std::string&, double fraction)> progress;
+};
+
+enum class MesoClass { Hit, Miss, Missed, False, WrongFeature, Unresolved };
+inline constexpr std::array<std::string_view, 6> kMesoClassNames = {"hit", "miss", "missed", "false", "wrong_feature", "unresolved"};
+
+/// What became of rays against one truth; fractions sum to 1. Errors along the ray, of hits that are not of a wrong
+/// feature (off by more than 2 texels), in texels.
+struct MesoJudged {
+    std::array<double, 6> fractions{};
+    double p50 = 0, p95 = 0, p99 = 0, max = 0;
+    double normalP50 = 0, normalP95 = 0;  ///< degrees, of the methods that give normals
+
+    [[nodiscard]] double fraction(MesoClass c) const { return fractions[static_cast<size_t>(c)]; }
+    /// Missed, false, of a wrong feature or unresolved.
+    [[nodiscard]] double wrong() const { return 1 - fraction(MesoClass::Hit) - fraction(MesoClass::Miss); }
+};
+
+struct BenchMesoRow {
+    std::string asset, view, method, knob;
+    uint64_t rays = 0;
+    double nsPerRay = 0;
+    MesoJudged shape;           ///< against the shape
+    bool hasSolver = false;
+    MesoJudged solver;          ///< against the method's own data
+    double fetchesMean = 0, iterationsMean = 0, iterationsP95 = 0, surfaceTestsMean = 0;
+    std::array<double, 4> iterationBins{};  ///< parts of the rays: up to 10, 34, 59 iterations, and more (the bins of the paper's Fig. 7)
+    double divergence8 = 0;     ///< mean over groups of 8 rays of most over mean iterations
+    uint64_t bytes = 0;
+    double preprocessSeconds = 0;
+};
+
+/// The conservative test: rays from anywhere, against what the map of their cell says.
+struct MesoCheck {
+    std::string asset, map;
+    uint64_t rays = 0, oversteps = 0;
+    double worstTexels = 0;
+};
+
+struct BenchMesoReport {
+    std::vector<BenchMesoRow> rows;
+    std::vector<MesoCheck> checks;
+};
+
+std::vector<std::string> mesoMethodNames();
+std::vector<std::string> mesoViewNames();
+
+/// Errors: Usage (no such asset, method or view), those of the builders, Cancelled.
+Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options);
+
+std::string benchMesoJson(const BenchMesoReport& report);
+std::string benchMesoCsv(const BenchMesoReport& report);
+std::string benchMesoMarkdown(const BenchMesoReport& report);
+/// File names without extension, and SVG.
+std::vector<std::pair<std::string, std::string>> benchMesoPlots(const BenchMesoReport& report);
+
+}  // namespace vcp

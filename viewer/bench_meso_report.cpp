@@ -1,0 +1,123 @@
+// The report of the mesostructure benchmark as JSON, CSV, Markdown and plots.
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "viewer/bench_meso.h"
+#include "viewer/csv_text.h"
+#include "viewer/plot_svg.h"
+
+namespace vcp {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json toJson(const BenchMesoRow& row) {
+    Json json = {{"asset", row.asset},
+                 {"view", row.view},
+                 {"method", row.method},
+                 {"knob", row.knob},
+                 {"rays", row.rays},
+                 {"ns_per_ray", row.nsPerRay},
+                 {"fetches_mean", row.fetchesMean},
+                 {"iterations_mean", row.iterationsMean},
+                 {"iterations_p95", row.iterationsP95},
+                 {"surface_tests_mean", row.surfaceTestsMean},
+                 {"divergence_8", row.divergence8}};
+    for (size_t i = 0; i < kMesoClassNames.size(); ++i) json[std::string(kMesoClassNames[i])] = row.shape.fractions[i];
+    json["p50_texels"] = row.shape.p50, json["p95_texels"] = row.shape.p95, json["p99_texels"] = row.shape.p99, json["max_texels"] = row.shape.max;
+    json["normal_p50_degrees"] = row.shape.normalP50, json["normal_p95_degrees"] = row.shape.normalP95;
+    // Columns are the same for all rows.
+    const auto solver = [&](double value) { return row.hasSolver ? Json(value) : Json(); };
+    json["solver_missed"] = solver(row.solver.fraction(MesoClass::Missed));
+    json["solver_wrong"] = solver(row.solver.wrong());
+    json["solver_p95_texels"] = solver(row.solver.p95);
+    json["solver_max_texels"] = solver(row.solver.max);
+    const char* bins[] = {"iterations_0_10", "iterations_11_34", "iterations_35_59", "iterations_60"};
+    for (size_t i = 0; i < 4; ++i) json[bins[i]] = row.iterationBins[i];
+    json["bytes"] = row.bytes;
+    json["preprocess_seconds"] = row.preprocessSeconds;
+    return json;
+}
+
+Json rowsOf(const BenchMesoReport& report) {
+    Json json = Json::array();
+    for (const BenchMesoRow& row : report.rows) json.push_back(toJson(row));
+    return json;
+}
+
+template <class Of>
+std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string title, const char* xName, const char* yName, Of of) {
+    Plot plot{.title = std::move(title), .xName = xName, .yName = yName, .logX = true, .logY = true};
+    for (const BenchMesoRow* first : rows) {
+        auto series = std::ranges::find(plot.series, first->method, &PlotSeries::name);
+        if (series == plot.series.end()) series = plot.series.insert(series, PlotSeries{first->method, {}});
+        if (std::ranges::find(series->points, first->knob, &PlotPoint::label) != series->points.end()) continue;
+        // The mean over the views.
+        PlotPoint point{0, 0, first->knob};
+        double count = 0;
+        for (const BenchMesoRow* row : rows) {
+            if (row->method != first->method || row->knob != first->knob) continue;
+            const auto [x, y] = of(*row);
+            point.x += x, point.y += y, ++count;
+        }
+        point.x /= count, point.y /= count;
+        series->points.push_back(point);
+    }
+    return plotSvg(plot);
+}
+
+}  // namespace
+
+std::string benchMesoJson(const BenchMesoReport& report) {
+    Json checks = Json::array();
+    for (const MesoCheck& check : report.checks)
+        checks.push_back({{"asset", check.asset}, {"map", check.map}, {"rays", check.rays}, {"oversteps", check.oversteps}, {"worst_texels", check.worstTexels}});
+    return Json{{"rows", rowsOf(report)}, {"checks", checks}}.dump();
+}
+
+std::string benchMesoCsv(const BenchMesoReport& report) { return csvOf(rowsOf(report)); }
+
+std::string benchMesoMarkdown(const BenchMesoReport& report) {
+    std::string text =
+        "| asset | view | method | knob | ns/ray | fetches | iterations | hit % | missed % | false % | wrong feature % | unresolved % | p50 | p95 | p99 texels | "
+        "solver wrong % | MB | built s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+    for (const BenchMesoRow& row : report.rows) {
+        const auto percent = [&](MesoClass c) { return 100 * row.shape.fraction(c); };
+        text += fmt::format("| {} | {} | {} | {} | {:.0f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ", row.asset, row.view, row.method, row.knob, row.nsPerRay,
+                            row.fetchesMean, row.iterationsMean, percent(MesoClass::Hit), percent(MesoClass::Missed), percent(MesoClass::False), percent(MesoClass::WrongFeature),
+                            percent(MesoClass::Unresolved));
+        text += fmt::format("| {:.4f} | {:.4f} | {:.4f} | {} | {:.2f} | {:.2f} |\n", row.shape.p50, row.shape.p95, row.shape.p99,
+                            row.hasSolver ? fmt::format("{:.3f}", 100 * row.solver.wrong()) : std::string(), double(row.bytes) * 1e-6, row.preprocessSeconds);
+    }
+    if (report.checks.empty()) return text;
+    text += "\n| asset | map | rays | oversteps | worst, texels |\n|---|---|---|---|---|\n";
+    for (const MesoCheck& check : report.checks) text += fmt::format("| {} | {} | {} | {} | {:.3f} |\n", check.asset, check.map, check.rays, check.oversteps, check.worstTexels);
+    return text;
+}
+
+std::vector<std::pair<std::string, std::string>> benchMesoPlots(const BenchMesoReport& report) {
+    std::vector<std::pair<std::string, std::string>> plots;
+    std::vector<std::string> assets;
+    for (const BenchMesoRow& row : report.rows)
+        if (std::ranges::find(assets, row.asset) == assets.end()) assets.push_back(row.asset);
+    for (const std::string& asset : assets) {
+        std::vector<const BenchMesoRow*> rows;
+        for (const BenchMesoRow& row : report.rows)
+            if (row.asset == asset) rows.push_back(&row);
+        // No wrong ray in a view counts as half a one.
+        const auto wrong = [](const BenchMesoRow& row) { return std::max(row.shape.wrong(), 0.5 / double(std::max<uint64_t>(row.rays, 1))); };
+        std::string name = asset.substr(asset.rfind('/') + 1);
+        plots.emplace_back("bench_meso_" + name + "_p95_time",
+                           plotOf(rows, name + ": error, p95", "ns a ray", "texels", [](const BenchMesoRow& r) { return std::pair(r.nsPerRay, r.shape.p95); }));
+        plots.emplace_back("bench_meso_" + name + "_wrong_fetches",
+                           plotOf(rows, name + ": wrong rays", "fetches a ray", "fraction; none: half a ray", [&](const BenchMesoRow& r) { return std::pair(r.fetchesMean, wrong(r)); }));
+        plots.emplace_back("bench_meso_" + name + "_p95_bytes",
+                           plotOf(rows, name + ": error, p95", "bytes", "texels", [](const BenchMesoRow& r) { return std::pair(double(r.bytes), r.shape.p95); }));
+    }
+    return plots;
+}
+
+}  // namespace vcp

@@ -1,0 +1,100 @@
+#include "viewer/height_image.h"
+
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include "octree/durable_file.h"
+
+namespace vcp {
+
+namespace {
+
+struct PngFailure {
+    std::string message;
+};
+
+/// No object with a destructor lives in the functions that libpng's errors jump out of.
+struct PngReader {
+    png_structp png = nullptr;
+    png_infop info = nullptr;
+    PngFailure failure;
+
+    ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+void failed(png_structp png, png_const_charp message) {
+    static_cast<PngFailure*>(png_get_error_ptr(png))->message = message;
+    png_longjmp(png, 1);
+}
+void warned(png_structp, png_const_charp) {}
+
+/// Size and form; rows become 8 or 16 bits a channel, without alpha.
+bool readStart(PngReader& reader, std::FILE* file) {
+    if (setjmp(png_jmpbuf(reader.png))) return false;
+    png_init_io(reader.png, file);
+    png_read_info(reader.png, reader.info);
+    png_set_expand(reader.png);
+    png_set_strip_alpha(reader.png);
+    if (std::endian::native == std::endian::little) png_set_swap(reader.png);
+    png_read_update_info(reader.png, reader.info);
+    return true;
+}
+
+bool readRows(PngReader& reader, png_bytepp rows) {
+    if (setjmp(png_jmpbuf(reader.png))) return false;
+    png_read_image(reader.png, rows);
+    png_read_end(reader.png, nullptr);
+    return true;
+}
+
+}  // namespace
+
+Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {
+    const auto fail = [&](ErrorCode code, std::string message) { return Error{.code = code, .message = std::move(message), .file = path.string()}; };
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+    if (!file) return systemError(path, "cannot open", errno);
+    png_byte signature[8] = {};
+    const size_t got = std::fread(signature, 1, 8, file.get());
+    if (got >= 4 && signature[0] == 0x76 && signature[1] == 0x2f && signature[2] == 0x31 && signature[3] == 0x01)
+        return fail(ErrorCode::Unsupported, "is an EXR picture, which is not read; save it as a PNG of 16 bits");
+    if (got < 8 || png_sig_cmp(signature, 0, 8) != 0) return fail(ErrorCode::InvalidInput, got == 0 ? "the file is empty" : "is not a PNG picture");
+    std::rewind(file.get());
+
+    PngReader reader;
+    reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader.failure, failed, warned);
+    if (reader.png) reader.info = png_create_info_struct(reader.png);
+    if (!reader.info) return fail(ErrorCode::Limit, "not enough memory for the picture");
+    if (!readStart(reader, file.get())) return fail(ErrorCode::InvalidInput, "the PNG is damaged: " + reader.failure.message);
+    const uint32_t width = png_get_image_width(reader.png, reader.info), height = png_get_image_height(reader.png, reader.info);
+    if (width > uint32_t(meso::kMaxGridEdge) || height > uint32_t(meso::kMaxGridEdge))
+        return fail(ErrorCode::Limit, fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, meso::kMaxGridEdge));
+    const size_t rowBytes = png_get_rowbytes(reader.png, reader.info), channels = png_get_channels(reader.png, reader.info);
+    const bool isWide = png_get_bit_depth(reader.png, reader.info) == 16;
+    std::vector<png_byte> bytes(rowBytes * height);
+    std::vector<png_bytep> rows(height);
+    for (uint32_t y = 0; y < height; ++y) rows[y] = bytes.data() + y * rowBytes;
+    if (!readRows(reader, rows.data())) return fail(ErrorCode::InvalidInput, "the PNG is damaged: " + reader.failure.message);
+
+    meso::HeightMap map{{int(width), int(height)}, range, std::vector<uint16_t>(size_t(width) * height)};
+    for (uint32_t y = 0; y < height; ++y)
+        for (uint32_t x = 0; x < width; ++x) {
+            uint32_t sum = 0;
+            for (size_t c = 0; c < channels; ++c) {
+                const png_byte* at = rows[height - 1 - y] + (x * channels + c) * (isWide ? 2 : 1);
+                uint16_t value = 0;
+                if (isWide) std::memcpy(&value, at, 2);
+                else value = uint16_t(*at * 257);
+                sum += value;
+            }
+            map.texels[size_t(y) * width + x] = uint16_t((sum + channels / 2) / channels);
+        }
+    return map;
+}
+
+}  // namespace vcp
