@@ -27,7 +27,7 @@ struct Surface {
 
 // Work of a ray; filled with kCountSteps only.
 struct Work {
-    uint steps, fetches;
+    uint steps, cells, fetches;
 };
 
 // A page of the cut, as the walk needs it.
@@ -129,10 +129,13 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
 }
 
 // Distance along the page's ray of the crossing in a soft leaf, or -1.
-float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout uint fetches) {
+float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
     uint face = page.sections.x + (node & kLeafIndexMask);
     LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), node >> kSoftAxisShift & 3u);
-    if (kCountSteps != 0u) fetches += 2u;
+    if (kCountSteps != 0u) {
+        work.cells++;
+        work.fetches += 2u;
+    }
     float scale = 1.0 / edge;  // a power of two: exact
     vec3 p = (s.from - lo) * scale;
     vec3 d = (s.to - s.from) * scale;
@@ -144,7 +147,8 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
 }
 
 // The triangles of a hard leaf. Distance, or -1.
-float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout uint fetches) {
+float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
+    if (kCountSteps != 0u) work.cells++;
     uint first = node & kLeafIndexMask;
     uint count = node >> kHardCountShift & kHardCountMask;
     if (count == kHardCountLong) {
@@ -158,7 +162,7 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
         uvec2 record = fetchPair(page.sections.y, first + i);
         uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
         uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y), c = fetchPair(page.sections.z, v.z);
-        if (kCountSteps != 0u) fetches += 4u;
+        if (kCountSteps != 0u) work.fetches += 4u;
         vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y), decodeVertex(c.x, c.y), kTriangleSlack);
         if (t.x >= lowest && t.x <= best) {
             best = t.x;
@@ -229,7 +233,7 @@ Surface surfaceAt(Hit hit, vec3 direction) {
 }
 
 // First hit in a page from distance `s` on, or kNoHit.
-float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, inout uint fetches) {
+float castPage(Ray ray, Page page, float s, inout Hit hit, inout Work work) {
     float sStart;
     PageRay local = enterPage(ray, page, sStart);
     Place at;
@@ -259,7 +263,7 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
                     at = next;
                     if (!at.inPage) break;
                 }
-                descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, steps);
+                descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, work.steps);
                 int bits = descent.bits - 1;
                 lo = vec3(at.subcell >> bits << bits) * (1.0 / kSubcells);
                 edge = float(1 << bits) * (1.0 / kSubcells);
@@ -273,11 +277,11 @@ float castPage(Ray ray, Page page, float s, inout Hit hit, inout uint steps, ino
             if (!at.inPage) break;
             segment = segmentInLeaf(local, lo, edge, at.tau);
             if (descent.node >> kNodeTypeShift == kNodeHard) break;
-            found = castSoft(page, descent.node, lo, edge, segment, hit, fetches);
+            found = castSoft(page, descent.node, lo, edge, segment, hit, work);
             if (found >= 0.0) break;
         }
         if (!at.inPage || found >= 0.0) break;
-        found = castHard(page, descent.node, segment, local.direction, hit, fetches);
+        found = castHard(page, descent.node, segment, local.direction, hit, work);
     }
     hit.leaf = descent.node;
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
@@ -298,7 +302,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
         if (!findPage(ray, reached, last, page, work.steps)) break;
         hit.record = page.record;
         hit.pageBits = page.bits;
-        hit.depth = castPage(ray, page, reached.x, hit, work.steps, work.fetches);
+        hit.depth = castPage(ray, page, reached.x, hit, work);
         if (hit.depth < kNoHit) break;
         reached = leaveLatticeBox(ray, page.corner, page.bits);
         inside = reached.x < last;
