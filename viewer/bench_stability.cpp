@@ -54,7 +54,7 @@ IndexedMesh shape() {
 class StabilityCase {
 public:
     StabilityCase(const StabilityOptions& options, double cell, double originCells) : options_(options), cell_(cell), mesh_(shape()) {
-        const glm::dvec3 origin = originCells * glm::dvec3(1, -1, 0.5);
+        const glm::dvec3 origin = originCells * glm::dvec3(1, -1.0 / 3, 0.7);
         for (glm::dvec3& p : mesh_.positions) p = (p + origin) * cell;
         bvh_ = std::make_unique<MeshBvh>(mesh_);
         camera_ = fitCamera(bvh_->low(), bvh_->high(), {-0.3, -0.5, -1}, {0.1, 1, 0.2}, 0.6, double(options.width) / options.height);
