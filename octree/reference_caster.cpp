@@ -292,6 +292,10 @@ Result<PageCache> PageCache::open(const std::filesystem::path& path) {
     if (!reader) return reader.error();
     auto dataset = readDataset(**reader);
     if (!dataset) return dataset.error();
+    if (dataset->header.method != Method::Certified)
+        return Error{.code = ErrorCode::Unsupported,
+                     .message = "was built with --method paper and has no certified surface; build it without",
+                     .file = path.string()};
     return PageCache(*reader, std::move(*dataset));
 }
 

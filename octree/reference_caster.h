@@ -37,7 +37,8 @@ public:
     /// Pages that are in memory already, one for each entry of `dataset.pages`; for tests and builders.
     /// Errors: what parsePage says.
     static Result<PageCache> fromPages(Dataset dataset, std::vector<PageBytes> pages);
-    /// Opens a .vcp file without loading a page. Errors: what openFile and readDataset say.
+    /// Opens a .vcp file without loading a page. Errors: what openFile and readDataset say; Unsupported where the file
+    /// is not of the certified method.
     static Result<PageCache> open(const std::filesystem::path& path);
 
     /// Loads what is not loaded yet. Errors: what readPage says; Usage for a page that does not exist.

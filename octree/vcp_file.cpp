@@ -65,20 +65,24 @@ bool finite(const double* values, int count) { return std::all_of(values, values
 Result<void> checkHeader(const ByteReader& reader, const FileHeader& h, std::span<const std::byte> bytes) {
     const auto fail = [&](uint64_t byte, std::string message) { return broken(reader, "header", byte, std::move(message)); };
     if (std::memcmp(h.magic, FileHeader{}.magic, sizeof h.magic) != 0) return fail(0, "not a .vcp file");
-    if (h.version != kFileVersion)
-        return Error{.code = ErrorCode::Unsupported,
-                     .message = fmt::format("file version {} is not known; this program reads version {}: {}", h.version, kFileVersion,
-                                                h.version < kFileVersion ? "build it again" : "use a newer program"),
-                     .file = reader.name(),
-                     .element = "header",
-                     .byte = 8};
+    const auto unsupported = [&](uint64_t byte, std::string message) {
+        return Error{.code = ErrorCode::Unsupported, .message = std::move(message), .file = reader.name(), .element = "header", .byte = byte};
+    };
+    if (h.version < kFileVersion || h.version > kMethodFileVersion)
+        return unsupported(8, fmt::format("file version {} is not known; this program reads version {} and version {}: {}", h.version, kFileVersion, kMethodFileVersion,
+                                          h.version < kFileVersion ? "build it again" : "use a newer program"));
     std::vector<std::byte> unhashed(bytes.begin(), bytes.end());
     std::memset(unhashed.data() + offsetof(FileHeader, hash), 0, 8);
     if (hashBytes(unhashed) != h.hash) return fail(0, "the header's hash does not match: the file was changed or damaged");
     if (h.headerBytes != kDirectoryOffset) return fail(12, "wrong header size");
     if (h.fileBytes != reader.size())
         return fail(16, fmt::format("the file should have {} bytes, it has {}: it was truncated or appended to", h.fileBytes, reader.size()));
-    if (h.levels < 1 || h.levels > kMaxLevels || h.log2Cells < 1 || h.log2Cells > 7) return fail(128, "levels or page size out of range");
+    const bool isPaper = h.method == Method::Paper;
+    if ((h.method != Method::Certified) != (h.version == kMethodFileVersion)) return fail(140, "the method does not go with the version");
+    if (h.method != Method::Certified && !isPaper)
+        return unsupported(140, fmt::format("it was built by method {}, which this program does not know: use a newer program", static_cast<uint32_t>(h.method)));
+    if (isPaper && (h.levels != 1 || h.pages != 1 || h.flags != 0)) return fail(128, "a file of this method has one page");
+    if (h.levels < 1 || h.levels > kMaxLevels || h.log2Cells < 1 || h.log2Cells > (isPaper ? kMaxPaperLog2Cells : 7)) return fail(128, "levels or page size out of range");
     if (!(h.cell > 0) || !std::isfinite(h.cell) || !finite(h.origin, 3) || !finite(h.boundsMin, 3) || !finite(h.boundsMax, 3))
         return fail(32, "origin, cell or bounds are not finite");
     if (h.pages < 1 || h.pages > kMaxPages || h.pages > h.fileBytes / sizeof(PageEntry)) return fail(24, "page count out of range");
@@ -218,6 +222,11 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     auto geometry = unpackGeometry(*stored, e.pageBytes);
     if (!geometry) return broken(reader, element, e.offset, geometry.error().message);
     page.geometry = *std::move(geometry);
+    if (dataset.header.method == Method::Paper) {
+        const auto paper = parsePaperPage(page.geometryBytes(), dataset.header.log2Cells);
+        if (!paper) return broken(reader, element, e.offset, paper.error().line());
+        return page;
+    }
     const auto view = parsePage(page.geometryBytes());
     if (!view) return broken(reader, element, e.offset, view.error().line());
     if (view->header.log2Cells != dataset.header.log2Cells) return broken(reader, element, e.offset, "page size differs from the file's");

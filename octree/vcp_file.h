@@ -1,4 +1,4 @@
-// The .vcp file, version 2.
+// The .vcp file, version 2, and version 3 for other methods than the certified one.
 //
 //   offset   bytes        content
 //   0        4096         FileHeader: what is in the file, tables of the levels, where the directory is
@@ -25,16 +25,25 @@
 #include <glm/vec3.hpp>
 
 #include "octree/page.h"
+#include "octree/paper_page.h"
 #include "octree/result.h"
 
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 2;
+inline constexpr uint32_t kMethodFileVersion = 3;  ///< of files whose method is not Certified
 inline constexpr uint32_t kMaxLevels = 22;  ///< Morton codes have 21 bits an axis
+inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
 inline constexpr uint32_t kEntriesPerBlock = 51;
 inline constexpr uint64_t kPageAlignment = 256;
+
+/// What pages hold.
+enum class Method : uint32_t {
+    Certified,  ///< octree/page.h
+    Paper,      ///< octree/paper_page.h: one level, one page, no certificate and no colour
+};
 
 /// One level's row in the header.
 struct LevelRow {
@@ -57,18 +66,19 @@ struct FileHeader {
     double boundsMin[3] = {};      ///< of the mesh, world units
     double boundsMax[3] = {};
     uint32_t levels = 0;    ///< 1 to kMaxLevels
-    uint32_t log2Cells = 0; ///< cells an edge of a page: 2^log2Cells
+    uint32_t log2Cells = 0; ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
     uint32_t flags = 0;     ///< bit 0: has colour
-    uint32_t reserved = 0;
+    Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft and hard, of the finest level
     uint64_t hardLeaves = 0;  ///< of the finest level
     LevelRow level[kMaxLevels] = {};
     uint64_t hash = 0;  ///< XXH3-64 of the 4096 bytes with this field zero
+    PaperParameters paper;  ///< zero where the method is another
 };
 inline constexpr uint32_t kFlagColour = 1;
 static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 && offsetof(FileHeader, triangles) == 144);
-static_assert(offsetof(FileHeader, level) == 184 && sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 && sizeof(FileHeader) <= 4096);
+static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels && sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 + 32);
 
 /// One page in the directory.
 struct PageEntry {
@@ -132,7 +142,7 @@ public:
 /// Opens a local file for bounded reads (pread). Errors: Io.
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 
-/// Reads and checks header, directory and commit record; no page. Errors: InvalidInput, Unsupported, Io;
+/// Reads and checks header, directory and commit record; no page. Errors: InvalidInput, Unsupported (version, method), Io;
 /// each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
@@ -145,7 +155,7 @@ struct PageBytes {
     [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
 };
 
-/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage) one page. Safe on hostile bytes: allocates
+/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage) one page. Safe on hostile bytes: allocates
 /// at most a few times the entry's pageBytes, which readDataset has bounded. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 

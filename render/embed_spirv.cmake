@@ -1,8 +1,12 @@
-# cmake -D INPUT=x.spv -D OUTPUT=x_spirv.h -D NAME=x -P embed_spirv.cmake: SPIR-V as an array of words.
+# cmake -D INPUT=x.spv -D OUTPUT=x_spirv.h -D NAME=x_y -P embed_spirv.cmake: SPIR-V as an array of words, kXYSpirv.
 file(READ ${INPUT} bytes HEX)
 string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1," words "${bytes}")
 string(REGEX REPLACE "((0x........,)(0x........,)(0x........,)(0x........,)(0x........,)(0x........,)(0x........,)(0x........,))" "\\1\n" words "${words}")
-string(SUBSTRING ${NAME} 0 1 initial)
-string(TOUPPER ${initial} initial)
-string(SUBSTRING ${NAME} 1 -1 rest)
-file(WRITE ${OUTPUT} "#pragma once\n\n#include <cstdint>\n\nnamespace vcp {\n\ninline constexpr uint32_t k${initial}${rest}Spirv[] = {\n${words}\n};\n\n}  // namespace vcp\n")
+string(REPLACE "_" ";" parts ${NAME})
+foreach(part IN LISTS parts)
+    string(SUBSTRING ${part} 0 1 initial)
+    string(TOUPPER ${initial} initial)
+    string(SUBSTRING ${part} 1 -1 rest)
+    string(APPEND camel ${initial}${rest})
+endforeach()
+file(WRITE ${OUTPUT} "#pragma once\n\n#include <cstdint>\n\nnamespace vcp {\n\ninline constexpr uint32_t k${camel}Spirv[] = {\n${words}\n};\n\n}  // namespace vcp\n")

@@ -27,6 +27,7 @@ frame::uint shadingMode(ShadingMode mode) {
         case ShadingMode::Unlit: return frame::kShadeUnlit;
         case ShadingMode::Normals: return frame::kShadeNormals;
         case ShadingMode::Steps: return frame::kShadeSteps;
+        case ShadingMode::Cells: return frame::kShadeCells;
         case ShadingMode::Fetches: return frame::kShadeFetches;
         case ShadingMode::Level: return frame::kShadeLevel;
         case ShadingMode::Error: return frame::kShadeError;
@@ -125,6 +126,7 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.clay = encoded(s.clay);
     c.cap = encoded(s.cap);
     c.extra.x = hitPlanes(request, colour) - 1;
+    c.march.x = request.march.epsilon;
     setSections(c, request, header);
     setLight(c, request, header, basis, errorPixels);
     return c;
@@ -165,6 +167,7 @@ Result<void> checkRequest(const FrameRequest& request) {
     if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
     const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up)) return usage("the camera has coordinates that are not numbers");
+    if (!(request.march.epsilon > 0) || !std::isfinite(request.march.epsilon)) return usage("epsilon must be above 0");
     if (request.sections.size() > kMostSections) return usage("at most 6 section planes at once");
     for (const SectionPlane& plane : request.sections)
         if (!finite(plane.normal) || !std::isfinite(plane.offset) || !(glm::length(plane.normal) > 0)) return usage("a section plane's normal is zero or not a number");

@@ -15,6 +15,7 @@
 #include "render/frame_setup.h"
 #include "render/passes/beam.h"
 #include "render/passes/light.h"
+#include "render/passes/paper_trace.h"
 #include "render/passes/readback.h"
 #include "render/passes/shade.h"
 #include "render/passes/trace.h"
@@ -67,6 +68,8 @@ private:
     VkQueryPool pool_ = VK_NULL_HANDLE;
 };
 
+bool showsWork(ShadingMode mode) { return mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches; }
+
 glm::vec3 unpackNormal(uint32_t code) {
     glm::vec3 n(float(code & 0xffff) / 65535.0f * 2 - 1, float(code >> 16) / 65535.0f * 2 - 1, 0);
     n.z = 1 - std::abs(n.x) - std::abs(n.y);
@@ -90,6 +93,7 @@ struct Renderer::State {
     std::unique_ptr<FrameResources> resources;
     BeamPass beam;
     TracePass trace;
+    PaperTracePass paperTrace;
     LightPass light;
     ShadePass shade;
     PassTimer timer;
@@ -99,6 +103,9 @@ struct Renderer::State {
     std::optional<FrameRequest> drawn;
     bool drawnColour = false;
 
+    [[nodiscard]] bool isPaper() const { return residency && residency->dataset().header.method == Method::Paper; }
+    /// The request without what the dataset's method cannot draw.
+    [[nodiscard]] FrameRequest drawable(FrameRequest request) const;
     [[nodiscard]] PassConstants constantsFor(const FrameRequest& request) const;
     Result<void> checkLimits(const FrameRequest& request) const;
     Result<void> prepare(const FrameRequest& request);
@@ -208,7 +215,7 @@ PassConstants Renderer::State::constantsFor(const FrameRequest& request) const {
         c.colour = residency->hasColour();
     }
     c.falseColour = isFalseColour(request.shading.mode);
-    c.countSteps = request.countSteps || request.shading.mode == ShadingMode::Steps || request.shading.mode == ShadingMode::Fetches;
+    c.countSteps = request.countSteps || showsWork(request.shading.mode);
     return c;
 }
 
@@ -228,6 +235,7 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     if (wanted.poolChunks != constants.poolChunks || wanted.chunkShift != constants.chunkShift) {
         beam.clear();
         trace.clear();
+        paperTrace.clear();
         light.clear();
         shade.clear();
     }
@@ -239,7 +247,8 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     tableStale = false;
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
-    VCP_TRY(trace.prepare(*resources, constants, sections));
+    if (isPaper()) VCP_TRY(paperTrace.prepare(*resources, constants, sections != SectionKind::None, request.march));
+    else VCP_TRY(trace.prepare(*resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
     if (traceLight) VCP_TRY(light.prepare(*resources, constants));
     return shade.prepare(*resources, constants, traceLight);
@@ -251,7 +260,8 @@ void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& 
     timer.mark(commands, 0);
     beam.record(commands, *resources);
     timer.mark(commands, 1);
-    trace.record(commands, *resources);
+    if (isPaper()) paperTrace.record(commands, *resources);
+    else trace.record(commands, *resources);
     timer.mark(commands, 2);
     if (hasLight(request.shading)) light.record(commands, *resources);
     timer.mark(commands, 3);
@@ -259,9 +269,17 @@ void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& 
     timer.mark(commands, 4);
 }
 
-Result<FrameStats> Renderer::render(const FrameRequest& request) {
+FrameRequest Renderer::State::drawable(FrameRequest request) const {
+    if (!isPaper()) return request;
+    request.beam = request.sectionCaps = request.shading.shadows = false;
+    request.shading.occlusionRays = 0;
+    return request;
+}
+
+Result<FrameStats> Renderer::render(const FrameRequest& wanted) {
     State& s = *state_;
     s.drawn.reset();
+    const FrameRequest request = s.drawable(wanted);
     VCP_TRY(s.prepare(request));
     const auto began = std::chrono::steady_clock::now();
     VCP_TRY(s.device->submitAndWait([&](VkCommandBuffer commands) { s.recordFrame(commands, request); }));
@@ -332,9 +350,21 @@ Result<std::vector<float>> Renderer::readDepth() {
     std::vector<float> depth(words->size());
     std::transform(words->begin(), words->end(), depth.begin(), [&](uint32_t word) {
         const float cells = std::abs(std::bit_cast<float>(word));
+        if (cells >= frame::kGaveUp) return std::numeric_limits<float>::quiet_NaN();
         return cells >= frame::kNoHit ? std::numeric_limits<float>::infinity() : static_cast<float>(double(cells) * cell);
     });
     return depth;
+}
+
+Result<std::vector<uint32_t>> Renderer::readWork() {
+    const State& s = *state_;
+    if (!s.drawn || !showsWork(s.drawn->shading.mode)) return Error{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
+    const ShadingMode mode = s.drawn->shading.mode;
+    const float most = mode == ShadingMode::Steps ? frame::kMostShownSteps : mode == ShadingMode::Cells ? frame::kMostShownCells : frame::kMostShownFetches;
+    auto words = s.hitPlane(hitPlanes(*s.drawn, s.drawnColour) - 1, 0);
+    if (!words) return words;
+    for (uint32_t& word : *words) word = static_cast<uint32_t>(std::lround(std::bit_cast<float>(word) * most));
+    return words;
 }
 
 Result<std::vector<glm::vec3>> Renderer::readNormals() {

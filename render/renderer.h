@@ -27,6 +27,7 @@
 #include <glm/vec3.hpp>
 #include <vulkan/vulkan_core.h>
 
+#include "octree/paper_page.h"
 #include "octree/result.h"
 #include "octree/vcp_file.h"
 #include "render/camera.h"
@@ -79,6 +80,7 @@ enum class ShadingMode {
     Normals, ///< normal as colour
     // False colours, blue through green to red (Demir and Westermann 2015, Figures 8 and 9).
     Steps,   ///< node visits of the ray, 0 to 64 (compiles the counting variant on first use)
+    Cells,   ///< leaves that the ray was intersected with, 0 to 16 (the same)
     Fetches, ///< 16-byte reads of the ray, 0 to 128 (the same)
     Level,   ///< level of the page that was hit, coarsest to finest
     Error,   ///< certified error of the page that was hit, 0 to 1 pixel
@@ -110,7 +112,9 @@ struct Shading {
     bool operator==(const Shading&) const = default;
 };
 
-/// All that a picture depends on, beside the pages.
+/// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/paper_page.h) are drawn by
+/// their own march, from their one page; they have no beam pass, no shadows, no ambient occlusion and no caps: what a
+/// request asks of these is left out.
 struct FrameRequest {
     Camera camera;
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
@@ -120,6 +124,7 @@ struct FrameRequest {
     bool sectionCaps = false;  ///< fills what the planes cut open; right for closed surfaces
     bool beam = true;          ///< beam pass; the picture is the same without it, only later
     bool countSteps = false;   ///< fills FrameStats::steps and fetches (a slower variant)
+    PaperMarch march;          ///< of datasets of the method `paper`
 
     bool operator==(const FrameRequest&) const = default;
 };
@@ -128,7 +133,7 @@ struct UpdateResult {
     bool changed = false;  ///< the cut differs from that of the update before
     bool settled = false;  ///< nothing that this view wants is missing, loading or queued
     bool drawable = false; ///< at least the coarsest page is there
-    double errorPixels = 0;     ///< largest projected certified error in the cut (inf without a page)
+    double errorPixels = 0;     ///< largest projected certified error in the cut (inf without a page or certificate)
     uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
     bool relaxed = false;       ///< the budget is too small for the view's pixel error; errorPixels says what it has
@@ -194,8 +199,12 @@ public:
 
     /// Of the last render(). Errors: Usage, where nothing was drawn yet; Device.
     Result<Picture> readPicture();
-    Result<std::vector<float>> readDepth();        ///< world units along the unit ray; infinity where no hit
+    /// World units along the unit ray; infinity where no hit, not a number where the ray gave up.
+    Result<std::vector<float>> readDepth();
     Result<std::vector<glm::vec3>> readNormals();  ///< unit, towards the viewer; 0 where no hit
+    /// The number behind the false colour of each pixel: steps, cells or fetches of its ray. Precondition: the last
+    /// render() was shaded so.
+    Result<std::vector<uint32_t>> readWork();
     /// One pixel of the last render(); nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -62,7 +63,8 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     result.settled = outcome.drawable.complete;
     result.drawable = !cut_.empty();
     result.relaxed = outcome.relaxed;
-    result.errorPixels = outcome.drawable.errorPixels;
+    const bool isCertified = dataset_->header.method == Method::Certified;
+    result.errorPixels = isCertified ? outcome.drawable.errorPixels : std::numeric_limits<double>::infinity();
     result.residentBytes = policy_->unitsTaken() * kPoolUnitBytes;
     result.heldBytesMax = loader.heldBytesMax;
     result.bytesRead = loader.bytesRead;
@@ -87,7 +89,9 @@ Result<bool> Residency::place(const LoadedPage& page) {
     for (const PageMove& move : placement.moves) VCP_TRY(pool_->move(move.from, move.to));
     if (!placement.slot) return false;
     const std::span geometry = page.bytes->geometryBytes();
-    std::memcpy(&headers_[page.page], geometry.data(), sizeof(PageHeader));
+    PageHeader& header = headers_[page.page];
+    // Pages of the other method say all in a header of their own, which the shader reads.
+    if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
     VCP_TRY(pool_->write(*placement.slot, 0, geometry));
     if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(*placement.slot, geometry.size(), page.bytes->colourBytes()));
     return true;

@@ -32,7 +32,7 @@ uint64_t endOfFirstView(std::span<const std::byte> head) {
     PageEntry root;
     std::memcpy(&header, head.data(), sizeof header);
     std::memcpy(&root, head.data() + kDirectoryOffset, sizeof root);
-    if (std::memcmp(header.magic, FileHeader{}.magic, sizeof header.magic) != 0 || header.version != kFileVersion) return 0;
+    if (std::memcmp(header.magic, FileHeader{}.magic, sizeof header.magic) != 0 || header.version < kFileVersion || header.version > kMethodFileVersion) return 0;
     if (header.pages > kMostAtOpening / sizeof(PageEntry)) return 0;
     const uint64_t directory = kDirectoryOffset + (header.pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes;
     const uint64_t page = std::max(root.offset + root.storedBytes, root.colourOffset + root.colourStoredBytes);

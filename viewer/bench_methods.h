@@ -4,6 +4,8 @@
 //   certified      the renderer on a Vulkan device                         error-pixels  0.5; swept 0.5, 1, 2, 4
 //   reference      the reference ray-caster in double, finest level
 //   paper          Demir and Westermann 2015 (peers/paper_octree.h)        eps  0.25; swept 0.5, 0.25, 0.1
+//   paper-gpu      the same march over the same octree on a Vulkan device   eps, as paper
+//   paper-rules    the same with one rule changed at a time                the rule; all of them, always
 //   sdf            signed-distance octree (peers/distance_octree.h)        cell  1; swept 2, 1, 0.5
 //   sdf-analytic   trilinear distance, cubic roots (the same)              cell  1; swept 2, 1, 0.5
 //   voxel          binary voxel octree (peers/voxel_octree.h)              cell  1; swept 1, 0.5, 0.25
@@ -51,7 +53,9 @@ public:
 
 private:
     const MeshSides& sides();
-    Result<std::unique_ptr<RayTracer>> makePaper(double epsilon);
+    Result<const PaperCaster*> paperOf(const PaperOptions& options);
+    Result<std::unique_ptr<RayTracer>> makePaper(const PaperOptions& options, std::string knob);
+    Result<std::unique_ptr<RayTracer>> makePaperGpu(const PaperOptions& options);
     Result<std::unique_ptr<RayTracer>> makeDistances(bool analytic, double cells);
     Result<std::unique_ptr<RayTracer>> makeVoxels(bool contours, double cells) const;
 

@@ -53,10 +53,11 @@ struct ModelFiles {
     std::string name;
 };
 
-Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder) {
+/// What is built of one mesh with several cells has several names. `cell` 0: chosen from the mesh.
+Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder, double cell) {
     if (model.extension() != ".vcp") {
         const std::string name = model.stem().string();
-        return ModelFiles{model, folder / (name + ".vcp"), name};
+        return ModelFiles{model, folder / (cell > 0 ? fmt::format("{}-cell-{}.vcp", name, cell) : name + ".vcp"), name};
     }
     for (const char* extension : {".ply", ".obj", ".stl"}) {
         std::filesystem::path mesh = model;
@@ -81,7 +82,8 @@ public:
     explicit RaysBench(const BenchRaysOptions& options) : options_(options), folder_(options.out) {
         if (options_.methods.empty())
             for (const std::string& method : rayMethodNames())
-                if (benchHasEmbree() || !method.starts_with("embree")) options_.methods.push_back(method);
+                if ((benchHasEmbree() || !method.starts_with("embree")) && method != "paper-rules")
+                    options_.methods.push_back(method);
     }
 
     Result<BenchRaysReport> run() {
@@ -93,6 +95,7 @@ public:
             modelShare_ = 1.0 / static_cast<double>(options_.models.size());
             VCP_TRY(runModel(options_.models[i]));
         }
+        if (options_.stability) VCP_TRY(runStability());
         return std::move(report_);
     }
 
@@ -122,13 +125,25 @@ private:
         return {};
     }
 
+    Result<void> runStability() {
+        StabilityOptions options;
+        options.device = options_.device;
+        options.threads = options_.threads;
+        options.folder = folder_.path();
+        options.progress = options_.progress;
+        auto rows = benchStability(options);
+        if (!rows) return rows.error();
+        report_.stability = std::move(*rows);
+        return {};
+    }
+
     Result<void> report(const std::string& what, double fractionOfModel) const {
         if (!options_.progress || options_.progress(what, modelFrom_ + modelShare_ * fractionOfModel)) return {};
         return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
     }
 
     Result<BenchModel> loadModel(const std::filesystem::path& path) const {
-        auto files = filesOf(path, folder_.path());
+        auto files = filesOf(path, folder_.path(), options_.cell);
         if (!files) return files.error();
         BenchModel model;
         model.files = *files;
@@ -186,7 +201,7 @@ private:
     }
 
     [[nodiscard]] std::vector<double> knobsOf(const std::string& method) const {
-        if (method == "paper" && !options_.sweep) return {options_.paper.epsilon};
+        if ((method == "paper" || method == "paper-gpu") && !options_.sweep) return {options_.paper.march.epsilon};
         return rayMethodKnobs(method, options_.sweep);
     }
 
@@ -208,10 +223,7 @@ private:
             if (!traced) return traced.error();
             seconds += traced->seconds;
             row.rays += traced->hits.size();
-            row.stepsMean += traced->stepsMean / options_.views;
-            row.fetchesMean += traced->fetchesMean / options_.views;
-            row.steps.merge(traced->steps);
-            row.fetches.merge(traced->fetches);
+            row.work.merge(traced->work);
             if (peer) {
                 const auto ofPeer = peer->trace(camera, options_.size, options_.repetitions);
                 if (!ofPeer) return ofPeer.error();

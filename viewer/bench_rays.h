@@ -17,6 +17,7 @@
 
 #include "builder/ray_classes.h"
 #include "octree/result.h"
+#include "viewer/bench_stability.h"
 #include "viewer/peers/paper_octree.h"
 #include "viewer/work_histogram.h"
 
@@ -25,7 +26,7 @@ namespace vcp {
 struct BenchRaysOptions {
     /// Meshes, or .vcp files beside which the mesh of the same name lies; none: viewer/analytic_models.h.
     std::vector<std::filesystem::path> models;
-    std::vector<std::string> methods;  ///< empty: all that this build has
+    std::vector<std::string> methods;  ///< empty: all that this build has, but paper-rules
     bool sweep = false;                ///< each method at several values of its knob, instead of its default alone
     std::vector<std::string> cameras = {"whole", "half", "close", "cells"};
     glm::ivec2 size{1920, 1200};
@@ -36,6 +37,7 @@ struct BenchRaysOptions {
     std::filesystem::path out;  ///< .vcp files are kept here and used again; empty: a temporary folder
     double cell = 0;            ///< as for vcp build
     PaperOptions paper;         ///< the rules of the method `paper`
+    bool stability = false;     ///< also what single precision costs (bench_stability.h)
     int judgeEvery = 1;         ///< 1: every ray is compared with the mesh; n: every nth row and column
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -62,14 +64,13 @@ struct BenchRaysRow {
     double ratioToEmbree = 0;  ///< rays per second over those of Embree's packets on the same rays; 0 without Embree
     RaySummary classes;
     double cell = 0;           ///< the model's finest edge, world units: that of all methods' rows
-    double stepsMean = 0;      ///< nodes and samples a ray, where the method counts
-    double fetchesMean = 0;    ///< reads a ray, where the method counts
-    WorkHistogram steps, fetches;  ///< empty where the method does not count ray by ray
+    RaysWork work;             ///< empty where the method does not count
     uint64_t bytes = 0;        ///< of what is traced: pages, a peer's octree, or Embree's tree and buffers
 };
 
 struct BenchRaysReport {
     std::vector<BenchRaysRow> rows;
+    std::vector<StabilityRow> stability;  ///< where it was asked for
 };
 
 /// Whether this build can measure against Embree.
@@ -79,8 +80,8 @@ bool benchHasEmbree();
 /// report, Cancelled.
 Result<BenchRaysReport> benchRays(const BenchRaysOptions& options);
 
-/// The report as one JSON object {"rows": [...]}, as CSV with a header line, and as Markdown: the table, and beside the
-/// paper's Tables 1 and 2 where the rows for it are there.
+/// The report as one JSON object {"rows": [...], "stability": [...]}, as CSV with a header line (the rows), and as
+/// Markdown: the table, beside the paper's Tables 1 and 2 where the rows for it are there, and stability.
 std::string benchRaysJson(const BenchRaysReport& report);
 std::string benchRaysCsv(const BenchRaysReport& report);
 std::string benchRaysMarkdown(const BenchRaysReport& report);

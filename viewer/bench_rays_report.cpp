@@ -29,13 +29,14 @@ Json toJson(const BenchRaysRow& row) {
     json["p99_cells"] = distance.p99;
     json["max_cells"] = distance.max;
     // Columns are the same for all rows; what a method does not count ray by ray is null.
-    const auto work = [&](const std::string& name, double mean, const WorkHistogram& rays) {
-        json[name + "_mean"] = mean;
+    const auto work = [&](const std::string& name, const WorkHistogram& rays) {
+        json[name + "_mean"] = rays.mean();
         json[name + "_p95"] = rays.empty() ? Json() : Json(rays.quantile(0.95));
         json[name + "_p99"] = rays.empty() ? Json() : Json(rays.quantile(0.99));
     };
-    work("steps", row.stepsMean, row.steps);
-    work("fetches", row.fetchesMean, row.fetches);
+    work("steps", row.work.steps);
+    work("cells", row.work.cells);
+    work("fetches", row.work.fetches);
     json["bytes"] = row.bytes;
     json["judged_rays"] = classes.judged;
     json["holes"] = classes.holes;
@@ -50,6 +51,28 @@ Json toJson(const BenchRaysRow& row) {
     json["normal_p99_degrees"] = normal.p99;
     json["cell"] = row.cell;
     return json;
+}
+
+Json toJson(const PrecisionRow& row) {
+    return {{"hits", row.hits},
+            {"other_outcome", row.otherOutcome},
+            {"depth_p50_cells", row.depthCells.p50},
+            {"depth_p99_cells", row.depthCells.p99},
+            {"depth_max_cells", row.depthCells.max},
+            {"holes", row.holes},
+            {"p50_cells", row.distanceCells.p50},
+            {"p99_cells", row.distanceCells.p99},
+            {"max_cells", row.distanceCells.max}};
+}
+
+Json toJson(const StabilityRow& row) {
+    return {{"cell", row.cell},
+            {"origin_cells", row.originCells},
+            {"rays", row.rays},
+            {"certified_cells", row.certifiedCells},
+            {"double", toJson(row.doubles)},
+            {"float", toJson(row.floats)},
+            {"device", toJson(row.device)}};
 }
 
 Json rowsOf(const BenchRaysReport& report) {
@@ -107,15 +130,19 @@ std::string plotOf(const std::vector<const BenchRaysRow*>& rows, const PlottedVa
 
 }  // namespace
 
-std::string benchRaysJson(const BenchRaysReport& report) { return Json{{"rows", rowsOf(report)}}.dump(); }
+std::string benchRaysJson(const BenchRaysReport& report) {
+    Json json{{"rows", rowsOf(report)}};
+    for (const StabilityRow& row : report.stability) json["stability"].push_back(toJson(row));
+    return json.dump();
+}
 std::string benchRaysCsv(const BenchRaysReport& report) { return csvOf(rowsOf(report)); }
 
 std::string benchRaysMarkdown(const BenchRaysReport& report) {
     std::string text =
         "| model | camera | method | knob | Mray/s | of Embree | hit % | missed % | false % | wrong sheet % | "
-        "unresolved % | holes | beyond certified | p50 | p95 | p99 | max cells | normal p50 | steps | p99 | fetches | "
+        "unresolved % | holes | beyond certified | p50 | p95 | p99 | max cells | normal p50 | steps | p99 | cells | p99 | fetches | "
         "p99 | MB |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     const auto tail = [](const WorkHistogram& rays) {
         return rays.empty() ? std::string() : fmt::format("{}", rays.quantile(0.99));
     };
@@ -129,11 +156,12 @@ std::string benchRaysMarkdown(const BenchRaysReport& report) {
             percent(RayClass::Missed), percent(RayClass::False), percent(RayClass::WrongSheet),
             percent(RayClass::Unresolved), classes.holes, classes.beyondCertified);
         text += fmt::format(
-            "| {:.5f} | {:.5f} | {:.5f} | {:.4f} | {:.1f}\u00b0 | {:.1f} | {} | {:.1f} | {} | {:.1f} |\n", distance.p50,
-            distance.p95, distance.p99, distance.max, classes.normalDegrees.p50, row.stepsMean, tail(row.steps),
-            row.fetchesMean, tail(row.fetches), static_cast<double>(row.bytes) * 1e-6);
+            "| {:.5f} | {:.5f} | {:.5f} | {:.4f} | {:.1f}\u00b0 | {:.1f} | {} | {:.1f} | {} | {:.1f} | {} | {:.1f} |\n",
+            distance.p50, distance.p95, distance.p99, distance.max, classes.normalDegrees.p50, row.work.steps.mean(),
+            tail(row.work.steps), row.work.cells.mean(), tail(row.work.cells), row.work.fetches.mean(),
+            tail(row.work.fetches), static_cast<double>(row.bytes) * 1e-6);
     }
-    return text + besidePaperMarkdown(report);
+    return text + besidePaperMarkdown(report) + stabilityMarkdown(report.stability);
 }
 
 std::vector<std::pair<std::string, std::string>> benchRaysPlots(const BenchRaysReport& report) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 #include <fmt/format.h>
@@ -29,7 +30,7 @@ public:
         std::mutex mutex;
         const auto start = std::chrono::steady_clock::now();
         forEachRow(size.y, threads_, [&](int y) {
-            WorkHistogram steps, fetches;
+            RaysWork work;
             for (int x = 0; x < size.x; ++x) {
                 CastCounters counters;
                 const CameraRay ray =
@@ -38,16 +39,14 @@ public:
                 if (hit)
                     picture.hits[static_cast<size_t>(y) * size.x + x] =
                         SurfaceHit{hit->t, hit->normal, hit->certifiedError};
-                steps.add(static_cast<uint32_t>(counters.nodes));
-                fetches.add(static_cast<uint32_t>(counters.softLeaves + counters.triangles));
+                work.add(static_cast<uint32_t>(counters.nodes),
+                         static_cast<uint32_t>(counters.softLeaves + counters.hardLeaves),
+                         static_cast<uint32_t>(counters.softLeaves + counters.triangles));
             }
             const std::lock_guard lock(mutex);
-            picture.steps.merge(steps);
-            picture.fetches.merge(fetches);
+            picture.work.merge(work);
         });
         picture.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        picture.stepsMean = picture.steps.mean();
-        picture.fetchesMean = picture.fetches.mean();
         return picture;
     }
 
@@ -56,13 +55,21 @@ private:
     unsigned threads_;
 };
 
-class CertifiedTracer final : public RayTracer {
+/// What the renderer is asked for, and what it promises of its hits.
+struct RendererKnob {
+    std::string name;
+    double errorPixels = 0.5;
+    PaperMarch march = {};
+    double certifiedError = 0;  // world units; infinite: nothing is promised
+};
+
+class RendererTracer final : public RayTracer {
 public:
-    CertifiedTracer(std::unique_ptr<Renderer> renderer, double certifiedError, double errorPixels)
-        : renderer_(std::move(renderer)), certifiedError_(certifiedError), errorPixels_(errorPixels) {}
+    RendererTracer(std::unique_ptr<Renderer> renderer, RendererKnob knob)
+        : renderer_(std::move(renderer)), knob_(std::move(knob)) {}
 
     [[nodiscard]] std::string device() const override { return renderer_->device().name; }
-    [[nodiscard]] std::string knob() const override { return fmt::format("error-pixels {:g}", errorPixels_); }
+    [[nodiscard]] std::string knob() const override { return knob_.name; }
     [[nodiscard]] uint64_t bytes() const override { return residentBytes_; }
 
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
@@ -70,7 +77,8 @@ public:
         request.camera = camera;
         request.width = static_cast<uint32_t>(size.x);
         request.height = static_cast<uint32_t>(size.y);
-        request.errorPixels = errorPixels_;
+        request.errorPixels = knob_.errorPixels;
+        request.march = knob_.march;
         const auto settled = renderer_->settle(request);
         if (!settled) return settled.error();
         residentBytes_ = settled->residentBytes;
@@ -101,26 +109,48 @@ private:
         picture.hits.resize(depth->size());
         for (size_t i = 0; i < depth->size(); ++i) {
             const double t = (*depth)[i];
-            if (!std::isfinite(t)) continue;
-            const double allowed = std::max(certifiedError_, errorPixels * perPixel * (parallel ? 1 : t));
+            if (std::isinf(t)) continue;
+            // Not a number where a ray gave up: the judge calls that unresolved.
+            const double allowed = std::isinf(knob_.certifiedError) || std::isnan(t)
+                                       ? knob_.certifiedError
+                                       : std::max(knob_.certifiedError, errorPixels * perPixel * (parallel ? 1 : t));
             picture.hits[i] = SurfaceHit{t, glm::dvec3((*normals)[i]), allowed};
         }
         return {};
     }
 
+    /// Ray by ray, read from pictures in false colours; rays of tiles that the beam pass proves empty do none.
     Result<void> countWork(FrameRequest request, TracedPicture& picture) {
-        request.countSteps = true;
-        const auto frame = renderer_->render(request);
-        if (!frame) return frame.error();
-        picture.stepsMean = static_cast<double>(frame->steps) / static_cast<double>(frame->rays);
-        picture.fetchesMean = static_cast<double>(frame->fetches) / static_cast<double>(frame->rays);
+        const std::pair<ShadingMode, WorkHistogram*> modes[] = {{ShadingMode::Steps, &picture.work.steps},
+                                                                {ShadingMode::Cells, &picture.work.cells},
+                                                                {ShadingMode::Fetches, &picture.work.fetches}};
+        for (const auto& [mode, histogram] : modes) {
+            request.shading.mode = mode;
+            const auto frame = renderer_->render(request);
+            if (!frame) return frame.error();
+            const auto work = renderer_->readWork();
+            if (!work) return work.error();
+            for (const uint32_t count : *work) histogram->add(count);
+        }
         return {};
     }
 
     std::unique_ptr<Renderer> renderer_;
-    double certifiedError_, errorPixels_;
+    RendererKnob knob_;
     uint64_t residentBytes_ = 0;
 };
+
+Result<std::unique_ptr<RayTracer>> makeRendererTracer(std::shared_ptr<const Dataset> dataset,
+                                                      std::shared_ptr<const PageSource> source,
+                                                      const std::string& device, RendererKnob knob) {
+    RendererOptions options;
+    options.device = device;
+    options.budgetBytes = uint64_t{2} << 30;
+    auto renderer = Renderer::create(options);
+    if (!renderer) return renderer.error();
+    VCP_TRY((*renderer)->open(std::move(dataset), std::move(source)));
+    return std::unique_ptr<RayTracer>(std::make_unique<RendererTracer>(std::move(*renderer), std::move(knob)));
+}
 
 }  // namespace
 
@@ -138,14 +168,19 @@ Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::pa
     auto dataset = readDataset(**reader);
     if (!dataset) return dataset.error();
     const auto shared = std::make_shared<const Dataset>(std::move(*dataset));
-    RendererOptions options;
-    options.device = device;
-    options.budgetBytes = uint64_t{2} << 30;
-    auto renderer = Renderer::create(options);
-    if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->open(shared, std::make_shared<FilePageSource>(*reader, shared)));
-    return std::unique_ptr<RayTracer>(
-        std::make_unique<CertifiedTracer>(std::move(*renderer), shared->header.certifiedErrorMax, errorPixels));
+    return makeRendererTracer(shared, std::make_shared<FilePageSource>(*reader, shared), device,
+                              {.name = fmt::format("error-pixels {:g}", errorPixels),
+                               .errorPixels = errorPixels,
+                               .certifiedError = shared->header.certifiedErrorMax});
+}
+
+Result<std::unique_ptr<RayTracer>> makePaperGpuTracer(std::shared_ptr<const Dataset> dataset,
+                                                      std::shared_ptr<const PageSource> source,
+                                                      const std::string& device, const PaperMarch& march) {
+    return makeRendererTracer(std::move(dataset), std::move(source), device,
+                              {.name = fmt::format("eps {:g}", march.epsilon),
+                               .march = march,
+                               .certifiedError = std::numeric_limits<double>::infinity()});
 }
 
 double medianOf(std::vector<double> seconds) {

@@ -15,6 +15,7 @@
 #include "builder/ray_classes.h"
 #include "octree/reference_caster.h"
 #include "render/camera.h"
+#include "streaming/page_source.h"
 #include "viewer/work_histogram.h"
 
 namespace vcp {
@@ -22,9 +23,8 @@ namespace vcp {
 /// One camera's picture by one method. Pixel (x, y) is ray y * width + x, through the pixel's centre.
 struct TracedPicture {
     std::vector<std::optional<SurfaceHit>> hits;
-    double seconds = 0;                     ///< median of the repetitions
-    double stepsMean = 0, fetchesMean = 0;  ///< a ray; 0 where the method does not count
-    WorkHistogram steps, fetches;           ///< ray by ray; empty where the method does not count them so
+    double seconds = 0;  ///< median of the repetitions
+    RaysWork work;       ///< empty where the method does not count
 };
 
 class RayTracer {
@@ -43,6 +43,11 @@ Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, u
 /// The renderer at `errorPixels`. The file is opened again. Errors: Device, what opening a dataset reports.
 Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device,
                                                        double errorPixels = 0.5);
+
+/// The renderer over a dataset of the method `paper` (peers/paper_file.h). Errors: Device.
+Result<std::unique_ptr<RayTracer>> makePaperGpuTracer(std::shared_ptr<const Dataset> dataset,
+                                                      std::shared_ptr<const PageSource> source,
+                                                      const std::string& device, const PaperMarch& march);
 
 /// Embree over the mesh, relative to its box's middle, in floats. Errors: Usage where this build has no Embree.
 Result<std::unique_ptr<RayTracer>> makeEmbreeTracer(const IndexedMesh& mesh, bool packets, unsigned threads);

@@ -1,6 +1,5 @@
 // vcp bench: run time against error, beside Embree measured in the same run.
 #include <fstream>
-#include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,6 +13,7 @@
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
+#include "viewer/paper_settings.h"
 
 namespace vcp {
 
@@ -50,7 +50,7 @@ struct RaysCommand : BenchCommand {
     std::string device;
     int views = 1;
     int judgeEvery = 1;
-    bool sweep = false;
+    bool sweep = false, stability = false;
     PaperOptions paper;
 };
 
@@ -153,7 +153,9 @@ Result<int> runRays(const RaysCommand& command) {
     options.cell = command.cellLength();
     options.judgeEvery = command.judgeEvery;
     options.sweep = command.sweep;
+    options.stability = command.stability;
     options.paper = command.paper;
+    options.paper.mergeScheme = command.paper.march.scheme;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = progressTo(display);
@@ -224,37 +226,15 @@ RunCommand addBenchBuild(CLI::App& bench) {
     return [command] { return runBuild(*command); };
 }
 
-/// The rules of the method `paper`, in finest cells where they are lengths.
-void addPaperOptions(CLI::App& app, PaperOptions& paper) {
-    const auto length = [&](const char* name, float& value, const char* what) {
-        app.add_option(name, value, what)->type_name("CELLS")->capture_default_str();
-    };
-    length("--paper-eps", paper.epsilon, "paper: a ray hits nearer than this; --sweep has its own values");
-    length("--paper-band", paper.band, "paper: vectors are kept in blocks nearer than this");
-    length("--paper-merge", paper.mergeThreshold, "paper: cells are merged where their vectors err by less; negative: never");
-    const auto choice = [&]<class Value>(const char* name, Value& value, const char* what, const std::map<std::string, Value>& values) {
-        std::vector<std::string> names;
-        for (const auto& [key, ignored] : values) names.push_back(key);
-        app.add_option_function<std::string>(name, [&value, values](const std::string& key) { value = values.at(key); }, what)
-            ->type_name(fmt::format("{}", fmt::join(names, "|")))
-            ->check(CLI::IsMember(names));
-    };
-    choice("--paper-scheme", paper.scheme, "paper: interpolation of the vectors [longer]",
-           std::map<std::string, PaperScheme>{
-               {"longer", PaperScheme::Longer}, {"min-plane", PaperScheme::MinPlane}, {"trilinear", PaperScheme::Trilinear}});
-    choice("--paper-step", paper.step, "paper: steps near the surface [planar]",
-           std::map<std::string, PaperStep>{{"distance", PaperStep::Distance}, {"planar", PaperStep::Planar}});
-    choice("--paper-packing", paper.packing, "paper: directions of the vectors [spherical]",
-           std::map<std::string, PaperPacking>{{"octahedral", PaperPacking::Octahedral}, {"spherical", PaperPacking::Spherical}});
-}
-
 RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
     addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
-    app->add_option("--methods", command->methods, fmt::format("{} [all]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_option("--methods", command->methods, fmt::format("{} [all but paper-rules]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
     app->add_flag("--sweep", command->sweep,
                   "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the other octrees");
+    app->add_flag("--stability", command->stability,
+                  "Also what single precision costs, on the processor and on the device, with cells from 1e-6 to 1e6 and origins to 1e7 cells");
     app->add_option("--cameras", command->cameras, "whole, half, close, cells [these four]; lattice and grazing, which look for holes")->type_name("A,B")->delimiter(',');
     app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(
         CLI::Range(1, 1000));
@@ -265,8 +245,9 @@ RunCommand addBenchRays(CLI::App& bench) {
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 16384));
-    app->add_option("--device", command->device, "Vulkan device of the method certified, see `vcp devices` [the best one]")->type_name("DEVICE");
-    addPaperOptions(*app, command->paper);
+    app->add_option("--device", command->device, "Vulkan device of the methods certified and paper-gpu, see `vcp devices` [the best one]")->type_name("DEVICE");
+    addPaperMarchOptions(*app, command->paper.march);
+    addPaperStructureOptions(*app, command->paper);
     return [command] { return runRays(*command); };
 }
 

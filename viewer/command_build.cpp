@@ -1,4 +1,6 @@
 // vcp build: meshes in, one .vcp out.
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "builder/build.h"
@@ -7,6 +9,8 @@
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
+#include "viewer/paper_settings.h"
+#include "viewer/peers/paper_file.h"
 
 namespace vcp {
 
@@ -18,7 +22,12 @@ struct BuildCommand {
     bool resume = false;
     bool dryRun = false;
     double checkpointSeconds = BuildOptions().checkpointSeconds;
+    std::string method = "certified";
+    PaperOptions paper;
+    bool paperOptionsGiven = false;
     BuildSettings settings;
+
+    [[nodiscard]] bool isPaper() const { return method == "paper"; }
     ReportOptions report;
 };
 
@@ -51,9 +60,10 @@ std::string summary(const std::string& output, const BuildReport& report) {
     text += fmt::format("  {} ({:.1f} bytes a triangle), {} levels, {} subvolumes, {} leaves, {} of them hard\n",
                         formatBytes(report.fileBytes), static_cast<double>(report.fileBytes) / triangles, report.levels,
                         formatCount(report.subvolumes), formatCount(report.leaves), formatCount(report.hardLeaves));
-    text += fmt::format("  cell {}, certified error {} ({:.3f} cells)", formatLength(report.cell),
-                        formatLength(report.certifiedErrorMax), report.certifiedErrorMax / report.cell);
-    return text;
+    text += fmt::format("  cell {}, ", formatLength(report.cell));
+    if (std::isnan(report.certifiedErrorMax)) return text + "no certified error";
+    return text + fmt::format("certified error {} ({:.3f} cells)", formatLength(report.certifiedErrorMax),
+                              report.certifiedErrorMax / report.cell);
 }
 
 Json toJson(const BuildEstimate& estimate) {
@@ -98,7 +108,20 @@ Result<int> tell(const BuildOptions& options, bool asJson) {
     return 0;
 }
 
+/// Options that do not go with the method.
+Result<void> checkMethod(const BuildCommand& command) {
+    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const BuildSettings& s = command.settings;
+    if (!command.isPaper() && command.paperOptionsGiven) return usage("the options --paper-... go with --method paper");
+    if (!command.isPaper()) return {};
+    if (!s.error.empty() || s.colour == "vertex" || s.colour == "texture") return usage("--method paper has neither a tolerance (--error) nor colour");
+    if (!s.memory.empty() || !s.temp.empty() || command.resume || command.dryRun)
+        return usage("--method paper builds in memory: without --memory, --temp, --resume and --dry-run");
+    return {};
+}
+
 Result<int> run(const BuildCommand& command) {
+    VCP_TRY(checkMethod(command));
     BuildOptions options = command.settings.optionsFor(command.inputs);
     if (command.output.empty() && !command.dryRun) return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
     options.output = command.output.empty() ? "." : command.output;
@@ -111,7 +134,7 @@ Result<int> run(const BuildCommand& command) {
         return !interrupted();
     };
     if (command.dryRun) return tell(options, command.report.json);
-    const auto report = buildOctree(options);
+    const auto report = command.isPaper() ? buildPaperFile(options, command.paper) : buildOctree(options);
     display.finish();
     if (!report) return report.error();
     if (command.report.json)
@@ -129,6 +152,12 @@ Command addBuild(CLI::App& vcp) {
     app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder stands for those in it, - for standard input")->type_name("")->required();
     app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp");
     addBuildSettings(*app, command->settings);
+    app->add_option("--method", command->method, "certified, or paper: the octree of Demir and Westermann 2015, for comparison (in memory, no colour, nothing certified)")
+        ->type_name("certified|paper")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"certified", "paper"}));
+    addPaperStructureOptions(*app, command->paper);
+    addPaperSchemeOption(*app, command->paper.mergeScheme);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
     app->add_option("--checkpoint", command->checkpointSeconds, "What is done is made durable at most so often")
         ->type_name("SECONDS")
@@ -137,7 +166,11 @@ Command addBuild(CLI::App& vcp) {
     app->add_flag("--dry-run", command->dryRun, "Say what is in the meshes and what the build would need; write nothing");
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
-    return {app, [command] { return run(*command); }};
+    return {app, [command, app] {
+                for (const CLI::Option* option : app->get_options())
+                    command->paperOptionsGiven = command->paperOptionsGiven || (option->count() > 0 && option->get_name().starts_with("--paper-"));
+                return run(*command);
+            }};
 }
 
 }  // namespace vcp

@@ -34,6 +34,8 @@ LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
     return sums;
 }
 
+const char* methodName(Method method) { return method == Method::Paper ? "paper" : "certified"; }
+
 Json toJson(const std::string& file, const Dataset& dataset) {
     const FileHeader& h = dataset.header;
     Json levels = Json::array();
@@ -50,6 +52,7 @@ Json toJson(const std::string& file, const Dataset& dataset) {
     }
     return {{"file", file},
             {"version", h.version},
+            {"method", methodName(h.method)},
             {"file_bytes", h.fileBytes},
             {"triangles", h.triangles},
             {"degenerate_triangles", h.degenerateTriangles},
@@ -65,8 +68,15 @@ Json toJson(const std::string& file, const Dataset& dataset) {
             {"leaves", h.leaves},
             {"hard_leaves", h.hardLeaves},
             {"error_target", h.errorTarget},
-            {"certified_error_max", h.certifiedErrorMax},
+            {"certified_error_max", h.method == Method::Certified ? Json(h.certifiedErrorMax) : Json()},
             {"level", levels}};
+}
+
+std::string paperLine(const PaperParameters& p) {
+    return fmt::format("  method      paper: band {:g} cells, {}, {}, {} vectors, {} empty nodes\n", p.band,
+                       p.mergeThreshold < 0 ? std::string("not merged") : fmt::format("merged below {:g} cells", p.mergeThreshold),
+                       p.growRounds < 0 ? std::string("exact points") : fmt::format("{} rounds of region growing", p.growRounds),
+                       p.packing == static_cast<uint32_t>(PaperPacking::Spherical) ? "spherical" : "octahedral", p.safeEmpty != 0 ? "safe" : "published");
 }
 
 std::string summary(const std::string& file, const Dataset& dataset) {
@@ -79,8 +89,11 @@ std::string summary(const std::string& file, const Dataset& dataset) {
                         h.boundsMin[2], h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);
     text += fmt::format("  origin      {:.9g} {:.9g} {:.9g}\n", h.origin[0], h.origin[1], h.origin[2]);
     text += fmt::format("  cell        {}, subvolumes of {}^3 cells\n", formatLength(h.cell), 1u << h.log2Cells);
-    text += fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
-                        h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
+    if (h.method == Method::Paper)
+        text += paperLine(h.paper) + "  error       nothing is certified\n";
+    else
+        text += fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
+                            h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
     text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>15}\n", "level", "cell", "subvolumes",
                         "stored", "in memory", "leaves", "hard", "certified error");
     for (uint32_t level = 0; level < h.levels; ++level) {

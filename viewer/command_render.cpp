@@ -1,5 +1,6 @@
 // vcp render: a picture without a window.
 #include <algorithm>
+#include <cmath>
 #include <thread>
 
 #include <fmt/format.h>
@@ -119,11 +120,12 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
 
 std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device) {
     const UpdateResult& update = drawing.update;
-    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s) on {}{}\n  {} subvolumes, {} resident, error {:.2g} pixels, {}",
+    const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels) : "no certified error";
+    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s) on {}{}\n  {} subvolumes, {} resident, {}, {}",
                        command.output, command.size, drawing.frameMs.empty() ? "first frame" : "a frame",
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), device.name,
                        device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
-                       update.errorPixels, update.settled ? "settled" : "not settled");
+                       error, update.settled ? "settled" : "not settled");
 }
 
 Result<int> run(const RenderCommand& command) {
@@ -132,6 +134,7 @@ Result<int> run(const RenderCommand& command) {
     if (!path) return path.error();
     const auto open = openDataset(path->string(), command.render.source);
     if (!open) return open.error();
+    VCP_TRY(command.render.checkFor(*open->dataset));
     const auto camera = command.render.cameraFor(open->bounds(), size);
     if (!camera) return camera.error();
     auto renderer = Renderer::create(command.render.rendererOptions(*open));
@@ -146,6 +149,7 @@ Result<int> run(const RenderCommand& command) {
     request.shading = command.render.shadingChosen();
     request.sections = command.render.sectionPlanes(open->bounds());
     request.sectionCaps = command.render.caps;
+    request.march = command.render.march;
     const InterruptScope catching;
     const auto drawing = draw(**renderer, request, command);
     if (!drawing) return drawing.error();

@@ -46,6 +46,7 @@ Result<int> run(const ViewCommand& command) {
     if (!path) return path.error();
     const auto open = openDataset(path->string(), command.render.source);
     if (!open) return open.error();
+    VCP_TRY(command.render.checkFor(*open->dataset));
     WindowOptions options;
     options.size = parseSize(command.size).value();
     options.title = titleFor(command.inputs);

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "viewer/option_values.h"
+#include "viewer/paper_settings.h"
 
 namespace vcp {
 
@@ -17,7 +18,8 @@ struct NamedShading {
 };
 constexpr NamedShading kShadings[] = {
     {"lit", ShadingMode::Lit},         {"unlit", ShadingMode::Unlit}, {"clay", ShadingMode::Clay},
-    {"normals", ShadingMode::Normals}, {"steps", ShadingMode::Steps}, {"fetches", ShadingMode::Fetches},
+    {"normals", ShadingMode::Normals}, {"steps", ShadingMode::Steps}, {"cells", ShadingMode::Cells},
+    {"fetches", ShadingMode::Fetches},
     {"level", ShadingMode::Level},     {"error", ShadingMode::Error},
 };
 constexpr const char* kDefaultOcclusionRays = "8";
@@ -56,6 +58,14 @@ RendererOptions RenderSettings::rendererOptions(const OpenDataset& open) const {
     // Colour pages are neither read nor kept when nothing would show them.
     options.colour = shading == "lit" || shading == "unlit";
     return options;
+}
+
+Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
+    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const bool isPaper = dataset.header.method == Method::Paper;
+    if (!isPaper && march != PaperMarch{}) return usage("the options --paper-... are for files built with --method paper");
+    if (isPaper && (shadows || occlusionRays > 0 || caps)) return usage("files built with --method paper have no --shadows, --occlusion or --caps");
+    return {};
 }
 
 Shading RenderSettings::shadingChosen() const {
@@ -102,7 +112,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("WHICH")
         ->capture_default_str()
         ->check(CLI::IsMember({"camera", "raking", "fixed"}));
-    app.add_option("--shading", settings.shading, "lit or unlit (with colour where there is any), clay, normals; false colours: steps, fetches (work of each ray), level, "
+    app.add_option("--shading", settings.shading, "lit or unlit (with colour where there is any), clay, normals; false colours: steps, cells, fetches (work of each ray), level, "
                                                "error (certified, up to a pixel)")
         ->type_name("MODE")
         ->capture_default_str()
@@ -135,6 +145,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("BYTES")
         ->capture_default_str()
         ->check(checkBudget);
+    addPaperMarchOptions(app, settings.march);
     addSourceSettings(app, settings.source);
     app.add_option("--device", settings.device, "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")
         ->type_name("DEVICE");

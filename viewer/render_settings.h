@@ -26,7 +26,11 @@ struct RenderSettings {
     uint32_t occlusionRays = 0;
     std::vector<std::string> sections;
     bool caps = false;
+    PaperMarch march;
     SourceSettings source;
+
+    /// Errors: Usage, where options do not go with the dataset's method.
+    [[nodiscard]] Result<void> checkFor(const Dataset& dataset) const;
 
     [[nodiscard]] RendererOptions rendererOptions(const OpenDataset& open) const;
     [[nodiscard]] Shading shadingChosen() const;

@@ -213,6 +213,7 @@ FrameRequest Viewer::requestWith(int reduction) const {
     if (isMoving(now_)) request.shading.occlusionRays = 0;
     request.sections = sections_;
     request.sectionCaps = sectionCaps_;
+    request.march = options_.march;
     return request;
 }
 

@@ -41,7 +41,7 @@ enum class ViewerAction {
     ToggleShadows,
     ToggleOcclusion,   ///< ambient occlusion; left out while the camera moves
     ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
-    NextShading,       ///< lit, unlit, clay, normals, steps, fetches, level, error
+    NextShading,       ///< lit, unlit, clay, normals, steps, cells, fetches, level, error
     ToggleProjection,  ///< perspective or orthographic, same size at the point of interest
     ViewFront,
     ViewRight,
@@ -55,6 +55,7 @@ struct ViewerOptions {
     Shading shading;
     std::vector<SectionPlane> sections;
     bool sectionCaps = false;
+    PaperMarch march;  ///< of datasets of the method `paper`
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
     double movingFrameMs = 66;
 };

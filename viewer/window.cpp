@@ -222,6 +222,7 @@ Result<WindowReport> showWindow(const OpenDataset& open, const RenderSettings& s
     viewerOptions.shading = settings.shadingChosen();
     viewerOptions.sections = settings.sectionPlanes(open.bounds());
     viewerOptions.sectionCaps = settings.caps;
+    viewerOptions.march = settings.march;
     auto viewer = Viewer::create(viewerOptions);
     if (!viewer) return viewer.error();
     VCP_TRY((*viewer)->open(open.dataset, open.source, *camera, options.title));

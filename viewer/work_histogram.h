@@ -48,4 +48,21 @@ private:
     std::vector<uint64_t> rays_;
 };
 
+/// What rays did, ray by ray: steps (nodes visited, or samples taken), cells (leaves whose surface was looked at), and
+/// fetches (reads of at most 16 bytes).
+struct RaysWork {
+    WorkHistogram steps, cells, fetches;
+
+    void add(uint32_t ofSteps, uint32_t ofCells, uint32_t ofFetches) {
+        steps.add(ofSteps);
+        cells.add(ofCells);
+        fetches.add(ofFetches);
+    }
+    void merge(const RaysWork& other) {
+        steps.merge(other.steps);
+        cells.merge(other.cells);
+        fetches.merge(other.fetches);
+    }
+};
+
 }  // namespace vcp

@@ -28,7 +28,7 @@ struct Surface {
 
 // Work of a ray; filled with kCountSteps only.
 struct Work {
-    uint steps, fetches;
+    uint steps, cells, fetches;
 };
 
 // A page of the cut, as the walk needs it.
@@ -175,10 +175,13 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
 }
 
 // Distance along the page's ray of the crossing in a soft leaf, or -1.
-float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout uint fetches) {
+float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
     uint face = page.sections.x + (node & kLeafIndexMask);
     LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), node >> kSoftAxisShift & 3u);
-    if (kCountSteps != 0u) fetches += 2u;
+    if (kCountSteps != 0u) {
+        work.cells++;
+        work.fetches += 2u;
+    }
     float scale = 1.0 / edge;  // a power of two: exact
     vec3 p = (s.from - lo) * scale;
     vec3 d = (s.to - s.from) * scale;
@@ -190,7 +193,8 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
 }
 
 // The triangles of a hard leaf. Distance, or -1.
-float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout uint fetches) {
+float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
+    if (kCountSteps != 0u) work.cells++;
     uint first = node & kLeafIndexMask;
     uint count = node >> kHardCountShift & kHardCountMask;
     if (count == kHardCountLong) {
@@ -204,7 +208,7 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
         uvec2 record = fetchPair(page.sections.y, first + i);
         uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
         uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y), c = fetchPair(page.sections.z, v.z);
-        if (kCountSteps != 0u) fetches += 4u;
+        if (kCountSteps != 0u) work.fetches += 4u;
         vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y), decodeVertex(c.x, c.y), kTriangleSlack);
         if (t.x >= lowest && t.x <= best) {
             best = t.x;
@@ -275,7 +279,7 @@ Surface surfaceAt(Hit hit, vec3 direction) {
 }
 
 // First hit in a page from distance `s` on, or kNoHit. Leaves that begin after `until` are not looked at.
-float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout uint steps, inout uint fetches) {
+float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Work work) {
     float sStart;
     PageRay local = enterPage(ray, page, sStart);
     Place at;
@@ -307,7 +311,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout ui
                     at.inPage = at.inPage && at.tau <= tauUntil;
                     if (!at.inPage) break;
                 }
-                descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, steps);
+                descend(descent, page.nodesTexel, rootOnly, page.root, at.subcell, work.steps);
                 int bits = descent.bits - 1;
                 lo = vec3(at.subcell >> bits << bits) * (1.0 / kSubcells);
                 edge = float(1 << bits) * (1.0 / kSubcells);
@@ -321,11 +325,11 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout ui
             if (!at.inPage) break;
             segment = segmentInLeaf(local, lo, edge, at.tau);
             if (descent.node >> kNodeTypeShift == kNodeHard) break;
-            found = castSoft(page, descent.node, lo, edge, segment, hit, fetches);
+            found = castSoft(page, descent.node, lo, edge, segment, hit, work);
             if (found >= 0.0) break;
         }
         if (!at.inPage || found >= 0.0) break;
-        found = castHard(page, descent.node, segment, local.direction, hit, fetches);
+        found = castHard(page, descent.node, segment, local.direction, hit, work);
     }
     hit.leaf = descent.node;
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
@@ -361,7 +365,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
             Hit found = hit;
             found.record = page.record;
             found.pageBits = page.bits;
-            found.depth = castPage(ray, page, start, until, found, work.steps, work.fetches);
+            found.depth = castPage(ray, page, start, until, found, work);
             if (found.depth < hit.depth && found.depth <= until + kIntervalSlack * page.cell) hit = found;
         }
         if (seam) {

@@ -10,6 +10,13 @@ PixelHit fetchPixelHit(uint pixel) {
     return PixelHit(abs(depth), depth < 0.0);
 }
 
+uint packHitNormal(vec3 n) {
+    n /= abs(n.x) + abs(n.y) + abs(n.z);
+    vec2 folded = (1.0 - abs(n.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));
+    vec2 e = n.z >= 0.0 ? n.xy : folded;
+    return packUnorm2x16(e * 0.5 + 0.5);
+}
+
 vec3 unpackHitNormal(uint code) {
     vec2 e = unpackUnorm2x16(code) * 2.0 - 1.0;
     vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));

@@ -45,7 +45,7 @@ void main() {
     float radius = frame.pixel.z;
     bool lit = dot(n, frame.lightDirection.xyz) > 0.0;
     float sun = lit ? 1.0 : 0.0, open = 0.0;
-    Work work = Work(0u, 0u);
+    Work work = Work(0u, 0u, 0u);
     for (uint i = 1u - frame.extra.w; i <= sky; i++) {
         vec3 direction = i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel);
         ray.direction = withoutZeros(direction);

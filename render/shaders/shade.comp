@@ -46,7 +46,7 @@ void main() {
     uint plane = frame.picture.x * frame.picture.y;
     PixelHit hit = fetchPixelHit(at);
     float depth = hit.depth;
-    bool ofWork = kFalseColour != 0u && (frame.mode.w == kShadeSteps || frame.mode.w == kShadeFetches);
+    bool ofWork = kFalseColour != 0u && (frame.mode.w >= kShadeSteps && frame.mode.w <= kShadeFetches);
     if (depth >= kNoHit && !ofWork) return;
     if (kFalseColour != 0u) {
         float value = uintBitsToFloat(fetchHit(frame.extra.x * plane + at));

@@ -9,6 +9,7 @@
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
+#include "render/shaders/hit_records.glsl"
 
 layout(constant_id = 6) const uint kSections = 0u;  // 0: none; 1: planes that cut; 2: with filled caps
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -60,20 +61,14 @@ Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work wor
     return hit;
 }
 
-uint packHitNormal(vec3 n) {
-    n /= abs(n.x) + abs(n.y) + abs(n.z);
-    vec2 folded = (1.0 - abs(n.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));
-    vec2 e = n.z >= 0.0 ? n.xy : folded;
-    return packUnorm2x16(e * 0.5 + 0.5);
-}
-
 // What a false colour shows of a hit, 0 to 1 (ShadingMode).
 float falseColour(Hit hit, Work work) {
     int level = int(kLatticeBits) - hit.pageBits;
     float error = uintBitsToFloat(fetchTable(hit.record * kRecordTexels + 2u).w);
     float pixels = error / max(frame.pixel.x + frame.pixel.y * hit.depth, 1e-30);
-    return frame.mode.w == kShadeSteps     ? float(work.steps) / 64.0
-           : frame.mode.w == kShadeFetches ? float(work.steps + work.fetches) / 128.0
+    return frame.mode.w == kShadeSteps     ? float(work.steps) / kMostShownSteps
+           : frame.mode.w == kShadeCells   ? float(work.cells) / kMostShownCells
+           : frame.mode.w == kShadeFetches ? float(work.steps + work.fetches) / kMostShownFetches
            : frame.mode.w == kShadeLevel   ? float(level) / max(float(frame.mode.y), 1.0)
                                            : pixels;
 }
@@ -84,7 +79,7 @@ void main() {
     if (!listedPixel(tile, pixel)) return;
 
     Ray ray = rayAt(vec2(pixel) + 0.5);
-    Work work = Work(0u, 0u);
+    Work work = Work(0u, 0u, 0u);
     float from = fetchTileStart(tile);
     bool onCap = false;
     Hit hit;

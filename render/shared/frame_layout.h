@@ -21,9 +21,14 @@ const uint kShadeNormals = 2u;
 const uint kShadeUnlit = 3u;
 // False colours, from here on.
 const uint kShadeSteps = 4u;
-const uint kShadeFetches = 5u;
-const uint kShadeLevel = 6u;
-const uint kShadeError = 7u;
+const uint kShadeCells = 5u;
+const uint kShadeFetches = 6u;
+const uint kShadeLevel = 7u;
+const uint kShadeError = 8u;
+// What false colours of work show as 1.
+const float kMostShownSteps = 64.0f;
+const float kMostShownCells = 16.0f;
+const float kMostShownFetches = 128.0f;
 
 const uint kMaxSections = 6u;
 
@@ -48,6 +53,7 @@ struct FrameConstants {
     vec4 pixel;
     // The hits' plane of light or false colours (0: none), section planes, occlusion rays a pixel, shadows.
     uvec4 extra;
+    vec4 march;  // of the method `paper`: epsilon, finest cells
     // Kept is where dot(xyz, p) + w >= 0, p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];
 };
@@ -71,6 +77,8 @@ const float kTileEmpty = 3e38f;
 
 // Depth of a pixel whose ray hits nothing.
 const float kNoHit = 3e38f;
+// Of one whose ray gave up.
+const float kGaveUp = 3.1e38f;
 
 struct FrameCounters {
     uint hitPixels;

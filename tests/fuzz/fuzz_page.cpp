@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "octree/page_codec.h"
+#include "octree/paper_page.h"
 
 namespace {
 
@@ -26,6 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (!block.ok()) return 0;
     const auto bytes = std::as_bytes(std::span(*block));
     require(bytes.size() == pageBytes / 16 * 16, "size of the page");
+    (void)vcp::parsePaperPage(bytes, 20);
     const auto page = vcp::parsePage(bytes);
     if (!page.ok()) return 0;
     const auto again = vcp::unpackGeometry(vcp::packPage(bytes, {}).geometry, bytes.size());

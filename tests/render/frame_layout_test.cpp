@@ -10,6 +10,7 @@
 #include "render/beam_spirv.h"
 #include "render/frame.h"
 #include "render/light_spirv.h"
+#include "render/paper_trace_spirv.h"
 #include "render/shade_spirv.h"
 #include "render/trace_spirv.h"
 
@@ -42,11 +43,12 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
     EXPECT_EQ(offsets.at("FrameConstants"),
               (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX), OFFSET(directionY),
                                      OFFSET(originLattice), OFFSET(lattice), OFFSET(picture), OFFSET(mode), OFFSET(lightDirection),
-                                     OFFSET(upDirection), OFFSET(clay), OFFSET(cap), OFFSET(pixel), OFFSET(extra), OFFSET(sections)}));
+                                     OFFSET(upDirection), OFFSET(clay), OFFSET(cap), OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(sections)}));
 }
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }
 TEST(FrameLayout, Beam) { expectSameLayout(kBeamSpirv); }
+TEST(FrameLayout, PaperTrace) { expectSameLayout(kPaperTraceSpirv); }
 TEST(FrameLayout, Shade) { expectSameLayout(kShadeSpirv); }
 TEST(FrameLayout, Trace) {
     expectSameLayout(kTraceSpirv);

@@ -10,11 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "../builder/test_meshes.h"
+#include "render/renderer.h"
 #include "vcp_program.h"
 #include "viewer/analytic_models.h"
 #include "viewer/bench_cameras.h"
 #include "viewer/bench_methods.h"
 #include "viewer/bench_rays.h"
+#include "viewer/bench_stability.h"
 #include "viewer/paper_tables.h"
 
 namespace vcp {
@@ -46,7 +48,7 @@ void expectRow(const Json& row) {
          {"model",           "camera",      "method",      "knob",      "device",     "rays",        "ns_per_ray",
           "ratio_to_embree", "hit",         "miss",        "missed",    "false",      "wrong_sheet", "unresolved",
           "p50_cells",       "p95_cells",   "p99_cells",   "max_cells", "steps_mean", "steps_p95",   "steps_p99",
-          "fetches_mean",    "fetches_p95", "fetches_p99", "bytes"})
+          "cells_mean",      "cells_p95",   "cells_p99",   "fetches_mean",    "fetches_p95", "fetches_p99", "bytes"})
         ASSERT_TRUE(row.contains(field)) << field;
     double sum = 0;
     for (const char* part : {"hit", "miss", "missed", "false", "wrong_sheet", "unresolved"})
@@ -63,6 +65,8 @@ void expectRow(const Json& row) {
     if (counts) {
         EXPECT_GT(row["steps_mean"], 0);
         EXPECT_LE(row["steps_p95"], row["steps_p99"]);
+        EXPECT_LE(row["cells_p95"], row["cells_p99"]);
+        EXPECT_LE(row["cells_mean"], row["steps_mean"]);
         EXPECT_LE(row["fetches_p95"], row["fetches_p99"]);
     }
 }
@@ -126,14 +130,96 @@ TEST_F(BenchRays, ThePapersRulesAreOptions) {
         const Json report = Json::parse(ran.out, nullptr, false);
         return report.is_discarded() ? Json() : report["rows"][0];
     };
-    const Json plain = row(""), nearer = row("--paper-eps 0.1 --paper-merge 0.5");
+    const Json plain = row(""), nearer = row("--paper-epsilon 0.1 --paper-merge 0.5");
     const Json slow = row("--paper-step distance --paper-scheme trilinear --paper-packing octahedral --paper-band 1.5");
+    const Json forgetful = row("--paper-cache off --paper-k exact --paper-back off --paper-empty safe");
+    EXPECT_GT(forgetful["fetches_mean"], plain["fetches_mean"]);
+    EXPECT_LT(forgetful["p50_cells"], plain["p50_cells"]) << "hits are not moved back to epsilon";
+    EXPECT_LT(row("--paper-k 0")["hit"], plain["hit"]);
     EXPECT_EQ(nearer["knob"], "eps 0.1");
     EXPECT_LT(nearer["p50_cells"], plain["p50_cells"]);
     EXPECT_LT(nearer["bytes"], plain["bytes"]);
     EXPECT_LT(slow["bytes"], plain["bytes"]);
     EXPECT_NE(slow["steps_mean"], plain["steps_mean"]);
     EXPECT_EQ(run(ball_ + " --methods paper --paper-scheme cubic" + kQuick).status, 2);
+    EXPECT_EQ(run(ball_ + " --methods paper --paper-k many" + kQuick).status, 2);
+}
+
+TEST_F(BenchRays, OneRuleOfThePaperAtATime) {
+    const Ran ran = run(ball_ + " --cameras whole --methods paper-rules" + kQuick);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    std::map<std::string, Json> rules;
+    const Json report = Json::parse(ran.out);
+    for (const Json& row : report["rows"]) {
+        expectRow(row);
+        rules[row["knob"]] = row;
+    }
+    ASSERT_EQ(rules.size(), rayMethodKnobs("paper-rules", false).size());
+    const Json& plain = rules["as published"];
+    EXPECT_GT(rules["step distance"]["steps_mean"], plain["steps_mean"]);
+    EXPECT_GT(rules["cache off"]["fetches_mean"], plain["fetches_mean"]);
+    EXPECT_GE(rules["merge never"]["bytes"], plain["bytes"]);
+    EXPECT_LT(rules["band halved"]["bytes"], rules["merge never"]["bytes"]);
+    EXPECT_LT(rules["merge 0.2"]["bytes"], plain["bytes"]);
+}
+
+TEST_F(BenchRays, TheDeviceShowsThePaperAndCountsRayByRay) {
+    if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    const Ran ran = run(ball_ + " --cameras whole --methods certified,reference,paper,paper-gpu" + kQuick);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    std::map<std::string, Json> rows;
+    const Json report = Json::parse(ran.out);
+    for (const Json& row : report["rows"]) {
+        expectRow(row);
+        rows[row["method"]] = row;
+    }
+    const Json &cpu = rows["paper"], &gpu = rows["paper-gpu"];
+    EXPECT_EQ(gpu["bytes"].get<uint64_t>() / 16384, (cpu["bytes"].get<uint64_t>() + 64 + 16383) / 16384) << "in units of the pool";
+    EXPECT_NEAR(gpu["p50_cells"], cpu["p50_cells"].get<double>(), 0.01);
+    EXPECT_NEAR(gpu["hit"], cpu["hit"].get<double>(), 0.01);
+    EXPECT_NEAR(gpu["steps_mean"], cpu["steps_mean"].get<double>(), 0.02 * cpu["steps_mean"].get<double>());
+    EXPECT_NEAR(gpu["fetches_mean"], cpu["fetches_mean"].get<double>(), 0.02 * cpu["fetches_mean"].get<double>());
+    EXPECT_LE(rows["certified"]["cells_p99"], rows["reference"]["cells_p99"]) << "the reference looks at leaves that it could skip";
+}
+
+TEST_F(BenchRays, AnotherCellIsBuiltAnew) {
+    const std::string out = " --out " + (folder_ / "cells").string();
+    const auto cellOf = [&](const std::string& cell) {
+        const Ran ran = run(ball_ + " --cameras whole --methods reference --repetitions 1 --size 16x12 --json --cell " + cell + out);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        const Json report = Json::parse(ran.out, nullptr, false);
+        return report.is_discarded() ? 0.0 : report["rows"][0]["cell"].get<double>();
+    };
+    EXPECT_EQ(cellOf("0.25"), 0.25);
+    EXPECT_EQ(cellOf("0.5"), 0.5);
+    EXPECT_EQ(cellOf("0.25"), 0.25);
+}
+
+TEST(BenchStability, FloatsStayWithDoubles) {
+    if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    const TestFolder folder("vcp_stability_test");
+    StabilityOptions options;
+    options.cells = {1e-6, 1e6};
+    options.originCells = {1e7};
+    options.width = 64;
+    options.height = 40;
+    options.folder = folder / ".";
+    const auto rows = benchStability(options);
+    ASSERT_TRUE(rows) << rows.error().line();
+    ASSERT_EQ(rows->size(), 2u);
+    for (const StabilityRow& row : *rows) {
+        EXPECT_EQ(row.rays, 64u * 40);
+        EXPECT_GT(row.doubles.hits, 500u);
+        EXPECT_EQ(row.doubles.depthCells.max, 0);
+        for (const PrecisionRow* single : {&row.floats, &row.device}) {
+            EXPECT_LE(single->otherOutcome, 2u);
+            EXPECT_EQ(single->holes, 0u);
+            EXPECT_LT(single->depthCells.p99, 1e-3);
+            EXPECT_GT(single->depthCells.max, 0);
+        }
+    }
+    EXPECT_TRUE(fs::is_empty(folder / "."));
+    EXPECT_NE(stabilityMarkdown(*rows).find("| 1e+06 | 1e+07 |"), std::string::npos) << stabilityMarkdown(*rows);
 }
 
 TEST_F(BenchRays, UnknownMethodsAndCamerasAreNamed) {
@@ -146,6 +232,7 @@ TEST_F(BenchRays, UnknownMethodsAndCamerasAreNamed) {
 
 TEST(RayMethods, KnobsAreSweptAboutTheDefault) {
     for (const std::string& method : rayMethodNames()) {
+        if (method == "paper-rules") continue;  // no knob: all of them, always
         const auto one = rayMethodKnobs(method, false), all = rayMethodKnobs(method, true);
         ASSERT_EQ(one.size(), 1u) << method;
         EXPECT_NE(std::find(all.begin(), all.end(), one[0]), all.end()) << method;

@@ -292,6 +292,35 @@ TEST_F(CommandLine, RenderRefusesBrokenPagesWithoutAPicture) {
     EXPECT_FALSE(fs::exists(png));
 }
 
+TEST_F(CommandLine, ThePapersMethodFromMeshToPicture) {
+    const fs::path file = *folder_ / "paper.vcp", again = *folder_ / "paper_again.vcp", png = *folder_ / "paper.png";
+    const Ran built = run({"build", ball().string(), "-o", file.string(), "--method", "paper", "--cell", "0.05", "--paper-k", "4", "--threads", "1", "--json"});
+    ASSERT_EQ(built.status, 0) << built.err;
+    const Json report = Json::parse(built.out);
+    EXPECT_TRUE(report["certified_error_max"].is_null());
+    EXPECT_EQ(report["file_bytes"], fs::file_size(file));
+    ASSERT_EQ(run({"build", ball().string(), "-o", again.string(), "--method", "paper", "--cell", "0.05", "--paper-k", "4", "--threads", "3"}).status, 0);
+    EXPECT_EQ(contentOf(file), contentOf(again));
+
+    const Json info = Json::parse(run({"info", file.string(), "--json"}).out);
+    EXPECT_EQ(info["method"], "paper");
+    EXPECT_EQ(info["cell"], 0.05);
+    EXPECT_TRUE(info["certified_error_max"].is_null());
+    EXPECT_NE(run({"info", file.string()}).out.find("4 rounds of region growing"), std::string::npos);
+    EXPECT_EQ(Json::parse(run({"info", dataset().string(), "--json"}).out)["method"], "certified");
+    EXPECT_EQ(run({"verify", file.string()}).status, 0);
+    expectFailure(run({"verify", file.string(), "--against", ball().string()}), 1, "--method paper");
+    expectFailure(run({"build", ball().string(), "-o", file.string(), "--paper-k", "4"}), 2, "--method paper");
+    expectFailure(run({"build", ball().string(), "-o", file.string(), "--method", "paper", "--error", "0.1"}), 2, "--error");
+    if (!hasDevice()) return;
+    const Ran drawn = run({"render", file.string(), "-o", png.string(), "--size", "64x64", "--paper-epsilon", "0.1", "--json"});
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    EXPECT_GT(Json::parse(drawn.out)["hit_pixels"], 64 * 64 / 5);
+    EXPECT_TRUE(Json::parse(drawn.out)["error_pixels"].is_null());
+    expectFailure(run({"render", file.string(), "-o", png.string(), "--shadows"}), 2, "--shadows");
+    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--paper-epsilon", "0.1"}), 2, "--paper-");
+}
+
 TEST_F(CommandLine, Devices) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const Ran ran = run({"devices", "--json"});

@@ -13,6 +13,7 @@
 #include "viewer/peers/grid_points.h"
 #include "viewer/peers/paper_octree.h"
 #include "viewer/peers/peer_tracer.h"
+#include "viewer/peers/region_growing.h"
 #include "viewer/peers/voxel_octree.h"
 
 namespace vcp {
@@ -35,7 +36,7 @@ TestRay randomRay(std::mt19937_64& random, double reach, double from) {
 /// World t of the first hit; infinite for a miss, not a number where the caster gave up.
 template <class Caster>
 double castWorld(const Caster& caster, const TestRay& ray) {
-    const GridFrame& frame = caster.frame();
+    const RootGrid& frame = caster.frame();
     const GridRay grid = GridRays::along(frame.gridFromWorld(ray.origin), ray.direction, frame.cells());
     NoWork work;
     const GridHit hit = caster.cast(grid, work);
@@ -113,7 +114,7 @@ TEST_F(PeersOnASphere, ThePaperShowsASurfaceEpsilonAway) {
     auto caster = PaperCaster::create(bvh_, {}, {.threads = 2});
     ASSERT_TRUE(caster);
     for (const float epsilon : {0.5f, 0.25f, 0.1f}) {
-        caster->setEpsilon(epsilon);
+        caster->setMarch({.epsilon = epsilon});
         const Outcome outcome = judge(*caster, bvh_, 10, 60);
         EXPECT_GT(outcome.hits, kRays * 9 / 10);
         EXPECT_NEAR(outcome.p99, epsilon, 0.05) << epsilon;
@@ -149,13 +150,16 @@ TEST_F(PeersOnASphere, CountersAndHitsAreTheSameOnAnyThreads) {
         four(std::make_shared<AnalyticCaster>(*again), "cell 1", 4);
     const auto a = one.trace(camera, size, 1), b = four.trace(camera, size, 2);
     ASSERT_TRUE(a && b);
-    EXPECT_EQ(a->steps.rays(), 2400u);
-    EXPECT_GT(a->stepsMean, 0);
-    EXPECT_GT(a->fetchesMean, a->stepsMean);
-    EXPECT_EQ(a->stepsMean, b->stepsMean);
-    EXPECT_EQ(a->fetchesMean, b->fetchesMean);
-    EXPECT_LE(a->steps.quantile(0.95), a->steps.quantile(0.99));
-    EXPECT_EQ(a->steps.quantile(0.99), b->steps.quantile(0.99));
+    const RaysWork &ofOne = a->work, &ofFour = b->work;
+    EXPECT_EQ(ofOne.steps.rays(), 2400u);
+    EXPECT_GT(ofOne.cells.mean(), 0);
+    EXPECT_GT(ofOne.steps.mean(), ofOne.cells.mean());
+    EXPECT_GT(ofOne.fetches.mean(), ofOne.steps.mean());
+    EXPECT_EQ(ofOne.steps.mean(), ofFour.steps.mean());
+    EXPECT_EQ(ofOne.cells.mean(), ofFour.cells.mean());
+    EXPECT_EQ(ofOne.fetches.mean(), ofFour.fetches.mean());
+    EXPECT_LE(ofOne.steps.quantile(0.95), ofOne.steps.quantile(0.99));
+    EXPECT_EQ(ofOne.steps.quantile(0.99), ofFour.steps.quantile(0.99));
     int hits = 0;
     for (size_t i = 0; i < a->hits.size(); ++i) {
         ASSERT_EQ(a->hits[i].has_value(), b->hits[i].has_value());
@@ -168,7 +172,9 @@ TEST_F(PeersOnASphere, CountersAndHitsAreTheSameOnAnyThreads) {
 }
 
 TEST_F(PeersOnASphere, MergingSavesBytesAndEveryRuleCanBeSwitched) {
+    // The signed distances' tree is made of exact points.
     PaperOptions options;
+    options.growRounds = CornerOctreeOptions::kExactPoints;
     const auto merged = PaperCaster::create(bvh_, options, {.threads = 2});
     options.mergeThreshold = -1;
     const auto whole = PaperCaster::create(bvh_, options, {.threads = 2});
@@ -196,8 +202,68 @@ TEST_F(PeersOnASphere, MergingSavesBytesAndEveryRuleCanBeSwitched) {
         return work.steps;
     };
     const uint32_t planar = steps(*thin);
-    thin->setStep(PaperStep::Distance);
+    thin->setMarch({.step = PaperStep::Distance});
     EXPECT_GT(steps(*thin), planar);
+}
+
+TEST(Peers, RegionGrowingIsNeverNearerAndFiveRoundsReachTheBand) {
+    const IndexedMesh mesh = test::randomTriangles(60, 3, false);
+    const MeshBvh bvh(mesh);
+    RootGrid frame = RootGrid::around(bvh.low(), bvh.high(), 0.05, 4);
+    GridPoints<CornerSample> points;
+    const glm::ivec3 cells = frame.cells();
+    for (int i = 0; i < cells.x; ++i)
+        for (int j = 0; j < cells.y; ++j)
+            for (int k = 0; k < cells.z; ++k)
+                if (bvh.nearestPoint(frame.worldFromGrid(glm::dvec3(i, j, k)), 5 * frame.cell)) points.add({i, j, k});
+    double reached = 0, tooLong = std::numeric_limits<double>::infinity();
+    for (const int rounds : {0, 1, 3, 5}) {
+        growClosestPoints(mesh, frame, rounds, 2, points);
+        double count = 0, longer = 0;
+        for (size_t slot = 0; slot < points.slots(); ++slot) {
+            if (!points.isUsed(slot)) continue;
+            const glm::ivec3 at = points.pointAt(slot);
+            const CornerSample grown = *points.find(at);
+            const double exact = bvh.nearestPoint(frame.worldFromGrid(glm::dvec3(at)))->distance / frame.cell;
+            if (!grown.isReached()) {
+                EXPECT_GT(exact, rounds);
+                continue;
+            }
+            ++count;
+            EXPECT_GE(grown.distance, exact - 1e-5);
+            EXPECT_NEAR(glm::length(grown.toSurface), grown.distance, 1e-5);
+            longer += grown.distance > exact + 1e-4 ? 1 : 0;
+        }
+        EXPECT_GT(count, reached) << rounds;
+        reached = count;
+        tooLong = longer / count;
+    }
+    EXPECT_EQ(reached, double(points.size()));
+    EXPECT_LT(tooLong, 0.05);
+}
+
+TEST_F(PeersOnASphere, KDecidesWhatTheBandHolds) {
+    const auto made = [&](int rounds) {
+        PaperOptions options;
+        options.growRounds = rounds;
+        auto caster = PaperCaster::create(bvh_, options, {.threads = 2});
+        EXPECT_TRUE(caster);
+        return std::move(*caster);
+    };
+    const PaperCaster exact = made(CornerOctreeOptions::kExactPoints), five = made(5), one = made(1), none = made(0);
+    EXPECT_NEAR(double(five.tree().leaves), double(exact.tree().leaves), 0.02 * double(exact.tree().leaves));
+    EXPECT_LT(one.tree().leaves, exact.tree().leaves);
+    EXPECT_LT(none.tree().leaves, one.tree().leaves);
+    EXPECT_EQ(judge(five, bvh_, 10, 60).missed, 0);
+    // Blocks that the surface crosses have points that no triangle reached.
+    std::mt19937_64 random(5);
+    int through = 0;
+    for (int i = 0; i < kRays; ++i) {
+        const TestRay ray = randomRay(random, 10, 60);
+        const auto front = bvh_.nearestHit(ray.origin, ray.direction);
+        through += front && !(std::abs(castWorld(none, ray) - front->t) < 4) ? 1 : 0;
+    }
+    EXPECT_GT(through, kRays / 20);
 }
 
 TEST(Peers, EmptyNodesStoreTheLeastDistanceOnTheirBoundary) {

@@ -124,7 +124,7 @@ TEST_F(ViewerTest, LooksAreSwitchedAndSwitchedBack) {
             EXPECT_NE(with, plain);
         }
     }
-    for (int mode = 0; mode < 8; ++mode) {
+    for (int mode = 0; mode < 9; ++mode) {
         viewer_->act(ViewerAction::NextShading);
         EXPECT_TRUE(turn(0.5));
     }

@@ -10,6 +10,7 @@
 
 #include "viewer/peers/grid_points.h"
 #include "viewer/peers/parallel_rows.h"
+#include "viewer/peers/region_growing.h"
 
 namespace vcp {
 
@@ -39,9 +40,9 @@ public:
     Result<CornerOctree> build() {
         const auto limit = [](const char* what) { return Error{.code = ErrorCode::Limit, .message = what}; };
         const glm::dvec3 extent = (mesh_.high() - mesh_.low()) / options_.cell;
-        if (!(std::max({extent.x, extent.y, extent.z}) < GridFrame::kMaxCells / 2))
+        if (!(std::max({extent.x, extent.y, extent.z}) < RootGrid::kMaxCells / 2))
             return limit("the cells are too small for this mesh: more than 2^19 would lie across it");
-        tree_.frame = GridFrame::around(mesh_.low(), mesh_.high(), options_.cell, 4);
+        tree_.frame = RootGrid::around(mesh_.low(), mesh_.high(), options_.cell, 4);
         levels_.resize(static_cast<size_t>(tree_.frame.rootLevel) + 1);
         makeRoots();
         for (int level = tree_.frame.rootLevel; level > kBlockLevel; --level) {
@@ -72,11 +73,12 @@ private:
     }
     [[nodiscard]] CornerSample sampled(glm::ivec3 point) const {
         const CornerSample* known = points_.find(point);
-        return known ? *known : sampleAt(point);
+        return known && known->isReached() ? *known : sampleAt(point);
     }
     /// Cells, without sign; nothing where it is more than `within`.
     [[nodiscard]] std::optional<float> distanceWithin(glm::ivec3 point, float within) const {
-        if (const CornerSample* known = points_.find(point)) return std::abs(known->distance);
+        if (const CornerSample* known = points_.find(point); known && known->isReached())
+            return std::abs(known->distance);
         const auto nearest = mesh_.nearestPoint(tree_.frame.worldFromGrid(glm::dvec3(point)), within * options_.cell);
         if (!nearest) return {};
         return static_cast<float>(nearest->distance / options_.cell);
@@ -88,7 +90,7 @@ private:
     }
 
     void makeRoots() {
-        const GridFrame& frame = tree_.frame;
+        const RootGrid& frame = tree_.frame;
         auto& roots = levels_[frame.rootLevel];
         for (int z = 0; z < frame.roots.z; ++z)
             for (int y = 0; y < frame.roots.y; ++y)
@@ -128,13 +130,19 @@ private:
         };
         for (const BuildNode& block : blocks)
             if (block.kind == Kind::Inner) forPoints(block, [&](glm::ivec3 point) { points_.add(point); });
-        points_.fill(options_.threads, [&](glm::ivec3 point) { return sampleAt(point); });
+        if (options_.growRounds >= 0)
+            growClosestPoints(mesh_.mesh(), tree_.frame, options_.growRounds, options_.threads, points_);
+        else
+            points_.fill(options_.threads, [&](glm::ivec3 point) { return sampleAt(point); });
         forEachIndex(blocks.size(), options_.threads, [&](size_t i) {
             if (blocks[i].kind != Kind::Inner) return;
-            float least = std::numeric_limits<float>::infinity();
-            forPoints(blocks[i],
-                      [&](glm::ivec3 point) { least = std::min(least, std::abs(points_.find(point)->distance)); });
-            if (least > field_.band()) blocks[i].kind = Kind::Empty;
+            float least = std::numeric_limits<float>::infinity(), most = 0;
+            forPoints(blocks[i], [&](glm::ivec3 point) {
+                const float d = std::abs(points_.find(point)->distance);
+                least = std::min(least, d);
+                most = std::max(most, d);
+            });
+            if (least > field_.band() || std::isinf(most)) blocks[i].kind = Kind::Empty;
         });
     }
 

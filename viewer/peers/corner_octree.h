@@ -15,6 +15,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "builder/mesh_bvh.h"
@@ -27,6 +28,10 @@ namespace vcp {
 struct CornerSample {
     glm::vec3 toSurface{0};  ///< closest point minus grid point
     float distance = 0;      ///< signed where the field asks for signs
+
+    /// Of a point that region growing did not reach.
+    static CornerSample unreached() { return {glm::vec3(0), std::numeric_limits<float>::infinity()}; }
+    [[nodiscard]] bool isReached() const { return distance < std::numeric_limits<float>::infinity(); }
 };
 using CornerSamples = std::array<CornerSample, 8>;  ///< x lowest
 
@@ -52,7 +57,7 @@ public:
 
 class CornerOctree {
 public:
-    GridFrame frame;
+    RootGrid frame;
     std::vector<int32_t> nodes;  ///< the roots first, x lowest
     std::vector<std::array<uint32_t, 4>> slices;
     float cutoff = 1;   ///< D, cells
@@ -79,10 +84,15 @@ struct CornerOctreeOptions {
     /// What an empty node stores is lowered by sqrt(1/2) cell, the farthest that a point of the boundary lies from
     /// its grid points: it is then a distance that may be stepped. Off: as published.
     bool safeEmpty = false;
+    /// Rounds of region growing (region_growing.h): k of Demir and Westermann. Blocks with a point that was not reached
+    /// are empty. kExactPoints: closest points of the whole mesh.
+    int growRounds = kExactPoints;
     unsigned threads = 0;
+
+    static constexpr int kExactPoints = -1;
 };
 
-/// `sides` is needed by signed fields. Errors: Limit where a grid of more than GridFrame::kMaxCells / 2 cells an edge
+/// `sides` is needed by signed fields. Errors: Limit where a grid of more than RootGrid::kMaxCells / 2 cells an edge
 /// or 2^30 nodes would be needed.
 Result<CornerOctree> buildCornerOctree(const MeshBvh& mesh, const MeshSides* sides, const CornerField& field,
                                        const CornerOctreeOptions& options);

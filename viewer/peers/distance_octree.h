@@ -62,7 +62,7 @@ public:
     static Result<DistanceCaster> create(const MeshBvh& mesh, const MeshSides& sides, const DistanceOptions& options,
                                          const CornerOctreeOptions& build);
 
-    [[nodiscard]] const GridFrame& frame() const { return tree_.frame; }
+    [[nodiscard]] const RootGrid& frame() const { return tree_.frame; }
     [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
     /// Any thread.
     template <class Work>
@@ -81,7 +81,7 @@ class AnalyticCaster {
 public:
     static Result<AnalyticCaster> create(const MeshBvh& mesh, const MeshSides& sides, const CornerOctreeOptions& build);
 
-    [[nodiscard]] const GridFrame& frame() const { return tree_.frame; }
+    [[nodiscard]] const RootGrid& frame() const { return tree_.frame; }
     [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
     /// Any thread.
     template <class Work>
@@ -119,6 +119,7 @@ GridHit DistanceCaster::cast(const GridRay& ray, Work& work) const {
         if (word != known) {
             f = leafDistances(tree_, word);
             known = word;
+            work.cell();
             work.fetch(2);
         }
         const auto size = static_cast<float>(1 << finder.level());
@@ -142,6 +143,7 @@ GridHit AnalyticCaster::cast(const GridRay& ray, Work& work) const {
     float side = 0, sideAt = -1;
     walkOctree(tree_, ray, work, [&](const WalkedNode& node) {
         if (!CornerOctree::isLeaf(node.word)) return node.tExit + tree_.emptyDistance(node.word);
+        work.cell();
         work.fetch(2);
         const Trilinear f = leafDistances(tree_, node.word);
         const glm::vec3 entry = glm::clamp(ray.origin + node.t * ray.direction - glm::vec3(node.low), 0.0f, 1.0f);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -25,18 +26,31 @@ public:
     }
     template <class Compute>
     void fill(unsigned threads, const Compute& compute) {
+        fillSlots(threads, [&](size_t slot) { return compute(pointAt(slot)); });
+    }
+    template <class Compute>
+    void fillSlots(unsigned threads, const Compute& compute) {
         values_.resize(slots_.size());
         forEachIndex(slots_.size(), threads, [&](size_t i) {
-            if (slots_[i] != kFree) values_[i] = compute(pointOf(slots_[i]));
+            if (isUsed(i)) values_[i] = compute(i);
         });
     }
     /// Null where the point was never added. After fill(), any thread.
     [[nodiscard]] const Value* find(glm::ivec3 point) const {
-        if (slots_.empty()) return nullptr;
-        const size_t slot = slotOf(keyOf(point));
-        return slots_[slot] == kFree ? nullptr : &values_[slot];
+        const auto slot = slotAt(point);
+        return slot ? &values_[*slot] : nullptr;
     }
     [[nodiscard]] size_t size() const { return count_; }
+
+    /// Slots are numbers below slots(); not all are used. They stay while no point is added.
+    [[nodiscard]] size_t slots() const { return slots_.size(); }
+    [[nodiscard]] bool isUsed(size_t slot) const { return slots_[slot] != kFree; }
+    [[nodiscard]] glm::ivec3 pointAt(size_t slot) const { return pointOf(slots_[slot]); }
+    [[nodiscard]] std::optional<size_t> slotAt(glm::ivec3 point) const {
+        if (slots_.empty()) return {};
+        const size_t slot = slotOf(keyOf(point));
+        return isUsed(slot) ? std::optional(slot) : std::nullopt;
+    }
 
 private:
     static constexpr uint64_t kFree = ~uint64_t{0};

@@ -19,7 +19,7 @@
 namespace vcp {
 
 /// A dense grid of root nodes, each 2^rootLevel finest cells an edge.
-struct GridFrame {
+struct RootGrid {
     glm::dvec3 low{0};  ///< world
     double cell = 1;    ///< edge of a finest cell, world units
     int rootLevel = 0;
@@ -37,8 +37,8 @@ struct GridFrame {
 
     /// About the middle of a box, with at least `margin` cells around it. Precondition: the box is at most
     /// kMaxCells / 2 cells across.
-    static GridFrame around(glm::dvec3 boxLow, glm::dvec3 boxHigh, double cell, int margin) {
-        GridFrame frame;
+    static RootGrid around(glm::dvec3 boxLow, glm::dvec3 boxHigh, double cell, int margin) {
+        RootGrid frame;
         frame.cell = cell;
         const glm::dvec3 wanted = (boxHigh - boxLow) / cell + 2.0 * margin;
         const double longest = std::max({wanted.x, wanted.y, wanted.z, 1.0});
@@ -65,7 +65,7 @@ struct GridHit {
 /// A perspective camera's rays through a frame.
 class GridRays {
 public:
-    GridRays(const Camera& camera, glm::ivec2 size, const GridFrame& frame) : high_(frame.cells()) {
+    GridRays(const Camera& camera, glm::ivec2 size, const RootGrid& frame) : high_(frame.cells()) {
         const CameraBasis b = cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
         eye_ = frame.gridFromWorld(camera.eye);
         perX_ = b.right * (2 * b.halfWidth / size.x);

@@ -34,6 +34,8 @@ public:
         level_ = level;
         return word_ = word;
     }
+    /// The next search starts at the root.
+    void forget() { level_ = parentLevel_ = -1; }
     [[nodiscard]] int level() const { return level_; }
     [[nodiscard]] glm::ivec3 low() const { return cell_ & glm::ivec3(-(1 << level_)); }
 

@@ -13,14 +13,16 @@
 
 namespace vcp {
 
-/// Counters of one ray's work, and none at all.
+/// Counters of one ray's work, and none at all. A cell: a leaf whose surface is looked at.
 struct RayWork {
-    uint32_t steps = 0, fetches = 0;
+    uint32_t steps = 0, cells = 0, fetches = 0;
     void step() { ++steps; }
+    void cell() { ++cells; }
     void fetch(uint32_t reads = 1) { fetches += reads; }
 };
 struct NoWork {
     void step() {}
+    void cell() {}
     void fetch(uint32_t = 1) {}
 };
 

@@ -59,7 +59,7 @@ public:
     [[nodiscard]] float mergeThreshold() const override { return options_.mergeThreshold; }
     [[nodiscard]] float mergeError(const CornerSamples& corners, float size, glm::vec3 at,
                                    const CornerSample& exact) const override {
-        return vectorMergeError(corners, size, at, exact, options_.scheme);
+        return vectorMergeError(corners, size, at, exact, options_.mergeScheme);
     }
     [[nodiscard]] uint32_t pack(const CornerSample& sample, float largest) const override {
         return packPaperVector(sample.toSurface, largest, options_.packing);
@@ -72,39 +72,7 @@ private:
 }  // namespace
 
 glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 at, PaperScheme scheme) {
-    const float wx[2] = {1 - at.x, at.x},
-                wyz[4] = {(1 - at.y) * (1 - at.z), at.y * (1 - at.z), (1 - at.y) * at.z, at.y * at.z};
-    float weight[8], along[8], squared[8];
-    for (int k = 0; k < 8; ++k) weight[k] = wx[k >> 2] * wyz[k & 3];
-    for (int k = 0; k < 8; ++k) {
-        // From the point to the corner's closest point, along the corner's vector.
-        const float ox = (static_cast<float>(k >> 2) - at.x) * size, oy = (static_cast<float>(k & 1) - at.y) * size,
-                    oz = (static_cast<float>(k >> 1 & 1) - at.z) * size;
-        const float x = corners.x[k], y = corners.y[k], z = corners.z[k];
-        squared[k] = x * x + y * y + z * z;
-        along[k] = x * (x + ox) + y * (y + oy) + z * (z + oz);
-    }
-    glm::vec3 trilinear(0), plane(0);
-    for (int k = 0; k < 8; ++k) {
-        trilinear.x += weight[k] * corners.x[k];
-        trilinear.y += weight[k] * corners.y[k];
-        trilinear.z += weight[k] * corners.z[k];
-    }
-    if (scheme == PaperScheme::Trilinear) return trilinear;
-    float nearest = std::numeric_limits<float>::infinity();
-    int which = -1;
-    for (int k = 0; k < 8; ++k) {
-        if (!(squared[k] > 0)) continue;
-        const float distance2 = along[k] * along[k] / squared[k];
-        if (distance2 < nearest) {
-            nearest = distance2;
-            which = k;
-        }
-    }
-    if (which < 0) return trilinear;
-    plane = along[which] / squared[which] * glm::vec3(corners.x[which], corners.y[which], corners.z[which]);
-    if (scheme == PaperScheme::MinPlane) return plane;
-    return glm::dot(trilinear, trilinear) > nearest ? trilinear : plane;
+    return paper::interpolateVectors(corners, size, at, static_cast<uint32_t>(scheme));
 }
 
 float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact,
@@ -117,23 +85,10 @@ uint32_t packPaperVector(glm::vec3 v, float longest, PaperPacking packing) {
                                               : packOctahedral(v, longest);
 }
 
-PaperDecoder::PaperDecoder(float longest, PaperPacking packing)
-    : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
-
-glm::vec3 PaperDecoder::spherical(uint32_t code) const {
+glm::vec3 PaperDecoder::spherical(uint32_t code) {
     const uint32_t theta = code >> 13 & 511u, phi = code >> 22;
     const float c = kAngles.cosTheta[theta];
     return {c * kAngles.cosPhi[phi], c * kAngles.sinPhi[phi], kAngles.sinTheta[theta]};
-}
-
-glm::vec3 PaperDecoder::octahedral(uint32_t code) {
-    const glm::vec2 o(static_cast<float>(code >> 13 & 1023u) * (2.0f / 1023) - 1,
-                      static_cast<float>(code >> 23) * (2.0f / 511) - 1);
-    glm::vec3 n(o.x, o.y, 1 - std::abs(o.x) - std::abs(o.y));
-    const float fold = std::max(-n.z, 0.0f);
-    n.x += n.x >= 0 ? -fold : fold;
-    n.y += n.y >= 0 ? -fold : fold;
-    return glm::normalize(n);
 }
 
 LeafVectors PaperCaster::vectorsOf(int32_t leaf) const {
@@ -148,7 +103,10 @@ LeafVectors PaperCaster::vectorsOf(int32_t leaf) const {
 
 Result<PaperCaster> PaperCaster::create(const MeshBvh& mesh, const PaperOptions& options,
                                         const CornerOctreeOptions& build) {
-    auto tree = buildCornerOctree(mesh, nullptr, VectorField(options), build);
+    CornerOctreeOptions structure = build;
+    structure.growRounds = options.growRounds;
+    structure.safeEmpty = options.safeEmpty;
+    auto tree = buildCornerOctree(mesh, nullptr, VectorField(options), structure);
     if (!tree) return tree.error();
     return PaperCaster(std::move(*tree), options);
 }

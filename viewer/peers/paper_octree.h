@@ -9,36 +9,34 @@
 //                   is epsilon between the last two samples (2.1)
 //   memory traffic  the parent of the last node and the vectors of the last leaf are remembered (4.2)
 //
-// Where the paper is silent: epsilon, the merging threshold and the longest vector (we take the longest that is
-// stored). Where we deviate: closest points are exact, of the whole mesh, instead of found by k rounds of region
-// growing (3.1), so there is no k; a vector of length 0 has no plane (their formula divides 0 by 0); trigonometry is
-// tabulated, one entry a code.
+// Each rule can be switched, so that its effect can be measured (PaperOptions). Where the paper is silent: epsilon, the
+// merging threshold, k, and the longest vector (we take the longest that is stored). Where we deviate: the distance to a
+// triangle is exact (region_growing.h); a vector of length 0 has no plane (their formula divides 0 by 0); trigonometry
+// is tabulated here, one entry a code, and computed on the GPU (octree/shared/paper_math.h, which holds what both share).
 #pragma once
 
+#include <cmath>
 #include <memory>
 
+#include "octree/paper_page.h"
 #include "viewer/peers/corner_octree.h"
 #include "viewer/peers/node_finder.h"
 
 namespace vcp {
 
-enum class PaperScheme : uint8_t { Trilinear, MinPlane, Longer };
-enum class PaperStep : uint8_t { Distance, Planar };
-/// Octahedral: 13 bits of length as before, 10 + 9 of direction, for comparison.
-enum class PaperPacking : uint8_t { Spherical, Octahedral };
+using paper::LeafVectors;
 
 struct PaperOptions {
-    float epsilon = 0.25f;         ///< cells
+    PaperMarch march;
     float band = 3.4641016f;       ///< t, cells: twice the diagonal
     float mergeThreshold = 0.05f;  ///< cells; below 0: no merging
-    PaperScheme scheme = PaperScheme::Longer;
-    PaperStep step = PaperStep::Planar;
+    PaperScheme mergeScheme = PaperScheme::Longer;  ///< that merging is judged by
     PaperPacking packing = PaperPacking::Spherical;
-};
+    /// k: rounds of region growing, or CornerOctreeOptions::kExactPoints. 5 reach every point of the default band.
+    int growRounds = 5;
+    bool safeEmpty = false;  ///< CornerOctreeOptions::safeEmpty
 
-/// The eight vectors of a leaf, cells; corner 4 x + 2 z + y.
-struct LeafVectors {
-    alignas(32) float x[8], y[8], z[8];
+    bool operator==(const PaperOptions&) const = default;
 };
 
 /// The vector at `at` (0 to 1 an axis) of a leaf of edge `size` cells.
@@ -51,15 +49,15 @@ uint32_t packPaperVector(glm::vec3 v, float longest, PaperPacking packing);
 /// Decodes what packPaperVector packed.
 class PaperDecoder {
 public:
-    PaperDecoder(float longest, PaperPacking packing);
+    PaperDecoder(float longest, PaperPacking packing)
+        : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
     [[nodiscard]] glm::vec3 operator()(uint32_t code) const {
         const float root = static_cast<float>(code & 8191u) * perStep_;
-        return root * root * (packing_ == PaperPacking::Spherical ? spherical(code) : octahedral(code));
+        return root * root * (packing_ == PaperPacking::Spherical ? spherical(code) : paper::octahedralDirection(code));
     }
 
 private:
-    [[nodiscard]] glm::vec3 spherical(uint32_t code) const;
-    static glm::vec3 octahedral(uint32_t code);
+    [[nodiscard]] static glm::vec3 spherical(uint32_t code);
 
     PaperPacking packing_;
     float perStep_;
@@ -67,30 +65,26 @@ private:
 
 class PaperCaster {
 public:
+    /// `build`: its growRounds and safeEmpty are those of `options`.
     static Result<PaperCaster> create(const MeshBvh& mesh, const PaperOptions& options,
                                       const CornerOctreeOptions& build);
 
-    [[nodiscard]] const GridFrame& frame() const { return tree_->frame; }
+    [[nodiscard]] const RootGrid& frame() const { return tree_->frame; }
     [[nodiscard]] const CornerOctree& tree() const { return *tree_; }
+    [[nodiscard]] const PaperOptions& options() const { return options_; }
     [[nodiscard]] uint64_t bytes() const { return tree_->bytes(); }
-    /// The march's options may change; those of the structure (band, threshold, packing) may not.
-    void setEpsilon(float cells) { options_.epsilon = cells; }
-    void setScheme(PaperScheme scheme) { options_.scheme = scheme; }
-    void setStep(PaperStep step) { options_.step = step; }
+    void setMarch(const PaperMarch& march) { options_.march = march; }
 
     /// Any thread.
     template <class Work>
     [[nodiscard]] GridHit cast(const GridRay& ray, Work& work) const;
 
 private:
-    static constexpr int kMaxSteps = 4096;
-
     PaperCaster(CornerOctree tree, const PaperOptions& options)
         : tree_(std::make_shared<const CornerOctree>(std::move(tree))),
           options_(options),
           decode_(tree_->largest, options.packing) {}
     [[nodiscard]] LeafVectors vectorsOf(int32_t leaf) const;
-    [[nodiscard]] float stepFrom(float d, glm::vec3 v, glm::vec3 direction) const;
 
     std::shared_ptr<const CornerOctree> tree_;  // shared by copies that march otherwise
     PaperOptions options_;
@@ -99,50 +93,53 @@ private:
 
 template <class Work>
 GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
+    const PaperMarch& rules = options_.march;
     NodeFinder finder(*tree_);
     LeafVectors corners;
     int32_t known = 0;
-    float t = 0, lastT = 0, lastDistance = 0;
     const glm::ivec3 last = tree_->frame.cells() - 1;
-    for (int step = 0; step < kMaxSteps && t <= ray.tMax; ++step) {
+    struct Sample {
+        float distance;
+        bool isLeaf;
+        glm::vec3 vector;  // of a leaf
+    };
+    const auto sampleAt = [&](float t) -> Sample {
         work.step();
         const glm::vec3 p = ray.origin + t * ray.direction;
+        if (!rules.cached) {
+            finder.forget();
+            known = 0;
+        }
         const int32_t word = finder.find(cellAt(p, last), work);
-        float d, advance;
-        if (CornerOctree::isLeaf(word)) {
-            if (word != known) {
-                corners = vectorsOf(word);
-                known = word;
-                work.fetch(2);
-            }
-            const auto size = static_cast<float>(1 << finder.level());
-            const glm::vec3 v =
-                interpolateVectors(corners, size, (p - glm::vec3(finder.low())) / size, options_.scheme);
-            d = glm::length(v);
-            if (d < options_.epsilon) {
-                const float back =
-                    lastDistance > options_.epsilon ? (lastDistance - options_.epsilon) / (lastDistance - d) : 1;
-                return {lastT + back * (t - lastT), v};
-            }
-            advance = stepFrom(d, v, ray.direction);
-        } else {
-            d = tree_->emptyDistance(word);
-            advance = std::max(d, options_.epsilon);
+        if (!CornerOctree::isLeaf(word)) return {tree_->emptyDistance(word), false, glm::vec3(0)};
+        if (word != known) {
+            corners = vectorsOf(word);
+            known = word;
+            work.cell();
+            work.fetch(2);
+        }
+        const auto size = static_cast<float>(1 << finder.level());
+        const glm::vec3 v = interpolateVectors(corners, size, (p - glm::vec3(finder.low())) / size, rules.scheme);
+        return {glm::length(v), true, v};
+    };
+    float t = 0, lastT = 0, lastDistance = 0;
+    for (uint32_t step = 0; step < paper::kPaperMostSteps && t <= ray.tMax; ++step) {
+        const Sample at = sampleAt(t);
+        if (at.isLeaf && at.distance < rules.epsilon) {
+            if (!rules.back) return {t, at.vector};
+            const float hit = lastT + paper::marchBack(lastDistance, at.distance, rules.epsilon) * (t - lastT);
+            // The normal is that of the point moved back to: here the vector may be too short to point anywhere.
+            const Sample back = sampleAt(hit);
+            return {hit, back.isLeaf && back.distance > 0 ? back.vector : at.vector};
         }
         lastT = t;
-        lastDistance = d;
-        t += advance;
+        lastDistance = at.distance;
+        t += at.isLeaf ? paper::marchStep(at.distance, glm::dot(at.vector, ray.direction), rules.epsilon,
+                                          rules.step == PaperStep::Planar)
+                       : std::max(at.distance, rules.epsilon);
     }
     if (t <= ray.tMax) return {std::numeric_limits<float>::quiet_NaN(), {}};
     return {};
-}
-
-inline float PaperCaster::stepFrom(float d, glm::vec3 v, glm::vec3 direction) const {
-    if (options_.step == PaperStep::Distance) return d;
-    // Not approaching: the plane is never met.
-    const float approach = glm::dot(v, direction);
-    const float planar = approach > 0 ? d * d / approach : std::numeric_limits<float>::infinity();
-    return std::max(d, std::min(planar, 2 * options_.epsilon));
 }
 
 }  // namespace vcp

@@ -37,24 +37,18 @@ public:
         TracedPicture picture;
         picture.seconds = medianOf(seconds);
         picture.hits.resize(hits.size());
-        std::vector<WorkHistogram> steps(size.y), fetches(size.y);
+        std::vector<RaysWork> works(size.y);
         forEachRow(size.y, threads_, [&](int y) {
             for (int x = 0; x < size.x; ++x) {
                 const GridRay ray = rays.ray(x, y);
                 RayWork work;
                 (void)caster_->cast(ray, work);
-                steps[y].add(work.steps);
-                fetches[y].add(work.fetches);
+                works[y].add(work.steps, work.cells, work.fetches);
                 const size_t pixel = static_cast<size_t>(y) * size.x + x;
                 picture.hits[pixel] = worldHit(ray, hits[pixel]);
             }
         });
-        for (int y = 0; y < size.y; ++y) {
-            picture.steps.merge(steps[y]);
-            picture.fetches.merge(fetches[y]);
-        }
-        picture.stepsMean = picture.steps.mean();
-        picture.fetchesMean = picture.fetches.mean();
+        for (const RaysWork& work : works) picture.work.merge(work);
         return picture;
     }
 

@@ -40,12 +40,12 @@ public:
                 high = glm::max(high, mesh.positions[vertex]);
             }
         extent_ = (high - low) / cell;
-        tree_.frame = GridFrame::around(low, high, cell, 1);
+        tree_.frame = RootGrid::around(low, high, cell, 1);
     }
 
     Result<VoxelOctree> build() {
         const auto limit = [](const char* what) { return Error{.code = ErrorCode::Limit, .message = what}; };
-        if (!(std::max({extent_.x, extent_.y, extent_.z}) < GridFrame::kMaxCells / 2))
+        if (!(std::max({extent_.x, extent_.y, extent_.z}) < RootGrid::kMaxCells / 2))
             return limit("the cells are too small for this mesh: more than 2^19 would lie across it");
         OpenLevel open = rootLevel();
         for (int level = tree_.frame.rootLevel; level > 0; --level) {
@@ -67,7 +67,7 @@ private:
     }
 
     OpenLevel rootLevel() {
-        const GridFrame& frame = tree_.frame;
+        const RootGrid& frame = tree_.frame;
         const int size = 1 << frame.rootLevel;
         std::vector<std::vector<uint32_t>> bins(static_cast<size_t>(frame.roots.x) * frame.roots.y * frame.roots.z);
         for (uint32_t i = 0; i < mesh_.triangles.size(); ++i) {

@@ -49,7 +49,7 @@ inline uint32_t childrenBefore(uint32_t mask, int octant) {
 
 class VoxelOctree {
 public:
-    GridFrame frame;
+    RootGrid frame;
     bool hasContours = false;
     std::vector<int32_t> roots;          ///< node of the root level, or kEmptyWord
     std::vector<uint32_t> nodes;         ///< levels from coarse to fine, above the last
@@ -91,7 +91,7 @@ class VoxelCaster {
 public:
     explicit VoxelCaster(VoxelOctree tree) : tree_(std::move(tree)) {}
 
-    [[nodiscard]] const GridFrame& frame() const { return tree_.frame; }
+    [[nodiscard]] const RootGrid& frame() const { return tree_.frame; }
     [[nodiscard]] const VoxelOctree& tree() const { return tree_; }
     [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
     /// Any thread.
@@ -107,6 +107,7 @@ GridHit VoxelCaster::cast(const GridRay& ray, Work& work) const {
     GridHit hit;
     walkOctree(tree_, ray, work, [&](const WalkedNode& node) {
         if (!VoxelOctree::isLeaf(node.word)) return node.tExit;
+        work.cell();
         const glm::vec3 centre = glm::vec3(node.low) + 0.5f;
         const glm::vec3 entry = ray.origin + node.t * ray.direction - centre;
         if (!tree_.hasContours) {

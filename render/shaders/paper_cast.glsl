@@ -1,0 +1,166 @@
+// Casting a ray through a page of the method `paper` (octree/paper_page.h): the march of Demir and Westermann 2015, as
+// viewer/peers/paper_octree.h does it on the CPU. Grid space: finest cells from the page's lowest corner.
+#define INLINE
+#define CONST_REF(T) T
+#include "octree/shared/paper_math.h"
+
+struct PaperHit {
+    float depth;  // finest cells along the ray; kNoHit, kGaveUp
+    vec3 normal;  // towards the ray's origin, not normalized
+    int level;    // of the leaf: 0 the finest cells
+};
+
+// Work of a ray; filled with kCountSteps only.
+struct Work {
+    uint steps, cells, fetches;
+};
+
+struct PaperPage {
+    uint nodes, slices;  // texels
+    int rootLevel;
+    uvec3 roots;
+    ivec3 cells;
+    uint packing;
+    float perDistance;  // cells a unit of an empty node
+    float perRoot;      // root of cells a unit of a packed length
+    bool isThere;
+};
+
+PaperPage fetchPaperPage() {
+    uvec4 record = fetchTable(0u);
+    PaperPage page;
+    page.isThere = (record.x & kRecordInCut) != 0u;
+    uint at = page.isThere ? record.w : 0u;
+    uvec4 words0 = fetchTexel(at), words1 = fetchTexel(at + 1u), words2 = fetchTexel(at + 2u);
+    page.nodes = at + kPaperHeaderBytes / 16u;
+    page.slices = page.nodes + (words0.w + 3u) / 4u;
+    page.rootLevel = int(words0.y);
+    page.packing = words0.z;
+    page.roots = words1.xyz;
+    page.cells = ivec3(words1.xyz) << page.rootLevel;
+    page.perDistance = uintBitsToFloat(words2.x) / float(kPaperEmpty - 1);
+    page.perRoot = sqrt(uintBitsToFloat(words2.y)) / 8191.0;
+    return page;
+}
+
+// A node, its parent, and where they are.
+struct PaperPlace {
+    ivec3 cell;
+    int level, parentLevel;  // -1: none is remembered
+    int word, parent;
+};
+
+bool holdsCell(int level, ivec3 a, ivec3 b) {
+    ivec3 changed = a ^ b;
+    return level >= 0 && (changed.x | changed.y | changed.z) >> max(level, 0) == 0;
+}
+
+// Finds the leaf or empty node at a cell, from the parent of the last one where that holds it too (4.2).
+void findNode(PaperPage page, ivec3 cell, inout PaperPlace at, inout Work work) {
+    bool known = holdsCell(at.level, cell, at.cell);
+    bool fromParent = holdsCell(at.parentLevel, cell, at.cell);
+    ivec3 root = cell >> page.rootLevel;
+    int level = fromParent ? at.parentLevel - 1 : page.rootLevel;
+    ivec3 bits = (cell >> max(level, 0)) & 1;
+    uint octant = uint(bits.x | bits.y << 1 | bits.z << 2);
+    uint index = fromParent ? uint(at.parent) + octant : (uint(root.z) * page.roots.y + uint(root.y)) * page.roots.x + uint(root.x);
+    if (!known && !fromParent) at.parentLevel = -1;
+    bool inner = !known;
+    while (inner) {
+        int word = int(fetchWord(page.nodes, index));
+        if (kCountSteps != 0u) work.fetches++;
+        inner = word >= 0 && word < kPaperEmpty;
+        at.word = word;
+        at.level = level;
+        if (inner) {
+            at.parent = word;
+            at.parentLevel = level;
+            level--;
+            bits = (cell >> level) & 1;
+            index = uint(word) + uint(bits.x | bits.y << 1 | bits.z << 2);
+        }
+    }
+    at.cell = known ? at.cell : cell;
+}
+
+vec3 unpackPaperVector(uint code, PaperPage page) {
+    float root = float(code & 8191u) * page.perRoot;
+    return root * root * (page.packing == kPaperSpherical ? sphericalDirection(code) : octahedralDirection(code));
+}
+
+LeafVectors fetchLeafVectors(PaperPage page, int word) {
+    uint slice = page.slices + uint(-(word + 1));
+    uvec4 low = fetchTexel(slice), high = fetchTexel(slice + 1u);
+    LeafVectors corners;
+    for (int k = 0; k < 8; k++) {
+        vec3 v = unpackPaperVector(k < 4 ? low[k & 3] : high[k & 3], page);
+        corners.x[k] = v.x;
+        corners.y[k] = v.y;
+        corners.z[k] = v.z;
+    }
+    return corners;
+}
+
+// First hit between two distances along the ray.
+PaperHit castPaper(Ray ray, PaperPage page, float from, float until, inout Work work) {
+    PaperHit hit = PaperHit(kNoHit, -ray.direction, 0);
+    int perCell = int(frame.lattice.x);
+    bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
+    ivec3 high = page.cells * perCell;
+    float first = max(maxOf(planeDistances(ray, mix(high, ivec3(0), ahead))), from);
+    float last = min(minOf(planeDistances(ray, mix(ivec3(0), high, ahead))), until);
+    vec3 eye = vec3(frame.originLattice.xyz) * frame.lattice.y + ray.origin;
+    vec3 start = clamp(eye + first * ray.direction, vec3(0.0), vec3(page.cells));
+    float tMax = page.isThere ? last - first : -1.0;
+    float epsilon = frame.march.x;
+
+    PaperPlace at = PaperPlace(ivec3(0), -1, -1, 0, 0);
+    LeafVectors corners;
+    for (int k = 0; k < 8; k++) corners.x[k] = corners.y[k] = corners.z[k] = 0.0;
+    int loaded = 0;
+    float t = 0.0, lastT = 0.0, lastDistance = 0.0;
+    uint steps = 0u;
+    bool going = t <= tMax, isBack = false;
+    while (going) {
+        steps++;
+        vec3 p = start + t * ray.direction;
+        if (kCached == 0u) {
+            at.level = -1;
+            at.parentLevel = -1;
+            loaded = 0;
+        }
+        findNode(page, clamp(ivec3(p), ivec3(0), page.cells - 1), at, work);
+        bool isLeaf = at.word < 0;
+        if (isLeaf && at.word != loaded) {
+            corners = fetchLeafVectors(page, at.word);
+            loaded = at.word;
+            if (kCountSteps != 0u) {
+                work.cells++;
+                work.fetches += 2u;
+            }
+        }
+        float size = float(1 << at.level);
+        vec3 low = vec3(at.cell >> at.level << at.level);
+        vec3 v = interpolateVectors(corners, size, (p - low) / size, kScheme);
+        float d = isLeaf ? length(v) : float(at.word - kPaperEmpty) * page.perDistance;
+        bool isHit = isLeaf && d < epsilon && !isBack;
+        // Of the point moved back to; before, the vector may point either way, or be too short to point anywhere.
+        vec3 facing = dot(v, ray.direction) > 0.0 ? -v : v;
+        if ((isHit || (isBack && isLeaf)) && d > 0.0) hit.normal = facing;
+        if (isHit) {
+            t = kBack != 0u ? lastT + marchBack(lastDistance, d, epsilon) * (t - lastT) : t;
+            hit.depth = first + t;
+            hit.level = at.level;
+        }
+        bool ends = isBack || (isHit && kBack == 0u);
+        isBack = isHit;
+        lastT = isHit ? lastT : t;
+        lastDistance = d;
+        float onward = isLeaf ? marchStep(d, dot(v, ray.direction), epsilon, kPlanar != 0u) : max(d, epsilon);
+        t += isHit ? 0.0 : onward;
+        going = !ends && (isHit || (t <= tMax && steps < kPaperMostSteps));
+        if (!ends && !going && t <= tMax) hit.depth = kGaveUp;
+    }
+    if (kCountSteps != 0u) work.steps += steps;
+    return hit;
+}

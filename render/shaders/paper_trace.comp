@@ -1,0 +1,56 @@
+// First hits of pixels in a dataset of the method `paper`. Reads pool, table and tile list; writes what trace.comp does.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "render/shaders/bindings.glsl"
+#include "render/shaders/rays.glsl"
+#include "render/shaders/tiles.glsl"
+#include "render/shaders/sections.glsl"
+#include "render/shaders/hit_records.glsl"
+
+layout(constant_id = 6) const uint kSections = 0u;  // 1: planes cut
+layout(constant_id = 7) const uint kScheme = 2u;    // PaperScheme
+layout(constant_id = 8) const uint kPlanar = 1u;    // PaperStep
+layout(constant_id = 9) const uint kBack = 1u;      // PaperMarch::back
+layout(constant_id = 10) const uint kCached = 1u;   // PaperMarch::cached
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#include "render/shaders/paper_cast.glsl"
+
+// What a false colour shows, 0 to 1 (ShadingMode). Nothing is certified; levels are those of the leaves.
+float falseColour(PaperHit hit, Work work, PaperPage page) {
+    return frame.mode.w == kShadeSteps     ? float(work.steps) / kMostShownSteps
+           : frame.mode.w == kShadeCells   ? float(work.cells) / kMostShownCells
+           : frame.mode.w == kShadeFetches ? float(work.fetches) / kMostShownFetches
+           : frame.mode.w == kShadeLevel   ? float(page.rootLevel - hit.level) / float(page.rootLevel)
+                                           : 0.0;
+}
+
+void main() {
+    uvec2 pixel;
+    uint tile;
+    if (!listedPixel(tile, pixel)) return;
+
+    Ray ray = rayAt(vec2(pixel) + 0.5);
+    PaperPage page = fetchPaperPage();
+    Work work = Work(0u, 0u, 0u);
+    Interval kept = Interval(0.0, kNoHit, vec3(0.0));
+    if (kSections != 0u) kept = keptInterval(ray);
+    PaperHit hit = castPaper(ray, page, kept.first, kept.last, work);
+
+    bool found = hit.depth < kNoHit;
+    hit.normal *= inversesqrt(max(dot(hit.normal, hit.normal), 1e-30));
+    hit.normal -= max(dot(hit.normal, ray.direction), 0.0) * ray.direction;
+    uint at = pixel.y * frame.picture.x + pixel.x;
+    uint plane = frame.picture.x * frame.picture.y;
+    hits[at] = floatBitsToUint(hit.depth);
+    hits[plane + at] = packHitNormal(hit.normal);
+    if (kFalseColour != 0u) hits[frame.extra.x * plane + at] = floatBitsToUint(falseColour(hit, work, page));
+
+    uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
+    if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);
+    if (kCountSteps != 0u) {
+        atomicAdd(counters.steps, work.steps);
+        atomicAdd(counters.fetches, work.fetches);
+    }
+}
