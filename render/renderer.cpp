@@ -14,6 +14,7 @@
 
 #include "render/frame_setup.h"
 #include "render/passes/beam.h"
+#include "render/passes/feedback.h"
 #include "render/passes/light.h"
 #include "render/passes/readback.h"
 #include "render/passes/shade.h"
@@ -31,7 +32,7 @@ constexpr uint64_t kLeastBudget = 1ull << 20;
 /// GPU clock readings between passes.
 class PassTimer {
 public:
-    static constexpr uint32_t kMarks = 5;
+    static constexpr uint32_t kMarks = 6;
 
     Result<void> create(const Device& device) {
         device_ = &device;
@@ -92,13 +93,17 @@ struct Renderer::State {
     TracePass trace;
     LightPass light;
     ShadePass shade;
+    FeedbackPass feedback;
     PassTimer timer;
     PassConstants constants;
     bool tableStale = true;
-    double errorPixels = 0;  // of the cut
+    std::vector<glm::uvec4> table;  // of the last frame
+    double errorPixels = 0;         // of the cut
     std::optional<FrameRequest> drawn;
     bool drawnColour = false;
 
+    /// Whether this frame has a feedback pass.
+    [[nodiscard]] bool listens() const { return residency && residency->listens(); }
     [[nodiscard]] PassConstants constantsFor(const FrameRequest& request) const;
     Result<void> checkLimits(const FrameRequest& request) const;
     Result<void> prepare(const FrameRequest& request);
@@ -148,6 +153,7 @@ Result<void> Renderer::open(std::shared_ptr<const Dataset> dataset, std::shared_
     ResidencyOptions options;
     options.budgetBytes = o.budgetBytes;
     options.uploadBytes = o.uploadBytes;
+    options.order = o.order;
     options.loader.withColour = o.colour;
     options.loader.threads = o.loaderThreads;
     options.loader.heldBytes = o.ramBytes;
@@ -172,7 +178,7 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     State& s = *state_;
     if (!s.residency) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
     auto result = s.residency->update(selectionView(request));
-    if (result) s.tableStale = s.tableStale || result->changed;
+    s.tableStale = s.tableStale || s.residency->tableChanged();
     if (result) s.errorPixels = result->errorPixels;
     return result;
 }
@@ -230,24 +236,31 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
         trace.clear();
         light.clear();
         shade.clear();
+        feedback.clear();
     }
     constants = wanted;
     VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
     resources->setBackground(backgroundRows(request.shading, request.height));
-    if (tableStale && residency) VCP_TRY(resources->setTable(residency->table()));
-    if (tableStale && !residency) VCP_TRY(resources->setTable(std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0))));
-    tableStale = false;
+    if (tableStale) {
+        table = residency ? residency->table() : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+        VCP_TRY(resources->setTable(table));
+        tableStale = false;
+    }
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
     VCP_TRY(trace.prepare(*resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
     if (traceLight) VCP_TRY(light.prepare(*resources, constants));
+    if (listens()) VCP_TRY(feedback.prepare(*device, *resources, constants, table));
     return shade.prepare(*resources, constants, traceLight);
 }
 
 void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& request) {
     timer.reset(commands);
-    resources->begin(commands, frameConstants(request, residency ? &residency->dataset() : nullptr, stripes, constants.colour, errorPixels));
+    frame::FrameConstants c = frameConstants(request, residency ? &residency->dataset() : nullptr, stripes, constants.colour, errorPixels);
+    c.lattice.z = feedback.jitter().x;
+    c.lattice.w = feedback.jitter().y;
+    resources->begin(commands, c);
     timer.mark(commands, 0);
     beam.record(commands, *resources);
     timer.mark(commands, 1);
@@ -257,6 +270,8 @@ void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& 
     timer.mark(commands, 3);
     shade.record(commands, *resources);
     timer.mark(commands, 4);
+    if (listens()) feedback.record(commands);
+    timer.mark(commands, 5);
 }
 
 Result<FrameStats> Renderer::render(const FrameRequest& request) {
@@ -268,6 +283,7 @@ Result<FrameStats> Renderer::render(const FrameRequest& request) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
     s.drawn = request;
     s.drawnColour = s.constants.colour;
+    if (s.listens()) s.residency->hear(s.feedback.read(), selectionView(request));
     auto stats = s.collectStats(request);
     if (stats) stats->msFrame = took.count();
     return stats;
@@ -290,6 +306,8 @@ Result<FrameStats> Renderer::State::collectStats(const FrameRequest& request) co
     stats.msTrace = (*ms)[1];
     stats.msLight = (*ms)[2];
     stats.msShade = (*ms)[3];
+    stats.msFeedback = (*ms)[4];
+    stats.feedbackPasses = feedback.passes();
     stats.pipelines = resources->pipelinesMade();
     if (residency) {
         stats.colourBytes = residency->colourBytes();

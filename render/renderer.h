@@ -31,6 +31,7 @@
 #include "octree/vcp_file.h"
 #include "render/camera.h"
 #include "render/picture.h"
+#include "streaming/load_order.h"
 #include "streaming/page_source.h"
 
 namespace vcp {
@@ -68,6 +69,7 @@ struct RendererOptions {
     PageAccess access = PageAccess::Auto;
     uint32_t loaderThreads = 2;
     uint64_t ramBytes = 256ull << 20;     ///< of pages being read and not in the pool yet, never exceeded
+    LoadOrder order = LoadOrder::Feedback;  ///< of pages; others are for comparison
     uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
 };
@@ -147,13 +149,14 @@ struct FrameStats {
     uint64_t rays = 0;        ///< pixels
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
     uint64_t hitPixels = 0;
-    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0;  ///< GPU timestamps; 0 where the device has none
+    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0, msFeedback = 0;  ///< GPU timestamps; 0 where the device has none
     double msFrame = 0;       ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
     uint64_t poolBytes = 0;     ///< allocated for the pool
     uint64_t colourBytes = 0;   ///< of colour, in the pool
     uint32_t pagesInCut = 0;
     uint32_t pipelines = 0;     ///< made since create()
+    uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 
 /// What one pixel shows.

@@ -20,7 +20,7 @@ Result<std::unique_ptr<Residency>> Residency::create(Device& device, PageAccess 
 Result<void> Residency::createPool(Device& device, PageAccess access) {
     for (uint64_t budget = options_.budgetBytes;; budget /= 2) {
         const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budget, poolChunkBytes(device.limits(), access));
-        policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape);
+        policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
         if (!dataset_->pages.empty() && !policy_->hasRoom())
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
@@ -36,6 +36,7 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
 }
 
 Result<UpdateResult> Residency::update(const SelectionView& view) {
+    tableChanged_ = false;
     std::vector<LoadedPage> loaded = loader_->collect(options_.uploadBytes);
     std::vector<Error> problems;
     for (const LoadedPage& page : loaded)
@@ -47,7 +48,9 @@ Result<UpdateResult> Residency::update(const SelectionView& view) {
     }
     PolicyOutcome outcome = policy_->finish();
     loader_->request(std::move(outcome.wishes));
+    listens_ = outcome.missing > 0 && options_.order == LoadOrder::Feedback;
     const bool changed = outcome.drawable.cut != cut_;
+    tableChanged_ = tableChanged_ || changed;
     cut_ = outcome.drawable.cut;
     UpdateResult result = report(outcome);
     result.changed = changed;
@@ -84,6 +87,7 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
 
 Result<bool> Residency::place(const LoadedPage& page) {
     const Placement placement = policy_->place(page.page);
+    tableChanged_ = tableChanged_ || !placement.moves.empty();
     for (const PageMove& move : placement.moves) VCP_TRY(pool_->move(move.from, move.to));
     if (!placement.slot) return false;
     const std::span geometry = page.bytes->geometryBytes();

@@ -21,6 +21,7 @@ namespace vcp {
 struct ResidencyOptions {
     uint64_t budgetBytes = 512ull << 20;  ///< of the pool
     uint64_t uploadBytes = 16ull << 20;   ///< that one update takes in; one page at least
+    LoadOrder order = LoadOrder::Feedback;
     LoaderOptions loader;
 };
 
@@ -34,12 +35,18 @@ public:
     /// Precondition: no frame is in flight. Never waits for the loader. Errors: Device.
     Result<UpdateResult> update(const SelectionView& view);
 
+    /// Whether what rays meet would be of use: pages are missing, and are read in the order that rays ask for them.
+    [[nodiscard]] bool listens() const { return listens_; }
+    void hear(const RayFeedback& feedback, const SelectionView& view) { policy_->hear(feedback, view); }
+
     /// Waits until the loader has something, or the time is over.
     void waitForPage(std::chrono::milliseconds timeout) { loader_->waitForPage(timeout); }
 
     [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
     [[nodiscard]] const std::vector<uint64_t>& cut() const { return cut_; }
     [[nodiscard]] std::vector<glm::uvec4> table() const;
+    /// Whether table() is another one since the update before: another cut, or pages in other places.
+    [[nodiscard]] bool tableChanged() const { return tableChanged_; }
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
     [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
     /// Of the pages in the pool.
@@ -58,6 +65,7 @@ private:
     std::unique_ptr<PageLoader> loader_;
     std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
     std::vector<uint64_t> cut_;
+    bool listens_ = false, tableChanged_ = false;
 };
 
 }  // namespace vcp

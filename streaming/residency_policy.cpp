@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
 
 namespace vcp {
 
@@ -23,6 +24,12 @@ uint64_t largestPageUnits(const Dataset& dataset, bool withColour) {
     return largest;
 }
 
+std::vector<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
+    std::vector<uint64_t> units;
+    for (const PageEntry& page : dataset.pages) units.push_back(pageUnits(page, withColour));
+    return units;
+}
+
 }  // namespace
 
 uint64_t pageUnits(const PageEntry& page, bool withColour) {
@@ -41,9 +48,9 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
     return {std::min(useful, budgetBytes / kPoolUnitBytes), chunk};
 }
 
-ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool)
-    : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk) {
-    for (const PageEntry& page : dataset_->pages) pageUnits_.push_back(pageUnits(page, withColour));
+ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order)
+    : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk), pageUnits_(unitsOfAll(*dataset_, withColour)),
+      priorities_(dataset_, pageUnits_, order) {
     const uint64_t unusable = unusableUnits(pool, largestPageUnits(*dataset_, withColour));
     planned_ = pool.units > unusable ? pool.units - unusable : 0;
     const size_t pages = dataset_->pages.size();
@@ -190,12 +197,14 @@ PolicyOutcome ResidencyPolicy::finish() const {
     outcome.drawable = drawableCut(*dataset_, *view_, choice_, resident_);
     outcome.relaxed = choice_.relaxed;
     outcome.wanted = choice_.wanted.size();
+    std::vector<WantedPage> missing;
+    std::copy_if(choice_.wanted.begin(), choice_.wanted.end(), std::back_inserter(missing),
+                 [&](const WantedPage& wanted) { return !isResident(wanted.page); });
+    outcome.missing = missing.size();
     // Wishes in order of urgency, as long as there is room for them.
     uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
     bool full = false;
-    for (const WantedPage& wanted : choice_.wanted) {
-        if (isResident(wanted.page)) continue;
-        ++outcome.missing;
+    for (const WantedPage& wanted : priorities_.ordered(std::move(missing), *view_)) {
         full = full || reserved + pageUnits_[wanted.page] > room;
         if (full) continue;
         reserved += pageUnits_[wanted.page];

@@ -28,6 +28,7 @@
 #include <vector>
 
 #include "octree/vcp_file.h"
+#include "streaming/load_order.h"
 #include "streaming/page_selection.h"
 #include "streaming/request_queue.h"
 #include "streaming/slot_allocator.h"
@@ -73,13 +74,15 @@ struct PolicyOutcome {
 
 class ResidencyPolicy {
 public:
-    /// `pool` from poolShapeFor.
-    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool);
+    /// `pool` from poolShapeFor. `order` decides what is read first, and nothing else.
+    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order = LoadOrder::Feedback);
 
     /// Whether the coarsest page fits.
     [[nodiscard]] bool hasRoom() const { return !pageUnits_.empty() && pageUnits_[0] <= planned_; }
 
     void look(const SelectionView& view);
+    /// What the rays of a frame of `view` met: its wishes come first.
+    void hear(const RayFeedback& feedback, const SelectionView& view) { priorities_.hear(feedback, view); }
     Placement place(uint64_t page);
     [[nodiscard]] PolicyOutcome finish() const;
 
@@ -119,6 +122,7 @@ private:
     std::shared_ptr<const Dataset> dataset_;
     SlotAllocator allocator_;
     std::vector<uint64_t> pageUnits_;
+    LoadPriorities priorities_;
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
     std::map<uint64_t, uint64_t> pageAt_;  // by the slot's first unit

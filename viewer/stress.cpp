@@ -21,6 +21,8 @@ using Clock = std::chrono::steady_clock;
 
 // A view that brings nothing new for so long does not settle.
 constexpr double kHopelessSeconds = 60;
+// Pictures of an order of arrival.
+constexpr int kOrderDraws = 100;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -88,6 +90,7 @@ public:
         VCP_TRY(alongPath());
         VCP_TRY(withoutLoads());
         VCP_TRY(compareWithFaultless());
+        VCP_TRY(compareOrdersOfArrival());
         return std::move(report_);
     }
 
@@ -271,6 +274,17 @@ private:
         if (!picture) return picture.error();
         // A page given up by bad luck is drawn from its parent, and said so.
         invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0, "the settled picture is not that of a run without faults");
+        return {};
+    }
+
+    Result<void> compareOrdersOfArrival() {
+        if (o_.orders.size() < 2) return {};
+        renderer_.reset();
+        auto curves = compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders, kOrderDraws, o_.progress);
+        if (!curves) return curves.error();
+        report_.orders = *std::move(curves);
+        for (const OrderCurve& curve : report_.orders)
+            invariants_.require(curve.settled == report_.orders[0].settled, "the settled picture depends on the order of arrival");
         return {};
     }
 

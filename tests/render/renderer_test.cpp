@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -240,6 +241,70 @@ TEST_F(RendererTest, PipelinesAreMadeOnceAndOnlyWhenNeeded) {
     EXPECT_GT(counted.fetches, counted.steps);
     EXPECT_LT(counted.steps, 60 * counted.tracedRays);
     EXPECT_EQ(draw(request).steps, counted.steps) << "exact";
+}
+
+TEST_F(RendererTest, OnlyFramesThatMissPagesAskRaysWhatToRead) {
+    start();
+    const Scene scene = test::sphereScene();
+    show(scene);
+    const FrameRequest request = requestOf(cameras(scene)[0].camera);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(draw(request).feedbackPasses, 0u) << "all is there";
+    EXPECT_EQ(draw(request).pipelines, 3u);
+    // A closer view: pages are missing in its first frame.
+    FrameRequest close = requestOf(cameras(scene)[7].camera);
+    close.errorPixels = 0.01;
+    const auto update = renderer_->update(close);
+    ASSERT_TRUE(update);
+    ASSERT_GT(update->pagesMissing, 0u);
+    const auto asking = renderer_->render(close);
+    ASSERT_TRUE(asking) << asking.error().line();
+    EXPECT_EQ(asking->feedbackPasses, 1u);
+    EXPECT_EQ(asking->pipelines, 4u);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(draw(close).feedbackPasses, 1u);
+}
+
+/// Pages of a sphere around `centre` in the order they were read; one page an update, each update drawn.
+std::vector<uint64_t> readInOrder(LoadOrder order, PageAccess access, const Scene& scene, const FrameRequest& request, std::vector<std::string>& messages) {
+    RendererOptions options;
+    options.order = order;
+    options.access = access;
+    options.validation = true;
+    options.loaderThreads = 1;
+    options.uploadBytes = 1;
+    auto renderer = Renderer::create(options);
+    EXPECT_TRUE(renderer);
+    auto source = std::make_shared<test::TurnstileSource>(scene.source);
+    EXPECT_TRUE((*renderer)->open(scene.dataset, source));
+    for (int i = 0; i < 1000; ++i) {
+        const auto update = (*renderer)->update(request);
+        EXPECT_TRUE(update && (*renderer)->render(request));
+        if (!update || update->settled) break;
+        source->letOnePass();
+        (*renderer)->waitForPage(std::chrono::milliseconds(1000));
+    }
+    messages = (*renderer)->validationMessages();
+    return source->read();
+}
+
+TEST(RendererFeedback, WhatRaysMeetIsReadFirst) {
+    const Scene scene = test::sphereScene(3);
+    FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 4.0 / 3));
+    request.errorPixels = 0.001;  // all pages
+    for (const PageAccess access : {PageAccess::TexelBuffer, PageAccess::StorageBuffer}) {
+        std::vector<std::string> messages;
+        const auto read = readInOrder(LoadOrder::Feedback, access, scene, request, messages);
+        for (const std::string& message : messages) ADD_FAILURE() << message;
+        ASSERT_EQ(read.size(), scene.dataset->pages.size());
+        // Of the finest pages: the rays see those in front.
+        std::vector<double> front;
+        for (const uint64_t page : read)
+            if (scene.dataset->pages[page].level == 2) front.push_back(scene.dataset->originOf(scene.dataset->pages[page]).z >= (scene.boxMin.z + scene.boxMax.z) / 2 ? 1 : 0);
+        const size_t half = front.size() / 2;
+        const double early = std::accumulate(front.begin(), front.begin() + std::ptrdiff_t(half), 0.0);
+        const double late = std::accumulate(front.begin() + std::ptrdiff_t(half), front.end(), 0.0);
+        EXPECT_GT(early, 0.9 * double(half));
+        EXPECT_LT(late, 0.2 * double(half));
+    }
 }
 
 TEST_F(RendererTest, BudgetIsKeptAndEveryViewSettles) {

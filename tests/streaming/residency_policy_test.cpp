@@ -20,6 +20,7 @@ struct Conditions {
     std::set<uint64_t> bad;  // pages that never can be read
     uint64_t seed = 0;       // order of arrival
     size_t perRound = 3;     // pages that arrive
+    LoadOrder order = LoadOrder::Feedback;
 };
 
 /// A pool that remembers which page's bytes are in each unit, a queue, and reads that end in any order.
@@ -28,7 +29,7 @@ public:
     Simulation(std::shared_ptr<const Dataset> dataset, Conditions conditions)
         : dataset_(std::move(dataset)), c_(std::move(conditions)), random_(c_.seed),
           shape_(poolShapeFor(*dataset_, dataset_->hasColour(), c_.budgetBytes, kChunkBytes)),
-          policy(dataset_, dataset_->hasColour(), shape_), queue_({.attempts = 12, .damagedAttempts = 12}), content_(shape_.units, kNothing) {
+          policy(dataset_, dataset_->hasColour(), shape_, c_.order), queue_({.attempts = 12, .damagedAttempts = 12}), content_(shape_.units, kNothing) {
         EXPECT_LE(shape_.units * kPoolUnitBytes, c_.budgetBytes);
     }
 
@@ -54,6 +55,8 @@ public:
         }
         policy.look(view);
         for (const uint64_t page : read) carryOut(page, policy.place(page));
+        // Rays may ask for anything.
+        if (c_.failRate > 0) policy.hear({.hits = {{random_() % dataset_->pages.size(), glm::ivec3(int(random_() >> 34))}}, .passed = {{random_() % dataset_->pages.size(), 1}}}, view);
         outcome = policy.finish();
         queue_.replace(outcome.wishes);
         check();
@@ -174,8 +177,9 @@ TEST(ResidencyPolicy, SettlesOnTheSamePagesWhateverTheHistoryOrderAndFaults) {
         Simulation plain(dataset, {.budgetBytes = budget, .failRate = 0, .bad = {}, .seed = 1, .perRound = 8});
         if (!plain.policy.hasRoom()) continue;
         plain.settle(view);
-        for (uint64_t other = 0; other < 3; ++other) {
-            Simulation wild(dataset, {.budgetBytes = budget, .failRate = 0.2, .bad = {}, .seed = seed * 10 + other, .perRound = 1 + random() % 5});
+        for (uint64_t other = 0; other < 5; ++other) {
+            Simulation wild(dataset, {.budgetBytes = budget, .failRate = 0.2, .bad = {}, .seed = seed * 10 + other, .perRound = 1 + random() % 5,
+                                      .order = static_cast<LoadOrder>(other)});
             SelectionView moving = view;
             for (int i = 0; i < 40; ++i) {
                 if (random() % 5 == 0) moving = test::randomView(random, 0.5);
