@@ -29,6 +29,8 @@ namespace {
 
 constexpr uint64_t kLeastBudget = 1ull << 20;
 
+const Error kGone{.code = ErrorCode::Device, .message = "the device was lost and could not be made anew"};
+
 /// GPU clock readings between passes.
 class PassTimer {
 public:
@@ -64,7 +66,7 @@ public:
     }
 
 private:
-    const Device* device_ = nullptr;
+    const Device* device_ = nullptr;  // not owned
     VkQueryPool pool_ = VK_NULL_HANDLE;
 };
 
@@ -82,7 +84,8 @@ glm::vec3 unpackNormal(uint32_t code) {
 struct Renderer::State {
     RendererOptions options;
     std::unique_ptr<Instance> instance;
-    std::unique_ptr<Device> device;
+    std::unique_ptr<Device> device;  // null after a loss that could not be made good
+    DeviceInfo info;
     std::unique_ptr<Swapchain> swapchain;
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
@@ -94,7 +97,8 @@ struct Renderer::State {
     LightPass light;
     ShadePass shade;
     FeedbackPass feedback;
-    PassTimer timer;
+    std::optional<PassTimer> timer;
+    uint32_t losses = 0;
     PassConstants constants;
     bool tableStale = true;
     std::vector<glm::uvec4> table;  // of the last frame
@@ -102,6 +106,16 @@ struct Renderer::State {
     std::optional<FrameRequest> drawn;
     bool drawnColour = false;
 
+    Result<void> createDevice(const DeviceFaults& faults);
+    /// Shaders see the residency's pool from now on; without one the dataset is closed.
+    void showPool();
+    /// Makes all anew that the device held.
+    Result<void> rebuild();
+    /// Does it; after an error that something can be done about, once more.
+    template <class Do>
+    auto tryAgain(Do doIt) -> decltype(doIt());
+    bool recover(bool mayRebuild);
+    Result<FrameStats> draw(const FrameRequest& request);
     /// Whether this frame has a feedback pass.
     [[nodiscard]] bool listens() const { return residency && residency->listens(); }
     [[nodiscard]] PassConstants constantsFor(const FrameRequest& request) const;
@@ -124,30 +138,88 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     auto instance = Instance::create(options.validation, options.surface ? options.surface->instanceExtensions : std::vector<std::string>{});
     if (!instance) return instance.error();
     state->instance = std::move(*instance);
-    VkSurfaceKHR surface = VK_NULL_HANDLE;
-    if (options.surface) VCP_VK(options.surface->createSurface, state->instance->handle(), &surface);
-    auto device = Device::create(*state->instance, options.device, surface);
-    if (!device) {
-        if (surface != VK_NULL_HANDLE) vkDestroySurfaceKHR(state->instance->handle(), surface, nullptr);
-        return device.error();
-    }
-    state->device = std::move(*device);
-    if (surface != VK_NULL_HANDLE) state->swapchain = std::make_unique<Swapchain>(state->instance->handle(), *state->device, surface);
-    const bool software = state->device->info().software;
-    state->access = options.access != PageAccess::Auto ? options.access : software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
-    state->stripes = software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
-    VCP_TRY(state->timer.create(*state->device));
-    auto resources = FrameResources::create(*state->device);
-    if (!resources) return resources.error();
-    state->resources = std::move(*resources);
+    VCP_TRY(state->createDevice(options.faults));
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
 
-const DeviceInfo& Renderer::device() const { return state_->device->info(); }
+Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
+    VkSurfaceKHR surface = VK_NULL_HANDLE;
+    if (options.surface) VCP_VK(options.surface->createSurface, instance->handle(), &surface);
+    auto made = Device::create(*instance, options.device, surface, faults);
+    if (!made) {
+        if (surface != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), surface, nullptr);
+        return made.error();
+    }
+    device = std::move(*made);
+    info = device->info();
+    if (surface != VK_NULL_HANDLE) swapchain = std::make_unique<Swapchain>(instance->handle(), *device, surface);
+    const bool software = device->info().software;
+    access = options.access != PageAccess::Auto ? options.access : software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
+    stripes = software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
+    VCP_TRY(timer.emplace().create(*device));
+    auto shared = FrameResources::create(*device);
+    if (!shared) return shared.error();
+    resources = std::move(*shared);
+    return {};
+}
+
+void Renderer::State::showPool() {
+    tableStale = true;
+    static_cast<void>(device->takeOutOfMemory());  // a pool that was halved for it is fine
+    if (!residency->hasPool()) {
+        residency.reset();
+        return;
+    }
+    const PagePool* pool = &residency->pages();
+    resources->setPools(pool, residency->hasColour() ? pool : nullptr);
+}
+
+Result<void> Renderer::State::rebuild() {
+    ++losses;
+    drawn.reset();
+    if (residency) residency->releasePool();
+    beam.clear(), trace.clear(), light.clear(), shade.clear();
+    feedback.release();
+    constants = {};
+    timer.reset();
+    swapchain.reset();
+    resources.reset();
+    device.reset();
+    DeviceFaults faults = options.faults;
+    faults.lostAtSubmission = 0;
+    VCP_TRY(createDevice(faults));
+    tableStale = true;
+    if (!residency) return {};
+    const auto done = residency->rebuild(*device, access);
+    showPool();
+    return done;
+}
+
+template <class Do>
+auto Renderer::State::tryAgain(Do doIt) -> decltype(doIt()) {
+    const uint32_t before = losses;
+    auto done = doIt();
+    // A device that is lost each time it does this is of no use; the pool can be halved a few times only.
+    while (!done && recover(losses == before)) done = doIt();
+    return done;
+}
+
+bool Renderer::State::recover(bool mayRebuild) {
+    if (!device) return false;
+    if (device->isLost()) return mayRebuild && rebuild().ok();
+    if (!device->takeOutOfMemory() || !residency) return false;
+    resources->setPools(nullptr, nullptr);
+    const bool halved = residency->setBudgets(*device, access, residency->pages().bytes() / 2, options.ramBytes).ok();
+    showPool();
+    return halved;
+}
+
+const DeviceInfo& Renderer::device() const { return state_->info; }
 PageAccess Renderer::access() const { return state_->access; }
 std::vector<std::string> Renderer::validationMessages() const { return state_->instance->log().messages(); }
 
 Result<void> Renderer::open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
+    if (!state_->device) return kGone;
     close();
     const RendererOptions& o = state_->options;
     ResidencyOptions options;
@@ -160,14 +232,29 @@ Result<void> Renderer::open(std::shared_ptr<const Dataset> dataset, std::shared_
     auto residency = Residency::create(*state_->device, state_->access, options, std::move(dataset), std::move(source));
     if (!residency) return residency.error();
     state_->residency = std::move(*residency);
-    const PagePool* pool = &state_->residency->pages();
-    state_->resources->setPools(pool, state_->residency->hasColour() ? pool : nullptr);
+    state_->showPool();
+    return {};
+}
+
+Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
+    State& s = *state_;
+    if (!s.device) return kGone;
+    if (budgetBytes < kLeastBudget)
+        return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
+    if (s.residency) {
+        s.resources->setPools(nullptr, nullptr);
+        const auto done = s.residency->setBudgets(*s.device, s.access, budgetBytes, ramBytes);
+        s.showPool();
+        if (!done) return done;
+    }
+    s.options.budgetBytes = budgetBytes;
+    s.options.ramBytes = ramBytes;
     return {};
 }
 
 void Renderer::close() {
     State& s = *state_;
-    s.resources->setPools(nullptr, nullptr);
+    if (s.resources) s.resources->setPools(nullptr, nullptr);
     s.residency.reset();
     s.drawn.reset();
     s.tableStale = true;
@@ -176,10 +263,13 @@ void Renderer::close() {
 Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
     State& s = *state_;
+    if (!s.device) return kGone;
     if (!s.residency) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
-    auto result = s.residency->update(selectionView(request));
+    auto result = s.tryAgain([&] { return s.residency->update(selectionView(request)); });
+    if (!result) return result;
+    result->deviceLosses = s.losses;
     s.tableStale = s.tableStale || s.residency->tableChanged();
-    if (result) s.errorPixels = result->errorPixels;
+    s.errorPixels = result->errorPixels;
     return result;
 }
 
@@ -197,7 +287,7 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
             return result;
         }
         if (cancel && cancel()) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
-        state_->residency->waitForPage(std::chrono::milliseconds(100));
+        waitForPage(std::chrono::milliseconds(100));
     }
 }
 
@@ -256,35 +346,39 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
 }
 
 void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& request) {
-    timer.reset(commands);
+    timer->reset(commands);
     frame::FrameConstants c = frameConstants(request, residency ? &residency->dataset() : nullptr, stripes, constants.colour, errorPixels);
     c.lattice.z = feedback.jitter().x;
     c.lattice.w = feedback.jitter().y;
     resources->begin(commands, c);
-    timer.mark(commands, 0);
+    timer->mark(commands, 0);
     beam.record(commands, *resources);
-    timer.mark(commands, 1);
+    timer->mark(commands, 1);
     trace.record(commands, *resources);
-    timer.mark(commands, 2);
+    timer->mark(commands, 2);
     if (hasLight(request.shading)) light.record(commands, *resources);
-    timer.mark(commands, 3);
+    timer->mark(commands, 3);
     shade.record(commands, *resources);
-    timer.mark(commands, 4);
+    timer->mark(commands, 4);
     if (listens()) feedback.record(commands);
-    timer.mark(commands, 5);
+    timer->mark(commands, 5);
 }
 
 Result<FrameStats> Renderer::render(const FrameRequest& request) {
-    State& s = *state_;
-    s.drawn.reset();
-    VCP_TRY(s.prepare(request));
+    return state_->tryAgain([&] { return state_->draw(request); });
+}
+
+Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
+    drawn.reset();
+    if (!device) return kGone;
+    VCP_TRY(prepare(request));
     const auto began = std::chrono::steady_clock::now();
-    VCP_TRY(s.device->submitAndWait([&](VkCommandBuffer commands) { s.recordFrame(commands, request); }));
+    VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) { recordFrame(commands, request); }));
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    s.drawn = request;
-    s.drawnColour = s.constants.colour;
-    if (s.listens()) s.residency->hear(s.feedback.read(), selectionView(request));
-    auto stats = s.collectStats(request);
+    drawn = request;
+    drawnColour = constants.colour;
+    if (listens()) residency->hear(feedback.read(), selectionView(request));
+    auto stats = collectStats(request);
     if (stats) stats->msFrame = took.count();
     return stats;
 }
@@ -300,7 +394,7 @@ Result<FrameStats> Renderer::State::collectStats(const FrameRequest& request) co
     stats.tracedRays = std::min<uint64_t>(stats.rays, uint64_t{listed->front()} * frame::kTileSize * frame::kTileSize);
     stats.steps = (*counters)[2];
     stats.fetches = (*counters)[3];
-    auto ms = timer.read();
+    auto ms = timer->read();
     if (!ms) return ms.error();
     stats.msBeam = (*ms)[0];
     stats.msTrace = (*ms)[1];

@@ -61,6 +61,13 @@ struct SurfaceSource {
     std::function<VkResult(VkInstance, VkSurfaceKHR*)> createSurface;
 };
 
+/// What goes wrong, or is lacking, on purpose: for tests.
+struct DeviceFaults {
+    bool separateMemory = false;        ///< the CPU does not see the device's memory, as on a discrete GPU
+    uint64_t memoryBytes = UINT64_MAX;  ///< more the device has not
+    uint64_t lostAtSubmission = 0;      ///< the device is lost at this submission of work, once; 0: never
+};
+
 struct RendererOptions {
     std::string device;             ///< index, or part of the name in any case; empty: the best one
     uint64_t budgetBytes = 512ull << 20;  ///< of the page pool, never exceeded; at least 1 MiB
@@ -71,6 +78,7 @@ struct RendererOptions {
     uint64_t ramBytes = 256ull << 20;     ///< of pages being read and not in the pool yet, never exceeded
     LoadOrder order = LoadOrder::Feedback;  ///< of pages; others are for comparison
     uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
+    DeviceFaults faults;
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
 };
 
@@ -134,9 +142,10 @@ struct UpdateResult {
     uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
     bool relaxed = false;       ///< the budget is too small for the view's pixel error; errorPixels says what it has
-    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool since open()
+    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool since open() or setBudgets()
     uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
     uint64_t reloads = 0;       ///< pages loaded twice in one still view: always 0
+    uint32_t deviceLosses = 0;  ///< since create(): each time all was made anew and pages are read again
     uint64_t failures = 0;      ///< reads that failed and were, or will be, tried again
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
     uint32_t pagesMissing = 0;  ///< wanted, not resident
@@ -182,7 +191,13 @@ public:
     /// Stops the loader and forgets all pages.
     void close();
 
-    /// See the top of this file. Errors: Device. Problems of single pages are in the result.
+    /// Other budgets than the options', from now on: what has no room goes at once, what is kept is not read again where
+    /// `ramBytes` has room to carry it over. Waits for the copies. To be followed by update(). Errors: Usage; Limit,
+    /// where the coarsest page has no room: the budgets stay as they were; Device: the dataset is closed.
+    Result<void> setBudgets(uint64_t budgetBytes, uint64_t ramBytes);
+
+    /// See the top of this file. Where the device runs out of memory, here or in render(), the pool is halved; where the
+    /// device was lost, all is made anew, once a call, and read again. Errors: Device. Problems of single pages are in the result.
     Result<UpdateResult> update(const FrameRequest& request);
     /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
     /// returns true (asked several times a second).

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -12,15 +13,31 @@ Result<std::unique_ptr<Residency>> Residency::create(Device& device, PageAccess 
     std::unique_ptr<Residency> made(new Residency(options));
     made->options_.loader.withColour = options.loader.withColour && dataset->hasColour();
     made->dataset_ = std::move(dataset);
+    made->source_ = std::move(source);
     VCP_TRY(made->createPool(device, access));
-    made->loader_ = std::make_unique<PageLoader>(std::move(source), made->options_.loader);
+    made->startLoader();
     return made;
+}
+
+void Residency::startLoader() {
+    if (loader_) {
+        const LoaderStats stats = loader_->stats();
+        past_.bytesRead += stats.bytesRead;
+        past_.failures += stats.failures;
+    }
+    loader_.reset();
+    loader_ = std::make_unique<PageLoader>(source_, options_.loader);
+}
+
+bool Residency::hasRoomIn(PoolShape shape) const {
+    return dataset_->pages.empty() || ResidencyPolicy(dataset_, hasColour(), shape).hasRoom();
 }
 
 Result<void> Residency::createPool(Device& device, PageAccess access) {
     for (uint64_t budget = options_.budgetBytes;; budget /= 2) {
         const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budget, poolChunkBytes(device.limits(), access));
-        policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
+        if (policy_) policy_->setPool(shape);
+        else policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
         if (!dataset_->pages.empty() && !policy_->hasRoom())
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
@@ -35,26 +52,83 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
     }
 }
 
+/// Pages of the pool, coarse ones first, as many as fit into the memory for pages.
+Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
+    std::vector<CarriedPage> carried;
+    uint64_t room = options_.loader.heldBytes;
+    Result<void> done;
+    policy_->forEachResident([&](uint64_t page) {
+        const PageEntry& entry = dataset_->pages[page];
+        const uint64_t bytes = uint64_t{entry.pageBytes} + (hasColour() ? entry.colourBytes : 0);
+        if (!done || bytes > room) return;
+        room -= bytes;
+        carried.push_back({page, std::vector<std::byte>(bytes)});
+        done = pool_->read(policy_->slotOf(page), 0, carried.back().bytes);
+    });
+    if (!done) return done.error();
+    return carried;
+}
+
+Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t budgetBytes, uint64_t ramBytes) {
+    const uint64_t chunkBytes = poolChunkBytes(device.limits(), access);
+    const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budgetBytes, chunkBytes);
+    if (!hasRoomIn(shape))
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes)};
+    options_.budgetBytes = budgetBytes;
+    options_.loader.heldBytes = ramBytes;
+    startLoader();  // what the old one held is gone
+    for (const uint64_t page : std::exchange(tooLarge_, {})) policy_->restore(page);
+    if (shape.units * kPoolUnitBytes == pool_->bytes()) return {};
+    auto carried = carryOut();
+    if (!carried) return carried.error();
+    VCP_TRY(rebuild(device, access));
+    for (CarriedPage& page : *carried) {
+        const auto slot = slotFor(page.page);
+        if (!slot) return slot.error();
+        if (*slot) VCP_TRY(pool_->write(**slot, 0, page.bytes));
+        page.bytes = {};
+    }
+    VCP_TRY(pool_->flush());
+    if (policy_->hasLooked()) cut_ = policy_->finish().drawable.cut;
+    return {};
+}
+
+void Residency::releasePool() {
+    pool_.reset();
+    policy_->clear();
+    cut_.clear();
+    redraw_ = tableChanged_ = true;
+    listens_ = false;
+}
+
+Result<void> Residency::rebuild(Device& device, PageAccess access) {
+    releasePool();
+    return createPool(device, access);
+}
+
 Result<UpdateResult> Residency::update(const SelectionView& view) {
     tableChanged_ = false;
     std::vector<LoadedPage> loaded = loader_->collect(options_.uploadBytes);
-    std::vector<Error> problems;
-    for (const LoadedPage& page : loaded)
-        if (!page.bytes && policy_->giveUp(page.page)) problems.push_back(page.bytes.error());
+    for (const LoadedPage& page : loaded) {
+        if (page.bytes || !policy_->giveUp(page.page)) continue;
+        problems_.push_back(page.bytes.error());
+        if (page.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(page.page);
+    }
     policy_->look(view);
     for (const LoadedPage& page : loaded) {
         if (!page.bytes) continue;
         if (auto placed = place(page); !placed) return placed.error();
     }
+    VCP_TRY(pool_->flush());
     PolicyOutcome outcome = policy_->finish();
     loader_->request(std::move(outcome.wishes));
     listens_ = outcome.missing > 0 && options_.order == LoadOrder::Feedback;
-    const bool changed = outcome.drawable.cut != cut_;
+    const bool changed = outcome.drawable.cut != cut_ || std::exchange(redraw_, false);
     tableChanged_ = tableChanged_ || changed;
     cut_ = outcome.drawable.cut;
     UpdateResult result = report(outcome);
     result.changed = changed;
-    result.problems = std::move(problems);
+    result.problems = std::exchange(problems_, {});
     return result;
 }
 
@@ -68,8 +142,8 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     result.errorPixels = outcome.drawable.errorPixels;
     result.residentBytes = policy_->unitsTaken() * kPoolUnitBytes;
     result.heldBytesMax = loader.heldBytesMax;
-    result.bytesRead = loader.bytesRead;
-    result.failures = loader.failures;
+    result.bytesRead = past_.bytesRead + loader.bytesRead;
+    result.failures = past_.failures + loader.failures;
     result.loads = counts.loads;
     result.evictions = counts.evictions;
     result.reloads = counts.reloads;
@@ -85,16 +159,22 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     return result;
 }
 
-Result<bool> Residency::place(const LoadedPage& page) {
-    const Placement placement = policy_->place(page.page);
+Result<std::optional<PoolSlot>> Residency::slotFor(uint64_t page) {
+    const Placement placement = policy_->place(page);
     tableChanged_ = tableChanged_ || !placement.moves.empty();
     for (const PageMove& move : placement.moves) VCP_TRY(pool_->move(move.from, move.to));
-    if (!placement.slot) return false;
+    return placement.slot;
+}
+
+Result<void> Residency::place(const LoadedPage& page) {
+    const auto slot = slotFor(page.page);
+    if (!slot) return slot.error();
+    if (!*slot) return {};
     const std::span geometry = page.bytes->geometryBytes();
     std::memcpy(&headers_[page.page], geometry.data(), sizeof(PageHeader));
-    VCP_TRY(pool_->write(*placement.slot, 0, geometry));
-    if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(*placement.slot, geometry.size(), page.bytes->colourBytes()));
-    return true;
+    VCP_TRY(pool_->write(**slot, 0, geometry));
+    if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), page.bytes->colourBytes()));
+    return {};
 }
 
 uint64_t Residency::colourBytes() const {

@@ -32,6 +32,16 @@ public:
     static Result<std::unique_ptr<Residency>> create(Device& device, PageAccess access, const ResidencyOptions& options,
                                                      std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
 
+    /// Other budgets, from now on; no frame is in flight. The pool is made anew without there ever being more than one:
+    /// pages go from the old one to the new by way of the memory that `ramBytes` allows, coarse ones first; others are
+    /// read again. Ends reads that are under way. Errors: Device; Limit, where the coarsest page would have no room:
+    /// nothing changes then.
+    Result<void> setBudgets(Device& device, PageAccess access, uint64_t budgetBytes, uint64_t ramBytes);
+
+    /// The device and all that was in it were lost: releases what there was of it, then begins anew on another.
+    void releasePool();
+    Result<void> rebuild(Device& device, PageAccess access);
+
     /// Precondition: no frame is in flight. Never waits for the loader. Errors: Device.
     Result<UpdateResult> update(const SelectionView& view);
 
@@ -47,6 +57,8 @@ public:
     [[nodiscard]] std::vector<glm::uvec4> table() const;
     /// Whether table() is another one since the update before: another cut, or pages in other places.
     [[nodiscard]] bool tableChanged() const { return tableChanged_; }
+    /// False after an error of setBudgets() or rebuild(): nothing but the destructor may be called then.
+    [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
     [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
     /// Of the pages in the pool.
@@ -54,18 +66,32 @@ public:
 
 private:
     explicit Residency(const ResidencyOptions& options) : options_(options) {}
+    struct CarriedPage {
+        uint64_t page = 0;
+        std::vector<std::byte> bytes;  // geometry and, behind it, colour
+    };
     Result<void> createPool(Device& device, PageAccess access);
-    Result<bool> place(const LoadedPage& page);
+    void startLoader();
+    Result<std::vector<CarriedPage>> carryOut();
+    [[nodiscard]] bool hasRoomIn(PoolShape shape) const;
+    /// A slot for the page, with pages moved out of its way; nothing where there is none.
+    Result<std::optional<PoolSlot>> slotFor(uint64_t page);
+    Result<void> place(const LoadedPage& page);
     UpdateResult report(const PolicyOutcome& outcome) const;
 
     ResidencyOptions options_;
     std::shared_ptr<const Dataset> dataset_;
     std::unique_ptr<ResidencyPolicy> policy_;
     std::unique_ptr<PagePool> pool_;
+    std::shared_ptr<const PageSource> source_;
     std::unique_ptr<PageLoader> loader_;
+    LoaderStats past_;  // of the loaders before this one
     std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
     std::vector<uint64_t> cut_;
+    std::vector<Error> problems_;    // not reported yet
+    std::vector<uint64_t> tooLarge_; // pages given up because reading them takes more memory than there is
     bool listens_ = false, tableChanged_ = false;
+    bool redraw_ = false;  // the pool is another one
 };
 
 }  // namespace vcp

@@ -51,8 +51,7 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
 ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order)
     : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk), pageUnits_(unitsOfAll(*dataset_, withColour)),
       priorities_(dataset_, pageUnits_, order) {
-    const uint64_t unusable = unusableUnits(pool, largestPageUnits(*dataset_, withColour));
-    planned_ = pool.units > unusable ? pool.units - unusable : 0;
+    planFor(pool);
     const size_t pages = dataset_->pages.size();
     resident_.assign(pages, 0);
     unavailable_.assign(pages, 0);
@@ -60,10 +59,24 @@ ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool wi
     ranks_.assign(pages, Rank::Stale);
 }
 
+void ResidencyPolicy::planFor(PoolShape pool) {
+    const uint64_t largest = pageUnits_.empty() ? 1 : *std::max_element(pageUnits_.begin(), pageUnits_.end());
+    const uint64_t unusable = unusableUnits(pool, largest);
+    planned_ = pool.units > unusable ? pool.units - unusable : 0;
+}
+
+void ResidencyPolicy::setPool(PoolShape pool) {
+    clear();
+    allocator_ = SlotAllocator(pool.units, pool.unitsPerChunk);
+    planFor(pool);
+    stale_ = true;
+}
+
 void ResidencyPolicy::look(const SelectionView& view) {
     ++round_;
     moving_ = !view_ || *view_ != view;
-    if (moving_) stillSince_ = round_;
+    if (moving_ || emptied_) stillSince_ = round_;
+    emptied_ = false;
     if (moving_ || stale_) {
         choice_ = choosePages(*dataset_, view, planned_, pageUnits_, unavailable_);
         std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
@@ -178,7 +191,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     pageAt_.emplace(placement.slot->firstUnit, page);
     resident_[page] = 1;
     ++counts_.loads;
-    if (loadedIn_[page] == stillSince_) ++counts_.reloads;
+    if (loadedIn_[page] == stillSince_ && !emptied_) ++counts_.reloads;
     loadedIn_[page] = stillSince_;
     return placement;
 }
@@ -228,8 +241,14 @@ bool ResidencyPolicy::giveUp(uint64_t page) {
     return true;
 }
 
+void ResidencyPolicy::restore(uint64_t page) {
+    unavailable_[page] = 0;
+    stale_ = true;
+}
+
 void ResidencyPolicy::clear() {
     while (!slots_.empty()) evict(slots_.begin()->first);
+    emptied_ = true;  // what was lost may come again
 }
 
 }  // namespace vcp

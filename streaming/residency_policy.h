@@ -88,8 +88,15 @@ public:
 
     /// The page cannot be read: from the next look() its parent is drawn in its place. True the first time.
     bool giveUp(uint64_t page);
+    /// It can be read after all.
+    void restore(uint64_t page);
     /// Forgets all pages: the pool's content was lost.
     void clear();
+    /// Another pool, empty; from the next look() on, views want what fits into it. Forgets all pages, but not which
+    /// cannot be read.
+    void setPool(PoolShape pool);
+    /// Whether finish() may be called.
+    [[nodiscard]] bool hasLooked() const { return view_.has_value(); }
 
     [[nodiscard]] bool isResident(uint64_t page) const { return resident_[page] != 0; }
     /// Precondition: isResident(page).
@@ -116,6 +123,7 @@ private:
     bool evictOne(Rank forRank);
     void evict(uint64_t page);
     bool gather(uint64_t units, std::vector<PageMove>& moves);
+    void planFor(PoolShape pool);
     void lookAhead(const SelectionView& view, const SelectionView& before);
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
@@ -133,7 +141,7 @@ private:
     PageChoice choice_;
     std::vector<WantedPage> ahead_;
     std::vector<Rank> ranks_;
-    bool moving_ = false, stale_ = true;
+    bool moving_ = false, stale_ = true, emptied_ = false;
     uint64_t round_ = 0, stillSince_ = 0;
     PolicyCounts counts_;
 };

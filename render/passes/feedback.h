@@ -25,6 +25,8 @@ public:
     [[nodiscard]] RayFeedback read() const;
     /// Forgets the pipeline: pools with another layout are to come.
     void clear() { pipelines_.clear(); }
+    /// Forgets all that the device holds.
+    void release() { pipelines_.clear(), buffer_ = {}, readback_ = {}; }
 
     /// Passes recorded so far.
     [[nodiscard]] uint64_t passes() const { return passes_; }

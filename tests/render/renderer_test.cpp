@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -337,6 +338,142 @@ TEST_F(RendererTest, BudgetIsKeptAndEveryViewSettles) {
             EXPECT_TRUE(again->settled);
             EXPECT_FALSE(again->changed) << "a settled view stays as it is";
         }
+}
+
+TEST_F(RendererTest, BudgetsChangeWhileRunning) {
+    const Scene scene = test::sphereScene(4);
+    FrameRequest request = requestOf(cameras(scene)[0].camera);
+    request.errorPixels = 0.001;
+    const uint64_t large = 64 << 20, small = 1 << 20, ram = 4 << 20;
+    std::map<uint64_t, Picture> expected;
+    for (const uint64_t budget : {large, small}) {
+        RendererOptions options;
+        options.budgetBytes = budget;
+        start(options);
+        show(scene);
+        draw(request);
+        expected[budget] = *renderer_->readPicture();
+    }
+    ASSERT_NE(expected[large], expected[small]);
+    RendererOptions options;
+    options.budgetBytes = large;
+    start(options);
+    show(scene);
+    draw(request);
+    for (const uint64_t budget : {small, large, small, large}) {
+        ASSERT_TRUE(renderer_->setBudgets(budget, ram));
+        // What was kept is there at once, and no more than the budget.
+        const auto kept = renderer_->render(request);
+        ASSERT_TRUE(kept) << kept.error().line();
+        EXPECT_GT(kept->hitPixels, 2500u);
+        EXPECT_LE(kept->poolBytes, budget);
+        const auto update = renderer_->update(request);
+        ASSERT_TRUE(update) << update.error().line();
+        EXPECT_TRUE(update->changed) << "to be drawn again";
+        EXPECT_LE(update->residentBytes, budget);
+        EXPECT_LE(update->heldBytesMax, ram);
+        draw(request);
+        EXPECT_EQ(*renderer_->readPicture(), expected[budget]);
+        EXPECT_EQ(renderer_->update(request)->reloads, 0u);
+    }
+    EXPECT_EQ(renderer_->setBudgets(100, ram).error().code, ErrorCode::Usage);
+}
+
+TEST_F(RendererTest, WithoutMemoryThePoolIsHalvedAndItGoesOnCoarser) {
+    const Scene scene = test::sphereScene(4);
+    FrameRequest request = requestOf(cameras(scene)[0].camera);
+    request.errorPixels = 0.001;
+    RendererOptions options;
+    options.faults.memoryBytes = 5 << 20;
+    start(options);
+    show(scene);
+    const uint64_t pool = draw(request).poolBytes;
+    EXPECT_LT(pool, options.faults.memoryBytes);
+    EXPECT_GT(pool, 0u);
+    // A larger picture takes memory that the pool has.
+    FrameRequest larger = request;
+    larger.width = 400, larger.height = 300;
+    const FrameStats stats = draw(larger);
+    EXPECT_LT(stats.poolBytes, pool);
+    EXPECT_GT(stats.hitPixels, 10000u);
+    const auto settled = renderer_->settle(larger);
+    ASSERT_TRUE(settled);
+    EXPECT_LE(settled->residentBytes, stats.poolBytes);
+    const auto picture = renderer_->render(larger) ? *renderer_->readPicture() : Picture{};
+    // A pool of that size from the beginning shows the same.
+    RendererOptions plain;
+    plain.budgetBytes = stats.poolBytes;
+    start(plain);
+    show(scene);
+    draw(larger);
+    EXPECT_EQ(*renderer_->readPicture(), picture);
+    // One that no pool would leave room for is an error, and the next picture is fine.
+    start(options);
+    show(scene);
+    FrameRequest huge = request;
+    huge.width = 2000, huge.height = 1500;
+    EXPECT_EQ(renderer_->render(huge).error().code, ErrorCode::Device);
+    EXPECT_GT(draw(request).hitPixels, 2500u);
+}
+
+/// Draws while pages come, then as it has settled.
+Picture drawAllTheWay(Renderer& renderer, const FrameRequest& request) {
+    for (;;) {
+        const auto update = renderer.update(request);
+        EXPECT_TRUE(update) << update.error().line();
+        EXPECT_TRUE(renderer.render(request)) << "at least the background";
+        if (!update || update->settled) break;
+        renderer.waitForPage(std::chrono::milliseconds(100));
+    }
+    return *renderer.readPicture();
+}
+
+TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
+    const Scene scene = test::torusScene();
+    const FrameRequest request = requestOf(cameras(scene)[0].camera, 64, 48);
+    start();
+    show(scene);
+    const Picture expected = drawAllTheWay(*renderer_, request);
+    // With separate memory, updates submit work too.
+    for (const bool separate : {false, true})
+        for (const uint64_t lostAt : {2, 3, 6}) {
+            SCOPED_TRACE(lostAt);
+            RendererOptions options;
+            options.faults.separateMemory = separate;
+            options.faults.lostAtSubmission = lostAt;
+            start(options);
+            show(scene);
+            uint32_t losses = 0;
+            for (int i = 0; i < 20 && losses == 0; ++i) {
+                drawAllTheWay(*renderer_, request);
+                losses = renderer_->update(request)->deviceLosses;
+            }
+            EXPECT_EQ(losses, 1u);
+            EXPECT_EQ(drawAllTheWay(*renderer_, request), expected);
+            EXPECT_EQ(renderer_->update(request)->deviceLosses, 1u);
+            for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+        }
+}
+
+TEST_F(RendererTest, PagesGoThroughStagingWhereTheMemoryIsSeparate) {
+    const Scene scene = test::sphereScene(4);
+    for (const uint64_t budget : {uint64_t{1} << 20, uint64_t{64} << 20}) {
+        std::vector<Picture> pictures[2];
+        for (const bool separate : {false, true}) {
+            RendererOptions options;
+            options.budgetBytes = budget;
+            options.faults.separateMemory = separate;
+            start(options);
+            show(scene);
+            for (int view = 0; view < 4; ++view) {
+                FrameRequest request = requestOf(cameras(scene)[static_cast<size_t>(view)].camera, 64, 48);
+                request.errorPixels = 0.001;
+                pictures[separate ? 1 : 0].push_back(drawAllTheWay(*renderer_, request));
+            }
+            for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+        }
+        EXPECT_EQ(pictures[0], pictures[1]);
+    }
 }
 
 TEST_F(RendererTest, ABrokenPageIsReportedOnceAndDrawnFromItsParent) {

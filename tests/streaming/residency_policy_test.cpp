@@ -81,6 +81,14 @@ public:
         EXPECT_GE(policy.counts().loads, loads);
     }
 
+    /// Another pool; its content is lost.
+    void setBudget(uint64_t budgetBytes) {
+        shape_ = poolShapeFor(*dataset_, dataset_->hasColour(), budgetBytes, kChunkBytes);
+        content_.assign(shape_.units, kNothing);
+        policy.setPool(shape_);
+        EXPECT_EQ(policy.unitsTaken(), 0u);
+    }
+
     uint64_t reads = 0;
 
 private:
@@ -289,6 +297,26 @@ TEST(ResidencyPolicy, ChildrenGoBeforeParentsAndTheCoarsestStays) {
             sim.settle(test::randomView(random, 0.2));
             for (uint64_t page = 0; page < dataset->pages.size(); ++page)
                 EXPECT_TRUE(!sim.policy.isResident(page) || sim.policy.isResident(parent[page])) << page;
+        }
+    }
+}
+
+TEST(ResidencyPolicy, WithAnotherPoolItSettlesAsIfItHadAlwaysBeenThere) {
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+        SCOPED_TRACE(seed);
+        const auto dataset = treeFor(seed);
+        std::mt19937_64 random(seed);
+        const SelectionView view = test::randomView(random, 0.5);
+        const std::set<uint64_t> bad{dataset->pages.size() - 1};
+        Simulation sim(dataset, {.budgetBytes = allBytes(*dataset), .failRate = 0, .bad = bad, .seed = seed});
+        for (int i = 0; i < 6; ++i) {
+            const uint64_t budget = randomBudget(*dataset, random);
+            Simulation fresh(dataset, {.budgetBytes = budget, .failRate = 0, .bad = bad, .seed = seed});
+            if (!fresh.policy.hasRoom()) continue;
+            fresh.settle(view);
+            sim.setBudget(budget);
+            sim.settle(view);
+            EXPECT_EQ(sim.outcome.drawable.cut, fresh.outcome.drawable.cut);
         }
     }
 }
