@@ -81,33 +81,75 @@ glm::vec3 unpackNormal(uint32_t code) {
 
 }  // namespace
 
-struct Renderer::State {
+/// What the views of one dataset share.
+struct Renderer::Shared {
     RendererOptions options;
     std::unique_ptr<Instance> instance;
     std::unique_ptr<Device> device;  // null after a loss that could not be made good
     DeviceInfo info;
-    std::unique_ptr<Swapchain> swapchain;
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
-
     std::unique_ptr<Residency> residency;
-    std::unique_ptr<FrameResources> resources;
+    uint32_t losses = 0;
+    // Views draw one after the other: one set of pipelines does for all.
     BeamPass beam;
     TracePass trace;
     LightPass light;
     ShadePass shade;
     FeedbackPass feedback;
+    PassConstants constants;  // of the last frame
+    std::vector<State*> views;
+    ViewNumber nextNumber = 0;
+};
+
+struct Renderer::State {
+    explicit State(std::shared_ptr<Shared> with, std::optional<SurfaceSource> window)
+        : shared(std::move(with)), surface(std::move(window)), number(shared->nextNumber++) {
+        shared->views.push_back(this);
+    }
+    ~State() {
+        std::erase(shared->views, this);
+        if (residency) residency->forgetView(number);
+    }
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+
+    const std::shared_ptr<Shared> shared;
+    RendererOptions& options = shared->options;
+    std::unique_ptr<Instance>& instance = shared->instance;
+    std::unique_ptr<Device>& device = shared->device;
+    DeviceInfo& info = shared->info;
+    PageAccess& access = shared->access;
+    uint32_t& stripes = shared->stripes;
+    std::unique_ptr<Residency>& residency = shared->residency;
+    uint32_t& losses = shared->losses;
+    BeamPass& beam = shared->beam;
+    TracePass& trace = shared->trace;
+    LightPass& light = shared->light;
+    ShadePass& shade = shared->shade;
+    FeedbackPass& feedback = shared->feedback;
+    PassConstants& constants = shared->constants;
+
+    const std::optional<SurfaceSource> surface;
+    const ViewNumber number;
+    std::unique_ptr<Swapchain> swapchain;
+    std::unique_ptr<FrameResources> resources;
     std::optional<PassTimer> timer;
-    uint32_t losses = 0;
-    PassConstants constants;
     bool tableStale = true;
+    uint64_t tableVersion = 0;
     std::vector<glm::uvec4> table;  // of the last frame
     double errorPixels = 0;         // of the cut
     std::optional<FrameRequest> drawn;
     bool drawnColour = false;
 
+    /// The device, and this view's part of it.
     Result<void> createDevice(const DeviceFaults& faults);
-    /// Shaders see the residency's pool from now on; without one the dataset is closed.
+    Result<VkSurfaceKHR> createSurface() const;
+    Result<void> attach(VkSurfaceKHR window);
+    Result<void> attachToDevice();
+    void release();
+    /// Shaders of all views see no pool; see the residency's, or the dataset is closed where it has none.
+    void hidePool();
     void showPool();
     /// Makes all anew that the device held.
     Result<void> rebuild();
@@ -120,6 +162,7 @@ struct Renderer::State {
     [[nodiscard]] bool listens() const { return residency && residency->listens(); }
     [[nodiscard]] PassConstants constantsFor(const FrameRequest& request) const;
     Result<void> checkLimits(const FrameRequest& request) const;
+    Result<void> prepareTable();
     Result<void> prepare(const FrameRequest& request);
     void recordFrame(VkCommandBuffer commands, const FrameRequest& request);
     Result<FrameStats> collectStats(const FrameRequest& request) const;
@@ -133,62 +176,99 @@ Renderer::~Renderer() = default;
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
     if (options.budgetBytes < kLeastBudget)
         return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", options.budgetBytes, kLeastBudget)};
-    auto state = std::make_unique<State>();
-    state->options = options;
+    auto shared = std::make_shared<Shared>();
+    shared->options = options;
     auto instance = Instance::create(options.validation, options.surface ? options.surface->instanceExtensions : std::vector<std::string>{});
     if (!instance) return instance.error();
-    state->instance = std::move(*instance);
+    shared->instance = std::move(*instance);
+    auto state = std::make_unique<State>(shared, options.surface);
     VCP_TRY(state->createDevice(options.faults));
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
 
+Result<std::unique_ptr<Renderer>> Renderer::addView(const std::optional<SurfaceSource>& surface) {
+    if (!state_->device) return kGone;
+    auto state = std::make_unique<State>(state_->shared, surface);
+    VCP_TRY(state->attachToDevice());
+    state->showPool();
+    return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
+}
+
+Result<VkSurfaceKHR> Renderer::State::createSurface() const {
+    VkSurfaceKHR made = VK_NULL_HANDLE;
+    if (surface) VCP_VK(surface->createSurface, instance->handle(), &made);
+    return made;
+}
+
 Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
-    VkSurfaceKHR surface = VK_NULL_HANDLE;
-    if (options.surface) VCP_VK(options.surface->createSurface, instance->handle(), &surface);
-    auto made = Device::create(*instance, options.device, surface, faults);
+    const auto window = createSurface();
+    if (!window) return window.error();
+    auto made = Device::create(*instance, options.device, *window, faults);
     if (!made) {
-        if (surface != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), surface, nullptr);
+        if (*window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
         return made.error();
     }
     device = std::move(*made);
     info = device->info();
-    if (surface != VK_NULL_HANDLE) swapchain = std::make_unique<Swapchain>(instance->handle(), *device, surface);
-    const bool software = device->info().software;
-    access = options.access != PageAccess::Auto ? options.access : software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
-    stripes = software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
+    access = options.access != PageAccess::Auto ? options.access : info.software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
+    stripes = info.software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
+    return attach(*window);
+}
+
+Result<void> Renderer::State::attach(VkSurfaceKHR window) {
+    if (window != VK_NULL_HANDLE) swapchain = std::make_unique<Swapchain>(instance->handle(), *device, window);
     VCP_TRY(timer.emplace().create(*device));
-    auto shared = FrameResources::create(*device);
-    if (!shared) return shared.error();
-    resources = std::move(*shared);
+    auto made = FrameResources::create(*device);
+    if (!made) return made.error();
+    resources = std::move(*made);
     return {};
 }
 
+Result<void> Renderer::State::attachToDevice() {
+    const auto window = createSurface();
+    if (!window) return window.error();
+    if (*window == VK_NULL_HANDLE || device->shows(*window)) return attach(*window);
+    vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
+    return Error{.code = ErrorCode::Device, .message = "device '" + info.name + "', as it was chosen for the first view, cannot show pictures in this window"};
+}
+
+void Renderer::State::release() {
+    drawn.reset();
+    timer.reset();
+    swapchain.reset();
+    resources.reset();
+}
+
+void Renderer::State::hidePool() {
+    for (State* view : shared->views)
+        if (view->resources) view->resources->setPools(nullptr, nullptr);
+}
+
 void Renderer::State::showPool() {
-    tableStale = true;
     static_cast<void>(device->takeOutOfMemory());  // a pool that was halved for it is fine
-    if (!residency->hasPool()) {
-        residency.reset();
-        return;
+    if (residency && !residency->hasPool()) residency.reset();
+    const PagePool* pool = residency ? &residency->pages() : nullptr;
+    for (State* view : shared->views) {
+        view->tableStale = true;
+        view->resources->setPools(pool, pool != nullptr && residency->hasColour() ? pool : nullptr);
     }
-    const PagePool* pool = &residency->pages();
-    resources->setPools(pool, residency->hasColour() ? pool : nullptr);
 }
 
 Result<void> Renderer::State::rebuild() {
     ++losses;
-    drawn.reset();
     if (residency) residency->releasePool();
+    for (State* view : shared->views) view->release();
     beam.clear(), trace.clear(), light.clear(), shade.clear();
     feedback.release();
-    constants = {};
-    timer.reset();
-    swapchain.reset();
-    resources.reset();
     device.reset();
     DeviceFaults faults = options.faults;
     faults.lostAtSubmission = 0;
-    VCP_TRY(createDevice(faults));
-    tableStale = true;
+    // A window decides which queue there has to be.
+    const auto windowed = std::find_if(shared->views.begin(), shared->views.end(), [](const State* view) { return view->surface.has_value(); });
+    State* const first = windowed != shared->views.end() ? *windowed : this;
+    VCP_TRY(first->createDevice(faults));
+    for (State* view : shared->views)
+        if (view != first) VCP_TRY(view->attachToDevice());
     if (!residency) return {};
     const auto done = residency->rebuild(*device, access);
     showPool();
@@ -208,7 +288,7 @@ bool Renderer::State::recover(bool mayRebuild) {
     if (!device) return false;
     if (device->isLost()) return mayRebuild && rebuild().ok();
     if (!device->takeOutOfMemory() || !residency) return false;
-    resources->setPools(nullptr, nullptr);
+    hidePool();
     const bool halved = residency->setBudgets(*device, access, residency->pages().bytes() / 2, options.ramBytes).ok();
     showPool();
     return halved;
@@ -242,7 +322,7 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     if (budgetBytes < kLeastBudget)
         return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
     if (s.residency) {
-        s.resources->setPools(nullptr, nullptr);
+        s.hidePool();
         const auto done = s.residency->setBudgets(*s.device, s.access, budgetBytes, ramBytes);
         s.showPool();
         if (!done) return done;
@@ -254,10 +334,12 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
 
 void Renderer::close() {
     State& s = *state_;
-    if (s.resources) s.resources->setPools(nullptr, nullptr);
+    s.hidePool();
     s.residency.reset();
-    s.drawn.reset();
-    s.tableStale = true;
+    for (State* view : s.shared->views) {
+        view->drawn.reset();
+        view->tableStale = true;
+    }
 }
 
 Result<UpdateResult> Renderer::update(const FrameRequest& request) {
@@ -265,10 +347,9 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     State& s = *state_;
     if (!s.device) return kGone;
     if (!s.residency) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
-    auto result = s.tryAgain([&] { return s.residency->update(selectionView(request)); });
+    auto result = s.tryAgain([&] { return s.residency->update(selectionView(request), s.number); });
     if (!result) return result;
     result->deviceLosses = s.losses;
-    s.tableStale = s.tableStale || s.residency->tableChanged();
     s.errorPixels = result->errorPixels;
     return result;
 }
@@ -317,6 +398,17 @@ Result<void> Renderer::State::checkLimits(const FrameRequest& request) const {
                                         device->info().name, std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) / (words / (uint64_t{request.width} * request.height)))};
 }
 
+Result<void> Renderer::State::prepareTable() {
+    const uint64_t version = residency ? residency->version() : 0;
+    if (!tableStale && version == tableVersion) return {};
+    auto next = residency ? residency->table(number) : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+    if (tableStale || next != table) VCP_TRY(resources->setTable(next));
+    table = std::move(next);
+    tableVersion = version;
+    tableStale = false;
+    return {};
+}
+
 Result<void> Renderer::State::prepare(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
     VCP_TRY(checkLimits(request));
@@ -331,11 +423,7 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     constants = wanted;
     VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
     resources->setBackground(backgroundRows(request.shading, request.height));
-    if (tableStale) {
-        table = residency ? residency->table() : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
-        VCP_TRY(resources->setTable(table));
-        tableStale = false;
-    }
+    VCP_TRY(prepareTable());
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
     VCP_TRY(trace.prepare(*resources, constants, sections));
@@ -406,7 +494,7 @@ Result<FrameStats> Renderer::State::collectStats(const FrameRequest& request) co
     if (residency) {
         stats.colourBytes = residency->colourBytes();
         stats.poolBytes = residency->pages().bytes();
-        stats.pagesInCut = static_cast<uint32_t>(residency->cut().size());
+        stats.pagesInCut = static_cast<uint32_t>(residency->cut(number).size());
     }
     return stats;
 }

@@ -14,6 +14,11 @@
 //
 // A picture without a window is settle(request), render(request), readPicture(). The same request and the
 // same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
+//
+// Several views of one dataset, such as the widgets of one program, share device, pool, budgets and loader:
+// renderer->addView() is a Renderer with camera, pictures and window of its own. What all of them want is read once; a
+// budget too small for all relaxes all together. Each is updated and drawn by itself; update() of one may change what
+// another draws next, which that one's update() then says. One thread at a time may call any of them.
 #pragma once
 
 #include <chrono>
@@ -183,10 +188,14 @@ public:
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
+    /// Another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for a window:
+    /// the options of create() must have had one too. Errors: Device.
+    Result<std::unique_ptr<Renderer>> addView(const std::optional<SurfaceSource>& surface = {});
+
     [[nodiscard]] const DeviceInfo& device() const;
     [[nodiscard]] PageAccess access() const;
 
-    /// Shows a dataset, in place of the one before. Its pages come from `source` in loader threads.
+    /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
     /// Stops the loader and forgets all pages.
     void close();
@@ -227,6 +236,7 @@ public:
     [[nodiscard]] std::vector<std::string> validationMessages() const;
 
 private:
+    struct Shared;
     struct State;
     explicit Renderer(std::unique_ptr<State> state);
     std::unique_ptr<State> state_;

@@ -1,12 +1,19 @@
 #include "render/residency.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <utility>
 
 #include <fmt/format.h>
 
 namespace vcp {
+
+namespace {
+
+double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+}  // namespace
 
 Result<std::unique_ptr<Residency>> Residency::create(Device& device, PageAccess access, const ResidencyOptions& options,
                                                      std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
@@ -88,16 +95,13 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
         if (*slot) VCP_TRY(pool_->write(**slot, 0, page.bytes));
         page.bytes = {};
     }
-    VCP_TRY(pool_->flush());
-    if (policy_->hasLooked()) cut_ = policy_->finish().drawable.cut;
-    return {};
+    return pool_->flush();
 }
 
 void Residency::releasePool() {
     pool_.reset();
     policy_->clear();
-    cut_.clear();
-    redraw_ = tableChanged_ = true;
+    cuts_.clear();  // all is to be drawn again
     listens_ = false;
 }
 
@@ -106,28 +110,40 @@ Result<void> Residency::rebuild(Device& device, PageAccess access) {
     return createPool(device, access);
 }
 
-Result<UpdateResult> Residency::update(const SelectionView& view) {
-    tableChanged_ = false;
+void Residency::forgetView(ViewNumber number) {
+    policy_->forgetView(number);
+    cuts_.erase(number);
+}
+
+const std::vector<uint64_t>& Residency::cut(ViewNumber number) {
+    ViewCut& cut = cuts_[number];
+    if (cut.version != version() && policy_->hasLooked(number)) {
+        cut.pages = policy_->drawable(number).cut;
+        cut.version = version();
+    }
+    return cut.pages;
+}
+
+Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber number) {
     std::vector<LoadedPage> loaded = loader_->collect(options_.uploadBytes);
     for (const LoadedPage& page : loaded) {
         if (page.bytes || !policy_->giveUp(page.page)) continue;
         problems_.push_back(page.bytes.error());
         if (page.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(page.page);
     }
-    policy_->look(view);
+    policy_->look(view, steadySeconds(), number);
     for (const LoadedPage& page : loaded) {
         if (!page.bytes) continue;
         if (auto placed = place(page); !placed) return placed.error();
     }
     VCP_TRY(pool_->flush());
-    PolicyOutcome outcome = policy_->finish();
+    PolicyOutcome outcome = policy_->finish(number);
     loader_->request(std::move(outcome.wishes));
     listens_ = outcome.missing > 0 && options_.order == LoadOrder::Feedback;
-    const bool changed = outcome.drawable.cut != cut_ || std::exchange(redraw_, false);
-    tableChanged_ = tableChanged_ || changed;
-    cut_ = outcome.drawable.cut;
     UpdateResult result = report(outcome);
-    result.changed = changed;
+    ViewCut& cut = cuts_[number];
+    result.changed = cut.version == UINT64_MAX || outcome.drawable.cut != cut.reported;
+    cut = {outcome.drawable.cut, version(), outcome.drawable.cut};
     result.problems = std::exchange(problems_, {});
     return result;
 }
@@ -137,8 +153,9 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     const PolicyCounts& counts = policy_->counts();
     UpdateResult result;
     result.settled = outcome.drawable.complete;
-    result.drawable = !cut_.empty();
-    result.relaxed = outcome.relaxed;
+    const std::vector<uint64_t>& cut = outcome.drawable.cut;
+    result.drawable = !cut.empty();
+    result.relaxed = outcome.drawable.isRelaxed;
     result.errorPixels = outcome.drawable.errorPixels;
     result.residentBytes = policy_->unitsTaken() * kPoolUnitBytes;
     result.heldBytesMax = loader.heldBytesMax;
@@ -149,19 +166,18 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     result.reloads = counts.reloads;
     result.pagesPending = static_cast<uint32_t>(loader_->pending());
     result.pagesResident = static_cast<uint32_t>(policy_->pagesResident());
-    result.pagesInCut = static_cast<uint32_t>(cut_.size());
-    result.pagesWanted = static_cast<uint32_t>(outcome.wanted);
-    result.pagesMissing = static_cast<uint32_t>(outcome.missing);
-    if (cut_.empty()) return result;
+    result.pagesInCut = static_cast<uint32_t>(cut.size());
+    result.pagesWanted = static_cast<uint32_t>(outcome.drawable.pagesWanted);
+    result.pagesMissing = static_cast<uint32_t>(outcome.drawable.pagesMissing);
+    if (cut.empty()) return result;
     // Pages are numbered level by level, coarsest first.
-    result.coarsestLevel = dataset_->pages[cut_.front()].level;
-    result.finestLevel = dataset_->pages[cut_.back()].level;
+    result.coarsestLevel = dataset_->pages[cut.front()].level;
+    result.finestLevel = dataset_->pages[cut.back()].level;
     return result;
 }
 
 Result<std::optional<PoolSlot>> Residency::slotFor(uint64_t page) {
     const Placement placement = policy_->place(page);
-    tableChanged_ = tableChanged_ || !placement.moves.empty();
     for (const PageMove& move : placement.moves) VCP_TRY(pool_->move(move.from, move.to));
     return placement.slot;
 }
@@ -183,8 +199,8 @@ uint64_t Residency::colourBytes() const {
     return bytes;
 }
 
-std::vector<glm::uvec4> Residency::table() const {
-    return pageTable(*dataset_, cut_, [&](uint64_t page) {
+std::vector<glm::uvec4> Residency::table(ViewNumber number) {
+    return pageTable(*dataset_, cut(number), [&](uint64_t page) {
         const uint32_t texel = pool_->texel(policy_->slotOf(page));
         const bool colour = hasColour() && dataset_->pages[page].colourBytes > 0;
         return ResidentPage{headers_.at(page), texel, colour ? texel + dataset_->pages[page].pageBytes / 16 : 0};

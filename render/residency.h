@@ -3,9 +3,11 @@
 //
 // A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while views
 // want it, evicted when its slot is needed. What an update takes in is capped, so that no frame waits for
-// many pages. All in the caller's thread but the loader's reads.
+// many pages. All in the caller's thread but the loader's reads. Several views may share the pool, each with a number
+// of its own and a cut of its own; an update of one may change the others' cuts.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <unordered_map>
 #include <vector>
@@ -43,7 +45,8 @@ public:
     Result<void> rebuild(Device& device, PageAccess access);
 
     /// Precondition: no frame is in flight. Never waits for the loader. Errors: Device.
-    Result<UpdateResult> update(const SelectionView& view);
+    Result<UpdateResult> update(const SelectionView& view, ViewNumber number = 0);
+    void forgetView(ViewNumber number);
 
     /// Whether what rays meet would be of use: pages are missing, and are read in the order that rays ask for them.
     [[nodiscard]] bool listens() const { return listens_; }
@@ -53,10 +56,11 @@ public:
     void waitForPage(std::chrono::milliseconds timeout) { loader_->waitForPage(timeout); }
 
     [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
-    [[nodiscard]] const std::vector<uint64_t>& cut() const { return cut_; }
-    [[nodiscard]] std::vector<glm::uvec4> table() const;
-    /// Whether table() is another one since the update before: another cut, or pages in other places.
-    [[nodiscard]] bool tableChanged() const { return tableChanged_; }
+    /// What the view can draw now, in directory order.
+    [[nodiscard]] const std::vector<uint64_t>& cut(ViewNumber number = 0);
+    [[nodiscard]] std::vector<glm::uvec4> table(ViewNumber number = 0);
+    /// Another table may follow where this is another number: of another cut, or of pages in other places.
+    [[nodiscard]] uint64_t version() const { return policy_->version(); }
     /// False after an error of setBudgets() or rebuild(): nothing but the destructor may be called then.
     [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
@@ -77,6 +81,11 @@ private:
     /// A slot for the page, with pages moved out of its way; nothing where there is none.
     Result<std::optional<PoolSlot>> slotFor(uint64_t page);
     Result<void> place(const LoadedPage& page);
+    struct ViewCut {
+        std::vector<uint64_t> pages;
+        uint64_t version = UINT64_MAX;
+        std::vector<uint64_t> reported;  // as of its last update
+    };
     UpdateResult report(const PolicyOutcome& outcome) const;
 
     ResidencyOptions options_;
@@ -87,11 +96,10 @@ private:
     std::unique_ptr<PageLoader> loader_;
     LoaderStats past_;  // of the loaders before this one
     std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
-    std::vector<uint64_t> cut_;
+    std::map<ViewNumber, ViewCut> cuts_;
     std::vector<Error> problems_;    // not reported yet
     std::vector<uint64_t> tooLarge_; // pages given up because reading them takes more memory than there is
-    bool listens_ = false, tableChanged_ = false;
-    bool redraw_ = false;  // the pool is another one
+    bool listens_ = false;
 };
 
 }  // namespace vcp

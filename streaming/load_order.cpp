@@ -43,8 +43,8 @@ std::optional<uint64_t> childAt(const PageEntry& page, glm::ivec3 place) {
     return uint64_t{page.firstChild} + std::popcount(page.childMask & ((1u << octant) - 1));
 }
 
-void fade(std::unordered_map<uint64_t, double>& values) {
-    for (auto& [page, value] : values) value *= kRemembered;
+void fade(std::unordered_map<uint64_t, double>& values, double remembered) {
+    for (auto& [page, value] : values) value *= remembered;
     std::erase_if(values, [](const auto& entry) { return entry.second < kForgotten; });
 }
 
@@ -66,9 +66,10 @@ LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::vect
     }
 }
 
-void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view) {
-    fade(gains_);
-    fade(nearness_);
+void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view, size_t views) {
+    const double remembered = std::pow(kRemembered, 1 / double(std::max<size_t>(views, 1)));
+    fade(gains_, remembered);
+    fade(nearness_, remembered);
     for (const RayFeedback::Passed& passed : feedback.passed) nearness_[passed.page] += passed.nearness;
     if (dataset_->pages.empty()) return;
     const glm::dvec3 corner = dataset_->originOf(dataset_->pages[0]);
@@ -100,29 +101,32 @@ double LoadPriorities::nearnessOf(uint64_t page) const {
     }
 }
 
-double LoadPriorities::feedbackPriority(uint64_t page, const SelectionView& view, uint64_t units) const {
+double LoadPriorities::feedbackPriority(uint64_t page, std::span<const SelectionView> views, uint64_t units) const {
     if (const double gain = gainOf(page); gain > 0) return inRange(gain / double(units), kRequested, kMost);
     if (const double nearness = nearnessOf(page); nearness > 0) return inRange(nearness, kPassed, kRequested);
-    const double error = std::min(projectedError(*dataset_, dataset_->pages[page], view), 1e9);
+    double error = 0;
+    for (const SelectionView& view : views) error = std::max(error, std::min(projectedError(*dataset_, dataset_->pages[page], view), 1e9));
     return inRange(error, kLeast, kPassed);
 }
 
 /// Of the children of `page`, which take so many units.
-double LoadPriorities::priorityBelow(uint64_t page, const SelectionView& view, uint64_t units) const {
+double LoadPriorities::priorityBelow(uint64_t page, std::span<const SelectionView> views, uint64_t units) const {
     const PageEntry& entry = dataset_->pages[page];
     switch (order_) {
         case LoadOrder::Nearest: {
             const glm::dvec3 low = dataset_->originOf(entry), high = low + dataset_->edgeOf(entry);
-            const double distance = glm::length(glm::clamp(view.eye, low, high) - view.eye) / dataset_->edgeOf(dataset_->pages[0]);
+            double distance = kMost;
+            for (const SelectionView& view : views)
+                distance = std::min(distance, glm::length(glm::clamp(view.eye, low, high) - view.eye) / dataset_->edgeOf(dataset_->pages[0]));
             return std::max(kMost / (1 + distance * kMost), kLeast);
         }
         case LoadOrder::Breadth: return std::ldexp(1.0, -entry.level);
         case LoadOrder::Random: return kLeast + double(hashOf(page) >> 11) * 0x1p-53;
-        default: return feedbackPriority(page, view, units);
+        default: return feedbackPriority(page, views, units);
     }
 }
 
-std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing, const SelectionView& view) const {
+std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing, std::span<const SelectionView> views) const {
     if (order_ == LoadOrder::Error) return missing;
     std::unordered_map<uint64_t, uint64_t> units;  // of missing children
     for (const WantedPage& wanted : missing) units[parents_[wanted.page]] += pageUnits_[wanted.page];
@@ -134,7 +138,7 @@ std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing,
             // No more urgent than its parent, which comes before it in the list where it is missing too.
             const uint64_t parent = parents_[wanted.page];
             const auto above = given.find(parent);
-            wanted.priority = priorityBelow(parent, view, units[parent]);
+            wanted.priority = priorityBelow(parent, views, units[parent]);
             if (above != given.end()) wanted.priority = std::min(wanted.priority, above->second);
         }
         given.emplace(wanted.page, wanted.priority);
@@ -144,6 +148,12 @@ std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing,
         return a.priority != b.priority ? a.priority > b.priority : a.page < b.page;
     });
     return missing;
+}
+
+uint64_t LoadPriorities::bytesHeld() const {
+    constexpr uint64_t kEntry = 4 * sizeof(void*);
+    const auto bytesOf = [](const auto& map) { return map.bucket_count() * sizeof(void*) + map.size() * kEntry; };
+    return pageUnits_.capacity() * sizeof(pageUnits_[0]) + parents_.capacity() * sizeof(parents_[0]) + bytesOf(gains_) + bytesOf(nearness_);
 }
 
 }  // namespace vcp

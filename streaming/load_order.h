@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <unordered_map>
 #include <vector>
@@ -66,19 +67,23 @@ public:
     [[nodiscard]] LoadOrder order() const { return order_; }
     void setOrder(LoadOrder order) { order_ = order; }
 
-    /// Takes in what the rays of a frame of `view` met.
-    void hear(const RayFeedback& feedback, const SelectionView& view);
+    /// Takes in what the rays of a frame of `view` met; `views` such frames in turn are a round of all views.
+    void hear(const RayFeedback& feedback, const SelectionView& view, size_t views = 1);
 
     /// `missing`: wanted pages that are not resident, as choosePages ordered them. Returns them most urgent first;
-    /// priorities are 0.001 to 10^6, the root's is infinite; with LoadOrder::Error, `missing` as it is.
-    [[nodiscard]] std::vector<WantedPage> ordered(std::vector<WantedPage> missing, const SelectionView& view) const;
+    /// priorities are 0.001 to 10^6, the root's is infinite; with LoadOrder::Error, `missing` as it is. Of several
+    /// views the one counts to which a page is most urgent.
+    [[nodiscard]] std::vector<WantedPage> ordered(std::vector<WantedPage> missing, std::span<const SelectionView> views) const;
 
     /// Pixels of error that refining `page` takes off the rays heard of; 0: no ray would have liked that.
     [[nodiscard]] double gainOf(uint64_t page) const;
 
+    /// Memory that this takes, near enough.
+    [[nodiscard]] uint64_t bytesHeld() const;
+
 private:
-    [[nodiscard]] double priorityBelow(uint64_t page, const SelectionView& view, uint64_t units) const;
-    [[nodiscard]] double feedbackPriority(uint64_t page, const SelectionView& view, uint64_t units) const;
+    [[nodiscard]] double priorityBelow(uint64_t page, std::span<const SelectionView> views, uint64_t units) const;
+    [[nodiscard]] double feedbackPriority(uint64_t page, std::span<const SelectionView> views, uint64_t units) const;
     [[nodiscard]] double nearnessOf(uint64_t page) const;
 
     std::shared_ptr<const Dataset> dataset_;

@@ -249,7 +249,7 @@ private:
             if (const auto update = frame(request, ms); !update) return update.error();
             times.push_back(static_cast<float>(ms));
             // Twice: a still view looks at nothing ahead. Nothing is ever placed, so all it wants is wished for.
-            for (int k = 0; k < 2; ++k) wants.look(selectionView(request));
+            for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
             for (const PageRequest& wish : wants.finish().wishes) needed.insert(wish.page);
         }
         report_.frameMsNoLoads = quantilesOf(std::move(times));

@@ -18,7 +18,7 @@ static_assert(frame::kFeedbackRays == frame::kFeedbackWidth * frame::kFeedbackHe
 
 FeedbackPass::FeedbackPass() : pipelines_(kFeedbackSpirv) {}
 
-Result<void> FeedbackPass::reserve(Device& device, FrameResources& resources, uint64_t words) {
+Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
     if (buffer_.bytes() >= words * 4) return {};
     const uint64_t bytes = std::bit_ceil(words) * 4;
     constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
@@ -30,13 +30,13 @@ Result<void> FeedbackPass::reserve(Device& device, FrameResources& resources, ui
         readback_ = std::move(*readback);
     }
     buffer_ = std::move(*buffer);
-    resources.setFeedback(&buffer_);
     return {};
 }
 
 Result<void> FeedbackPass::prepare(Device& device, FrameResources& resources, const PassConstants& constants, std::span<const glm::uvec4> table) {
     const size_t records = table.size() / frame::kRecordTexels;
-    VCP_TRY(reserve(device, resources, kRayWords + records));
+    VCP_TRY(reserve(device, kRayWords + records));
+    resources.setFeedback(&buffer_);
     pages_.resize(records);
     for (size_t i = 0; i < records; ++i) pages_[i] = table[i * frame::kRecordTexels + 2].z;
     PassConstants plain = constants;

@@ -34,7 +34,7 @@ public:
     [[nodiscard]] glm::vec2 jitter() const;
 
 private:
-    Result<void> reserve(Device& device, FrameResources& resources, uint64_t words);
+    Result<void> reserve(Device& device, uint64_t words);
 
     PipelineVariants pipelines_;
     Buffer buffer_, readback_;  // the latter where the former is not mapped

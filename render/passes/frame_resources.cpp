@@ -158,7 +158,9 @@ void FrameResources::setPools(const PagePool* pages, const PagePool* colours) {
 }
 
 void FrameResources::setFeedback(const Buffer* feedback) {
+    if (feedback_ == feedback && feedbackHandle_ == feedback->handle()) return;
     feedback_ = feedback;
+    feedbackHandle_ = feedback->handle();
     setStale_ = true;
 }
 

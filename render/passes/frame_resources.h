@@ -121,6 +121,7 @@ private:
     const PagePool* pages_ = nullptr;
     const PagePool* colours_ = nullptr;
     const Buffer* feedback_ = nullptr;
+    VkBuffer feedbackHandle_ = VK_NULL_HANDLE;  // as of the last call
     bool setStale_ = true;
     uint32_t pipelinesMade_ = 0;
 };

@@ -79,7 +79,13 @@ Result<void> Device::chooseQueue(VkSurfaceKHR surface) {
     return Error{.code = ErrorCode::Device, .message = "device '" + info_.name + "' has no queue that computes and shows pictures"};
 }
 
+bool Device::shows(VkSurfaceKHR surface) const {
+    VkBool32 shows = VK_FALSE;
+    return hasSwapchain_ && vkGetPhysicalDeviceSurfaceSupportKHR(physical_, family_, surface, &shows) == VK_SUCCESS && shows == VK_TRUE;
+}
+
 Result<void> Device::createDevice(bool withSwapchain) {
+    hasSwapchain_ = withSwapchain;
     const float priority = 1;
     VkDeviceQueueCreateInfo queue{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
     queue.queueFamilyIndex = family_;

@@ -85,6 +85,8 @@ public:
     /// Nanoseconds a timestamp step, 0 where the queue has no timestamps.
     [[nodiscard]] double timestampNanoseconds() const { return timestampNanoseconds_; }
 
+    /// Whether the queue can show pictures in this window.
+    [[nodiscard]] bool shows(VkSurfaceKHR surface) const;
     /// Whether the device was lost: nothing works any more but destroying it.
     [[nodiscard]] bool isLost() const { return lost_; }
     /// Whether a buffer could not be had for want of memory since this was asked last.
@@ -131,6 +133,7 @@ private:
     mutable uint64_t allocated_ = 0;
     mutable bool outOfMemory_ = false;
     bool lost_ = false;
+    bool hasSwapchain_ = false;
 };
 
 }  // namespace vcp

@@ -476,6 +476,85 @@ TEST_F(RendererTest, PagesGoThroughStagingWhereTheMemoryIsSeparate) {
     }
 }
 
+Picture alonePicture(const Scene& scene, const FrameRequest& request, uint64_t budget) {
+    RendererOptions options;
+    options.budgetBytes = budget;
+    auto renderer = Renderer::create(options);
+    EXPECT_TRUE(renderer && (*renderer)->open(scene.dataset, scene.source));
+    EXPECT_TRUE((*renderer)->settle(request) && (*renderer)->render(request));
+    return *(*renderer)->readPicture();
+}
+
+/// Pictures of views of one renderer, updated and drawn in turn until all have settled.
+std::vector<Picture> drawTogether(std::span<const std::unique_ptr<Renderer>> views, std::span<const FrameRequest> requests, bool& relaxed) {
+    for (bool settled = false; !settled;) {
+        settled = true;
+        for (size_t i = 0; i < views.size(); ++i) {
+            const auto update = views[i]->update(requests[i]);
+            EXPECT_TRUE(update) << update.error().line();
+            EXPECT_TRUE(views[i]->render(requests[i]));
+            if (!update) return {};
+            settled = settled && update->settled;
+            relaxed = relaxed || update->relaxed;
+            EXPECT_EQ(update->reloads, 0u);
+        }
+        if (!settled) views[0]->waitForPage(std::chrono::milliseconds(100));
+    }
+    std::vector<Picture> pictures;
+    for (size_t i = 0; i < views.size(); ++i) {
+        EXPECT_TRUE(views[i]->render(requests[i]));
+        pictures.push_back(*views[i]->readPicture());
+    }
+    return pictures;
+}
+
+TEST_F(RendererTest, TenViewsShareOnePoolAndOneBudget) {
+    const Scene scene = test::sphereScene(4);
+    std::vector<FrameRequest> requests;
+    for (const NamedCamera& named : cameras(scene)) {
+        if (requests.size() == 10) break;
+        requests.push_back(requestOf(named.camera, 48, 36));
+        requests.back().errorPixels = 0.02;
+    }
+    RendererOptions alone;
+    start(alone);
+    show(scene);
+    std::vector<Picture> expected;
+    for (const FrameRequest& request : requests) {
+        draw(request);
+        expected.push_back(*renderer_->readPicture());
+    }
+    for (const uint64_t budget : {uint64_t{64} << 20, uint64_t{1} << 20}) {
+        RendererOptions options;
+        options.budgetBytes = budget;
+        options.faults.lostAtSubmission = 25;  // all views come back
+        start(options);
+        show(scene);
+        std::vector<std::unique_ptr<Renderer>> views;
+        views.push_back(std::move(renderer_));
+        while (views.size() < requests.size()) {
+            auto view = views[0]->addView();
+            ASSERT_TRUE(view) << view.error().line();
+            views.push_back(std::move(*view));
+        }
+        bool relaxed = false;
+        drawTogether(views, requests, relaxed);
+        const auto pictures = drawTogether(views, requests, relaxed);
+        EXPECT_EQ(relaxed, budget == 1 << 20);
+        EXPECT_NE(pictures == expected, relaxed);
+        EXPECT_EQ(views.back()->render(requests.back())->pipelines, 0u) << "pipelines are shared";
+        const auto update = views[3]->update(requests[3]);
+        ASSERT_TRUE(update);
+        EXPECT_LE(update->residentBytes, budget);
+        EXPECT_EQ(update->deviceLosses, 1u);
+        // Those that stay have the whole budget, also where the first is gone.
+        views.erase(views.begin(), views.end() - 1);
+        renderer_ = std::move(views[0]);
+        draw(requests.back());
+        EXPECT_EQ(*renderer_->readPicture(), alonePicture(scene, requests.back(), budget));
+    }
+}
+
 TEST_F(RendererTest, ABrokenPageIsReportedOnceAndDrawnFromItsParent) {
     start();
     const Scene scene = test::sphereScene();

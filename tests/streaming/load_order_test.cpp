@@ -29,7 +29,7 @@ struct Fixture {
     /// What the view wants, from a level on.
     [[nodiscard]] std::vector<WantedPage> missing(uint32_t level) const {
         const std::vector<uint8_t> none(units.size(), 0);
-        auto wanted = choosePages(*dataset, view, UINT64_MAX, units, none).wanted;
+        auto wanted = choosePages(*dataset, {&view, 1}, UINT64_MAX, units, none).wanted;
         std::erase_if(wanted, [&](const WantedPage& w) { return dataset->pages[w.page].level < level; });
         return wanted;
     }
@@ -69,7 +69,7 @@ TEST(LoadOrder, EveryOrderHasAllPagesAndParentsFirst) {
                 feedback.passed.push_back({random() % f.units.size(), 1});
             }
             priorities.hear(feedback, f.view);
-            const auto ordered = priorities.ordered(missing, f.view);
+            const auto ordered = priorities.ordered(missing, {&f.view, 1});
             const auto given = byPage(ordered);
             ASSERT_EQ(given.size(), missing.size());
             std::map<uint64_t, size_t> place;
@@ -123,7 +123,7 @@ TEST(LoadOrder, RequestsThenCountersThenTheRest) {
     LoadPriorities priorities = f.priorities(LoadOrder::Feedback);
     const uint64_t hit = 3, passedOften = 5, passed = 7, untouched = 8;
     priorities.hear({.hits = {{hit, f.middleOf(hit)}}, .passed = {{passed, 1}, {passedOften, 9}, {hit, 0.1}}}, f.view);
-    const auto first = [&](uint64_t page) { return byPage(priorities.ordered(f.missing(2), f.view)).at(f.dataset->pages[page].firstChild); };
+    const auto first = [&](uint64_t page) { return byPage(priorities.ordered(f.missing(2), {&f.view, 1})).at(f.dataset->pages[page].firstChild); };
     EXPECT_GT(first(hit), first(passedOften));
     EXPECT_GT(first(passedOften), first(passed));
     EXPECT_GT(first(passed), first(untouched));
@@ -133,7 +133,7 @@ TEST(LoadOrder, RequestsThenCountersThenTheRest) {
     for (uint32_t i = 0; i < 8; ++i) f.units[f.dataset->pages[passed].firstChild + i] = 200;
     LoadPriorities dear = f.priorities(LoadOrder::Feedback);
     dear.hear({.hits = {{hit, f.middleOf(hit)}, {passed, f.middleOf(passed)}}, .passed = {}}, f.view);
-    const auto given = byPage(dear.ordered(f.missing(2), f.view));
+    const auto given = byPage(dear.ordered(f.missing(2), {&f.view, 1}));
     EXPECT_GT(given.at(f.dataset->pages[hit].firstChild), given.at(f.dataset->pages[passed].firstChild));
 }
 
