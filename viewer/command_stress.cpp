@@ -26,6 +26,7 @@ struct StressCommand {
     std::string device;
     uint64_t seed = 1;
     int frames = 120;
+    int views = 1;
     double errorPixels = 0.5;
     SourceSettings source;
     ReportOptions report;
@@ -60,6 +61,7 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
     options.seed = command.seed;
     options.size = parseSize(command.size).value();
     options.frames = command.frames;
+    options.views = command.views;
     options.errorPixels = command.errorPixels;
     options.renderer.device = command.device;
     options.renderer.budgetBytes = parseBytes(command.budget).value();
@@ -121,6 +123,10 @@ Command addStress(CLI::App& vcp) {
         ->check([](const std::string& text) { return parseOrders(text) ? std::string() : "must be like feedback,nearest, not \"" + text + "\""; });
     app->add_option("--seed", command->seed, "Of the faults and of the paths teleport and jitter")->type_name("N")->capture_default_str();
     app->add_option("--frames", command->frames, "Frames along the path")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1'000'000));
+    app->add_option("--views", command->views, "More than one: so many views then fly along the path together, with one pool and one budget")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100));
     app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
         return parseSize(text) ? std::string() : "must be like 640x400, not \"" + text + "\"";
     });

@@ -91,6 +91,7 @@ public:
         VCP_TRY(withoutLoads());
         VCP_TRY(compareWithFaultless());
         VCP_TRY(compareOrdersOfArrival());
+        VCP_TRY(severalViews());
         return std::move(report_);
     }
 
@@ -285,6 +286,18 @@ private:
         report_.orders = *std::move(curves);
         for (const OrderCurve& curve : report_.orders)
             invariants_.require(curve.settled == report_.orders[0].settled, "the settled picture depends on the order of arrival");
+        return {};
+    }
+
+    Result<void> severalViews() {
+        if (o_.views < 2) return {};
+        renderer_.reset();
+        std::vector<FrameRequest> path;
+        for (const Camera& camera : cameras_) path.push_back(requestFor(camera));
+        auto together = flyTogether(open_, o_.renderer, path, o_.views, o_.progress);
+        if (!together) return together.error();
+        for (const std::string& violation : together->violations) invariants_.require(false, violation);
+        report_.views = *std::move(together);
         return {};
     }
 

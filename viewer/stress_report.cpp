@@ -35,6 +35,25 @@ std::string ordersMarkdown(const std::vector<OrderCurve>& orders) {
     return text + "\n![orders of arrival](stress_orders.svg)\n";
 }
 
+Json toJson(const StressViews& v) {
+    return {{"views", v.views},
+            {"settled_seconds", v.settledSeconds},
+            {"resident_bytes_max", v.residentBytesMax},
+            {"pages_wanted", v.pagesWanted},
+            {"pages_resident", v.pagesResident},
+            {"loads", v.loads},
+            {"relaxed", v.relaxed},
+            {"identical", v.identical}};
+}
+
+std::string viewsMarkdown(const std::optional<StressViews>& views) {
+    if (!views) return "";
+    return fmt::format("\n{} views shared the pool: {} pages wanted by each summed up, {} resident together, at most {}. All had settled {:.3f} s after the last "
+                       "frame; {} showed what they show alone, the budget was too small for {}.\n",
+                       views->views, formatCount(views->pagesWanted), formatCount(views->pagesResident), formatBytes(views->residentBytesMax),
+                       views->settledSeconds, views->identical, views->relaxed);
+}
+
 double ratio(double a, double b) { return b > 0 ? a / b : 0; }
 
 std::string row(const std::string& name, const Quantiles& q) {
@@ -55,7 +74,7 @@ std::string stressJson(const StressReport& r) {
     for (const StressSample& sample : r.samples) samples.push_back(toJson(sample));
     Json orders = Json::array();
     for (const OrderCurve& curve : r.orders) orders.push_back(toJson(curve));
-    const Json json = {{"name", r.name},
+    Json json = {{"name", r.name},
                        {"path", r.path},
                        {"faults", r.faults},
                        {"seed", r.seed},
@@ -83,6 +102,7 @@ std::string stressJson(const StressReport& r) {
                        {"violations", r.violations},
                        {"orders", orders},
                        {"samples", samples}};
+    if (r.views) json["several_views"] = toJson(*r.views);
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -104,7 +124,7 @@ std::string stressMarkdown(const StressReport& r) {
                         ratio(r.frameMs.p99, r.frameMsNoLoads.p99), formatCount(r.loads), formatCount(r.evictions), formatCount(r.failures),
                         formatCount(r.pagesGivenUp), r.errorPixels, r.relaxed ? "; the budget was too small for some views" : "");
     text += "\n![resident bytes](stress_bytes.svg)\n![pages](stress_pages.svg)\n![frame time](stress_frames.svg)\n![error](stress_error.svg)\n";
-    return text + ordersMarkdown(r.orders);
+    return text + ordersMarkdown(r.orders) + viewsMarkdown(r.views);
 }
 
 std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport& r) {

@@ -420,6 +420,14 @@ TEST_F(CommandLine, StressReportsAndItsInvariantsHold) {
         EXPECT_GT(curve["samples"][0]["error"].get<double>(), 0);
     }
     EXPECT_GT(fs::file_size(fs::path(out) / "stress_orders.svg"), 100u);
+    const Ran together = run({"stress", dataset().string(), "--path", "orbit", "--frames", "4", "--size", "64x48", "--error-pixels", "0.02", "--views", "3", "--json",
+                              "--progress", "none"});
+    ASSERT_EQ(together.status, 0) << together.out << together.err;
+    const Json views = Json::parse(together.out)["several_views"];
+    EXPECT_EQ(views["views"], 3);
+    EXPECT_EQ(views["identical"], 3);
+    EXPECT_EQ(views["relaxed"], 0);
+    EXPECT_EQ(views["loads"], views["pages_resident"]) << "each page once, for all";
     expectFailure(run({"stress", dataset().string(), "--order", "newest"}), 2, "newest");
     expectFailure(run({"stress", dataset().string(), "--path", "no/such/file"}), 1, "no/such/file");
     expectFailure(run({"stress", dataset().string(), "--faults", "error=2"}), 2, "error=2");
