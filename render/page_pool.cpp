@@ -4,12 +4,21 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "render/frame.h"
+#include "render/vulkan/compute_pipeline.h"
 
 namespace vcp {
+
+namespace {
+
+// Of the staging buffer, where there is one; more where a page is larger.
+constexpr uint64_t kStagingBytes = 4ull << 20;
+
+}  // namespace
 
 uint64_t poolChunkBytes(const VkPhysicalDeviceLimits& limits, PageAccess access) {
     const uint64_t reach = access == PageAccess::TexelBuffer ? uint64_t{limits.maxTexelBufferElements} * 16 : limits.maxStorageBufferRange;
@@ -53,20 +62,57 @@ Result<void> PagePool::reserveStaging(uint64_t bytes) {
     return {};
 }
 
+bool PagePool::overlapsWaiting(uint64_t chunk, uint64_t at, uint64_t bytes) const {
+    return std::any_of(waiting_.begin(), waiting_.end(), [&](const StagedCopy& copy) {
+        return copy.chunk == chunk && at < copy.region.dstOffset + copy.region.size && copy.region.dstOffset < at + bytes;
+    });
+}
+
 Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes) {
     assert(at + bytes.size() <= slot.units * kPoolUnitBytes && at % 16 == 0 && bytes.size() % 16 == 0);
-    const uint64_t to = slot.firstUnit * kPoolUnitBytes + at;
-    const Chunk& chunk = chunks_[to / chunkBytes()];
-    if (std::byte* mapped = chunk.buffer.mapped()) {
-        std::memcpy(mapped + to % chunkBytes(), bytes.data(), bytes.size());
+    const uint64_t place = slot.firstUnit * kPoolUnitBytes + at;
+    const uint64_t chunk = place / chunkBytes(), to = place % chunkBytes();
+    if (std::byte* mapped = chunks_[chunk].buffer.mapped()) {
+        std::memcpy(mapped + to, bytes.data(), bytes.size());
         return {};
     }
-    VCP_TRY(reserveStaging(bytes.size()));
-    std::memcpy(staging_.mapped(), bytes.data(), bytes.size());
+    // Copies of one submission have no order among them.
+    if (stagedBytes_ + bytes.size() > staging_.bytes() || overlapsWaiting(chunk, to, bytes.size())) {
+        VCP_TRY(flush());
+        VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));
+    }
+    std::memcpy(staging_.mapped() + stagedBytes_, bytes.data(), bytes.size());
+    waiting_.push_back({chunk, {stagedBytes_, to, bytes.size()}});
+    stagedBytes_ += bytes.size();
+    return {};
+}
+
+Result<void> PagePool::flush() {
+    if (waiting_.empty()) return {};
+    stagedBytes_ = 0;
+    const std::vector<StagedCopy> copies = std::exchange(waiting_, {});
     return device_.submitAndWait([&](VkCommandBuffer commands) {
-        const VkBufferCopy region{0, to % chunkBytes(), bytes.size()};
-        vkCmdCopyBuffer(commands, staging_.handle(), chunk.buffer.handle(), 1, &region);
+        for (const StagedCopy& copy : copies) vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
     });
+}
+
+Result<void> PagePool::read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes) {
+    assert(at + bytes.size() <= slot.units * kPoolUnitBytes);
+    const uint64_t from = slot.firstUnit * kPoolUnitBytes + at;
+    const Chunk& chunk = chunks_[from / chunkBytes()];
+    if (const std::byte* mapped = chunk.buffer.mapped()) {
+        std::memcpy(bytes.data(), mapped + from % chunkBytes(), bytes.size());
+        return {};
+    }
+    VCP_TRY(flush());
+    VCP_TRY(reserveStaging(bytes.size()));
+    VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{from % chunkBytes(), 0, bytes.size()};
+        vkCmdCopyBuffer(commands, chunk.buffer.handle(), staging_.handle(), 1, &region);
+        barrierTransferToHost(commands);
+    }));
+    std::memcpy(bytes.data(), staging_.mapped(), bytes.size());
+    return {};
 }
 
 Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
@@ -79,6 +125,7 @@ Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
         return {};
     }
     // Regions of one copy must not overlap: by way of the staging buffer.
+    VCP_TRY(flush());
     VCP_TRY(reserveStaging(bytes));
     VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
         const VkBufferCopy region{source % chunkBytes(), 0, bytes};

@@ -1,6 +1,6 @@
 // Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that
 // shaders see as texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into
-// their slots; elsewhere through a staging buffer and a copy. A slot is written only while no frame that
+// their slots; elsewhere through a staging buffer, many with one submission. A slot is written only while no frame that
 // could read it is in flight: the renderer waits for each frame. Who is in which slot is not known here
 // (streaming/residency_policy.h).
 #pragma once
@@ -20,8 +20,13 @@ public:
     static Result<std::unique_ptr<PagePool>> create(Device& device, uint64_t bytes, PageAccess access);
     ~PagePool();
 
-    /// Writes at byte `at` of a slot. Precondition: they fit into the slot and are multiples of 16. Errors: Device.
+    /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: they fit into the slot and are multiples
+    /// of 16. Errors: Device.
     Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes);
+    /// What was written is there for all that is submitted later. Errors: Device.
+    Result<void> flush();
+    /// Reads from byte `at` of a slot; as write(). Errors: Device.
+    Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes);
     /// Copies a slot's bytes; the two are of one chunk and may overlap. Errors: Device.
     Result<void> move(PoolSlot from, PoolSlot to);
 
@@ -41,13 +46,20 @@ private:
     };
     PagePool(Device& device, uint64_t bytes) : device_(device), bytes_(bytes) {}
     [[nodiscard]] uint64_t chunkBytes() const { return uint64_t{16} << chunkShift_; }
+    struct StagedCopy {
+        uint64_t chunk = 0;
+        VkBufferCopy region{};
+    };
     Result<void> reserveStaging(uint64_t bytes);
+    [[nodiscard]] bool overlapsWaiting(uint64_t chunk, uint64_t at, uint64_t bytes) const;
 
     Device& device_;
     uint64_t bytes_;
     std::vector<Chunk> chunks_;
     uint32_t chunkShift_ = 0;
     Buffer staging_;
+    uint64_t stagedBytes_ = 0;
+    std::vector<StagedCopy> waiting_;  // from the staging buffer to the pool, not submitted yet
 };
 
 /// Largest chunk that shaders of this device can address whole, a power of two of at most 1 GiB.

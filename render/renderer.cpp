@@ -14,6 +14,7 @@
 
 #include "render/frame_setup.h"
 #include "render/passes/beam.h"
+#include "render/passes/feedback.h"
 #include "render/passes/light.h"
 #include "render/passes/paper_trace.h"
 #include "render/passes/readback.h"
@@ -29,10 +30,12 @@ namespace {
 
 constexpr uint64_t kLeastBudget = 1ull << 20;
 
+const Error kGone{.code = ErrorCode::Device, .message = "the device was lost and could not be made anew"};
+
 /// GPU clock readings between passes.
 class PassTimer {
 public:
-    static constexpr uint32_t kMarks = 5;
+    static constexpr uint32_t kMarks = 6;
 
     Result<void> create(const Device& device) {
         device_ = &device;
@@ -64,7 +67,7 @@ public:
     }
 
 private:
-    const Device* device_ = nullptr;
+    const Device* device_ = nullptr;  // not owned
     VkQueryPool pool_ = VK_NULL_HANDLE;
 };
 
@@ -81,33 +84,93 @@ glm::vec3 unpackNormal(uint32_t code) {
 
 }  // namespace
 
-struct Renderer::State {
+/// What the views of one dataset share.
+struct Renderer::Shared {
     RendererOptions options;
     std::unique_ptr<Instance> instance;
-    std::unique_ptr<Device> device;
-    std::unique_ptr<Swapchain> swapchain;
+    std::unique_ptr<Device> device;  // null after a loss that could not be made good
+    DeviceInfo info;
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
-
     std::unique_ptr<Residency> residency;
-    std::unique_ptr<FrameResources> resources;
+    uint32_t losses = 0;
+    // Views draw one after the other: one set of pipelines does for all.
     BeamPass beam;
     TracePass trace;
     PaperTracePass paperTrace;
     LightPass light;
     ShadePass shade;
-    PassTimer timer;
-    PassConstants constants;
+    FeedbackPass feedback;
+    PassConstants constants;  // of the last frame
+    std::vector<State*> views;
+    ViewNumber nextNumber = 0;
+};
+
+struct Renderer::State {
+    explicit State(std::shared_ptr<Shared> with, std::optional<SurfaceSource> window)
+        : shared(std::move(with)), surface(std::move(window)), number(shared->nextNumber++) {
+        shared->views.push_back(this);
+    }
+    ~State() {
+        std::erase(shared->views, this);
+        if (residency) residency->forgetView(number);
+    }
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+
+    const std::shared_ptr<Shared> shared;
+    RendererOptions& options = shared->options;
+    std::unique_ptr<Instance>& instance = shared->instance;
+    std::unique_ptr<Device>& device = shared->device;
+    DeviceInfo& info = shared->info;
+    PageAccess& access = shared->access;
+    uint32_t& stripes = shared->stripes;
+    std::unique_ptr<Residency>& residency = shared->residency;
+    uint32_t& losses = shared->losses;
+    BeamPass& beam = shared->beam;
+    TracePass& trace = shared->trace;
+    PaperTracePass& paperTrace = shared->paperTrace;
+    LightPass& light = shared->light;
+    ShadePass& shade = shared->shade;
+    FeedbackPass& feedback = shared->feedback;
+    PassConstants& constants = shared->constants;
+
+    const std::optional<SurfaceSource> surface;
+    const ViewNumber number;
+    std::unique_ptr<Swapchain> swapchain;
+    std::unique_ptr<FrameResources> resources;
+    std::optional<PassTimer> timer;
     bool tableStale = true;
-    double errorPixels = 0;  // of the cut
+    uint64_t tableVersion = 0;
+    std::vector<glm::uvec4> table;  // of the last frame
+    double errorPixels = 0;         // of the cut
     std::optional<FrameRequest> drawn;
     bool drawnColour = false;
 
     [[nodiscard]] bool isPaper() const { return residency && residency->dataset().header.method == Method::Paper; }
     /// The request without what the dataset's method cannot draw.
     [[nodiscard]] FrameRequest drawable(FrameRequest request) const;
+    /// The device, and this view's part of it.
+    Result<void> createDevice(const DeviceFaults& faults);
+    Result<VkSurfaceKHR> createSurface() const;
+    Result<void> attach(VkSurfaceKHR window);
+    Result<void> attachToDevice();
+    void release();
+    /// Shaders of all views see no pool; see the residency's, or the dataset is closed where it has none.
+    void hidePool();
+    void showPool();
+    /// Makes all anew that the device held.
+    Result<void> rebuild();
+    /// Does it; after an error that something can be done about, once more.
+    template <class Do>
+    auto tryAgain(Do doIt) -> decltype(doIt());
+    bool recover(bool mayRebuild);
+    Result<FrameStats> draw(const FrameRequest& request);
+    /// Whether this frame has a feedback pass.
+    [[nodiscard]] bool listens() const { return residency && residency->listens() && !isPaper(); }
     [[nodiscard]] PassConstants constantsFor(const FrameRequest& request) const;
     Result<void> checkLimits(const FrameRequest& request) const;
+    Result<void> prepareTable();
     Result<void> prepare(const FrameRequest& request);
     void recordFrame(VkCommandBuffer commands, const FrameRequest& request);
     Result<FrameStats> collectStats(const FrameRequest& request) const;
@@ -121,66 +184,181 @@ Renderer::~Renderer() = default;
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
     if (options.budgetBytes < kLeastBudget)
         return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", options.budgetBytes, kLeastBudget)};
-    auto state = std::make_unique<State>();
-    state->options = options;
+    auto shared = std::make_shared<Shared>();
+    shared->options = options;
     auto instance = Instance::create(options.validation, options.surface ? options.surface->instanceExtensions : std::vector<std::string>{});
     if (!instance) return instance.error();
-    state->instance = std::move(*instance);
-    VkSurfaceKHR surface = VK_NULL_HANDLE;
-    if (options.surface) VCP_VK(options.surface->createSurface, state->instance->handle(), &surface);
-    auto device = Device::create(*state->instance, options.device, surface);
-    if (!device) {
-        if (surface != VK_NULL_HANDLE) vkDestroySurfaceKHR(state->instance->handle(), surface, nullptr);
-        return device.error();
-    }
-    state->device = std::move(*device);
-    if (surface != VK_NULL_HANDLE) state->swapchain = std::make_unique<Swapchain>(state->instance->handle(), *state->device, surface);
-    const bool software = state->device->info().software;
-    state->access = options.access != PageAccess::Auto ? options.access : software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
-    state->stripes = software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
-    VCP_TRY(state->timer.create(*state->device));
-    auto resources = FrameResources::create(*state->device);
-    if (!resources) return resources.error();
-    state->resources = std::move(*resources);
+    shared->instance = std::move(*instance);
+    auto state = std::make_unique<State>(shared, options.surface);
+    VCP_TRY(state->createDevice(options.faults));
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
 
-const DeviceInfo& Renderer::device() const { return state_->device->info(); }
+Result<std::unique_ptr<Renderer>> Renderer::addView(const std::optional<SurfaceSource>& surface) {
+    if (!state_->device) return kGone;
+    auto state = std::make_unique<State>(state_->shared, surface);
+    VCP_TRY(state->attachToDevice());
+    state->showPool();
+    return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
+}
+
+Result<VkSurfaceKHR> Renderer::State::createSurface() const {
+    VkSurfaceKHR made = VK_NULL_HANDLE;
+    if (surface) VCP_VK(surface->createSurface, instance->handle(), &made);
+    return made;
+}
+
+Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
+    const auto window = createSurface();
+    if (!window) return window.error();
+    auto made = Device::create(*instance, options.device, *window, faults);
+    if (!made) {
+        if (*window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
+        return made.error();
+    }
+    device = std::move(*made);
+    info = device->info();
+    access = options.access != PageAccess::Auto ? options.access : info.software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
+    stripes = info.software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
+    return attach(*window);
+}
+
+Result<void> Renderer::State::attach(VkSurfaceKHR window) {
+    if (window != VK_NULL_HANDLE) swapchain = std::make_unique<Swapchain>(instance->handle(), *device, window);
+    VCP_TRY(timer.emplace().create(*device));
+    auto made = FrameResources::create(*device);
+    if (!made) return made.error();
+    resources = std::move(*made);
+    return {};
+}
+
+Result<void> Renderer::State::attachToDevice() {
+    const auto window = createSurface();
+    if (!window) return window.error();
+    if (*window == VK_NULL_HANDLE || device->shows(*window)) return attach(*window);
+    vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
+    return Error{.code = ErrorCode::Device, .message = "device '" + info.name + "', as it was chosen for the first view, cannot show pictures in this window"};
+}
+
+void Renderer::State::release() {
+    drawn.reset();
+    timer.reset();
+    swapchain.reset();
+    resources.reset();
+}
+
+void Renderer::State::hidePool() {
+    for (State* view : shared->views)
+        if (view->resources) view->resources->setPools(nullptr, nullptr);
+}
+
+void Renderer::State::showPool() {
+    static_cast<void>(device->takeOutOfMemory());  // a pool that was halved for it is fine
+    if (residency && !residency->hasPool()) residency.reset();
+    const PagePool* pool = residency ? &residency->pages() : nullptr;
+    for (State* view : shared->views) {
+        view->tableStale = true;
+        view->resources->setPools(pool, pool != nullptr && residency->hasColour() ? pool : nullptr);
+    }
+}
+
+Result<void> Renderer::State::rebuild() {
+    ++losses;
+    if (residency) residency->releasePool();
+    for (State* view : shared->views) view->release();
+    beam.clear(), trace.clear(), paperTrace.clear(), light.clear(), shade.clear();
+    feedback.release();
+    device.reset();
+    DeviceFaults faults = options.faults;
+    faults.lostAtSubmission = 0;
+    // A window decides which queue there has to be.
+    const auto windowed = std::find_if(shared->views.begin(), shared->views.end(), [](const State* view) { return view->surface.has_value(); });
+    State* const first = windowed != shared->views.end() ? *windowed : this;
+    VCP_TRY(first->createDevice(faults));
+    for (State* view : shared->views)
+        if (view != first) VCP_TRY(view->attachToDevice());
+    if (!residency) return {};
+    const auto done = residency->rebuild(*device, access);
+    showPool();
+    return done;
+}
+
+template <class Do>
+auto Renderer::State::tryAgain(Do doIt) -> decltype(doIt()) {
+    const uint32_t before = losses;
+    auto done = doIt();
+    // A device that is lost each time it does this is of no use; the pool can be halved a few times only.
+    while (!done && recover(losses == before)) done = doIt();
+    return done;
+}
+
+bool Renderer::State::recover(bool mayRebuild) {
+    if (!device) return false;
+    if (device->isLost()) return mayRebuild && rebuild().ok();
+    if (!device->takeOutOfMemory() || !residency) return false;
+    hidePool();
+    const bool halved = residency->setBudgets(*device, access, residency->pages().bytes() / 2, options.ramBytes).ok();
+    showPool();
+    return halved;
+}
+
+const DeviceInfo& Renderer::device() const { return state_->info; }
 PageAccess Renderer::access() const { return state_->access; }
 std::vector<std::string> Renderer::validationMessages() const { return state_->instance->log().messages(); }
 
 Result<void> Renderer::open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
+    if (!state_->device) return kGone;
     close();
     const RendererOptions& o = state_->options;
     ResidencyOptions options;
     options.budgetBytes = o.budgetBytes;
     options.uploadBytes = o.uploadBytes;
+    options.order = o.order;
     options.loader.withColour = o.colour;
     options.loader.threads = o.loaderThreads;
     options.loader.heldBytes = o.ramBytes;
     auto residency = Residency::create(*state_->device, state_->access, options, std::move(dataset), std::move(source));
     if (!residency) return residency.error();
     state_->residency = std::move(*residency);
-    const PagePool* pool = &state_->residency->pages();
-    state_->resources->setPools(pool, state_->residency->hasColour() ? pool : nullptr);
+    state_->showPool();
+    return {};
+}
+
+Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
+    State& s = *state_;
+    if (!s.device) return kGone;
+    if (budgetBytes < kLeastBudget)
+        return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
+    if (s.residency) {
+        s.hidePool();
+        const auto done = s.residency->setBudgets(*s.device, s.access, budgetBytes, ramBytes);
+        s.showPool();
+        if (!done) return done;
+    }
+    s.options.budgetBytes = budgetBytes;
+    s.options.ramBytes = ramBytes;
     return {};
 }
 
 void Renderer::close() {
     State& s = *state_;
-    s.resources->setPools(nullptr, nullptr);
+    s.hidePool();
     s.residency.reset();
-    s.drawn.reset();
-    s.tableStale = true;
+    for (State* view : s.shared->views) {
+        view->drawn.reset();
+        view->tableStale = true;
+    }
 }
 
 Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
     State& s = *state_;
+    if (!s.device) return kGone;
     if (!s.residency) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
-    auto result = s.residency->update(selectionView(request));
-    if (result) s.tableStale = s.tableStale || result->changed;
-    if (result) s.errorPixels = result->errorPixels;
+    auto result = s.tryAgain([&] { return s.residency->update(selectionView(request), s.number); });
+    if (!result) return result;
+    result->deviceLosses = s.losses;
+    s.errorPixels = result->errorPixels;
     return result;
 }
 
@@ -198,7 +376,7 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
             return result;
         }
         if (cancel && cancel()) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
-        state_->residency->waitForPage(std::chrono::milliseconds(100));
+        waitForPage(std::chrono::milliseconds(100));
     }
 }
 
@@ -228,6 +406,17 @@ Result<void> Renderer::State::checkLimits(const FrameRequest& request) const {
                                         device->info().name, std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) / (words / (uint64_t{request.width} * request.height)))};
 }
 
+Result<void> Renderer::State::prepareTable() {
+    const uint64_t version = residency ? residency->version() : 0;
+    if (!tableStale && version == tableVersion) return {};
+    auto next = residency ? residency->table(number) : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+    if (tableStale || next != table) VCP_TRY(resources->setTable(next));
+    table = std::move(next);
+    tableVersion = version;
+    tableStale = false;
+    return {};
+}
+
 Result<void> Renderer::State::prepare(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
     VCP_TRY(checkLimits(request));
@@ -238,35 +427,40 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
         paperTrace.clear();
         light.clear();
         shade.clear();
+        feedback.clear();
     }
     constants = wanted;
     VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
     resources->setBackground(backgroundRows(request.shading, request.height));
-    if (tableStale && residency) VCP_TRY(resources->setTable(residency->table()));
-    if (tableStale && !residency) VCP_TRY(resources->setTable(std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0))));
-    tableStale = false;
+    VCP_TRY(prepareTable());
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
     if (isPaper()) VCP_TRY(paperTrace.prepare(*resources, constants, sections != SectionKind::None, request.march));
     else VCP_TRY(trace.prepare(*resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
     if (traceLight) VCP_TRY(light.prepare(*resources, constants));
+    if (listens()) VCP_TRY(feedback.prepare(*device, *resources, constants, table));
     return shade.prepare(*resources, constants, traceLight);
 }
 
 void Renderer::State::recordFrame(VkCommandBuffer commands, const FrameRequest& request) {
-    timer.reset(commands);
-    resources->begin(commands, frameConstants(request, residency ? &residency->dataset() : nullptr, stripes, constants.colour, errorPixels));
-    timer.mark(commands, 0);
+    timer->reset(commands);
+    frame::FrameConstants c = frameConstants(request, residency ? &residency->dataset() : nullptr, stripes, constants.colour, errorPixels);
+    c.lattice.z = feedback.jitter().x;
+    c.lattice.w = feedback.jitter().y;
+    resources->begin(commands, c);
+    timer->mark(commands, 0);
     beam.record(commands, *resources);
-    timer.mark(commands, 1);
+    timer->mark(commands, 1);
     if (isPaper()) paperTrace.record(commands, *resources);
     else trace.record(commands, *resources);
-    timer.mark(commands, 2);
+    timer->mark(commands, 2);
     if (hasLight(request.shading)) light.record(commands, *resources);
-    timer.mark(commands, 3);
+    timer->mark(commands, 3);
     shade.record(commands, *resources);
-    timer.mark(commands, 4);
+    timer->mark(commands, 4);
+    if (listens()) feedback.record(commands);
+    timer->mark(commands, 5);
 }
 
 FrameRequest Renderer::State::drawable(FrameRequest request) const {
@@ -277,16 +471,21 @@ FrameRequest Renderer::State::drawable(FrameRequest request) const {
 }
 
 Result<FrameStats> Renderer::render(const FrameRequest& wanted) {
-    State& s = *state_;
-    s.drawn.reset();
-    const FrameRequest request = s.drawable(wanted);
-    VCP_TRY(s.prepare(request));
+    const FrameRequest request = state_->drawable(wanted);
+    return state_->tryAgain([&] { return state_->draw(request); });
+}
+
+Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
+    drawn.reset();
+    if (!device) return kGone;
+    VCP_TRY(prepare(request));
     const auto began = std::chrono::steady_clock::now();
-    VCP_TRY(s.device->submitAndWait([&](VkCommandBuffer commands) { s.recordFrame(commands, request); }));
+    VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) { recordFrame(commands, request); }));
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    s.drawn = request;
-    s.drawnColour = s.constants.colour;
-    auto stats = s.collectStats(request);
+    drawn = request;
+    drawnColour = constants.colour;
+    if (listens()) residency->hear(feedback.read(), selectionView(request));
+    auto stats = collectStats(request);
     if (stats) stats->msFrame = took.count();
     return stats;
 }
@@ -302,17 +501,19 @@ Result<FrameStats> Renderer::State::collectStats(const FrameRequest& request) co
     stats.tracedRays = std::min<uint64_t>(stats.rays, uint64_t{listed->front()} * frame::kTileSize * frame::kTileSize);
     stats.steps = (*counters)[2];
     stats.fetches = (*counters)[3];
-    auto ms = timer.read();
+    auto ms = timer->read();
     if (!ms) return ms.error();
     stats.msBeam = (*ms)[0];
     stats.msTrace = (*ms)[1];
     stats.msLight = (*ms)[2];
     stats.msShade = (*ms)[3];
+    stats.msFeedback = (*ms)[4];
+    stats.feedbackPasses = feedback.passes();
     stats.pipelines = resources->pipelinesMade();
     if (residency) {
         stats.colourBytes = residency->colourBytes();
         stats.poolBytes = residency->pages().bytes();
-        stats.pagesInCut = static_cast<uint32_t>(residency->cut().size());
+        stats.pagesInCut = static_cast<uint32_t>(residency->cut(number).size());
     }
     return stats;
 }

@@ -14,6 +14,11 @@
 //
 // A picture without a window is settle(request), render(request), readPicture(). The same request and the
 // same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
+//
+// Several views of one dataset, such as the widgets of one program, share device, pool, budgets and loader:
+// renderer->addView() is a Renderer with camera, pictures and window of its own. What all of them want is read once; a
+// budget too small for all relaxes all together. Each is updated and drawn by itself; update() of one may change what
+// another draws next, which that one's update() then says. One thread at a time may call any of them.
 #pragma once
 
 #include <chrono>
@@ -32,6 +37,7 @@
 #include "octree/vcp_file.h"
 #include "render/camera.h"
 #include "render/picture.h"
+#include "streaming/load_order.h"
 #include "streaming/page_source.h"
 
 namespace vcp {
@@ -61,6 +67,13 @@ struct SurfaceSource {
     std::function<VkResult(VkInstance, VkSurfaceKHR*)> createSurface;
 };
 
+/// What goes wrong, or is lacking, on purpose: for tests.
+struct DeviceFaults {
+    bool separateMemory = false;        ///< the CPU does not see the device's memory, as on a discrete GPU
+    uint64_t memoryBytes = UINT64_MAX;  ///< more the device has not
+    uint64_t lostAtSubmission = 0;      ///< the device is lost at this submission of work, once; 0: never
+};
+
 struct RendererOptions {
     std::string device;             ///< index, or part of the name in any case; empty: the best one
     uint64_t budgetBytes = 512ull << 20;  ///< of the page pool, never exceeded; at least 1 MiB
@@ -69,7 +82,9 @@ struct RendererOptions {
     PageAccess access = PageAccess::Auto;
     uint32_t loaderThreads = 2;
     uint64_t ramBytes = 256ull << 20;     ///< of pages being read and not in the pool yet, never exceeded
+    LoadOrder order = LoadOrder::Feedback;  ///< of pages; others are for comparison
     uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
+    DeviceFaults faults;
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
 };
 
@@ -137,9 +152,10 @@ struct UpdateResult {
     uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
     bool relaxed = false;       ///< the budget is too small for the view's pixel error; errorPixels says what it has
-    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool since open()
+    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool since open() or setBudgets()
     uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
     uint64_t reloads = 0;       ///< pages loaded twice in one still view: always 0
+    uint32_t deviceLosses = 0;  ///< since create(): each time all was made anew and pages are read again
     uint64_t failures = 0;      ///< reads that failed and were, or will be, tried again
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
     uint32_t pagesMissing = 0;  ///< wanted, not resident
@@ -152,13 +168,14 @@ struct FrameStats {
     uint64_t rays = 0;        ///< pixels
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
     uint64_t hitPixels = 0;
-    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0;  ///< GPU timestamps; 0 where the device has none
+    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0, msFeedback = 0;  ///< GPU timestamps; 0 where the device has none
     double msFrame = 0;       ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
     uint64_t poolBytes = 0;     ///< allocated for the pool
     uint64_t colourBytes = 0;   ///< of colour, in the pool
     uint32_t pagesInCut = 0;
     uint32_t pipelines = 0;     ///< made since create()
+    uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 
 /// What one pixel shows.
@@ -176,15 +193,25 @@ public:
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
+    /// Another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for a window:
+    /// the options of create() must have had one too. Errors: Device.
+    Result<std::unique_ptr<Renderer>> addView(const std::optional<SurfaceSource>& surface = {});
+
     [[nodiscard]] const DeviceInfo& device() const;
     [[nodiscard]] PageAccess access() const;
 
-    /// Shows a dataset, in place of the one before. Its pages come from `source` in loader threads.
+    /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
     /// Stops the loader and forgets all pages.
     void close();
 
-    /// See the top of this file. Errors: Device. Problems of single pages are in the result.
+    /// Other budgets than the options', from now on: what has no room goes at once, what is kept is not read again where
+    /// `ramBytes` has room to carry it over. Waits for the copies. To be followed by update(). Errors: Usage; Limit,
+    /// where the coarsest page has no room: the budgets stay as they were; Device: the dataset is closed.
+    Result<void> setBudgets(uint64_t budgetBytes, uint64_t ramBytes);
+
+    /// See the top of this file. Where the device runs out of memory, here or in render(), the pool is halved; where the
+    /// device was lost, all is made anew, once a call, and read again. Errors: Device. Problems of single pages are in the result.
     Result<UpdateResult> update(const FrameRequest& request);
     /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
     /// returns true (asked several times a second).
@@ -218,6 +245,7 @@ public:
     [[nodiscard]] std::vector<std::string> validationMessages() const;
 
 private:
+    struct Shared;
     struct State;
     explicit Renderer(std::unique_ptr<State> state);
     std::unique_ptr<State> state_;

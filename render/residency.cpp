@@ -1,27 +1,51 @@
 #include "render/residency.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 namespace vcp {
+
+namespace {
+
+double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+}  // namespace
 
 Result<std::unique_ptr<Residency>> Residency::create(Device& device, PageAccess access, const ResidencyOptions& options,
                                                      std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
     std::unique_ptr<Residency> made(new Residency(options));
     made->options_.loader.withColour = options.loader.withColour && dataset->hasColour();
     made->dataset_ = std::move(dataset);
+    made->source_ = std::move(source);
     VCP_TRY(made->createPool(device, access));
-    made->loader_ = std::make_unique<PageLoader>(std::move(source), made->options_.loader);
+    made->startLoader();
     return made;
+}
+
+void Residency::startLoader() {
+    if (loader_) {
+        const LoaderStats stats = loader_->stats();
+        past_.bytesRead += stats.bytesRead;
+        past_.failures += stats.failures;
+    }
+    loader_.reset();
+    loader_ = std::make_unique<PageLoader>(source_, options_.loader);
+}
+
+bool Residency::hasRoomIn(PoolShape shape) const {
+    return dataset_->pages.empty() || ResidencyPolicy(dataset_, hasColour(), shape).hasRoom();
 }
 
 Result<void> Residency::createPool(Device& device, PageAccess access) {
     for (uint64_t budget = options_.budgetBytes;; budget /= 2) {
         const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budget, poolChunkBytes(device.limits(), access));
-        policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape);
+        if (policy_) policy_->setPool(shape);
+        else policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
         if (!dataset_->pages.empty() && !policy_->hasRoom())
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
@@ -36,23 +60,92 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
     }
 }
 
-Result<UpdateResult> Residency::update(const SelectionView& view) {
+/// Pages of the pool, coarse ones first, as many as fit into the memory for pages.
+Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
+    std::vector<CarriedPage> carried;
+    uint64_t room = options_.loader.heldBytes;
+    Result<void> done;
+    policy_->forEachResident([&](uint64_t page) {
+        const PageEntry& entry = dataset_->pages[page];
+        const uint64_t bytes = uint64_t{entry.pageBytes} + (hasColour() ? entry.colourBytes : 0);
+        if (!done || bytes > room) return;
+        room -= bytes;
+        carried.push_back({page, std::vector<std::byte>(bytes)});
+        done = pool_->read(policy_->slotOf(page), 0, carried.back().bytes);
+    });
+    if (!done) return done.error();
+    return carried;
+}
+
+Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t budgetBytes, uint64_t ramBytes) {
+    const uint64_t chunkBytes = poolChunkBytes(device.limits(), access);
+    const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budgetBytes, chunkBytes);
+    if (!hasRoomIn(shape))
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes)};
+    options_.budgetBytes = budgetBytes;
+    options_.loader.heldBytes = ramBytes;
+    startLoader();  // what the old one held is gone
+    for (const uint64_t page : std::exchange(tooLarge_, {})) policy_->restore(page);
+    if (shape.units * kPoolUnitBytes == pool_->bytes()) return {};
+    auto carried = carryOut();
+    if (!carried) return carried.error();
+    VCP_TRY(rebuild(device, access));
+    for (CarriedPage& page : *carried) {
+        const auto slot = slotFor(page.page);
+        if (!slot) return slot.error();
+        if (*slot) VCP_TRY(pool_->write(**slot, 0, page.bytes));
+        page.bytes = {};
+    }
+    return pool_->flush();
+}
+
+void Residency::releasePool() {
+    pool_.reset();
+    policy_->clear();
+    cuts_.clear();  // all is to be drawn again
+    listens_ = false;
+}
+
+Result<void> Residency::rebuild(Device& device, PageAccess access) {
+    releasePool();
+    return createPool(device, access);
+}
+
+void Residency::forgetView(ViewNumber number) {
+    policy_->forgetView(number);
+    cuts_.erase(number);
+}
+
+const std::vector<uint64_t>& Residency::cut(ViewNumber number) {
+    ViewCut& cut = cuts_[number];
+    if (cut.version != version() && policy_->hasLooked(number)) {
+        cut.pages = policy_->drawable(number).cut;
+        cut.version = version();
+    }
+    return cut.pages;
+}
+
+Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber number) {
     std::vector<LoadedPage> loaded = loader_->collect(options_.uploadBytes);
-    std::vector<Error> problems;
-    for (const LoadedPage& page : loaded)
-        if (!page.bytes && policy_->giveUp(page.page)) problems.push_back(page.bytes.error());
-    policy_->look(view);
+    for (const LoadedPage& page : loaded) {
+        if (page.bytes || !policy_->giveUp(page.page)) continue;
+        problems_.push_back(page.bytes.error());
+        if (page.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(page.page);
+    }
+    policy_->look(view, steadySeconds(), number);
     for (const LoadedPage& page : loaded) {
         if (!page.bytes) continue;
         if (auto placed = place(page); !placed) return placed.error();
     }
-    PolicyOutcome outcome = policy_->finish();
+    VCP_TRY(pool_->flush());
+    PolicyOutcome outcome = policy_->finish(number);
     loader_->request(std::move(outcome.wishes));
-    const bool changed = outcome.drawable.cut != cut_;
-    cut_ = outcome.drawable.cut;
+    listens_ = outcome.missing > 0 && options_.order == LoadOrder::Feedback;
     UpdateResult result = report(outcome);
-    result.changed = changed;
-    result.problems = std::move(problems);
+    ViewCut& cut = cuts_[number];
+    result.changed = cut.version == UINT64_MAX || outcome.drawable.cut != cut.reported;
+    cut = {outcome.drawable.cut, version(), outcome.drawable.cut};
+    result.problems = std::exchange(problems_, {});
     return result;
 }
 
@@ -61,40 +154,47 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     const PolicyCounts& counts = policy_->counts();
     UpdateResult result;
     result.settled = outcome.drawable.complete;
-    result.drawable = !cut_.empty();
-    result.relaxed = outcome.relaxed;
+    const std::vector<uint64_t>& cut = outcome.drawable.cut;
+    result.drawable = !cut.empty();
+    result.relaxed = outcome.drawable.isRelaxed;
     const bool isCertified = dataset_->header.method == Method::Certified;
     result.errorPixels = isCertified ? outcome.drawable.errorPixels : std::numeric_limits<double>::infinity();
     result.residentBytes = policy_->unitsTaken() * kPoolUnitBytes;
     result.heldBytesMax = loader.heldBytesMax;
-    result.bytesRead = loader.bytesRead;
-    result.failures = loader.failures;
+    result.bytesRead = past_.bytesRead + loader.bytesRead;
+    result.failures = past_.failures + loader.failures;
     result.loads = counts.loads;
     result.evictions = counts.evictions;
     result.reloads = counts.reloads;
     result.pagesPending = static_cast<uint32_t>(loader_->pending());
     result.pagesResident = static_cast<uint32_t>(policy_->pagesResident());
-    result.pagesInCut = static_cast<uint32_t>(cut_.size());
-    result.pagesWanted = static_cast<uint32_t>(outcome.wanted);
-    result.pagesMissing = static_cast<uint32_t>(outcome.missing);
-    if (cut_.empty()) return result;
+    result.pagesInCut = static_cast<uint32_t>(cut.size());
+    result.pagesWanted = static_cast<uint32_t>(outcome.drawable.pagesWanted);
+    result.pagesMissing = static_cast<uint32_t>(outcome.drawable.pagesMissing);
+    if (cut.empty()) return result;
     // Pages are numbered level by level, coarsest first.
-    result.coarsestLevel = dataset_->pages[cut_.front()].level;
-    result.finestLevel = dataset_->pages[cut_.back()].level;
+    result.coarsestLevel = dataset_->pages[cut.front()].level;
+    result.finestLevel = dataset_->pages[cut.back()].level;
     return result;
 }
 
-Result<bool> Residency::place(const LoadedPage& page) {
-    const Placement placement = policy_->place(page.page);
+Result<std::optional<PoolSlot>> Residency::slotFor(uint64_t page) {
+    const Placement placement = policy_->place(page);
     for (const PageMove& move : placement.moves) VCP_TRY(pool_->move(move.from, move.to));
-    if (!placement.slot) return false;
+    return placement.slot;
+}
+
+Result<void> Residency::place(const LoadedPage& page) {
+    const auto slot = slotFor(page.page);
+    if (!slot) return slot.error();
+    if (!*slot) return {};
     const std::span geometry = page.bytes->geometryBytes();
     PageHeader& header = headers_[page.page];
     // Pages of the other method say all in a header of their own, which the shader reads.
     if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
-    VCP_TRY(pool_->write(*placement.slot, 0, geometry));
-    if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(*placement.slot, geometry.size(), page.bytes->colourBytes()));
-    return true;
+    VCP_TRY(pool_->write(**slot, 0, geometry));
+    if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), page.bytes->colourBytes()));
+    return {};
 }
 
 uint64_t Residency::colourBytes() const {
@@ -103,8 +203,8 @@ uint64_t Residency::colourBytes() const {
     return bytes;
 }
 
-std::vector<glm::uvec4> Residency::table() const {
-    return pageTable(*dataset_, cut_, [&](uint64_t page) -> std::optional<ResidentPage> {
+std::vector<glm::uvec4> Residency::table(ViewNumber number) {
+    return pageTable(*dataset_, cut(number), [&](uint64_t page) -> std::optional<ResidentPage> {
         if (!policy_->isResident(page)) return {};
         const uint32_t texel = pool_->texel(policy_->slotOf(page));
         const bool colour = hasColour() && dataset_->pages[page].colourBytes > 0;

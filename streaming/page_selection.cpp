@@ -62,15 +62,33 @@ bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionVie
 
 namespace {
 
+// Where a view allows no error, errors are compared as multiples of this.
+constexpr double kLeastErrorPixels = 1e-9;
+
 /// Of pages outside of the view: none.
 double errorInView(const Dataset& dataset, uint64_t page, const SelectionView& view) {
     const PageEntry& entry = dataset.pages[page];
     return inFrustum(dataset, entry, view) ? projectedError(dataset, entry, view) : 0;
 }
 
+bool isTooCoarse(double error, const SelectionView& view) { return error > view.errorPixels; }
+
+/// The page's error as a multiple of what is allowed, in the view where that is largest; 0: fine enough for all.
+double excessOf(const Dataset& dataset, uint64_t page, std::span<const SelectionView> views) {
+    double excess = 0;
+    for (const SelectionView& view : views)
+        if (const double error = errorInView(dataset, page, view); isTooCoarse(error, view))
+            excess = std::max(excess, error / std::max(view.errorPixels, kLeastErrorPixels));
+    return excess;
+}
+
+bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> unavailable) {
+    return page.childMask != 0 && allOf(childrenOf(page), [&](uint64_t child) { return unavailable[child] == 0; });
+}
+
 }  // namespace
 
-PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
+PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
                        std::span<const uint8_t> unavailable) {
     PageChoice choice;
     choice.refined.assign(dataset.pages.size(), 0);
@@ -78,14 +96,14 @@ PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64
     std::priority_queue<Candidate> open;
     uint64_t bytes = pageBytes[0];
     choice.wanted.push_back({0, kInfinity});
-    open.push({errorInView(dataset, 0, view), 0});
+    open.push({excessOf(dataset, 0, views), 0});
     while (!open.empty()) {
         const Candidate next = open.top();
         open.pop();
-        if (next.error <= view.errorPixels) break;
+        if (next.error <= 0) break;
         const PageEntry& entry = dataset.pages[next.page];
+        if (!mayBeRefined(entry, unavailable)) continue;
         const Children children = childrenOf(entry);
-        if (entry.childMask == 0 || !allOf(children, [&](uint64_t child) { return unavailable[child] == 0; })) continue;
         uint64_t more = 0;
         for (uint64_t child = children.first; child < children.end; ++child) more += pageBytes[child];
         if (bytes + more > budgetBytes) {
@@ -96,7 +114,7 @@ PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64
         choice.refined[next.page] = 1;
         for (uint64_t child = children.first; child < children.end; ++child) {
             choice.wanted.push_back({child, next.error});
-            open.push({errorInView(dataset, child, view), child});
+            open.push({excessOf(dataset, child, views), child});
         }
     }
     return choice;
@@ -105,26 +123,36 @@ PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64
 DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice, std::span<const uint8_t> resident) {
     DrawableCut drawable;
     drawable.errorPixels = kInfinity;
-    drawable.complete = std::all_of(choice.wanted.begin(), choice.wanted.end(), [&](const WantedPage& wanted) { return resident[wanted.page] != 0; });
-    if (choice.wanted.empty() || resident[0] == 0) return drawable;
-    drawable.errorPixels = 0;
-    // Refined where all children are there.
-    std::vector<uint64_t> walk{0};
+    drawable.complete = true;
+    if (choice.wanted.empty()) return drawable;
+    const bool hasRoot = resident[0] != 0;
+    if (hasRoot) drawable.errorPixels = 0;
+    // Refined where all children are there; beneath what is drawn, pages are counted only.
+    struct Place {
+        uint64_t page;
+        bool isCovered;
+    };
+    std::vector<Place> walk{{0, !hasRoot}};
     while (!walk.empty()) {
-        const uint64_t page = walk.back();
+        const Place at = walk.back();
         walk.pop_back();
-        const Children children = childrenOf(dataset.pages[page]);
-        if (choice.refined[page] != 0 && allOf(children, [&](uint64_t child) { return resident[child] != 0; })) {
-            for (uint64_t child = children.first; child < children.end; ++child) walk.push_back(child);
-            continue;
-        }
-        drawable.cut.push_back(page);
+        ++drawable.pagesWanted;
+        drawable.pagesMissing += resident[at.page] != 0 ? 0 : 1;
+        const PageEntry& entry = dataset.pages[at.page];
+        const Children children = childrenOf(entry);
+        const double error = errorInView(dataset, at.page, view);
+        const bool refined = choice.refined[at.page] != 0 && isTooCoarse(error, view);
+        const bool drawn = !at.isCovered && !(refined && allOf(children, [&](uint64_t child) { return resident[child] != 0; }));
+        if (refined)
+            for (uint64_t child = children.first; child < children.end; ++child) walk.push_back({child, at.isCovered || drawn});
+        if (!refined && isTooCoarse(error, view) && entry.childMask != 0) drawable.isRelaxed = drawable.isRelaxed || choice.relaxed;
+        if (!drawn) continue;
+        drawable.cut.push_back(at.page);
         // Inside a page's box the error has no bound; it is reported as seen from a cell away.
-        const PageEntry& entry = dataset.pages[page];
-        const double error = errorInView(dataset, page, view);
         const double fromACell = double(entry.certifiedError) * view.pixelsPerUnit / dataset.cellOf(entry.level);
         drawable.errorPixels = std::max(drawable.errorPixels, view.orthographic ? error : std::min(error, fromACell));
     }
+    drawable.complete = drawable.pagesMissing == 0;
     std::sort(drawable.cut.begin(), drawable.cut.end());
     return drawable;
 }
@@ -133,7 +161,7 @@ Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_
                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
                       std::span<const uint8_t> unavailable) {
     Selection selection;
-    static_cast<PageChoice&>(selection) = choosePages(dataset, view, budgetBytes, pageBytes, unavailable);
+    static_cast<PageChoice&>(selection) = choosePages(dataset, {&view, 1}, budgetBytes, pageBytes, unavailable);
     static_cast<DrawableCut&>(selection) = drawableCut(dataset, view, selection, resident);
     return selection;
 }

@@ -7,6 +7,10 @@
 // picture. Pages outside of the view's frustum are not refined. A refined page stays wanted beneath its
 // children: it is what is drawn when they have to go.
 //
+// Several views share one choice and one budget: a page is refined where any of them needs it, the largest error as
+// a multiple of what its view allows first. Each view draws the choice only as fine as it needs, so where the budget
+// suffices it draws what it would draw alone, and where it does not, all are relaxed together.
+//
 // Source: Demir and Westermann 2015, section 4.4, with certified errors in place of voxel sizes.
 #pragma once
 
@@ -37,10 +41,10 @@ struct SelectionView {
 
 struct WantedPage {
     uint64_t page;
-    double priority;  ///< projected error in pixels of what is drawn without it; the root's is infinite
+    double priority;  ///< projected error of what is drawn without it, as a multiple of what views allow; the root's is infinite
 };
 
-/// What a view wants, whatever is resident.
+/// What views want, whatever is resident.
 struct PageChoice {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
@@ -50,17 +54,19 @@ struct PageChoice {
 
 /// `pageBytes[i]`: what page i takes of the budget (any unit). `unavailable[i]`: it cannot be read; its parent is
 /// drawn in its place. Both have one element a page of the dataset.
-PageChoice choosePages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
+PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
                        std::span<const uint8_t> unavailable);
 
-/// What can be drawn of a choice.
+/// What one view can draw of a choice.
 struct DrawableCut {
     std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
     double errorPixels = 0;     ///< largest projected error in the cut, of pages in view, from no nearer than a cell; infinite without one
-    bool complete = false;      ///< all that is wanted is resident; also where nothing can be
+    uint64_t pagesWanted = 0, pagesMissing = 0;  ///< of the choice, that this view needs; of these, not resident
+    bool complete = false;      ///< none is missing; also where nothing can be drawn
+    bool isRelaxed = false;     ///< the budget kept a page of this view from being refined
 };
 
-/// `resident[i]`: page i may be drawn.
+/// `view`: one of those of the choice. `resident[i]`: page i may be drawn.
 DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice, std::span<const uint8_t> resident);
 
 /// Both in one: the answer for a view and what is resident.

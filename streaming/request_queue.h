@@ -61,6 +61,8 @@ public:
     [[nodiscard]] double nextTry() const;
     /// Pages wished for or under way.
     [[nodiscard]] size_t pending() const;
+    /// Elements of all containers: bounded by the dataset's pages.
+    [[nodiscard]] size_t entries() const { return wishes_.size() + priorities_.size() + underWay_.size() + over_.size() + givenUp_.size() + trials_.size(); }
 
 private:
     struct Trial {

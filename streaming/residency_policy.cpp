@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
 
 namespace vcp {
 
@@ -9,6 +10,8 @@ namespace {
 
 // Wishes for what comes later are less urgent than any for what is in view.
 constexpr double kAheadUrgency = 1e-9;
+// Motion is continued for no more steps than this.
+constexpr double kMostAhead = 20;
 
 /// What first fit may leave unused: in every chunk less than the largest page needs. One chunk can be
 /// gathered whole.
@@ -21,6 +24,22 @@ uint64_t largestPageUnits(const Dataset& dataset, bool withColour) {
     uint64_t largest = 1;
     for (const PageEntry& page : dataset.pages) largest = std::max(largest, pageUnits(page, withColour));
     return largest;
+}
+
+/// Where a view that went from `before` to `view` in so many seconds will be.
+std::optional<SelectionView> aheadOf(const SelectionView& view, const SelectionView& before, double seconds) {
+    if (view.orthographic != before.orthographic || seconds <= 0) return std::nullopt;
+    const double times = std::min(kAheadSeconds / seconds, kMostAhead);
+    SelectionView later = view;
+    later.eye += times * (view.eye - before.eye);
+    for (size_t i = 0; i < later.planes.size(); ++i) later.planes[i] += times * (view.planes[i] - before.planes[i]);
+    return later;
+}
+
+std::vector<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
+    std::vector<uint64_t> units;
+    for (const PageEntry& page : dataset.pages) units.push_back(pageUnits(page, withColour));
+    return units;
 }
 
 }  // namespace
@@ -41,11 +60,10 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
     return {std::min(useful, budgetBytes / kPoolUnitBytes), chunk};
 }
 
-ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool)
-    : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk) {
-    for (const PageEntry& page : dataset_->pages) pageUnits_.push_back(pageUnits(page, withColour));
-    const uint64_t unusable = unusableUnits(pool, largestPageUnits(*dataset_, withColour));
-    planned_ = pool.units > unusable ? pool.units - unusable : 0;
+ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order)
+    : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk), pageUnits_(unitsOfAll(*dataset_, withColour)),
+      priorities_(dataset_, pageUnits_, order) {
+    planFor(pool);
     const size_t pages = dataset_->pages.size();
     resident_.assign(pages, 0);
     unavailable_.assign(pages, 0);
@@ -53,35 +71,61 @@ ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool wi
     ranks_.assign(pages, Rank::Stale);
 }
 
-void ResidencyPolicy::look(const SelectionView& view) {
+void ResidencyPolicy::planFor(PoolShape pool) {
+    const uint64_t largest = pageUnits_.empty() ? 1 : *std::max_element(pageUnits_.begin(), pageUnits_.end());
+    const uint64_t unusable = unusableUnits(pool, largest);
+    planned_ = pool.units > unusable ? pool.units - unusable : 0;
+}
+
+void ResidencyPolicy::setPool(PoolShape pool) {
+    clear();
+    allocator_ = SlotAllocator(pool.units, pool.unitsPerChunk);
+    planFor(pool);
+    stale_ = true;
+}
+
+void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber number) {
     ++round_;
-    moving_ = !view_ || *view_ != view;
-    if (moving_) stillSince_ = round_;
-    if (moving_ || stale_) {
-        choice_ = choosePages(*dataset_, view, planned_, pageUnits_, unavailable_);
-        std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
-        ahead_.clear();
-        if (moving_ && view_) lookAhead(view, *view_);
-        for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
-        stale_ = moving_;  // a still view looks at nothing ahead
-    }
-    view_ = view;
+    seconds_ = seconds;
+    const auto known = motions_.find(number);
+    Motion next{view, seconds, std::nullopt, known == motions_.end() || known->second.view != view};
+    if (next.moves && known != motions_.end()) next.later = aheadOf(view, known->second.view, seconds - known->second.seconds);
+    // A view that stands still looks at nothing ahead.
+    stale_ = stale_ || next.moves || known->second.moves;
+    if (next.moves || emptied_) stillSince_ = round_;
+    emptied_ = false;
+    motions_[number] = next;
+    moving_ = std::any_of(motions_.begin(), motions_.end(), [](const auto& motion) { return motion.second.moves; });
+    if (stale_) choose();
     for (const WantedPage& wanted : choice_.wanted)
         if (const auto at = slots_.find(wanted.page); at != slots_.end()) at->second.lastWanted = round_;
 }
 
-void ResidencyPolicy::lookAhead(const SelectionView& view, const SelectionView& before) {
-    if (view.orthographic != before.orthographic) return;
-    SelectionView later = view;
-    later.eye += double(kAheadRounds) * (view.eye - before.eye);
-    for (size_t i = 0; i < later.planes.size(); ++i) later.planes[i] += double(kAheadRounds) * (view.planes[i] - before.planes[i]);
-    ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, unavailable_).wanted;
+void ResidencyPolicy::forgetView(ViewNumber number) {
+    motions_.erase(number);
+    stale_ = true;
+}
+
+void ResidencyPolicy::choose() {
+    views_.clear();
+    std::vector<SelectionView> later;
+    for (const auto& [number, motion] : motions_) {
+        views_.push_back(motion.view);
+        later.push_back(motion.later.value_or(motion.view));
+    }
+    choice_ = choosePages(*dataset_, views_, planned_, pageUnits_, unavailable_);
+    std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
+    ahead_.clear();
+    if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, unavailable_).wanted;
     for (const WantedPage& wanted : ahead_) ranks_[wanted.page] = Rank::Ahead;
+    for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
+    stale_ = false;
+    ++version_;
 }
 
 bool ResidencyPolicy::mayEvict(uint64_t page, const Resident& resident, Rank forRank) const {
     if (page == 0 || rankOf(page) >= forRank) return false;
-    return !moving_ || resident.loaded + kSettlingRounds <= round_;
+    return !moving_ || resident.loaded + kSettlingSeconds <= seconds_;
 }
 
 bool ResidencyPolicy::evictOne(Rank forRank) {
@@ -105,6 +149,7 @@ void ResidencyPolicy::evict(uint64_t page) {
     pageAt_.erase(slot.firstUnit);
     slots_.erase(page);
     resident_[page] = 0;
+    ++version_;
     ++counts_.evictions;
 }
 
@@ -146,6 +191,7 @@ bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
         allocator_.release(from);
         allocator_.take(slot);
         moves.push_back({page, from, slot});
+        ++version_;
         ++counts_.moves;
     }
     return true;
@@ -167,11 +213,12 @@ Placement ResidencyPolicy::place(uint64_t page) {
         ++counts_.refused;
         return placement;
     }
-    slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, round_});
+    slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, seconds_});
     pageAt_.emplace(placement.slot->firstUnit, page);
     resident_[page] = 1;
+    ++version_;
     ++counts_.loads;
-    if (loadedIn_[page] == stillSince_) ++counts_.reloads;
+    if (loadedIn_[page] == stillSince_ && !emptied_) ++counts_.reloads;
     loadedIn_[page] = stillSince_;
     return placement;
 }
@@ -184,18 +231,22 @@ uint64_t ResidencyPolicy::unitsWithin(Rank forRank) const {
     return units;
 }
 
-PolicyOutcome ResidencyPolicy::finish() const {
+DrawableCut ResidencyPolicy::drawable(ViewNumber number) const {
+    assert(hasLooked(number));
+    return drawableCut(*dataset_, motions_.at(number).view, choice_, resident_);
+}
+
+PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     PolicyOutcome outcome;
-    assert(view_);
-    outcome.drawable = drawableCut(*dataset_, *view_, choice_, resident_);
-    outcome.relaxed = choice_.relaxed;
-    outcome.wanted = choice_.wanted.size();
+    outcome.drawable = drawable(number);
+    std::vector<WantedPage> missing;
+    std::copy_if(choice_.wanted.begin(), choice_.wanted.end(), std::back_inserter(missing),
+                 [&](const WantedPage& wanted) { return !isResident(wanted.page); });
+    outcome.missing = missing.size();
     // Wishes in order of urgency, as long as there is room for them.
     uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
     bool full = false;
-    for (const WantedPage& wanted : choice_.wanted) {
-        if (isResident(wanted.page)) continue;
-        ++outcome.missing;
+    for (const WantedPage& wanted : priorities_.ordered(std::move(missing), views_)) {
         full = full || reserved + pageUnits_[wanted.page] > room;
         if (full) continue;
         reserved += pageUnits_[wanted.page];
@@ -203,11 +254,14 @@ PolicyOutcome ResidencyPolicy::finish() const {
     }
     if (ahead_.empty() || full) return outcome;
     room = unitsWithin(Rank::Ahead);
+    double urgency = 1e6;
     for (const WantedPage& wanted : ahead_) {
         if (isResident(wanted.page) || rankOf(wanted.page) != Rank::Ahead) continue;
         reserved += pageUnits_[wanted.page];
         if (reserved > room) break;
-        outcome.wishes.push_back({wanted.page, std::min(wanted.priority, 1e6) * kAheadUrgency});
+        // Parents, which come before, are no less urgent.
+        urgency = std::min(urgency, wanted.priority);
+        outcome.wishes.push_back({wanted.page, urgency * kAheadUrgency});
     }
     return outcome;
 }
@@ -219,8 +273,23 @@ bool ResidencyPolicy::giveUp(uint64_t page) {
     return true;
 }
 
+uint64_t ResidencyPolicy::bytesHeld() const {
+    constexpr uint64_t kNode = 4 * sizeof(void*);  // of a map, beside its value
+    const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
+    uint64_t bytes = bytesOf(pageUnits_) + bytesOf(resident_) + bytesOf(unavailable_) + bytesOf(loadedIn_) + bytesOf(views_) + bytesOf(ahead_) + bytesOf(ranks_);
+    bytes += bytesOf(choice_.wanted) + bytesOf(choice_.refined) + priorities_.bytesHeld() + allocator_.bytesHeld();
+    bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
+    return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);
+}
+
+void ResidencyPolicy::restore(uint64_t page) {
+    unavailable_[page] = 0;
+    stale_ = true;
+}
+
 void ResidencyPolicy::clear() {
     while (!slots_.empty()) evict(slots_.begin()->first);
+    emptied_ = true;  // what was lost may come again
 }
 
 }  // namespace vcp

@@ -1,24 +1,27 @@
 // Which pages of a dataset are in the pool, where, and which are wished for. Pure: no threads, no clock, no
-// GPU; a round's outcome depends on the views, the pages that were placed, and nothing else.
+// GPU; a round's outcome depends on the views, the pages that were placed, the time it is told, and nothing else.
 //
 // A round, one for each update of a view:
 //
-//   policy.look(view);                       // what this view wants
+//   policy.look(view, seconds);              // what the views want
 //   for each page that was read:
 //       placement = policy.place(page);      // makes room: evicts what is not wanted, moves pages together
 //       carry out placement.moves, then write the page into placement.slot
 //   outcome = policy.finish();               // what can be drawn, what to read next
 //
+// Several views, each with a number of its own, share the pool: what any of them wanted in its last look() is wanted
+// (page_selection.h), until forgetView().
+//
 // Rules:
-// - A page's units are counted once, in the pool's; what look() wants always fits into the pool at once, with
-//   its fragments moved together. So every still view settles, on pages that depend on the view, the pool's
+// - A page's units are counted once, in the pool's; what the views want always fits into the pool at once, with
+//   its fragments moved together. So all still views settle, on pages that depend on the views, the pool's
 //   size and the pages that cannot be read, and not on what was there before.
-// - Parents before children; children are evicted before parents; what this view wants is not evicted, so
-//   a still view loads no page twice. The coarsest page is wanted by all views.
-// - Hysteresis: while the view moves, a page that came less than kSettlingRounds rounds ago is not evicted
+// - Parents before children; children are evicted before parents; what a view wants is not evicted, so
+//   still views load no page twice. The coarsest page is wanted by all views.
+// - Hysteresis: while a view moves, a page that came less than kSettlingSeconds ago is not evicted
 //   for another, and what would need its place is not wished for.
-// - While the view moves, what it would want a little later (its motion continued for kAheadRounds rounds) is
-//   wished for last, and only into places that are free or hold what neither view wants.
+// - While a view moves, what it would want a little later (its motion continued for kAheadSeconds) is
+//   wished for last, and only into places that are free or hold what no view wants.
 #pragma once
 
 #include <cstdint>
@@ -28,14 +31,18 @@
 #include <vector>
 
 #include "octree/vcp_file.h"
+#include "streaming/load_order.h"
 #include "streaming/page_selection.h"
 #include "streaming/request_queue.h"
 #include "streaming/slot_allocator.h"
 
 namespace vcp {
 
-inline constexpr uint64_t kSettlingRounds = 30;
-inline constexpr uint64_t kAheadRounds = 10;
+inline constexpr double kSettlingSeconds = 0.5;
+inline constexpr double kAheadSeconds = 0.2;
+
+/// A view among those that share a pool.
+using ViewNumber = uint32_t;
 
 /// A pool of slots of kPoolUnitBytes, in chunks that no slot crosses.
 struct PoolShape {
@@ -65,28 +72,44 @@ struct PolicyCounts {
 };
 
 struct PolicyOutcome {
-    DrawableCut drawable;
-    std::vector<PageRequest> wishes;
-    uint64_t wanted = 0, missing = 0;  ///< pages, of this view
-    bool relaxed = false;              ///< the pool is too small for the view's pixel error
+    DrawableCut drawable;             ///< of one view
+    std::vector<PageRequest> wishes;  ///< of all views
+    uint64_t missing = 0;             ///< pages that any view wants
 };
 
 class ResidencyPolicy {
 public:
-    /// `pool` from poolShapeFor.
-    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool);
+    /// `pool` from poolShapeFor. `order` decides what is read first, and nothing else.
+    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order = LoadOrder::Feedback);
 
     /// Whether the coarsest page fits.
     [[nodiscard]] bool hasRoom() const { return !pageUnits_.empty() && pageUnits_[0] <= planned_; }
 
-    void look(const SelectionView& view);
+    /// `seconds`: the time, on any clock; never less than before.
+    void look(const SelectionView& view, double seconds, ViewNumber number = 0);
+    /// The view is gone.
+    void forgetView(ViewNumber number);
+    /// What the rays of a frame of `view` met: its wishes come first.
+    void hear(const RayFeedback& feedback, const SelectionView& view) { priorities_.hear(feedback, view, views_.size()); }
     Placement place(uint64_t page);
-    [[nodiscard]] PolicyOutcome finish() const;
+    /// Precondition: hasLooked(number).
+    [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
+    [[nodiscard]] DrawableCut drawable(ViewNumber number) const;
 
     /// The page cannot be read: from the next look() its parent is drawn in its place. True the first time.
     bool giveUp(uint64_t page);
+    /// It can be read after all.
+    void restore(uint64_t page);
     /// Forgets all pages: the pool's content was lost.
     void clear();
+    /// Another pool, empty; from the next look() on, views want what fits into it. Forgets all pages, but not which
+    /// cannot be read.
+    void setPool(PoolShape pool);
+    [[nodiscard]] bool hasLooked(ViewNumber number = 0) const { return motions_.contains(number); }
+    /// Counts up with all that can change a cut or a page's place.
+    [[nodiscard]] uint64_t version() const { return version_; }
+    /// Memory that this takes, near enough: bounded by the dataset, whatever the number of rounds.
+    [[nodiscard]] uint64_t bytesHeld() const;
 
     [[nodiscard]] bool isResident(uint64_t page) const { return resident_[page] != 0; }
     /// Precondition: isResident(page).
@@ -105,7 +128,13 @@ private:
     struct Resident {
         PoolSlot slot;
         uint64_t lastWanted = 0;  // round
-        uint64_t loaded = 0;      // round
+        double loaded = 0;        // seconds
+    };
+    struct Motion {
+        SelectionView view;
+        double seconds = 0;                  // of the last look
+        std::optional<SelectionView> later;  // where it will be, while it moves
+        bool moves = false;
     };
     [[nodiscard]] Rank rankOf(uint64_t page) const { return ranks_[page]; }
     /// Whether a page may go for one of rank `forRank`.
@@ -113,24 +142,28 @@ private:
     bool evictOne(Rank forRank);
     void evict(uint64_t page);
     bool gather(uint64_t units, std::vector<PageMove>& moves);
-    void lookAhead(const SelectionView& view, const SelectionView& before);
+    void planFor(PoolShape pool);
+    void choose();
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
     std::shared_ptr<const Dataset> dataset_;
     SlotAllocator allocator_;
     std::vector<uint64_t> pageUnits_;
+    LoadPriorities priorities_;
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
     std::map<uint64_t, uint64_t> pageAt_;  // by the slot's first unit
     std::vector<uint8_t> resident_, unavailable_;
     std::vector<uint64_t> loadedIn_;  // the still view that a page was last placed in: its stillSince_
 
-    std::optional<SelectionView> view_;
+    std::map<ViewNumber, Motion> motions_;
+    std::vector<SelectionView> views_;  // of motions_
     PageChoice choice_;
     std::vector<WantedPage> ahead_;
     std::vector<Rank> ranks_;
-    bool moving_ = false, stale_ = true;
-    uint64_t round_ = 0, stillSince_ = 0;
+    bool moving_ = false, stale_ = true, emptied_ = false;
+    double seconds_ = 0;
+    uint64_t round_ = 0, stillSince_ = 0, version_ = 0;
     PolicyCounts counts_;
 };
 

@@ -35,6 +35,7 @@ public:
     [[nodiscard]] uint64_t unitsPerChunk() const { return unitsPerChunk_; }
     [[nodiscard]] uint64_t unitsTaken() const { return unitsTaken_; }
     [[nodiscard]] uint64_t unitsFree() const { return units() - unitsTaken_; }
+    [[nodiscard]] uint64_t bytesHeld() const { return taken_.capacity() / 8; }
 
 private:
     std::vector<bool> taken_;

@@ -22,9 +22,11 @@ struct StressCommand {
     std::string path = "orbit";
     std::string size = "640x400";
     std::string budget = "256M", ram = "64M";
+    std::string order = "feedback";
     std::string device;
     uint64_t seed = 1;
     int frames = 120;
+    int views = 1;
     double errorPixels = 0.5;
     SourceSettings source;
     ReportOptions report;
@@ -59,10 +61,13 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
     options.seed = command.seed;
     options.size = parseSize(command.size).value();
     options.frames = command.frames;
+    options.views = command.views;
     options.errorPixels = command.errorPixels;
     options.renderer.device = command.device;
     options.renderer.budgetBytes = parseBytes(command.budget).value();
     options.renderer.ramBytes = parseBytes(command.ram).value();
+    options.orders = parseOrders(command.order).value();
+    options.renderer.order = options.orders[0];
     // Reads that are made to stall or fail late are waited for by more threads, as from a server.
     const bool isSlow = open.isRemote || options.faults.stallSeconds > 0 || options.faults.latencySeconds > 0;
     options.renderer.loaderThreads = isSlow ? 8 : open.loaderThreads();
@@ -110,8 +115,18 @@ Command addStress(CLI::App& vcp) {
                     "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, bandwidth=2.5M (bytes a second)")
         ->type_name("A=X,B=Y")
         ->check([](const std::string& text) { return parseFaults(text) ? std::string() : "must be like error=0.1,stall=500ms, not \"" + text + "\""; });
+    app->add_option("--order", command->order,
+                    "Which pages are read first: feedback (what rays ask for), error, nearest, breadth, random; of several, the first is used and all\n"
+                    "are compared on the path's last view")
+        ->type_name("A,B")
+        ->capture_default_str()
+        ->check([](const std::string& text) { return parseOrders(text) ? std::string() : "must be like feedback,nearest, not \"" + text + "\""; });
     app->add_option("--seed", command->seed, "Of the faults and of the paths teleport and jitter")->type_name("N")->capture_default_str();
     app->add_option("--frames", command->frames, "Frames along the path")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1'000'000));
+    app->add_option("--views", command->views, "More than one: so many views then fly along the path together, with one pool and one budget")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100));
     app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
         return parseSize(text) ? std::string() : "must be like 640x400, not \"" + text + "\"";
     });

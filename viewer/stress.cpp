@@ -21,6 +21,8 @@ using Clock = std::chrono::steady_clock;
 
 // A view that brings nothing new for so long does not settle.
 constexpr double kHopelessSeconds = 60;
+// Pictures of an order of arrival.
+constexpr int kOrderDraws = 100;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -88,6 +90,8 @@ public:
         VCP_TRY(alongPath());
         VCP_TRY(withoutLoads());
         VCP_TRY(compareWithFaultless());
+        VCP_TRY(compareOrdersOfArrival());
+        VCP_TRY(severalViews());
         return std::move(report_);
     }
 
@@ -246,7 +250,7 @@ private:
             if (const auto update = frame(request, ms); !update) return update.error();
             times.push_back(static_cast<float>(ms));
             // Twice: a still view looks at nothing ahead. Nothing is ever placed, so all it wants is wished for.
-            for (int k = 0; k < 2; ++k) wants.look(selectionView(request));
+            for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
             for (const PageRequest& wish : wants.finish().wishes) needed.insert(wish.page);
         }
         report_.frameMsNoLoads = quantilesOf(std::move(times));
@@ -271,6 +275,29 @@ private:
         if (!picture) return picture.error();
         // A page given up by bad luck is drawn from its parent, and said so.
         invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0, "the settled picture is not that of a run without faults");
+        return {};
+    }
+
+    Result<void> compareOrdersOfArrival() {
+        if (o_.orders.size() < 2) return {};
+        renderer_.reset();
+        auto curves = compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders, kOrderDraws, o_.progress);
+        if (!curves) return curves.error();
+        report_.orders = *std::move(curves);
+        for (const OrderCurve& curve : report_.orders)
+            invariants_.require(curve.settled == report_.orders[0].settled, "the settled picture depends on the order of arrival");
+        return {};
+    }
+
+    Result<void> severalViews() {
+        if (o_.views < 2) return {};
+        renderer_.reset();
+        std::vector<FrameRequest> path;
+        for (const Camera& camera : cameras_) path.push_back(requestFor(camera));
+        auto together = flyTogether(open_, o_.renderer, path, o_.views, o_.progress);
+        if (!together) return together.error();
+        for (const std::string& violation : together->violations) invariants_.require(false, violation);
+        report_.views = *std::move(together);
         return {};
     }
 

@@ -3,11 +3,13 @@
 //
 // Three passes: the first view until it has settled; the path, frame by frame, while pages load, until its last
 // view has settled; the path again, each view settled before it is timed. The settled last picture must be that
-// of a renderer of its own with the same budget and no faults.
+// of a renderer of its own with the same budget and no faults. On request, orders of arrival are compared on that view,
+// and several views fly along the path together.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +19,8 @@
 #include "render/renderer.h"
 #include "streaming/faulty_reader.h"
 #include "viewer/source_settings.h"
+#include "viewer/stress_orders.h"
+#include "viewer/stress_views.h"
 
 namespace vcp {
 
@@ -29,6 +33,8 @@ struct StressOptions {
     int frames = 120;
     double errorPixels = 0.5;
     RendererOptions renderer;
+    std::vector<LoadOrder> orders;  ///< compared on the path's last view; fewer than two: no comparison
+    int views = 1;           ///< more than one: so many share a pool
     double openSeconds = 0;  ///< what opening the dataset took: counted into the times below
     /// Asked between frames; false cancels.
     std::function<bool(const std::string& what, double fraction)> progress;
@@ -59,6 +65,8 @@ struct StressReport {
     double errorPixels = 0;  ///< of the settled last view
     Quantiles frameMs, frameMsNoLoads;
     std::vector<StressSample> samples;
+    std::vector<OrderCurve> orders;
+    std::optional<StressViews> views;
     std::vector<std::string> violations;  ///< invariants that were broken; must be empty
 };
 

@@ -19,6 +19,41 @@ Json toJson(const StressSample& s) {
             {"requests", s.pending}, {"loads", s.loads},     {"evictions", s.evictions},       {"missing", s.missing}};
 }
 
+Json toJson(const OrderCurve& curve) {
+    Json samples = Json::array();
+    for (const OrderSample& s : curve.samples) samples.push_back({{"seconds", s.seconds}, {"bytes", s.bytes}, {"error", s.error}});
+    return {{"order", nameOf(curve.order)}, {"mean_error", curve.meanError}, {"bytes_to_tenth", curve.bytesToTenth}, {"samples", samples}};
+}
+
+std::string ordersMarkdown(const std::vector<OrderCurve>& orders) {
+    if (orders.empty()) return "";
+    std::string text = "\nThe path's last view from nothing, pages in different orders; error: root mean square of colours (0 to 255) against the settled picture.\n\n"
+                       "| order | mean error over the bytes | read until a tenth of the error | read |\n|---|---|---|---|\n";
+    for (const OrderCurve& curve : orders)
+        text += fmt::format("| {} | {:.3f} | {} | {} |\n", nameOf(curve.order), curve.meanError, formatBytes(curve.bytesToTenth),
+                            formatBytes(curve.samples.empty() ? 0 : curve.samples.back().bytes));
+    return text + "\n![orders of arrival](stress_orders.svg)\n";
+}
+
+Json toJson(const StressViews& v) {
+    return {{"views", v.views},
+            {"settled_seconds", v.settledSeconds},
+            {"resident_bytes_max", v.residentBytesMax},
+            {"pages_wanted", v.pagesWanted},
+            {"pages_resident", v.pagesResident},
+            {"loads", v.loads},
+            {"relaxed", v.relaxed},
+            {"identical", v.identical}};
+}
+
+std::string viewsMarkdown(const std::optional<StressViews>& views) {
+    if (!views) return "";
+    return fmt::format("\n{} views shared the pool: {} pages wanted by each summed up, {} resident together, at most {}. All had settled {:.3f} s after the last "
+                       "frame; {} showed what they show alone, the budget was too small for {}.\n",
+                       views->views, formatCount(views->pagesWanted), formatCount(views->pagesResident), formatBytes(views->residentBytesMax),
+                       views->settledSeconds, views->identical, views->relaxed);
+}
+
 double ratio(double a, double b) { return b > 0 ? a / b : 0; }
 
 std::string row(const std::string& name, const Quantiles& q) {
@@ -37,7 +72,9 @@ PlotSeries series(const StressReport& report, const std::string& name, Value val
 std::string stressJson(const StressReport& r) {
     Json samples = Json::array();
     for (const StressSample& sample : r.samples) samples.push_back(toJson(sample));
-    const Json json = {{"name", r.name},
+    Json orders = Json::array();
+    for (const OrderCurve& curve : r.orders) orders.push_back(toJson(curve));
+    Json json = {{"name", r.name},
                        {"path", r.path},
                        {"faults", r.faults},
                        {"seed", r.seed},
@@ -63,7 +100,9 @@ std::string stressJson(const StressReport& r) {
                        {"frame_ms", toJson(r.frameMs)},
                        {"frame_ms_no_loads", toJson(r.frameMsNoLoads)},
                        {"violations", r.violations},
+                       {"orders", orders},
                        {"samples", samples}};
+    if (r.views) json["several_views"] = toJson(*r.views);
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -85,7 +124,7 @@ std::string stressMarkdown(const StressReport& r) {
                         ratio(r.frameMs.p99, r.frameMsNoLoads.p99), formatCount(r.loads), formatCount(r.evictions), formatCount(r.failures),
                         formatCount(r.pagesGivenUp), r.errorPixels, r.relaxed ? "; the budget was too small for some views" : "");
     text += "\n![resident bytes](stress_bytes.svg)\n![pages](stress_pages.svg)\n![frame time](stress_frames.svg)\n![error](stress_error.svg)\n";
-    return text;
+    return text + ordersMarkdown(r.orders) + viewsMarkdown(r.views);
 }
 
 std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport& r) {
@@ -103,7 +142,17 @@ std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport&
     const Plot error = plot("Error and missing detail", "pixels; % of pages",
                             {series(r, "pixel error", [](const StressSample& s) { return s.errorPixels; }),
                              series(r, "missing detail, %", [](const StressSample& s) { return 100 * s.missing; })});
-    return {{"stress_bytes", plotSvg(bytes)}, {"stress_pages", plotSvg(pages)}, {"stress_frames", plotSvg(frames)}, {"stress_error", plotSvg(error)}};
+    std::vector<std::pair<std::string, std::string>> plots{
+        {"stress_bytes", plotSvg(bytes)}, {"stress_pages", plotSvg(pages)}, {"stress_frames", plotSvg(frames)}, {"stress_error", plotSvg(error)}};
+    if (r.orders.empty()) return plots;
+    Plot orders{.title = "Orders of arrival", .xName = "MB read", .yName = "error of the picture"};
+    for (const OrderCurve& curve : r.orders) {
+        PlotSeries points{std::string(nameOf(curve.order)), {}};
+        for (const OrderSample& sample : curve.samples) points.points.push_back({1e-6 * double(sample.bytes), sample.error});
+        orders.series.push_back(std::move(points));
+    }
+    plots.emplace_back("stress_orders", plotSvg(orders));
+    return plots;
 }
 
 }  // namespace vcp

@@ -29,6 +29,7 @@ constexpr Binding kBindings[] = {
     {kStorage, 1}, {kTexels, 1},
     {kStorage, 1},
     {kStorage, 1},
+    {kStorage, 1},
 };
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
@@ -156,6 +157,13 @@ void FrameResources::setPools(const PagePool* pages, const PagePool* colours) {
     setStale_ = true;
 }
 
+void FrameResources::setFeedback(const Buffer* feedback) {
+    if (feedback_ == feedback && feedbackHandle_ == feedback->handle()) return;
+    feedback_ = feedback;
+    feedbackHandle_ = feedback->handle();
+    setStale_ = true;
+}
+
 void FrameResources::writeSet() {
     VkDescriptorBufferInfo buffers[kBindingCount][frame::kMaxPoolChunks] = {};
     VkBufferView views[kBindingCount][frame::kMaxPoolChunks] = {};
@@ -183,6 +191,7 @@ void FrameResources::writeSet() {
     views[12][0] = hits_.view.handle();
     useBuffer(13, 0, picture_);
     useBuffer(14, 0, counters_);
+    useBuffer(15, 0, feedback_ != nullptr ? *feedback_ : none_.buffer);
 
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {

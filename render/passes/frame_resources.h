@@ -4,12 +4,13 @@
 //  0        frame constants                CPU (upload)      all
 //  1, 2     page pool, texels and storage  page_pool         beam, trace, light
 //  3, 4     page pool, for colour          page_pool         trace with kColour
-//  5, 6     page table                     CPU (upload)      beam, trace, light
+//  5, 6     page table                     CPU (upload)      beam, trace, light, feedback
 //  7, 8     tile starts                    beam              trace, shade
 //  9, 10    tile list, indirect dispatch   beam              trace, light, shade
 // 11, 12    hits                           trace, light      light, shade, readback
 // 13        picture                        begin, shade      readback, present
 // 14        counters                       trace             readback
+// 15        feedback (passes/feedback.h)   feedback          readback
 #pragma once
 
 #include <initializer_list>
@@ -81,6 +82,8 @@ public:
     void setBackground(std::vector<uint32_t> rows);
     /// Null pools: nothing is shown, or without colour. They may be the same.
     void setPools(const PagePool* pages, const PagePool* colours);
+    /// Null, or as long as frames with the feedback pass are drawn.
+    void setFeedback(const Buffer* feedback);
 
     /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
@@ -117,6 +120,8 @@ private:
     WordBuffer tileStarts_, tileList_, hits_, table_, none_;
     const PagePool* pages_ = nullptr;
     const PagePool* colours_ = nullptr;
+    const Buffer* feedback_ = nullptr;
+    VkBuffer feedbackHandle_ = VK_NULL_HANDLE;  // as of the last call
     bool setStale_ = true;
     uint32_t pipelinesMade_ = 0;
 };

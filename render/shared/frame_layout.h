@@ -38,7 +38,7 @@ struct FrameConstants {
     vec4 origin, originX, originY;
     vec4 direction, directionX, directionY;
     ivec4 originLattice;
-    // Lattice units a finest cell; its reciprocal; largest and smallest exponent of pages: see uvec4s.
+    // Lattice units a finest cell; its reciprocal; where in its part of the picture a feedback ray goes, 0 to 1.
     vec4 lattice;
     // width, height, tiles in x, tiles in y
     uvec4 picture;
@@ -79,6 +79,16 @@ const float kTileEmpty = 3e38f;
 const float kNoHit = 3e38f;
 // Of one whose ray gave up.
 const float kGaveUp = 3.1e38f;
+
+// Feedback: a ray for each of 24 x 16 parts of the picture. Its buffer has four words a ray (lattice point of the
+// hit; number in the table, plus 1, of the page that was hit, or 0), then a word a record of the table: the sum of
+// kNearnessOne eps / (a + eps) over the rays that went into that page at a distance a.
+const uint kFeedbackWidth = 24u;
+const uint kFeedbackHeight = 16u;
+const uint kFeedbackRays = 384u;
+const uint kFeedbackRayWords = 4u;
+const float kNearnessOne = 65536.0f;
+const float kNearnessEps = 0.015625f;  // edges of the root page
 
 struct FrameCounters {
     uint hitPixels;

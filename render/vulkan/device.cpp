@@ -15,6 +15,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
     mapped_ = std::exchange(other.mapped_, nullptr);
     bytes_ = std::exchange(other.bytes_, 0);
+    account_ = std::exchange(other.account_, nullptr);
     return *this;
 }
 
@@ -22,6 +23,7 @@ void Buffer::destroy() {
     if (device_ == VK_NULL_HANDLE) return;
     vkDestroyBuffer(device_, buffer_, nullptr);
     vkFreeMemory(device_, memory_, nullptr);
+    if (memory_ != VK_NULL_HANDLE) *account_ -= bytes_;
 }
 
 TexelView& TexelView::operator=(TexelView&& other) noexcept {
@@ -36,7 +38,7 @@ void TexelView::destroy() {
     if (device_ != VK_NULL_HANDLE) vkDestroyBufferView(device_, view_, nullptr);
 }
 
-Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface) {
+Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface, const DeviceFaults& faults) {
     auto physical = instance.physicalDevices();
     if (!physical) return physical.error();
     std::vector<DeviceInfo> infos;
@@ -48,6 +50,7 @@ Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const s
     made->physical_ = (*physical)[*chosen];
     made->info_ = infos[*chosen];
     made->info_.chosen = true;
+    made->faults_ = faults;
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(made->physical_, &properties);
     made->limits_ = properties.limits;
@@ -76,7 +79,13 @@ Result<void> Device::chooseQueue(VkSurfaceKHR surface) {
     return Error{.code = ErrorCode::Device, .message = "device '" + info_.name + "' has no queue that computes and shows pictures"};
 }
 
+bool Device::shows(VkSurfaceKHR surface) const {
+    VkBool32 shows = VK_FALSE;
+    return hasSwapchain_ && vkGetPhysicalDeviceSurfaceSupportKHR(physical_, family_, surface, &shows) == VK_SUCCESS && shows == VK_TRUE;
+}
+
 Result<void> Device::createDevice(bool withSwapchain) {
+    hasSwapchain_ = withSwapchain;
     const float priority = 1;
     VkDeviceQueueCreateInfo queue{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
     queue.queueFamilyIndex = family_;
@@ -121,7 +130,7 @@ Result<uint32_t> Device::memoryType(uint32_t allowed, MemoryUse use) const {
     constexpr VkMemoryPropertyFlags kMapped = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
     // Local memory is mapped only where it is all one memory: a discrete device's mapped window is small.
-    const bool unified = info_.software || info_.type == "integrated";
+    const bool unified = (info_.software || info_.type == "integrated") && !faults_.separateMemory;
     std::vector<VkMemoryPropertyFlags> wishes;
     if (use == MemoryUse::Local) wishes = unified ? std::vector{kLocal | kMapped | kCached, kLocal | kMapped, kLocal} : std::vector{kLocal};
     if (use == MemoryUse::Upload) wishes = {kMapped};
@@ -136,8 +145,14 @@ Result<Buffer> Device::createBuffer(uint64_t bytes, VkBufferUsageFlags usage, Me
     Buffer made;
     made.device_ = device_;
     made.bytes_ = bytes;
+    made.account_ = &allocated_;
+    VCP_TRY(allocate(made, usage, use));
+    return made;
+}
+
+Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse use) const {
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
-    info.size = bytes;
+    info.size = made.bytes_;
     info.usage = usage;
     VCP_VK(vkCreateBuffer, device_, &info, nullptr, &made.buffer_);
     VkMemoryRequirements needs;
@@ -147,14 +162,22 @@ Result<Buffer> Device::createBuffer(uint64_t bytes, VkBufferUsageFlags usage, Me
     VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocation.allocationSize = needs.size;
     allocation.memoryTypeIndex = *type;
-    VCP_VK(vkAllocateMemory, device_, &allocation, nullptr, &made.memory_);
+    const bool fits = made.bytes_ <= faults_.memoryBytes && allocated_ <= faults_.memoryBytes - made.bytes_;
+    const VkResult allocated = fits ? vkAllocateMemory(device_, &allocation, nullptr, &made.memory_) : VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    if (allocated != VK_SUCCESS) {
+        made.memory_ = VK_NULL_HANDLE;
+        outOfMemory_ = true;
+        return vulkanError("vkAllocateMemory", allocated);
+    }
+    allocated_ += made.bytes_;
     VCP_VK(vkBindBufferMemory, device_, made.buffer_, made.memory_, 0);
-    if ((memory_.memoryTypes[*type].propertyFlags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {
+    const bool isHidden = use == MemoryUse::Local && faults_.separateMemory;
+    if (!isHidden && (memory_.memoryTypes[*type].propertyFlags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {
         void* mapped = nullptr;
         VCP_VK(vkMapMemory, device_, made.memory_, 0, VK_WHOLE_SIZE, 0, &mapped);
         made.mapped_ = static_cast<std::byte*>(mapped);
     }
-    return made;
+    return {};
 }
 
 Result<TexelView> Device::createTexelView(const Buffer& buffer, VkFormat format, uint64_t bytes) const {
@@ -186,8 +209,10 @@ Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
     submit.pCommandBuffers = &commands_;
     submit.signalSemaphoreCount = signal != VK_NULL_HANDLE ? 1 : 0;
     submit.pSignalSemaphores = &signal;
-    VCP_VK(vkQueueSubmit, queue_, 1, &submit, fence_);
-    VCP_VK(vkWaitForFences, device_, 1, &fence_, VK_TRUE, UINT64_MAX);
+    VkResult done = ++submissions_ == faults_.lostAtSubmission ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue_, 1, &submit, fence_);
+    if (done == VK_SUCCESS) done = vkWaitForFences(device_, 1, &fence_, VK_TRUE, UINT64_MAX);
+    lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
+    if (done != VK_SUCCESS) return vulkanError("vkQueueSubmit", done);
     VCP_VK(vkResetFences, device_, 1, &fence_);
     return {};
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <vulkan/vulkan_core.h>
@@ -39,6 +40,7 @@ private:
     VkDeviceMemory memory_ = VK_NULL_HANDLE;
     std::byte* mapped_ = nullptr;
     uint64_t bytes_ = 0;
+    uint64_t* account_ = nullptr;  // of the device: bytes allocated
 };
 
 /// A view of a buffer as texels. Move-only.
@@ -67,7 +69,8 @@ class Device {
 public:
     /// `choice` as in RendererOptions::device; a surface asks for the swapchain extension and a queue that
     /// can show pictures. Errors: Device.
-    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface);
+    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface,
+                                                  const DeviceFaults& faults = {});
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
@@ -81,6 +84,13 @@ public:
     [[nodiscard]] const VkPhysicalDeviceLimits& limits() const { return limits_; }
     /// Nanoseconds a timestamp step, 0 where the queue has no timestamps.
     [[nodiscard]] double timestampNanoseconds() const { return timestampNanoseconds_; }
+
+    /// Whether the queue can show pictures in this window.
+    [[nodiscard]] bool shows(VkSurfaceKHR surface) const;
+    /// Whether the device was lost: nothing works any more but destroying it.
+    [[nodiscard]] bool isLost() const { return lost_; }
+    /// Whether a buffer could not be had for want of memory since this was asked last.
+    [[nodiscard]] bool takeOutOfMemory() const { return std::exchange(outOfMemory_, false); }
 
     /// Errors: Device (out of memory).
     Result<Buffer> createBuffer(uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
@@ -102,6 +112,7 @@ public:
 
 private:
     Device() = default;
+    Result<void> allocate(Buffer& buffer, VkBufferUsageFlags usage, MemoryUse use) const;
     Result<void> chooseQueue(VkSurfaceKHR surface);
     Result<void> createDevice(bool withSwapchain);
 
@@ -117,6 +128,12 @@ private:
     DeviceInfo info_;
     VkPhysicalDeviceLimits limits_{};
     VkPhysicalDeviceMemoryProperties memory_{};
+    DeviceFaults faults_;
+    uint64_t submissions_ = 0;
+    mutable uint64_t allocated_ = 0;
+    mutable bool outOfMemory_ = false;
+    bool lost_ = false;
+    bool hasSwapchain_ = false;
 };
 
 }  // namespace vcp

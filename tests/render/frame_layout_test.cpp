@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "render/beam_spirv.h"
+#include "render/feedback_spirv.h"
 #include "render/frame.h"
 #include "render/light_spirv.h"
 #include "render/paper_trace_spirv.h"
@@ -49,6 +50,7 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }
 TEST(FrameLayout, Beam) { expectSameLayout(kBeamSpirv); }
 TEST(FrameLayout, PaperTrace) { expectSameLayout(kPaperTraceSpirv); }
+TEST(FrameLayout, Feedback) { expectSameLayout(kFeedbackSpirv); }
 TEST(FrameLayout, Shade) { expectSameLayout(kShadeSpirv); }
 TEST(FrameLayout, Trace) {
     expectSameLayout(kTraceSpirv);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -242,6 +244,70 @@ TEST_F(RendererTest, PipelinesAreMadeOnceAndOnlyWhenNeeded) {
     EXPECT_EQ(draw(request).steps, counted.steps) << "exact";
 }
 
+TEST_F(RendererTest, OnlyFramesThatMissPagesAskRaysWhatToRead) {
+    start();
+    const Scene scene = test::sphereScene();
+    show(scene);
+    const FrameRequest request = requestOf(cameras(scene)[0].camera);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(draw(request).feedbackPasses, 0u) << "all is there";
+    EXPECT_EQ(draw(request).pipelines, 3u);
+    // A closer view: pages are missing in its first frame.
+    FrameRequest close = requestOf(cameras(scene)[7].camera);
+    close.errorPixels = 0.01;
+    const auto update = renderer_->update(close);
+    ASSERT_TRUE(update);
+    ASSERT_GT(update->pagesMissing, 0u);
+    const auto asking = renderer_->render(close);
+    ASSERT_TRUE(asking) << asking.error().line();
+    EXPECT_EQ(asking->feedbackPasses, 1u);
+    EXPECT_EQ(asking->pipelines, 4u);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(draw(close).feedbackPasses, 1u);
+}
+
+/// Pages of a sphere around `centre` in the order they were read; one page an update, each update drawn.
+std::vector<uint64_t> readInOrder(LoadOrder order, PageAccess access, const Scene& scene, const FrameRequest& request, std::vector<std::string>& messages) {
+    RendererOptions options;
+    options.order = order;
+    options.access = access;
+    options.validation = true;
+    options.loaderThreads = 1;
+    options.uploadBytes = 1;
+    auto renderer = Renderer::create(options);
+    EXPECT_TRUE(renderer);
+    auto source = std::make_shared<test::TurnstileSource>(scene.source);
+    EXPECT_TRUE((*renderer)->open(scene.dataset, source));
+    for (int i = 0; i < 1000; ++i) {
+        const auto update = (*renderer)->update(request);
+        EXPECT_TRUE(update && (*renderer)->render(request));
+        if (!update || update->settled) break;
+        source->letOnePass();
+        (*renderer)->waitForPage(std::chrono::milliseconds(1000));
+    }
+    messages = (*renderer)->validationMessages();
+    return source->read();
+}
+
+TEST(RendererFeedback, WhatRaysMeetIsReadFirst) {
+    const Scene scene = test::sphereScene(3);
+    FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 4.0 / 3));
+    request.errorPixels = 0.001;  // all pages
+    for (const PageAccess access : {PageAccess::TexelBuffer, PageAccess::StorageBuffer}) {
+        std::vector<std::string> messages;
+        const auto read = readInOrder(LoadOrder::Feedback, access, scene, request, messages);
+        for (const std::string& message : messages) ADD_FAILURE() << message;
+        ASSERT_EQ(read.size(), scene.dataset->pages.size());
+        // Of the finest pages: the rays see those in front.
+        std::vector<double> front;
+        for (const uint64_t page : read)
+            if (scene.dataset->pages[page].level == 2) front.push_back(scene.dataset->originOf(scene.dataset->pages[page]).z >= (scene.boxMin.z + scene.boxMax.z) / 2 ? 1 : 0);
+        const size_t half = front.size() / 2;
+        const double early = std::accumulate(front.begin(), front.begin() + std::ptrdiff_t(half), 0.0);
+        const double late = std::accumulate(front.begin() + std::ptrdiff_t(half), front.end(), 0.0);
+        EXPECT_GT(early, 0.9 * double(half));
+        EXPECT_LT(late, 0.2 * double(half));
+    }
+}
+
 TEST_F(RendererTest, BudgetIsKeptAndEveryViewSettles) {
     RendererOptions options;
     options.budgetBytes = 1 << 20;
@@ -272,6 +338,221 @@ TEST_F(RendererTest, BudgetIsKeptAndEveryViewSettles) {
             EXPECT_TRUE(again->settled);
             EXPECT_FALSE(again->changed) << "a settled view stays as it is";
         }
+}
+
+TEST_F(RendererTest, BudgetsChangeWhileRunning) {
+    const Scene scene = test::sphereScene(4);
+    FrameRequest request = requestOf(cameras(scene)[0].camera);
+    request.errorPixels = 0.001;
+    const uint64_t large = 64 << 20, small = 1 << 20, ram = 4 << 20;
+    std::map<uint64_t, Picture> expected;
+    for (const uint64_t budget : {large, small}) {
+        RendererOptions options;
+        options.budgetBytes = budget;
+        start(options);
+        show(scene);
+        draw(request);
+        expected[budget] = *renderer_->readPicture();
+    }
+    ASSERT_NE(expected[large], expected[small]);
+    RendererOptions options;
+    options.budgetBytes = large;
+    start(options);
+    show(scene);
+    draw(request);
+    for (const uint64_t budget : {small, large, small, large}) {
+        ASSERT_TRUE(renderer_->setBudgets(budget, ram));
+        // What was kept is there at once, and no more than the budget.
+        const auto kept = renderer_->render(request);
+        ASSERT_TRUE(kept) << kept.error().line();
+        EXPECT_GT(kept->hitPixels, 2500u);
+        EXPECT_LE(kept->poolBytes, budget);
+        const auto update = renderer_->update(request);
+        ASSERT_TRUE(update) << update.error().line();
+        EXPECT_TRUE(update->changed) << "to be drawn again";
+        EXPECT_LE(update->residentBytes, budget);
+        EXPECT_LE(update->heldBytesMax, ram);
+        draw(request);
+        EXPECT_EQ(*renderer_->readPicture(), expected[budget]);
+        EXPECT_EQ(renderer_->update(request)->reloads, 0u);
+    }
+    EXPECT_EQ(renderer_->setBudgets(100, ram).error().code, ErrorCode::Usage);
+}
+
+TEST_F(RendererTest, WithoutMemoryThePoolIsHalvedAndItGoesOnCoarser) {
+    const Scene scene = test::sphereScene(4);
+    FrameRequest request = requestOf(cameras(scene)[0].camera);
+    request.errorPixels = 0.001;
+    RendererOptions options;
+    options.faults.memoryBytes = 5 << 20;
+    start(options);
+    show(scene);
+    const uint64_t pool = draw(request).poolBytes;
+    EXPECT_LT(pool, options.faults.memoryBytes);
+    EXPECT_GT(pool, 0u);
+    // A larger picture takes memory that the pool has.
+    FrameRequest larger = request;
+    larger.width = 400, larger.height = 300;
+    const FrameStats stats = draw(larger);
+    EXPECT_LT(stats.poolBytes, pool);
+    EXPECT_GT(stats.hitPixels, 10000u);
+    const auto settled = renderer_->settle(larger);
+    ASSERT_TRUE(settled);
+    EXPECT_LE(settled->residentBytes, stats.poolBytes);
+    const auto picture = renderer_->render(larger) ? *renderer_->readPicture() : Picture{};
+    // A pool of that size from the beginning shows the same.
+    RendererOptions plain;
+    plain.budgetBytes = stats.poolBytes;
+    start(plain);
+    show(scene);
+    draw(larger);
+    EXPECT_EQ(*renderer_->readPicture(), picture);
+    // One that no pool would leave room for is an error, and the next picture is fine.
+    start(options);
+    show(scene);
+    FrameRequest huge = request;
+    huge.width = 2000, huge.height = 1500;
+    EXPECT_EQ(renderer_->render(huge).error().code, ErrorCode::Device);
+    EXPECT_GT(draw(request).hitPixels, 2500u);
+}
+
+/// Draws while pages come, then as it has settled.
+Picture drawAllTheWay(Renderer& renderer, const FrameRequest& request) {
+    for (;;) {
+        const auto update = renderer.update(request);
+        EXPECT_TRUE(update) << update.error().line();
+        EXPECT_TRUE(renderer.render(request)) << "at least the background";
+        if (!update || update->settled) break;
+        renderer.waitForPage(std::chrono::milliseconds(100));
+    }
+    return *renderer.readPicture();
+}
+
+TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
+    const Scene scene = test::torusScene();
+    const FrameRequest request = requestOf(cameras(scene)[0].camera, 64, 48);
+    start();
+    show(scene);
+    const Picture expected = drawAllTheWay(*renderer_, request);
+    // With separate memory, updates submit work too.
+    for (const bool separate : {false, true})
+        for (const uint64_t lostAt : {2, 5}) {
+            SCOPED_TRACE(lostAt);
+            RendererOptions options;
+            options.faults.separateMemory = separate;
+            options.faults.lostAtSubmission = lostAt;
+            start(options);
+            show(scene);
+            uint32_t losses = 0;
+            for (int i = 0; i < 20 && losses == 0; ++i) {
+                drawAllTheWay(*renderer_, request);
+                losses = renderer_->update(request)->deviceLosses;
+            }
+            EXPECT_EQ(losses, 1u);
+            EXPECT_EQ(drawAllTheWay(*renderer_, request), expected);
+            EXPECT_EQ(renderer_->update(request)->deviceLosses, 1u);
+            for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+        }
+}
+
+TEST_F(RendererTest, PagesGoThroughStagingWhereTheMemoryIsSeparate) {
+    const Scene scene = test::sphereScene(4);
+    for (const uint64_t budget : {uint64_t{1} << 20, uint64_t{64} << 20}) {
+        std::vector<Picture> pictures[2];
+        for (const bool separate : {false, true}) {
+            RendererOptions options;
+            options.budgetBytes = budget;
+            options.faults.separateMemory = separate;
+            start(options);
+            show(scene);
+            for (int view = 0; view < 4; ++view) {
+                FrameRequest request = requestOf(cameras(scene)[static_cast<size_t>(view)].camera, 64, 48);
+                request.errorPixels = 0.001;
+                pictures[separate ? 1 : 0].push_back(drawAllTheWay(*renderer_, request));
+            }
+            for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+        }
+        EXPECT_EQ(pictures[0], pictures[1]);
+    }
+}
+
+Picture alonePicture(const Scene& scene, const FrameRequest& request, uint64_t budget) {
+    RendererOptions options;
+    options.budgetBytes = budget;
+    auto renderer = Renderer::create(options);
+    EXPECT_TRUE(renderer && (*renderer)->open(scene.dataset, scene.source));
+    EXPECT_TRUE((*renderer)->settle(request) && (*renderer)->render(request));
+    return *(*renderer)->readPicture();
+}
+
+/// Pictures of views of one renderer, updated and drawn in turn until all have settled.
+std::vector<Picture> drawTogether(std::span<const std::unique_ptr<Renderer>> views, std::span<const FrameRequest> requests, bool& relaxed) {
+    for (bool settled = false; !settled;) {
+        settled = true;
+        for (size_t i = 0; i < views.size(); ++i) {
+            const auto update = views[i]->update(requests[i]);
+            EXPECT_TRUE(update) << update.error().line();
+            EXPECT_TRUE(views[i]->render(requests[i]));
+            if (!update) return {};
+            settled = settled && update->settled;
+            relaxed = relaxed || update->relaxed;
+            EXPECT_EQ(update->reloads, 0u);
+        }
+        if (!settled) views[0]->waitForPage(std::chrono::milliseconds(100));
+    }
+    std::vector<Picture> pictures;
+    for (size_t i = 0; i < views.size(); ++i) {
+        EXPECT_TRUE(views[i]->render(requests[i]));
+        pictures.push_back(*views[i]->readPicture());
+    }
+    return pictures;
+}
+
+TEST_F(RendererTest, TenViewsShareOnePoolAndOneBudget) {
+    const Scene scene = test::sphereScene(4);
+    std::vector<FrameRequest> requests;
+    for (const NamedCamera& named : cameras(scene)) {
+        if (requests.size() == 10) break;
+        requests.push_back(requestOf(named.camera, 48, 36));
+        requests.back().errorPixels = 0.02;
+    }
+    RendererOptions alone;
+    start(alone);
+    show(scene);
+    std::vector<Picture> expected;
+    for (const FrameRequest& request : requests) {
+        draw(request);
+        expected.push_back(*renderer_->readPicture());
+    }
+    for (const uint64_t budget : {uint64_t{64} << 20, uint64_t{1} << 20}) {
+        RendererOptions options;
+        options.budgetBytes = budget;
+        options.faults.lostAtSubmission = 25;  // all views come back
+        start(options);
+        show(scene);
+        std::vector<std::unique_ptr<Renderer>> views;
+        views.push_back(std::move(renderer_));
+        while (views.size() < requests.size()) {
+            auto view = views[0]->addView();
+            ASSERT_TRUE(view) << view.error().line();
+            views.push_back(std::move(*view));
+        }
+        bool relaxed = false;
+        drawTogether(views, requests, relaxed);
+        const auto pictures = drawTogether(views, requests, relaxed);
+        EXPECT_EQ(relaxed, budget == 1 << 20);
+        EXPECT_NE(pictures == expected, relaxed);
+        EXPECT_EQ(views.back()->render(requests.back())->pipelines, 0u) << "pipelines are shared";
+        const auto update = views[3]->update(requests[3]);
+        ASSERT_TRUE(update);
+        EXPECT_LE(update->residentBytes, budget);
+        EXPECT_EQ(update->deviceLosses, 1u);
+        // Those that stay have the whole budget, also where the first is gone.
+        views.erase(views.begin(), views.end() - 1);
+        renderer_ = std::move(views[0]);
+        draw(requests.back());
+        EXPECT_EQ(*renderer_->readPicture(), alonePicture(scene, requests.back(), budget));
+    }
 }
 
 TEST_F(RendererTest, ABrokenPageIsReportedOnceAndDrawnFromItsParent) {

@@ -1,8 +1,10 @@
 // Datasets in memory for tests of the renderer.
 #pragma once
 
+#include <condition_variable>
 #include <cstring>
 #include <memory>
+#include <mutex>
 #include <set>
 #include <string>
 #include <vector>
@@ -30,6 +32,43 @@ public:
 
 private:
     std::vector<PageBytes> pages_;
+};
+
+/// Lets one read pass at a time, and remembers what was read.
+class TurnstileSource final : public PageSource {
+public:
+    explicit TurnstileSource(std::shared_ptr<const PageSource> source) : source_(std::move(source)) {}
+    Result<PageBytes> read(uint64_t page, bool withColour) const override {
+        std::unique_lock lock(mutex_);
+        turned_.wait(lock, [&] { return passes_ > 0 || open_; });
+        if (open_) return Error{.code = ErrorCode::Cancelled, .message = "closed"};
+        --passes_;
+        read_.push_back(page);
+        return source_->read(page, withColour);
+    }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override { return source_->bytesToRead(page, withColour); }
+    void interrupt() const override {
+        const std::lock_guard lock(mutex_);
+        open_ = true;
+        turned_.notify_all();
+    }
+    void letOnePass() const {
+        const std::lock_guard lock(mutex_);
+        ++passes_;
+        turned_.notify_all();
+    }
+    [[nodiscard]] std::vector<uint64_t> read() const {
+        const std::lock_guard lock(mutex_);
+        return read_;
+    }
+
+private:
+    std::shared_ptr<const PageSource> source_;
+    mutable std::mutex mutex_;
+    mutable std::condition_variable turned_;
+    mutable int passes_ = 0;
+    mutable bool open_ = false;
+    mutable std::vector<uint64_t> read_;
 };
 
 struct Scene {

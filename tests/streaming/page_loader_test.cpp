@@ -111,6 +111,23 @@ TEST(PageLoader, UrgentFirstOfEqualsInOrder) {
     EXPECT_EQ(source->begun(), (std::vector<uint64_t>{50, 4, 2, 3, 1}));
 }
 
+TEST(PageLoader, AFrameTakesNoMoreThanItsShare) {
+    const auto source = std::make_shared<FakeSource>();
+    PageLoader loader(source, options(true, 2, 1 << 20));
+    std::vector<PageRequest> wishes;
+    for (uint64_t page = 0; page < 30; ++page) wishes.push_back({page, 1});
+    loader.request(wishes);
+    // 32 bytes a page: three have 96, and one comes even where the share is less.
+    std::set<uint64_t> seen;
+    for (uint64_t share = 100; seen.size() < 30; share = share == 100 ? 10 : 100) {
+        ASSERT_TRUE(loader.waitForPage(kLong));
+        const auto pages = loader.collect(share);
+        EXPECT_GE(pages.size(), 1u);
+        EXPECT_LE(pages.size(), share == 100 ? 3u : 1u);
+        for (const LoadedPage& page : pages) EXPECT_TRUE(seen.insert(page.page).second);
+    }
+}
+
 TEST(PageLoader, StaleWishesAreNotRead) {
     const auto source = std::make_shared<FakeSource>();
     source->hold(true);

@@ -438,6 +438,26 @@ TEST_F(CommandLine, StressReportsAndItsInvariantsHold) {
     EXPECT_EQ(json["samples"].size(), 20u);
     for (const char* name : {"stress.json", "stress.md", "stress_bytes.svg", "stress_pages.svg", "stress_frames.svg", "stress_error.svg"})
         EXPECT_GT(fs::file_size(fs::path(out) / name), 100u) << name;
+    const Ran orders = run({"stress", dataset().string(), "--path", "orbit", "--frames", "2", "--size", "96x64", "--error-pixels", "0.02", "--order",
+                            "feedback,error,nearest,breadth,random", "--out", out, "--json", "--progress", "none"});
+    ASSERT_EQ(orders.status, 0) << orders.err << orders.out.substr(0, 2000);
+    const Json curves = Json::parse(orders.out)["orders"];
+    ASSERT_EQ(curves.size(), 5u);
+    for (const Json& curve : curves) {
+        EXPECT_GT(curve["samples"].size(), 2u);
+        EXPECT_EQ(curve["samples"].back()["error"], 0);
+        EXPECT_GT(curve["samples"][0]["error"].get<double>(), 0);
+    }
+    EXPECT_GT(fs::file_size(fs::path(out) / "stress_orders.svg"), 100u);
+    const Ran together = run({"stress", dataset().string(), "--path", "orbit", "--frames", "4", "--size", "64x48", "--error-pixels", "0.02", "--views", "3", "--json",
+                              "--progress", "none"});
+    ASSERT_EQ(together.status, 0) << together.out << together.err;
+    const Json views = Json::parse(together.out)["several_views"];
+    EXPECT_EQ(views["views"], 3);
+    EXPECT_EQ(views["identical"], 3);
+    EXPECT_EQ(views["relaxed"], 0);
+    EXPECT_EQ(views["loads"], views["pages_resident"]) << "each page once, for all";
+    expectFailure(run({"stress", dataset().string(), "--order", "newest"}), 2, "newest");
     expectFailure(run({"stress", dataset().string(), "--path", "no/such/file"}), 1, "no/such/file");
     expectFailure(run({"stress", dataset().string(), "--faults", "error=2"}), 2, "error=2");
 }

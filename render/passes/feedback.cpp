@@ -1,0 +1,80 @@
+#include "render/passes/feedback.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "render/feedback_spirv.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr uint64_t kRayWords = uint64_t{frame::kFeedbackRays} * frame::kFeedbackRayWords;
+constexpr uint32_t kGroupSize = 64;
+static_assert(frame::kFeedbackRays == frame::kFeedbackWidth * frame::kFeedbackHeight && frame::kFeedbackRays % kGroupSize == 0);
+
+}  // namespace
+
+FeedbackPass::FeedbackPass() : pipelines_(kFeedbackSpirv) {}
+
+Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
+    if (buffer_.bytes() >= words * 4) return {};
+    const uint64_t bytes = std::bit_ceil(words) * 4;
+    constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    auto buffer = device.createBuffer(bytes, kUsage, MemoryUse::Local);
+    if (!buffer) return buffer.error();
+    if (buffer->mapped() == nullptr) {
+        auto readback = device.createBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
+        if (!readback) return readback.error();
+        readback_ = std::move(*readback);
+    }
+    buffer_ = std::move(*buffer);
+    return {};
+}
+
+Result<void> FeedbackPass::prepare(Device& device, FrameResources& resources, const PassConstants& constants, std::span<const glm::uvec4> table) {
+    const size_t records = table.size() / frame::kRecordTexels;
+    VCP_TRY(reserve(device, kRayWords + records));
+    resources.setFeedback(&buffer_);
+    pages_.resize(records);
+    for (size_t i = 0; i < records; ++i) pages_[i] = table[i * frame::kRecordTexels + 2].z;
+    PassConstants plain = constants;
+    plain.colour = plain.countSteps = plain.falseColour = false;
+    return pipelines_.choose(resources, plain);
+}
+
+glm::vec2 FeedbackPass::jitter() const {
+    // Two-dimensional golden ratio: fills the square evenly, whatever the number of frames (Roberts 2018).
+    const double n = double(passes_ % 4096);
+    return {std::fmod(0.5 + 0.7548776662466927 * n, 1.0), std::fmod(0.5 + 0.5698402909980532 * n, 1.0)};
+}
+
+void FeedbackPass::record(VkCommandBuffer commands) {
+    vkCmdFillBuffer(commands, buffer_.handle(), 0, VK_WHOLE_SIZE, 0);
+    barrierTransferToAll(commands);
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
+    vkCmdDispatch(commands, frame::kFeedbackRays / kGroupSize, 1, 1);
+    barrierComputeToReadback(commands);
+    ++passes_;
+    if (buffer_.mapped() != nullptr) return;
+    const VkBufferCopy whole{0, 0, (kRayWords + pages_.size()) * 4};
+    vkCmdCopyBuffer(commands, buffer_.handle(), readback_.handle(), 1, &whole);
+    barrierTransferToHost(commands);
+}
+
+RayFeedback FeedbackPass::read() const {
+    std::vector<uint32_t> words(kRayWords + pages_.size());
+    std::memcpy(words.data(), buffer_.mapped() != nullptr ? buffer_.mapped() : readback_.mapped(), words.size() * 4);
+    RayFeedback feedback;
+    for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
+        const uint32_t* w = &words[uint64_t{ray} * frame::kFeedbackRayWords];
+        if (w[3] == 0 || w[3] > pages_.size()) continue;
+        feedback.hits.push_back({pages_[w[3] - 1], glm::ivec3(w[0], w[1], w[2])});
+    }
+    for (size_t record = 0; record < pages_.size(); ++record)
+        if (words[kRayWords + record] != 0) feedback.passed.push_back({pages_[record], double(words[kRayWords + record]) / double(frame::kNearnessOne)});
+    return feedback;
+}
+
+}  // namespace vcp

@@ -1,0 +1,116 @@
+#!/usr/bin/env bash
+# Streams a file from disk and from nginx on the loopback, and writes what it took as a Markdown table.
+#
+# usage: tests/bench/stream_nginx.sh FILE.vcp [OUT_FOLDER]
+#
+# nginx runs with a configuration of its own, in a temporary folder, on free ports: plain, with TLS (a certificate made
+# here), at 20 Mbit/s (8 connections, each limited to an eighth), and behind a proxy that delays answers by 50 ms.
+# Needs nginx (Debian: nginx-light), openssl and python3. Variables, and what they are without:
+#   VCP=build/release/vcp  BUDGETS="64M 256M 1G"  SOURCES="disk http https 20mbit 50ms"
+#   STRESS="--path fly --frames 60 --size 640x400"
+# Exit status 1 when a run fails or an invariant breaks.
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+[ $# -ge 1 ] || { sed -n '4p' "${BASH_SOURCE[0]}" >&2; exit 2; }
+file=$(realpath "$1")
+out=${2:-$(mktemp -d)}
+vcp=${VCP:-$here/../../build/release/vcp}
+budgets=${BUDGETS:-64M 256M 1G}
+sources=${SOURCES:-disk http https 20mbit 50ms}
+read -ra stress <<<"${STRESS:---path fly --frames 60 --size 640x400}"
+nginx=$(PATH=$PATH:/usr/sbin command -v nginx) || { echo "nginx is missing; on Debian: apt-get install nginx-light" >&2; exit 1; }
+
+work=$(mktemp -d)
+proxy=
+stop() {
+    [ -z "$proxy" ] || kill "$proxy" 2>/dev/null || true
+    [ ! -s "$work/nginx.pid" ] || kill "$(cat "$work/nginx.pid")" 2>/dev/null || true
+    rm -rf "$work"
+}
+trap stop EXIT
+mkdir -p "$out" "$work/www"
+chmod 755 "$work" "$work/www"
+ln -s "$file" "$work/www/scan.vcp"
+
+# What the loopback serves stays on this machine.
+unset http_proxy https_proxy all_proxy HTTP_PROXY HTTPS_PROXY ALL_PROXY
+read -r plain secure limited < <(python3 -c '
+import socket
+all = [socket.socket() for _ in range(3)]
+for s in all: s.bind(("127.0.0.1", 0))
+print(*[s.getsockname()[1] for s in all])')
+openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=loopback \
+    -addext subjectAltName=IP:127.0.0.1 -keyout "$work/key.pem" -out "$work/certificate.pem" 2>/dev/null
+user=$([ "$(id -u)" -ne 0 ] || echo "user root;")
+cat >"$work/nginx.conf" <<CONF
+$user
+worker_processes 1;
+pid $work/nginx.pid;
+error_log $work/error.log;
+events { worker_connections 256; }
+http {
+    access_log off;
+    sendfile on;
+    client_body_temp_path $work/body;
+    proxy_temp_path $work/proxy;
+    fastcgi_temp_path $work/fastcgi;
+    uwsgi_temp_path $work/uwsgi;
+    scgi_temp_path $work/scgi;
+    root $work/www;
+    server { listen 127.0.0.1:$plain; }
+    server {
+        listen 127.0.0.1:$secure ssl http2;
+        ssl_certificate $work/certificate.pem;
+        ssl_certificate_key $work/key.pem;
+    }
+    server { listen 127.0.0.1:$limited; limit_rate 312500; }
+}
+CONF
+"$nginx" -p "$work" -e "$work/error.log" -c "$work/nginx.conf"
+coproc DELAY { exec python3 "$here/delay_proxy.py" "$plain" 50; }
+proxy=$DELAY_PID
+read -r _ delayed <&"${DELAY[0]}"
+
+address() {
+    case $1 in
+        disk) echo "$file" ;;
+        http) echo "http://127.0.0.1:$plain/scan.vcp" ;;
+        https) echo "https://127.0.0.1:$secure/scan.vcp" ;;
+        20mbit) echo "http://127.0.0.1:$limited/scan.vcp" ;;
+        50ms) echo "http://127.0.0.1:$delayed/scan.vcp" ;;
+        *) echo "no such source: $1" >&2; return 1 ;;
+    esac
+}
+
+status=0
+for source in $sources; do
+    for budget in $budgets; do
+        # Cold: the file's pages leave the cache of the system.
+        dd if="$file" iflag=nocache count=0 2>/dev/null
+        more=()
+        [ "$source" != https ] || more=(--ca-file "$work/certificate.pem")
+        echo "$source, $budget" >&2
+        "$vcp" stress "$(address "$source")" --budget "$budget" "${stress[@]}" ${more[@]+"${more[@]}"} --progress none --json \
+            >"$out/$source-$budget.json" || status=1
+    done
+done
+
+python3 - "$out" "$sources" "$budgets" <<'TABLE' | tee "$out/table.md"
+import json, os, sys
+
+out, sources, budgets = sys.argv[1], sys.argv[2].split(), sys.argv[3].split()
+print("| source | budget | first picture, s | 90 % detail, s | settled, s | frame p50 / p95 / p99 / max, ms | without loads | p99 ratio | read, MB | needed, MB | ratio | relaxed |")
+print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+for source in sources:
+    for budget in budgets:
+        path = os.path.join(out, f"{source}-{budget}.json")
+        if os.path.getsize(path) == 0:
+            continue
+        r = json.load(open(path))
+        times = lambda q: " / ".join(f"{q[k]:.0f}" for k in ("p50", "p95", "p99", "max"))
+        print(f"| {source} | {budget} | {r['first_picture_seconds']:.2f} | {r['detail_90_seconds']:.2f} | {r['settled_seconds']:.2f} "
+              f"| {times(r['frame_ms'])} | {times(r['frame_ms_no_loads'])} | {r['frame_ms']['p99'] / r['frame_ms_no_loads']['p99']:.2f} "
+              f"| {r['bytes_read'] / 1e6:.1f} | {r['bytes_needed'] / 1e6:.1f} | {r['bytes_read'] / max(1, r['bytes_needed']):.2f} "
+              f"| {'yes' if r['relaxed'] else 'no'} |{' **broken: ' + '; '.join(r['violations']) + '**' if r['violations'] else ''}")
+TABLE
+exit $status
