@@ -372,11 +372,19 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
     return std::optional<PixelHit>(hit);
 }
 
-Result<void> Renderer::present(uint32_t width, uint32_t height, const Picture* overlay) {
+Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& drawOver) {
     State& s = *state_;
     if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
     if (!s.drawn) return {};
-    return s.swapchain->show(s.resources->picture(), s.resources->size(), {width, height}, overlay);
+    return s.swapchain->show(s.resources->picture(), s.resources->size(), {width, height}, drawOver);
+}
+
+Result<WindowDrawing> Renderer::windowDrawing() {
+    const State& s = *state_;
+    if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
+    const auto renderPass = s.swapchain->renderPass();
+    if (!renderPass) return renderPass.error();
+    return WindowDrawing{s.instance->handle(), s.device->physical(), s.device->handle(), s.device->queue(), s.device->queueFamily(), *renderPass};
 }
 
 }  // namespace vcp

@@ -60,6 +60,18 @@ struct SurfaceSource {
     std::function<VkResult(VkInstance, VkSurfaceKHR*)> createSurface;
 };
 
+/// What draws over the picture in the window (a user interface) needs to make its pipelines.
+struct WindowDrawing {
+    VkInstance instance;
+    VkPhysicalDevice physical;
+    VkDevice device;
+    VkQueue queue;  ///< idle between calls of the renderer
+    uint32_t queueFamily;
+    VkRenderPass renderPass;  ///< one colour attachment, one sample, the picture in it
+};
+/// Records draws of an image of the window, inside of WindowDrawing::renderPass.
+using DrawOver = std::function<void(VkCommandBuffer commands, VkExtent2D size)>;
+
 struct RendererOptions {
     std::string device;             ///< index, or part of the name in any case; empty: the best one
     uint64_t budgetBytes = 512ull << 20;  ///< of the page pool, never exceeded; at least 1 MiB
@@ -201,9 +213,10 @@ public:
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.
-    /// `overlay`, opaque and in shades of grey, lies unscaled over the window's lower left corner; what
-    /// does not fit is cut off. Precondition: options.surface. Errors: Device.
-    Result<void> present(uint32_t width, uint32_t height, const Picture* overlay = nullptr);
+    /// `drawOver` (may be empty) draws over it. Precondition: options.surface. Errors: Device.
+    Result<void> present(uint32_t width, uint32_t height, const DrawOver& drawOver = {});
+    /// The same as long as the renderer. Precondition: options.surface. Errors: Device.
+    Result<WindowDrawing> windowDrawing();
 
     /// Validation messages (warnings and errors) since create(); always empty without options.validation.
     [[nodiscard]] std::vector<std::string> validationMessages() const;

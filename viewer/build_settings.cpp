@@ -89,7 +89,7 @@ BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) c
 ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.triangles, .tempBytes = at.tempBytes}; }
 
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
-                                         ProgressStyle progress) {
+                                         const std::function<bool(const BuildProgress&)>& progress) {
     const auto isDataset = [](const std::string& input) { return isHttpUrl(input) || looksLikeDataset(input); };
     if (inputs.size() == 1 && isDataset(inputs.front())) return std::filesystem::path(inputs.front());
     if (std::any_of(inputs.begin(), inputs.end(), isDataset))
@@ -98,13 +98,18 @@ Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs,
     auto folder = defaultCacheFolder();
     if (!folder) return folder;
     BuildOptions options = settings.optionsFor(inputs);
+    options.progress = progress;
+    return MeshCache(*folder).dataset(std::move(options), buildOctree);
+}
+
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         ProgressStyle progress) {
     ProgressDisplay display(progress, stderr);
     const InterruptScope catching;
-    options.progress = [&](const BuildProgress& at) {
+    return datasetFor(inputs, settings, [&](const BuildProgress& at) {
         display.update(at.stage, at.fraction, detailsOf(at));
         return !interrupted();
-    };
-    return MeshCache(*folder).dataset(std::move(options), buildOctree);
+    });
 }
 
 }  // namespace vcp

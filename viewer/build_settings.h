@@ -2,6 +2,8 @@
 // the cache first.
 #pragma once
 
+#include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,8 +31,12 @@ void addBuildSettings(CLI::App& app, BuildSettings& settings);
 /// What a display is told of a build.
 ProgressDetails detailsOf(const BuildProgress& at);
 
-/// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache, with
-/// progress. Errors: Usage (a .vcp among several inputs); those of MeshCache.
+/// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache. `progress` as in
+/// BuildOptions. Any thread. Errors: Usage (a .vcp among several inputs); those of MeshCache.
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         const std::function<bool(const BuildProgress&)>& progress);
+
+/// The same with progress on stderr, cancelled by Ctrl-C.
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          ProgressStyle progress);
 

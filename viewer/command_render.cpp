@@ -134,7 +134,9 @@ Result<int> run(const RenderCommand& command) {
     if (!open) return open.error();
     const auto camera = command.render.cameraFor(open->bounds(), size);
     if (!camera) return camera.error();
-    auto renderer = Renderer::create(command.render.rendererOptions(*open));
+    RendererOptions options = command.render.rendererOptions();
+    options.loaderThreads = open->loaderThreads();
+    auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(open->dataset, open->source));
 

@@ -28,7 +28,8 @@ struct RenderSettings {
     bool caps = false;
     SourceSettings source;
 
-    [[nodiscard]] RendererOptions rendererOptions(const OpenDataset& open) const;
+    /// For a local file; a server wants more loader threads.
+    [[nodiscard]] RendererOptions rendererOptions() const;
     [[nodiscard]] Shading shadingChosen() const;
     [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
