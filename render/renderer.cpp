@@ -233,7 +233,7 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     }
     constants = wanted;
     VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
-    resources->setBackground(backgroundRows(request.shading, request.height));
+    resources->setBackground(backgroundRows(request));
     if (tableStale && residency) VCP_TRY(resources->setTable(residency->table()));
     if (tableStale && !residency) VCP_TRY(resources->setTable(std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0))));
     tableStale = false;
@@ -366,7 +366,8 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
     if (std::bit_cast<float>(words[0]) >= frame::kTileEmpty || cells >= frame::kNoHit) return std::optional<PixelHit>{};
     PixelHit hit;
     hit.depth = double(cells) * s.residency->dataset().header.cell;
-    const CameraRay ray = cameraRay(s.drawn->camera, size.width, size.height, x + 0.5, y + 0.5);
+    const PictureTile whole = wholePicture(*s.drawn);
+    const CameraRay ray = cameraRay(s.drawn->camera, whole.fullWidth, whole.fullHeight, whole.x + x + 0.5, whole.y + y + 0.5);
     hit.position = ray.origin + ray.direction * hit.depth;
     hit.normal = unpackNormal(words[2]);
     return std::optional<PixelHit>(hit);

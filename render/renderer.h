@@ -118,14 +118,24 @@ struct Shading {
     double occlusionRadius = 0;   ///< how far they look, world units; 0: a tenth of the box's diagonal
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};    ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
+    bool transparent = false;     ///< background is black with alpha 0
 
     bool operator==(const Shading&) const = default;
 };
 
+/// Where a picture lies in a larger one: its upper left pixel, and the size of the whole.
+struct PictureTile {
+    uint32_t x = 0, y = 0;
+    uint32_t fullWidth = 1, fullHeight = 1;  ///< 1 to 2^20 each
+
+    bool operator==(const PictureTile&) const = default;
+};
+
 /// All that a picture depends on, beside the pages.
 struct FrameRequest {
-    Camera camera;
+    Camera camera;  ///< of the whole, where the picture is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
+    std::optional<PictureTile> tile;      ///< absent: the picture is the whole
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
     std::vector<SectionPlane> sections;   ///< at most kMostSections
