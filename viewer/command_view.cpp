@@ -4,6 +4,7 @@
 #include "streaming/http_reader.h"
 #include "viewer/build_settings.h"
 #include "viewer/commands.h"
+#include "viewer/interrupt.h"
 #include "viewer/key_map.h"
 #include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"
@@ -45,6 +46,7 @@ Json toJson(const WindowReport& report) {
 
 /// What can be said before a window is opened: a mesh that is not there, a .vcp that is none.
 Result<void> checkInputs(const ViewCommand& command) {
+    if (const auto isBuilt = isOneDataset(command.inputs); !isBuilt) return isBuilt.error();
     for (const std::string& input : command.inputs) {
         if (isHttpUrl(input)) continue;
         if (looksLikeDataset(input)) {
@@ -87,6 +89,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     if (!report) return report.error();
     if (settingsPath) VCP_TRY(writeUserSettings(report->user, *settingsPath));
     if (command.report.json) VCP_TRY(printJson(toJson(*report)));
+    if (!report->firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
     if (!report->firstPictureSeconds && !report->problem.empty()) return Error{ErrorCode::InvalidInput, report->problem};
     return 0;
 }

@@ -81,7 +81,7 @@ Result<void> InterfacePainter::start() {
     info.DescriptorPool = descriptors_;
     info.MinImageCount = info.ImageCount = kBuffers;
     info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
-#if IMGUI_VERSION_NUM >= 19003
+#if IMGUI_VERSION_NUM >= 19030
     info.RenderPass = window_.renderPass;
     ImGui_ImplVulkan_Init(&info);
 #else
@@ -99,7 +99,7 @@ void InterfacePainter::stop() {
 }
 
 Result<void> InterfacePainter::uploadFont() {
-#if IMGUI_VERSION_NUM < 18995
+#if IMGUI_VERSION_NUM < 19000
     VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
     poolInfo.queueFamilyIndex = window_.queueFamily;
     VkCommandPool pool = VK_NULL_HANDLE;

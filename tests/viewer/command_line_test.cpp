@@ -345,6 +345,7 @@ TEST_F(CommandLine, PicturesInTilesAndSequences) {
 
 TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {
     expectFailure(run({"view", dataset().string()}), 1, "vcp render");
+    expectFailure(run({"view", dataset().string(), dataset().string()}), 2, "one .vcp at a time");
 }
 
 TEST_F(CommandLine, UnwritableOutputs) {
