@@ -76,7 +76,9 @@ differs() { waits_for "$1 and $2 are the same picture" is_other "$1" "$2"; }
 equals() { waits_for "$1 and $2 differ" is_same "$1" "$2"; }
 
 starts ball.ply ball.ply --size 640x480
-waits_for "the first picture is empty" is_picture start
+# The window shows its background and the build's progress first: wait for clay in the middle.
+is_first() { is_picture "$1" && [ "$(convert "$1.png" -format '%[fx:p{320,240}.r>0.6]' info:)" = 1 ]; }
+waits_for "the first picture is empty" is_first start
 xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 380 260 mousemove --window $window 440 280 mouseup 1
 differs start orbit
 xdotool key --window $window r
@@ -125,7 +127,7 @@ awk -F, 'NR>1 { n++; r=sqrt($3*$3+$4*$4+$5*$5); if (r<0.88 || r>1.12 || $6<=0) e
     END { if (n!=2) exit 1 }' measurement-1.csv || { cat measurement-1.csv; fail "what was measured is wrong"; }
 xdotool key --window $window Escape
 xdotool windowsize $window 500 300
-is_resized() { is_picture resized && [ "$(convert resized.png -format %wx%h info:)" = 500x300 ]; }
+is_resized() { is_picture resized && [ "$(convert resized.png -format '%wx%h:%[fx:p{250,150}.r>0.6]' info:)" = 500x300:1 ]; }
 waits_for "no picture of the size asked for after a resize" is_resized
 # At rest the window sleeps: how often its thread was woken in two seconds.
 wakes() { awk '/ctxt_switches/ { n += $2 } END { print n }' /proc/$viewer/status; }
