@@ -39,9 +39,17 @@ frame::uint shadingMode(ShadingMode mode) {
 struct PicturePlane {
     glm::dvec3 corner, stepX, stepY;
 };
-PicturePlane picturePlane(const CameraBasis& basis, uint32_t width, uint32_t height) {
-    return {basis.up * basis.halfHeight - basis.right * basis.halfWidth, basis.right * (2 * basis.halfWidth / width),
-            basis.up * (-2 * basis.halfHeight / height)};
+PicturePlane picturePlane(const CameraBasis& basis, const PictureTile& tile) {
+    PicturePlane plane;
+    plane.stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth);
+    plane.stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
+    plane.corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + plane.stepX * double(tile.x) + plane.stepY * double(tile.y);
+    return plane;
+}
+
+CameraBasis basisOf(const FrameRequest& request) {
+    const PictureTile tile = wholePicture(request);
+    return cameraBasis(request.camera, tile.fullWidth, tile.fullHeight);
 }
 
 /// Splits the eye, in finest cells from the root's corner, into a lattice point and a small rest where it is
@@ -71,7 +79,7 @@ void setSections(frame::FrameConstants& c, const FrameRequest& request, const Fi
 constexpr double kLiftPixels = 0.5;
 
 void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header, const CameraBasis& basis, double errorPixels) {
-    const double pixel = 2 * basis.halfHeight / request.height;
+    const double pixel = 2 * basis.halfHeight / wholePicture(request).fullHeight;
     const bool perspective = request.camera.projection == Projection::Perspective;
     const double diagonal = glm::distance(glm::dvec3(header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]),
                                           glm::dvec3(header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]));
@@ -99,8 +107,8 @@ uint32_t hitPlanes(const FrameRequest& request, bool colour) {
 frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels) {
     frame::FrameConstants c{};
     const FileHeader header = dataset != nullptr ? dataset->header : FileHeader{.cell = 1, .levels = 1, .log2Cells = 5};
-    const CameraBasis basis = cameraBasis(request.camera, request.width, request.height);
-    const PicturePlane plane = picturePlane(basis, request.width, request.height);
+    const CameraBasis basis = basisOf(request);
+    const PicturePlane plane = picturePlane(basis, wholePicture(request));
     if (request.camera.projection == Projection::Perspective) {
         c.direction = toVec4(basis.forward + plane.corner);
         c.directionX = toVec4(plane.stepX);
@@ -132,11 +140,18 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     return c;
 }
 
-std::vector<uint32_t> backgroundRows(const Shading& shading, uint32_t height) {
+PictureTile wholePicture(const FrameRequest& request) {
+    return request.tile.value_or(PictureTile{0, 0, request.width, request.height});
+}
+
+std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
+    const Shading& shading = request.shading;
+    std::vector<uint32_t> rows(request.height);
+    if (shading.transparent) return rows;
     const glm::vec4 top = encoded(shading.backgroundTop), bottom = encoded(shading.backgroundBottom);
-    std::vector<uint32_t> rows(height);
-    for (uint32_t y = 0; y < height; ++y) {
-        const glm::vec4 colour = glm::mix(top, bottom, (float(y) + 0.5f) / float(height));
+    const PictureTile whole = wholePicture(request);
+    for (uint32_t y = 0; y < request.height; ++y) {
+        const glm::vec4 colour = glm::mix(top, bottom, (float(whole.y + y) + 0.5f) / float(whole.fullHeight));
         rows[y] = 0xff000000u;
         for (int i = 0; i < 3; ++i) rows[y] |= static_cast<uint32_t>(std::lround(glm::clamp(colour[i], 0.0f, 1.0f) * 255)) << 8 * i;
     }
@@ -144,18 +159,22 @@ std::vector<uint32_t> backgroundRows(const Shading& shading, uint32_t height) {
 }
 
 SelectionView selectionView(const FrameRequest& request) {
-    const CameraBasis basis = cameraBasis(request.camera, request.width, request.height);
+    const CameraBasis basis = basisOf(request);
+    const PictureTile whole = wholePicture(request);
     SelectionView view;
     view.eye = request.camera.eye;
     view.orthographic = request.camera.projection == Projection::Orthographic;
-    view.pixelsPerUnit = request.height / (2 * basis.halfHeight);
+    view.pixelsPerUnit = whole.fullHeight / (2 * basis.halfHeight);
     view.errorPixels = request.errorPixels;
-    const double ahead = view.orthographic ? 0 : 1;
-    const double w = view.orthographic ? basis.halfWidth : 0, h = view.orthographic ? basis.halfHeight : 0;
-    view.planes = {glm::dvec4(basis.right + basis.forward * (ahead * basis.halfWidth), w),
-                   glm::dvec4(-basis.right + basis.forward * (ahead * basis.halfWidth), w),
-                   glm::dvec4(basis.up + basis.forward * (ahead * basis.halfHeight), h),
-                   glm::dvec4(-basis.up + basis.forward * (ahead * basis.halfHeight), h)};
+    // The picture's edges: tangents, or world units where the projection is orthographic.
+    const auto across = [&](double x) { return basis.halfWidth * (2 * x / whole.fullWidth - 1); };
+    const auto upward = [&](double y) { return basis.halfHeight * (1 - 2 * y / whole.fullHeight); };
+    const double left = across(whole.x), right = across(double(whole.x) + request.width);
+    const double upper = upward(whole.y), lower = upward(double(whole.y) + request.height);
+    const auto plane = [&](glm::dvec3 inward, double off) {
+        return view.orthographic ? glm::dvec4(inward, off) : glm::dvec4(inward + basis.forward * off, 0);
+    };
+    view.planes = {plane(basis.right, -left), plane(-basis.right, right), plane(basis.up, -lower), plane(-basis.up, upper)};
     return view;
 }
 
@@ -164,6 +183,11 @@ Result<void> checkRequest(const FrameRequest& request) {
     const Camera& camera = request.camera;
     if (request.width < 1 || request.height < 1 || request.width > 16384 || request.height > 16384)
         return usage("a picture is 1 to 16384 pixels wide and high");
+    const PictureTile whole = wholePicture(request);
+    constexpr uint32_t kLargestWhole = 1 << 20;
+    if (whole.fullWidth < 1 || whole.fullHeight < 1 || whole.fullWidth > kLargestWhole || whole.fullHeight > kLargestWhole ||
+        uint64_t{whole.x} + request.width > whole.fullWidth || uint64_t{whole.y} + request.height > whole.fullHeight)
+        return usage("a tile must lie within its picture, and that be at most 2^20 pixels wide and high");
     if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
     const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up)) return usage("the camera has coordinates that are not numbers");

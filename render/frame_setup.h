@@ -20,8 +20,11 @@ bool isFalseColour(ShadingMode mode);
 /// Words that a pixel's hit takes: depth, normal, and where wanted colour and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 
+/// The tile that a request draws; of a whole picture the whole.
+PictureTile wholePicture(const FrameRequest& request);
+
 /// The picture's background, one RGBA8 word a row.
-std::vector<uint32_t> backgroundRows(const Shading& shading, uint32_t height);
+std::vector<uint32_t> backgroundRows(const FrameRequest& request);
 
 SelectionView selectionView(const FrameRequest& request);
 

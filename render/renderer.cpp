@@ -431,7 +431,7 @@ Result<void> Renderer::State::prepare(const FrameRequest& request) {
     }
     constants = wanted;
     VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
-    resources->setBackground(backgroundRows(request.shading, request.height));
+    resources->setBackground(backgroundRows(request));
     VCP_TRY(prepareTable());
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
@@ -597,17 +597,26 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
     if (std::bit_cast<float>(words[0]) >= frame::kTileEmpty || cells >= frame::kNoHit) return std::optional<PixelHit>{};
     PixelHit hit;
     hit.depth = double(cells) * s.residency->dataset().header.cell;
-    const CameraRay ray = cameraRay(s.drawn->camera, size.width, size.height, x + 0.5, y + 0.5);
+    const PictureTile whole = wholePicture(*s.drawn);
+    const CameraRay ray = cameraRay(s.drawn->camera, whole.fullWidth, whole.fullHeight, whole.x + x + 0.5, whole.y + y + 0.5);
     hit.position = ray.origin + ray.direction * hit.depth;
     hit.normal = unpackNormal(words[2]);
     return std::optional<PixelHit>(hit);
 }
 
-Result<void> Renderer::present(uint32_t width, uint32_t height, const Picture* overlay) {
+Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& drawOver) {
     State& s = *state_;
     if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
     if (!s.drawn) return {};
-    return s.swapchain->show(s.resources->picture(), s.resources->size(), {width, height}, overlay);
+    return s.swapchain->show(s.resources->picture(), s.resources->size(), {width, height}, drawOver);
+}
+
+Result<WindowDrawing> Renderer::windowDrawing() {
+    const State& s = *state_;
+    if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
+    const auto renderPass = s.swapchain->renderPass();
+    if (!renderPass) return renderPass.error();
+    return WindowDrawing{s.instance->handle(), s.device->physical(), s.device->handle(), s.device->queue(), s.device->queueFamily(), *renderPass};
 }
 
 }  // namespace vcp

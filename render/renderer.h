@@ -74,6 +74,18 @@ struct DeviceFaults {
     uint64_t lostAtSubmission = 0;      ///< the device is lost at this submission of work, once; 0: never
 };
 
+/// What draws over the picture in the window (a user interface) needs to make its pipelines.
+struct WindowDrawing {
+    VkInstance instance;
+    VkPhysicalDevice physical;
+    VkDevice device;
+    VkQueue queue;  ///< idle between calls of the renderer
+    uint32_t queueFamily;
+    VkRenderPass renderPass;  ///< one colour attachment, one sample, the picture in it
+};
+/// Records draws of an image of the window, inside of WindowDrawing::renderPass.
+using DrawOver = std::function<void(VkCommandBuffer commands, VkExtent2D size)>;
+
 struct RendererOptions {
     std::string device;             ///< index, or part of the name in any case; empty: the best one
     uint64_t budgetBytes = 512ull << 20;  ///< of the page pool, never exceeded; at least 1 MiB
@@ -123,16 +135,26 @@ struct Shading {
     double occlusionRadius = 0;   ///< how far they look, world units; 0: a tenth of the box's diagonal
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};    ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
+    bool transparent = false;     ///< background is black with alpha 0
 
     bool operator==(const Shading&) const = default;
+};
+
+/// Where a picture lies in a larger one: its upper left pixel, and the size of the whole.
+struct PictureTile {
+    uint32_t x = 0, y = 0;
+    uint32_t fullWidth = 1, fullHeight = 1;  ///< 1 to 2^20 each
+
+    bool operator==(const PictureTile&) const = default;
 };
 
 /// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/paper_page.h) are drawn by
 /// their own march, from their one page; they have no beam pass, no shadows, no ambient occlusion and no caps: what a
 /// request asks of these is left out.
 struct FrameRequest {
-    Camera camera;
+    Camera camera;  ///< of the whole, where the picture is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
+    std::optional<PictureTile> tile;      ///< absent: the picture is the whole
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
     std::vector<SectionPlane> sections;   ///< at most kMostSections
@@ -237,9 +259,10 @@ public:
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.
-    /// `overlay`, opaque and in shades of grey, lies unscaled over the window's lower left corner; what
-    /// does not fit is cut off. Precondition: options.surface. Errors: Device.
-    Result<void> present(uint32_t width, uint32_t height, const Picture* overlay = nullptr);
+    /// `drawOver` (may be empty) draws over it. Precondition: options.surface. Errors: Device.
+    Result<void> present(uint32_t width, uint32_t height, const DrawOver& drawOver = {});
+    /// The same as long as the renderer. Precondition: options.surface. Errors: Device.
+    Result<WindowDrawing> windowDrawing();
 
     /// Validation messages (warnings and errors) since create(); always empty without options.validation.
     [[nodiscard]] std::vector<std::string> validationMessages() const;

@@ -1,7 +1,6 @@
 #include "render/swapchain.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "render/vulkan/check.h"
 
@@ -31,10 +30,15 @@ Swapchain::~Swapchain() {
     vkDeviceWaitIdle(device_.handle());
     destroySwapchain();
     destroyPictureImage();
+    if (renderPass_ != VK_NULL_HANDLE) vkDestroyRenderPass(device_.handle(), renderPass_, nullptr);
     vkDestroySurfaceKHR(instance_, surface_, nullptr);
 }
 
 void Swapchain::destroySwapchain() {
+    for (VkFramebuffer framebuffer : framebuffers_) vkDestroyFramebuffer(device_.handle(), framebuffer, nullptr);
+    for (VkImageView view : views_) vkDestroyImageView(device_.handle(), view, nullptr);
+    framebuffers_.clear();
+    views_.clear();
     for (VkSemaphore semaphore : shown_) vkDestroySemaphore(device_.handle(), semaphore, nullptr);
     shown_.clear();
     if (acquired_ != VK_NULL_HANDLE) vkDestroySemaphore(device_.handle(), acquired_, nullptr);
@@ -51,12 +55,8 @@ void Swapchain::destroyPictureImage() {
     pictureSize_ = {};
 }
 
-Result<void> Swapchain::recreate(PictureSize window) {
-    VCP_VK(vkDeviceWaitIdle, device_.handle());
-    destroySwapchain();
-    window_ = window;
-    VkSurfaceCapabilitiesKHR can;
-    VCP_VK(vkGetPhysicalDeviceSurfaceCapabilitiesKHR, device_.physical(), surface_, &can);
+Result<void> Swapchain::chooseFormat() {
+    if (format_.format != VK_FORMAT_UNDEFINED) return {};
     uint32_t count = 0;
     VCP_VK(vkGetPhysicalDeviceSurfaceFormatsKHR, device_.physical(), surface_, &count, nullptr);
     std::vector<VkSurfaceFormatKHR> formats(count);
@@ -66,7 +66,72 @@ Result<void> Swapchain::recreate(PictureSize window) {
     const auto plain = std::find_if(formats.begin(), formats.end(), [](const VkSurfaceFormatKHR& f) {
         return f.format == VK_FORMAT_B8G8R8A8_UNORM || f.format == VK_FORMAT_R8G8B8A8_UNORM;
     });
-    const VkSurfaceFormatKHR format = plain != formats.end() ? *plain : formats.front();
+    format_ = plain != formats.end() ? *plain : formats.front();
+    return {};
+}
+
+Result<VkRenderPass> Swapchain::renderPass() {
+    if (renderPass_ != VK_NULL_HANDLE) return renderPass_;
+    VCP_TRY(chooseFormat());
+    VkAttachmentDescription image{};
+    image.format = format_.format;
+    image.samples = VK_SAMPLE_COUNT_1_BIT;
+    image.loadOp = VK_ATTACHMENT_LOAD_OP_LOAD;
+    image.storeOp = VK_ATTACHMENT_STORE_OP_STORE;
+    image.stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE;
+    image.stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE;
+    image.initialLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+    image.finalLayout = VK_IMAGE_LAYOUT_PRESENT_SRC_KHR;
+    const VkAttachmentReference colour{0, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL};
+    VkSubpassDescription subpass{};
+    subpass.pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS;
+    subpass.colorAttachmentCount = 1;
+    subpass.pColorAttachments = &colour;
+    VkSubpassDependency afterCopy{};
+    afterCopy.srcSubpass = VK_SUBPASS_EXTERNAL;
+    afterCopy.srcStageMask = VK_PIPELINE_STAGE_TRANSFER_BIT;
+    afterCopy.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    afterCopy.dstStageMask = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+    afterCopy.dstAccessMask = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT;
+    VkRenderPassCreateInfo info{VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO};
+    info.attachmentCount = info.subpassCount = info.dependencyCount = 1;
+    info.pAttachments = &image;
+    info.pSubpasses = &subpass;
+    info.pDependencies = &afterCopy;
+    VCP_VK(vkCreateRenderPass, device_.handle(), &info, nullptr, &renderPass_);
+    return renderPass_;
+}
+
+Result<void> Swapchain::makeFramebuffers() {
+    if (!framebuffers_.empty()) return {};
+    const auto pass = renderPass();
+    if (!pass) return pass.error();
+    for (VkImage image : images_) {
+        VkImageViewCreateInfo viewInfo{VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO};
+        viewInfo.image = image;
+        viewInfo.viewType = VK_IMAGE_VIEW_TYPE_2D;
+        viewInfo.format = format_.format;
+        viewInfo.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+        VCP_VK(vkCreateImageView, device_.handle(), &viewInfo, nullptr, &views_.emplace_back(VK_NULL_HANDLE));
+        VkFramebufferCreateInfo info{VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO};
+        info.renderPass = *pass;
+        info.attachmentCount = 1;
+        info.pAttachments = &views_.back();
+        info.width = extent_.width;
+        info.height = extent_.height;
+        info.layers = 1;
+        VCP_VK(vkCreateFramebuffer, device_.handle(), &info, nullptr, &framebuffers_.emplace_back(VK_NULL_HANDLE));
+    }
+    return {};
+}
+
+Result<void> Swapchain::recreate(PictureSize window) {
+    VCP_VK(vkDeviceWaitIdle, device_.handle());
+    destroySwapchain();
+    window_ = window;
+    VkSurfaceCapabilitiesKHR can;
+    VCP_VK(vkGetPhysicalDeviceSurfaceCapabilitiesKHR, device_.physical(), surface_, &can);
+    VCP_TRY(chooseFormat());
     extent_ = can.currentExtent;
     if (extent_.width == UINT32_MAX)
         extent_ = {std::clamp(window.width, can.minImageExtent.width, can.maxImageExtent.width),
@@ -75,16 +140,17 @@ Result<void> Swapchain::recreate(PictureSize window) {
     VkSwapchainCreateInfoKHR info{VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR};
     info.surface = surface_;
     info.minImageCount = can.maxImageCount > 0 ? std::min(can.minImageCount + 1, can.maxImageCount) : can.minImageCount + 1;
-    info.imageFormat = format.format;
-    info.imageColorSpace = format.colorSpace;
+    info.imageFormat = format_.format;
+    info.imageColorSpace = format_.colorSpace;
     info.imageExtent = extent_;
     info.imageArrayLayers = 1;
-    info.imageUsage = VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+    info.imageUsage = VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
     info.preTransform = can.currentTransform;
     info.compositeAlpha = VK_COMPOSITE_ALPHA_OPAQUE_BIT_KHR;
     info.presentMode = VK_PRESENT_MODE_FIFO_KHR;
     info.clipped = VK_TRUE;
     VCP_VK(vkCreateSwapchainKHR, device_.handle(), &info, nullptr, &swapchain_);
+    uint32_t count = 0;
     VCP_VK(vkGetSwapchainImagesKHR, device_.handle(), swapchain_, &count, nullptr);
     images_.resize(count);
     VCP_VK(vkGetSwapchainImagesKHR, device_.handle(), swapchain_, &count, images_.data());
@@ -119,7 +185,7 @@ Result<void> Swapchain::makePictureImage(PictureSize size) {
     return {};
 }
 
-void Swapchain::record(VkCommandBuffer commands, const Buffer& picture, VkImage target) const {
+void Swapchain::recordPicture(VkCommandBuffer commands, const Buffer& picture, VkImage target) const {
     constexpr VkImageLayout kTo = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, kFrom = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
     changeLayout(commands, pictureImage_, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
     const VkBufferImageCopy copy{0, 0, 0, kLayer, {0, 0, 0}, {pictureSize_.width, pictureSize_.height, 1}};
@@ -130,35 +196,19 @@ void Swapchain::record(VkCommandBuffer commands, const Buffer& picture, VkImage 
                            {{0, 0, 0}, farCorner(extent_.width, extent_.height)}};
     const bool same = pictureSize_.width == extent_.width && pictureSize_.height == extent_.height;
     vkCmdBlitImage(commands, pictureImage_, kFrom, target, kTo, 1, &blit, same ? VK_FILTER_NEAREST : VK_FILTER_LINEAR);
-    recordOverlay(commands, target);
-    changeLayout(commands, target, kTo, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_ACCESS_TRANSFER_WRITE_BIT, 0);
 }
 
-Result<void> Swapchain::takeOverlay(const Picture* overlay) {
-    overlaySize_ = {};
-    if (!overlay || overlay->rgba.empty()) return {};
-    const uint64_t bytes = overlay->rgba.size();
-    if (overlay_.bytes() < bytes) {
-        auto buffer = device_.createBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
-        if (!buffer) return buffer.error();
-        overlay_ = std::move(*buffer);
-    }
-    // Greys look the same whichever channel comes first in the window's format.
-    std::memcpy(overlay_.mapped(), overlay->rgba.data(), bytes);
-    overlaySize_ = {overlay->width, overlay->height};
-    return {};
+void Swapchain::recordOver(VkCommandBuffer commands, const DrawOver& drawOver, uint32_t image) const {
+    VkRenderPassBeginInfo begin{VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO};
+    begin.renderPass = renderPass_;
+    begin.framebuffer = framebuffers_[image];
+    begin.renderArea = {{0, 0}, extent_};
+    vkCmdBeginRenderPass(commands, &begin, VK_SUBPASS_CONTENTS_INLINE);
+    drawOver(commands, extent_);
+    vkCmdEndRenderPass(commands);
 }
 
-void Swapchain::recordOverlay(VkCommandBuffer commands, VkImage target) const {
-    constexpr VkImageLayout kTo = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
-    const uint32_t width = std::min(overlaySize_.width, extent_.width), height = std::min(overlaySize_.height, extent_.height);
-    if (width == 0 || height == 0) return;
-    changeLayout(commands, target, kTo, kTo, VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
-    const VkBufferImageCopy copy{0, overlaySize_.width, overlaySize_.height, kLayer, {0, static_cast<int32_t>(extent_.height - height), 0}, {width, height, 1}};
-    vkCmdCopyBufferToImage(commands, overlay_.handle(), target, kTo, 1, &copy);
-}
-
-Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const Picture* overlay) {
+Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const DrawOver& drawOver) {
     if (window.width == 0 || window.height == 0) return {};
     if (swapchain_ == VK_NULL_HANDLE || window != window_) VCP_TRY(recreate(window));
     uint32_t image = 0;
@@ -172,10 +222,14 @@ Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, Pic
     if (acquired == VK_ERROR_OUT_OF_DATE_KHR) return {};
     if (acquired != VK_SUCCESS && acquired != VK_SUBOPTIMAL_KHR) return vulkanError("vkAcquireNextImageKHR", acquired);
     VCP_TRY(makePictureImage(pictureSize));
-    VCP_TRY(takeOverlay(overlay));
+    if (drawOver) VCP_TRY(makeFramebuffers());
     auto commands = device_.beginCommands();
     if (!commands) return commands.error();
-    record(*commands, picture, images_[image]);
+    recordPicture(*commands, picture, images_[image]);
+    if (drawOver)
+        recordOver(*commands, drawOver, image);
+    else
+        changeLayout(*commands, images_[image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_ACCESS_TRANSFER_WRITE_BIT, 0);
     VCP_TRY(device_.endCommandsAndWait(acquired_, shown_[image]));
     VkPresentInfoKHR present{VK_STRUCTURE_TYPE_PRESENT_INFO_KHR};
     present.waitSemaphoreCount = 1;

@@ -18,10 +18,12 @@ public:
     Swapchain(const Swapchain&) = delete;
     Swapchain& operator=(const Swapchain&) = delete;
 
-    /// Shows an RGBA8 picture, scaled to the window's framebuffer, and over its lower left corner, unscaled,
-    /// `overlay`, if there is one (see Renderer::present); waits until it is handed over. Does nothing where
-    /// the framebuffer has no area. Errors: Device.
-    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const Picture* overlay = nullptr);
+    /// Shows an RGBA8 picture, scaled to the window's framebuffer, with what `drawOver` draws over it, if it is not
+    /// empty; waits until it is handed over. Does nothing where the framebuffer has no area. Errors: Device.
+    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const DrawOver& drawOver = {});
+
+    /// What drawOver draws in; made on first use. Errors: Device.
+    Result<VkRenderPass> renderPass();
 
 private:
     Result<void> recreate(PictureSize window);
@@ -29,15 +31,20 @@ private:
     void destroySwapchain();
     void destroyAfterResize();
     void destroyPictureImage();
-    Result<void> takeOverlay(const Picture* overlay);
-    void record(VkCommandBuffer commands, const Buffer& picture, VkImage target) const;
-    void recordOverlay(VkCommandBuffer commands, VkImage target) const;
+    Result<void> chooseFormat();
+    Result<void> makeFramebuffers();
+    void recordPicture(VkCommandBuffer commands, const Buffer& picture, VkImage target) const;
+    void recordOver(VkCommandBuffer commands, const DrawOver& drawOver, uint32_t image) const;
 
     VkInstance instance_;
     Device& device_;
     VkSurfaceKHR surface_;
     VkSwapchainKHR swapchain_ = VK_NULL_HANDLE;
+    VkSurfaceFormatKHR format_{};  // VK_FORMAT_UNDEFINED: not chosen yet
+    VkRenderPass renderPass_ = VK_NULL_HANDLE;
     std::vector<VkImage> images_;
+    std::vector<VkImageView> views_;           // one an image, like the framebuffers; empty until drawn over
+    std::vector<VkFramebuffer> framebuffers_;
     std::vector<VkSemaphore> shown_;  // one an image: free again when the image comes back
     VkSemaphore acquired_ = VK_NULL_HANDLE;
     PictureSize window_;  // as asked for
@@ -45,8 +52,6 @@ private:
     VkImage pictureImage_ = VK_NULL_HANDLE;  // the picture, as something that can be scaled
     VkDeviceMemory pictureMemory_ = VK_NULL_HANDLE;
     PictureSize pictureSize_;
-    Buffer overlay_;
-    PictureSize overlaySize_;  // without area: there is none
 };
 
 }  // namespace vcp

@@ -88,23 +88,34 @@ BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) c
 
 ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.triangles, .tempBytes = at.tempBytes}; }
 
-Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
-                                         ProgressStyle progress) {
+Result<bool> isOneDataset(const std::vector<std::string>& inputs) {
     const auto isDataset = [](const std::string& input) { return isHttpUrl(input) || looksLikeDataset(input); };
-    if (inputs.size() == 1 && isDataset(inputs.front())) return std::filesystem::path(inputs.front());
-    if (std::any_of(inputs.begin(), inputs.end(), isDataset))
-        return Error{ErrorCode::Usage, "several inputs must all be meshes; one .vcp at a time"};
+    const bool any = std::any_of(inputs.begin(), inputs.end(), isDataset);
+    if (any && inputs.size() > 1) return Error{ErrorCode::Usage, "several inputs must all be meshes; one .vcp at a time"};
+    return any;
+}
+
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         const std::function<bool(const BuildProgress&)>& progress) {
+    const auto isBuilt = isOneDataset(inputs);
+    if (!isBuilt) return isBuilt.error();
+    if (*isBuilt) return std::filesystem::path(inputs.front());
 
     auto folder = defaultCacheFolder();
     if (!folder) return folder;
     BuildOptions options = settings.optionsFor(inputs);
+    options.progress = progress;
+    return MeshCache(*folder).dataset(std::move(options), buildOctree);
+}
+
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         ProgressStyle progress) {
     ProgressDisplay display(progress, stderr);
     const InterruptScope catching;
-    options.progress = [&](const BuildProgress& at) {
+    return datasetFor(inputs, settings, [&](const BuildProgress& at) {
         display.update(at.stage, at.fraction, detailsOf(at));
         return !interrupted();
-    };
-    return MeshCache(*folder).dataset(std::move(options), buildOctree);
+    });
 }
 
 }  // namespace vcp

@@ -2,6 +2,8 @@
 // the cache first.
 #pragma once
 
+#include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,8 +31,15 @@ void addBuildSettings(CLI::App& app, BuildSettings& settings);
 /// What a display is told of a build.
 ProgressDetails detailsOf(const BuildProgress& at);
 
-/// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache, with
-/// progress. Errors: Usage (a .vcp among several inputs); those of MeshCache.
+/// True for one .vcp or address, false for meshes. Errors: Usage (a .vcp among several inputs).
+Result<bool> isOneDataset(const std::vector<std::string>& inputs);
+
+/// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache. `progress` as in
+/// BuildOptions. Any thread. Errors: those of isOneDataset and MeshCache.
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                         const std::function<bool(const BuildProgress&)>& progress);
+
+/// The same with progress on stderr, cancelled by Ctrl-C.
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          ProgressStyle progress);
 

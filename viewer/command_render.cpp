@@ -1,6 +1,9 @@
-// vcp render: a picture without a window.
+// vcp render: pictures without a window: one, one larger than the device draws at once, or a sequence.
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
+#include <numbers>
 #include <thread>
 
 #include <fmt/format.h>
@@ -11,11 +14,20 @@
 #include "viewer/image_files.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
+#include "viewer/png_rows.h"
 #include "viewer/render_settings.h"
+#include "viewer/stress_path.h"
+#include "viewer/tiled_picture.h"
 
 namespace vcp {
 
 namespace {
+
+// Pictures of more pixels are drawn in tiles: devices limit how many a buffer may hold.
+constexpr uint64_t kMostPixelsAtOnce = 8 << 20;
+constexpr uint32_t kTile = 2048;
+constexpr int kPathFrames = 120;
+constexpr std::uintmax_t kLargestPathFile = 64 << 20;
 
 struct RenderCommand {
     std::vector<std::string> inputs;
@@ -24,12 +36,20 @@ struct RenderCommand {
     std::string depth, normals;
     int frames = 0;  // 0: not given
     bool settle = true;
+    uint32_t tile = 0;  // 0: not given
+    bool transparent = false;
+    int turntable = 0;
+    std::string path;
     BuildSettings build;
     RenderSettings render;
     ReportOptions report;
 
     /// With --json somebody wants figures, and the first frame, which compiles, would not be one.
     [[nodiscard]] int framesToTime() const { return frames > 0 ? frames : report.json ? 5 : 0; }
+    [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty(); }
+    [[nodiscard]] bool isTiled(const FrameRequest& request) const {
+        return tile > 0 || isSequence() || uint64_t{request.width} * request.height > kMostPixelsAtOnce;
+    }
 };
 
 /// What the frames cost and showed.
@@ -128,6 +148,97 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
                        error, update.settled ? "settled" : "not settled");
 }
 
+/// "statue.png" and 7: "statue-0007.png".
+std::string numbered(const std::string& path, size_t number) {
+    const std::filesystem::path p(path);
+    return (p.parent_path() / fmt::format("{}-{:04}{}", p.stem().string(), number, p.extension().string())).string();
+}
+
+/// Draws into files tile by tile. `progress` of this picture.
+Result<TiledPictureStats> drawTiledFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command, const std::string& output,
+                                         const std::function<bool(double)>& progress) {
+    auto png = PngRows::create(output, request.width, request.height);
+    if (!png) return png.error();
+    TiledPictureOptions options;
+    options.tile = command.tile > 0 ? command.tile : kTile;
+    options.depth = !command.depth.empty();
+    options.normals = !command.normals.empty();
+    options.progress = progress;
+    std::vector<float> depth;
+    std::vector<glm::vec3> normals;
+    const auto stats = drawTiled(renderer, request, options, [&](const PictureBand& band) {
+        depth.insert(depth.end(), band.depth.begin(), band.depth.end());
+        normals.insert(normals.end(), band.normals.begin(), band.normals.end());
+        return (*png)->add(band.picture.rgba);
+    });
+    if (!stats) return stats;
+    if (options.depth) VCP_TRY(writeDepth(depth, request.width, request.height, command.depth));
+    if (options.normals) VCP_TRY(writeNormals(normals, request.width, request.height, command.normals));
+    VCP_TRY((*png)->finish());
+    return stats;
+}
+
+/// The cameras of a sequence, or the one camera.
+Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
+    std::vector<Camera> cameras;
+    for (int i = 0; i < command.turntable; ++i) {
+        OrbitCamera turned = camera;
+        turned.orbit(bounds.centre(), 2 * std::numbers::pi * i / command.turntable, 0);
+        cameras.push_back(turned.current());
+    }
+    if (command.turntable > 0) return cameras;
+    if (command.path.empty()) return std::vector{camera.current()};
+    std::error_code failed;
+    std::ifstream file(command.path, std::ios::binary);
+    if (!file || std::filesystem::file_size(command.path, failed) > kLargestPathFile || failed)
+        return Error{ErrorCode::Io, "cannot be opened; a path is a JSON array of cameras", command.path};
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    return stressPathFromJson(text, command.path, command.frames > 0 ? command.frames : kPathFrames);
+}
+
+Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& device, const FrameRequest& request) {
+    return {{"width", request.width},
+            {"height", request.height},
+            {"pictures", pictures},
+            {"tiles", total.tiles},
+            {"ms_per_frame", total.ms / static_cast<double>(pictures)},
+            {"rays_per_second", static_cast<double>(total.rays) / std::max(1e-3 * total.ms, 1e-9)},
+            {"rays", total.rays},
+            {"hit_pixels", total.hitPixels},
+            {"device", device.name},
+            {"software", device.software},
+            {"settled", total.settled},
+            {"error_pixels", total.errorPixels},
+            {"resident_bytes", total.update.residentBytes},
+            {"bytes_read", total.update.bytesRead}};
+}
+
+/// Pictures in tiles and sequences, with progress; what is finished when it is cancelled stays.
+Result<void> makeTiled(Renderer& renderer, FrameRequest request, const std::vector<Camera>& cameras, const RenderCommand& command) {
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    TiledPictureStats total;
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        request.camera = cameras[i];
+        const std::string output = command.isSequence() ? numbered(command.output, i + 1) : command.output;
+        const auto stats = drawTiledFiles(renderer, request, command, output, [&](double fraction) {
+            display.update("drawing", (static_cast<double>(i) + fraction) / static_cast<double>(cameras.size()));
+            return !interrupted();
+        });
+        if (!stats) return stats.error();
+        total.tiles += stats->tiles;
+        total.rays += stats->rays;
+        total.hitPixels += stats->hitPixels;
+        total.ms += stats->ms;
+        total.errorPixels = std::max(total.errorPixels, stats->errorPixels);
+        total.settled = total.settled && stats->settled;
+        total.update = stats->update;
+    }
+    display.finish();
+    if (command.report.json) return printJson(toJson(total, cameras.size(), renderer.device(), request));
+    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1), numbered(command.output, cameras.size())) : command.output;
+    return printLine(fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles, formatSeconds(1e-3 * total.ms)));
+}
+
 Result<int> run(const RenderCommand& command) {
     const glm::ivec2 size = parseSize(command.size).value();
     const auto path = datasetFor(command.inputs, command.build, command.report.progressStyle());
@@ -137,7 +248,11 @@ Result<int> run(const RenderCommand& command) {
     VCP_TRY(command.render.checkFor(*open->dataset));
     const auto camera = command.render.cameraFor(open->bounds(), size);
     if (!camera) return camera.error();
-    auto renderer = Renderer::create(command.render.rendererOptions(*open));
+    const auto cameras = camerasOf(command, *camera, open->bounds());
+    if (!cameras) return cameras.error();
+    RendererOptions options = command.render.rendererOptions();
+    options.loaderThreads = open->loaderThreads();
+    auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(open->dataset, open->source));
 
@@ -147,10 +262,15 @@ Result<int> run(const RenderCommand& command) {
     request.height = static_cast<uint32_t>(size.y);
     request.errorPixels = command.render.errorPixels;
     request.shading = command.render.shadingChosen();
+    request.shading.transparent = command.transparent;
     request.sections = command.render.sectionPlanes(open->bounds());
     request.sectionCaps = command.render.caps;
     request.march = command.render.march;
     const InterruptScope catching;
+    if (command.isTiled(request)) {
+        VCP_TRY(makeTiled(**renderer, request, *cameras, command));
+        return 0;
+    }
     const auto drawing = draw(**renderer, request, command);
     if (!drawing) return drawing.error();
     VCP_TRY(writeFiles(**renderer, request, command));
@@ -180,13 +300,25 @@ Command addRender(CLI::App& vcp) {
     app->add_option("-o,--output", command->output, "The PNG file to write")->type_name("OUT.png")->required();
     app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check(checkSize);
     addRenderSettings(*app, command->render);
-    app->add_option("--depth", command->depth, "Write also the distance along each ray: .pfm (float, world units) or .png "
+    app->add_flag("--transparent", command->transparent, "No background: alpha 0 where nothing is hit");
+    CLI::Option* turntable = app->add_option("--turntable", command->turntable, "So many pictures once around the up axis: OUT-0001.png and so on")
+                                 ->type_name("N")
+                                 ->check(CLI::Range(1, 9999));
+    CLI::Option* path = app->add_option("--path", command->path, "Pictures along the cameras of a JSON array, --frames of them [120]: OUT-0001.png and so on")
+                            ->type_name("FILE")
+                            ->excludes(turntable);
+    app->add_option("--tile", command->tile, fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
+        ->type_name("PIXELS")
+        ->check(CLI::Range(16, 8192));
+    CLI::Option* depth = app->add_option("--depth", command->depth, "Write also the distance along each ray: .pfm (float, world units) or .png "
                                                "(16-bit, 0 no hit, 1 nearest to 65535 farthest)")
         ->type_name("FILE")
         ->check(checkPlane);
-    app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
+    CLI::Option* normals = app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
         ->type_name("FILE")
         ->check(checkPlane);
+    for (CLI::Option* sequence : {turntable, path})
+        for (CLI::Option* plane : {depth, normals}) sequence->excludes(plane);
     app->add_option("--frames", command->frames, "Draw so many frames after the first and report their median time [0; 5 with --json]")
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));

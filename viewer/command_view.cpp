@@ -1,8 +1,12 @@
 // vcp view: the window.
-#include <fmt/format.h>
+#include <system_error>
 
+#include "streaming/http_reader.h"
 #include "viewer/build_settings.h"
 #include "viewer/commands.h"
+#include "viewer/interrupt.h"
+#include "viewer/key_map.h"
+#include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"
 #include "viewer/render_settings.h"
 #include "viewer/window.h"
@@ -11,24 +15,22 @@ namespace vcp {
 
 namespace {
 
+constexpr uint32_t kRememberedOcclusionRays = 8;
+
 struct ViewCommand {
     std::vector<std::string> inputs;
-    std::string size = "1280x800";
+    std::string size;
     BuildSettings build;
     RenderSettings render;
     ReportOptions report;
 };
 
-std::string titleFor(const std::vector<std::string>& inputs) {
-    const std::string first = std::filesystem::path(inputs.front()).filename().string();
-    return inputs.size() == 1 ? first : fmt::format("{} and {} more", first, inputs.size() - 1);
-}
-
 Json secondsOrNull(const std::optional<double>& seconds) { return seconds ? Json(*seconds) : Json(nullptr); }
 
 Json toJson(const WindowReport& report) {
     const ViewerStatus& status = report.status;
-    return {{"first_picture_seconds", secondsOrNull(report.firstPictureSeconds)},
+    return {{"window_seconds", secondsOrNull(report.windowSeconds)},
+            {"first_picture_seconds", secondsOrNull(report.firstPictureSeconds)},
             {"settled_seconds", secondsOrNull(report.settledSeconds)},
             {"frames", report.framesDrawn},
             {"ms_per_frame", status.frame.msFrame},
@@ -38,21 +40,59 @@ Json toJson(const WindowReport& report) {
             {"error_pixels", status.update.errorPixels},
             {"resident_bytes", status.update.residentBytes},
             {"bytes_read", status.update.bytesRead},
-            {"hit_pixels", status.frame.hitPixels}};
+            {"hit_pixels", status.frame.hitPixels},
+            {"problem", report.problem}};
 }
 
-Result<int> run(const ViewCommand& command) {
-    const auto path = datasetFor(command.inputs, command.build, command.report.progressStyle());
-    if (!path) return path.error();
-    const auto open = openDataset(path->string(), command.render.source);
-    if (!open) return open.error();
-    VCP_TRY(command.render.checkFor(*open->dataset));
+/// What can be said before a window is opened: a mesh that is not there, a .vcp that is none.
+Result<void> checkInputs(const ViewCommand& command) {
+    if (const auto isBuilt = isOneDataset(command.inputs); !isBuilt) return isBuilt.error();
+    for (const std::string& input : command.inputs) {
+        if (isHttpUrl(input)) continue;
+        if (looksLikeDataset(input)) {
+            const auto open = openDataset(input, command.render.source);
+            if (!open) return open.error();
+            VCP_TRY(command.render.checkFor(*open->dataset));
+        } else if (std::error_code failed; !std::filesystem::exists(input, failed)) {
+            return Error{ErrorCode::Io, "cannot be opened: there is no such file", input};
+        }
+    }
+    return {};
+}
+
+/// What is remembered stands in for options that were not given.
+void applyRemembered(ViewCommand& command, const CLI::App& app, UserSettings& user) {
+    const auto given = [&](const char* option) { return app.count(option) > 0; };
+    RenderSettings& render = command.render;
+    if (!given("--error-pixels")) render.errorPixels = user.errorPixels;
+    if (!given("--budget")) render.budget = std::to_string(user.budgetBytes);
+    if (!given("--shadows")) render.shadows = user.shadows;
+    if (!given("--occlusion") && user.occlusion) render.occlusionRays = kRememberedOcclusionRays;
+    if (given("--up"))
+        user.up = render.upAxis();
+    else
+        render.up = user.up == UpAxis::Z ? "z" : "y";
+}
+
+Result<int> run(ViewCommand command, const CLI::App& app) {
+    VCP_TRY(checkInputs(command));
+    const auto settingsPath = userSettingsPath();
     WindowOptions options;
-    options.size = parseSize(command.size).value();
-    options.title = titleFor(command.inputs);
-    const auto report = showWindow(*open, command.render, options);
+    // Settings that cannot be read are those of the first time.
+    if (settingsPath)
+        if (const auto user = readUserSettings(*settingsPath)) options.session.user = *user;
+    applyRemembered(command, app, options.session.user);
+    options.session.inputs = command.inputs;
+    options.session.build = command.build;
+    options.session.render = command.render;
+    options.session.progress = command.report.progressStyle();
+    if (!command.size.empty()) options.size = parseSize(command.size).value();
+    const auto report = showWindow(options);
     if (!report) return report.error();
+    if (settingsPath) VCP_TRY(writeUserSettings(report->user, *settingsPath));
     if (command.report.json) VCP_TRY(printJson(toJson(*report)));
+    if (!report->firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+    if (!report->firstPictureSeconds && !report->problem.empty()) return Error{ErrorCode::InvalidInput, report->problem};
     return 0;
 }
 
@@ -60,13 +100,11 @@ Result<int> run(const ViewCommand& command) {
 
 Command addView(CLI::App& vcp) {
     auto command = std::make_shared<ViewCommand>();
-    CLI::App* app = vcp.add_subcommand("view", "Open a window on a .vcp file or on meshes");
+    CLI::App* app = vcp.add_subcommand("view", "Open a window, on a .vcp file or on meshes");
     app->add_option("IN", command->inputs, "A .vcp file or its http(s) address, or meshes, which are built into the cache first")
-        ->type_name("")
-        ->required();
-    app->add_option("--size", command->size, "Width and height of the window")
+        ->type_name("");
+    app->add_option("--size", command->size, "Width and height of the window [1280x800, then as it was left]")
         ->type_name("WxH")
-        ->capture_default_str()
         ->check([](const std::string& text) {
             return parseSize(text) ? std::string() : "must be like 1280x800, not \"" + text + "\"";
         });
@@ -74,11 +112,8 @@ Command addView(CLI::App& vcp) {
     addBuildSettings(*app, command->build);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
-    app->footer("Mouse: left drag orbits about the point under the cursor; right or middle drag, or shift and left, pans;\n"
-                "the wheel zooms to the cursor. Keys: F fit; R or Home reset; L light follows the camera or stays;\n"
-                "M shading mode; S shadows; O ambient occlusion; X section through the middle, shift and wheel move it;\n"
-                "P perspective or orthographic; 1 3 7 9 front, right, top, isometric; Esc or Q quit.");
-    return {app, [command] { return run(*command); }};
+    app->footer("Files may also be dropped into the window. Looks, limits, bookmarks and recent files are remembered.\n\n" + keyMapText());
+    return {app, [command, app] { return run(*command, *app); }};
 }
 
 }  // namespace vcp

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <sstream>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <nlohmann/json.hpp>
@@ -96,6 +97,28 @@ void OrbitCamera::orbit(glm::dvec3 pivot, double yaw, double pitch) {
     const glm::dquat turn = glm::angleAxis(yaw, axis) * glm::angleAxis(pitch, rightVector());
     position = pivot + turn * (position - pivot);
     orientation = glm::normalize(turn * orientation);
+}
+
+void OrbitCamera::turnHead(double yaw, double pitch) { orbit(position, yaw, pitch); }
+
+void OrbitCamera::centreOn(glm::dvec3 point) { position = point - forwardVector() * focusDistance; }
+
+void OrbitCamera::standUp(UpAxis axis) {
+    up = axis;
+    const glm::dvec3 upward = axisOf(axis), ahead = forwardVector();
+    const bool isAlong = glm::length(glm::cross(ahead, upward)) < kPoleMargin;
+    orientation = facing(ahead, isAlong ? upVector() : upward);
+}
+
+OrbitCamera between(const OrbitCamera& from, const OrbitCamera& to, double part) {
+    if (part <= 0) return from;
+    if (part >= 1) return to;
+    OrbitCamera camera = to;
+    camera.orientation = glm::normalize(glm::slerp(from.orientation, to.orientation, part));
+    camera.fovY = glm::mix(from.fovY, to.fovY, part);
+    camera.focusDistance = from.focusDistance * std::pow(to.focusDistance / from.focusDistance, part);
+    camera.position = glm::mix(from.focus(), to.focus(), part) - camera.forwardVector() * camera.focusDistance;
+    return camera;
 }
 
 void OrbitCamera::pan(glm::dvec2 from, glm::dvec2 to, double depth, glm::ivec2 size) {

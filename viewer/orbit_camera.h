@@ -84,7 +84,22 @@ struct OrbitCamera {
 
     /// Turns to a standard view and fits.
     void look(View view, const Box& box, glm::ivec2 size);
+
+    /// Turns the view with the eye where it is: `yaw` about the up axis, `pitch` about the camera's x axis. The
+    /// pitch stops short of the poles.
+    void turnHead(double yaw, double pitch);
+
+    /// Moves sideways and along the view until `point` is in the middle of the picture, at the focus; the distance
+    /// to the focus stays.
+    void centreOn(glm::dvec3 point);
+
+    /// Takes another axis as up; the eye and, unless it looks along that axis, the view direction stay.
+    void standUp(UpAxis axis);
 };
+
+/// Between two cameras, `part` in [0, 1] of the way: the focus moves on a line, the distance to it geometrically,
+/// the orientation on the shorter arc. 0 and 1 are `from` and `to` themselves; the projection is `to`'s.
+OrbitCamera between(const OrbitCamera& from, const OrbitCamera& to, double part);
 
 /// A view's name on the command line ("fit", "front", "iso", ...).
 std::optional<View> viewNamed(std::string_view name);

@@ -49,12 +49,11 @@ std::string checkBudget(const std::string& text) {
 
 }  // namespace
 
-RendererOptions RenderSettings::rendererOptions(const OpenDataset& open) const {
+RendererOptions RenderSettings::rendererOptions() const {
     RendererOptions options;
     options.device = device;
     options.budgetBytes = parseBytes(budget).value_or(options.budgetBytes);
     options.ramBytes = parseBytes(ram).value_or(options.ramBytes);
-    options.loaderThreads = open.loaderThreads();
     // Colour pages are neither read nor kept when nothing would show them.
     options.colour = shading == "lit" || shading == "unlit";
     return options;

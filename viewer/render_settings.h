@@ -32,7 +32,8 @@ struct RenderSettings {
     /// Errors: Usage, where options do not go with the dataset's method.
     [[nodiscard]] Result<void> checkFor(const Dataset& dataset) const;
 
-    [[nodiscard]] RendererOptions rendererOptions(const OpenDataset& open) const;
+    /// For a local file; a server wants more loader threads.
+    [[nodiscard]] RendererOptions rendererOptions() const;
     [[nodiscard]] Shading shadingChosen() const;
     [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }

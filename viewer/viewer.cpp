@@ -26,6 +26,9 @@ constexpr double kRefineFrames = 3;
 constexpr int kLargestReduction = 4;
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
+constexpr double kFlySeconds = 4;    // for the dataset's diagonal, at speed 1
+constexpr double kLongestFlyStep = 0.1;  // seconds: a hiccup is no leap
+constexpr double kFlySpeedPerNotch = 1.25;
 constexpr uint32_t kOcclusionRays = 8;
 // A dataset smaller than this part of the picture's height is far enough away.
 constexpr double kSmallestInView = 1e-3;
@@ -33,6 +36,9 @@ constexpr double kSmallestInView = 1e-3;
 ShadingMode next(ShadingMode mode) {
     return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(static_cast<int>(mode) + 1);
 }
+
+/// Starts and ends slowly.
+double eased(double part) { return part * part * (3 - 2 * part); }
 
 bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
     return a.position == b.position && a.orientation == b.orientation && a.focusDistance == b.focusDistance &&
@@ -42,9 +48,8 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 }  // namespace
 
 std::string statusLine(const ViewerStatus& status) {
-    std::string line;
-    if (!status.problem.empty()) line += "! " + status.problem + " | ";
-    line += fmt::format("{} | {} triangles | {}", status.name, formatCount(status.triangles), status.update.settled ? "settled" : "loading");
+    if (status.levels == 0) return status.device + (status.software ? " (software)" : "");
+    std::string line = fmt::format("{} | {} triangles | {}", status.name, formatCount(status.triangles), status.update.settled ? "settled" : "loading");
     // What matters most comes first: a narrow window cuts the line off.
     if (status.update.drawable) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
@@ -81,6 +86,8 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
     camera_ = home_ = seen_ = camera;
     drawn_.reset();
     drag_ = Drag::None;
+    move_.reset();
+    flySpeed_ = 1;
     status_.name = std::move(name);
     status_.triangles = header.triangles;
     status_.levels = header.levels;
@@ -115,23 +122,28 @@ glm::dvec3 Viewer::pointOfInterest(glm::dvec2 pixel) {
     return ray.origin + ray.direction * ((depth > 0 ? depth : camera_.focusDistance) / along);
 }
 
-void Viewer::press(MouseButton button, glm::dvec2 pixel, bool shift) {
+void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
     if (drag_ != Drag::None || !hasSize() || !dataset_) return;
+    move_.reset();
     dragButton_ = button;
     cursor_ = pixel;
-    drag_ = button == MouseButton::Left && !shift ? Drag::Orbit : Drag::Pan;
+    const bool left = button == MouseButton::Left;
+    drag_ = !left || modifiers.shift ? Drag::Pan : modifiers.control ? Drag::Light : isFlying_ ? Drag::Head : Drag::Orbit;
     const bool onSurface = drag_ == Drag::Pan || pointAt(pixel);
     pivot_ = onSurface ? pointOfInterest(pixel) : bounds_.centre();
 }
 
 void Viewer::move(glm::dvec2 pixel) {
     const glm::dvec2 by = pixel - cursor_;
-    if (drag_ == Drag::Orbit) {
-        // A drag over the picture's height is half a turn; what is under the cursor goes where it goes.
-        const double perPixel = std::numbers::pi / std::max(1, size_.y);
-        camera_.orbit(pivot_, -by.x * perPixel, -by.y * perPixel);
-    } else if (drag_ == Drag::Pan) {
-        camera_.pan(cursor_, pixel, camera_.depthOf(pivot_), size_);
+    // A drag over the picture's height is half a turn; what is under the cursor goes where it goes.
+    const double perPixel = std::numbers::pi / std::max(1, size_.y);
+    const double headPerPixel = camera_.fovY / std::max(1, size_.y);
+    switch (drag_) {
+        case Drag::None: break;
+        case Drag::Orbit: camera_.orbit(pivot_, -by.x * perPixel, -by.y * perPixel); break;
+        case Drag::Pan: camera_.pan(cursor_, pixel, camera_.depthOf(pivot_), size_); break;
+        case Drag::Light: turnLight(by * perPixel); break;
+        case Drag::Head: camera_.turnHead(by.x * headPerPixel, by.y * headPerPixel); break;
     }
     cursor_ = pixel;
 }
@@ -143,12 +155,57 @@ void Viewer::release(MouseButton button) {
 void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
     if (!hasSize() || !dataset_ || steps == 0) return;
     if (shift && !sections_.empty()) return moveSections(steps);
+    move_.reset();
+    if (isFlying_) {
+        flySpeed_ = std::clamp(flySpeed_ * std::pow(kFlySpeedPerNotch, steps), 1e-6, 1e3);
+        return;
+    }
     const double factor = std::pow(kZoomPerNotch, std::clamp(steps, -20.0, 20.0));
     if (factor > 1 && kSmallestInView * camera_.viewHeight() > bounds_.diagonal()) return;
     camera_.zoomAbout(pointOfInterest(pixel), factor);
 }
 
-void Viewer::look(View view) { camera_.look(view, bounds_, size_); }
+void Viewer::moveTo(const OrbitCamera& camera) {
+    if (!dataset_) return;
+    move_.reset();
+    if (options_.moveSeconds <= 0)
+        camera_ = camera;
+    else if (!sameView(camera_, camera) || camera_.up != camera.up)
+        move_ = {camera_, camera, std::numeric_limits<double>::quiet_NaN()};
+}
+
+void Viewer::look(View view) {
+    OrbitCamera there = camera_;
+    there.look(view, bounds_, size_);
+    moveTo(there);
+}
+
+void Viewer::centreOn(glm::dvec2 pixel) {
+    const auto point = pointAt(pixel);
+    if (!point) return;
+    OrbitCamera there = camera_;
+    there.centreOn(*point);
+    moveTo(there);
+}
+
+void Viewer::turnLight(glm::dvec2 by) {
+    const glm::dquat camera = shading_.lightFollowsCamera ? glm::dquat(1, 0, 0, 0) : camera_.orientation;
+    const glm::dquat turn = glm::angleAxis(by.x, glm::dvec3(0, 1, 0)) * glm::angleAxis(by.y, glm::dvec3(1, 0, 0));
+    const glm::dvec3 direction = camera * (turn * (glm::conjugate(camera) * glm::dvec3(shading_.lightDirection)));
+    shading_.lightDirection = glm::vec3(glm::normalize(direction));
+}
+
+void Viewer::advanceCamera(double now) {
+    if (move_) {
+        if (std::isnan(move_->beganAt)) move_->beganAt = now;
+        const double part = (now - move_->beganAt) / options_.moveSeconds;
+        camera_ = between(move_->from, move_->to, eased(std::clamp(part, 0.0, 1.0)));
+        if (part >= 1) move_.reset();
+    } else if (isSentSomewhere()) {
+        const double step = std::min(now - now_, kLongestFlyStep) * flySpeed_ * bounds_.diagonal() / kFlySeconds;
+        camera_.position += camera_.orientation * (glm::dvec3(flyDirection_.x, flyDirection_.y, -flyDirection_.z) * step);
+    }
+}
 
 void Viewer::toggleLight() {
     // The light stays where it is at this moment: only what it is tied to changes.
@@ -158,6 +215,7 @@ void Viewer::toggleLight() {
 }
 
 void Viewer::toggleProjection() {
+    move_.reset();
     camera_.projection =
         camera_.projection == Projection::Perspective ? Projection::Orthographic : Projection::Perspective;
 }
@@ -180,14 +238,27 @@ void Viewer::moveSections(double steps) {
 void Viewer::act(ViewerAction action) {
     if (!dataset_ || !hasSize()) return;
     switch (action) {
-        case ViewerAction::Fit: camera_.fit(bounds_, size_); break;
-        case ViewerAction::Reset: camera_ = home_; break;
+        case ViewerAction::Fit: {
+            OrbitCamera there = camera_;
+            there.fit(bounds_, size_);
+            moveTo(there);
+            break;
+        }
+        case ViewerAction::Reset: moveTo(home_); break;
         case ViewerAction::ToggleLight: toggleLight(); break;
         case ViewerAction::ToggleShadows: shading_.shadows = !shading_.shadows; break;
         case ViewerAction::ToggleOcclusion: shading_.occlusionRays = shading_.occlusionRays > 0 ? 0 : kOcclusionRays; break;
         case ViewerAction::ToggleSection: toggleSection(); break;
         case ViewerAction::NextShading: shading_.mode = next(shading_.mode); break;
         case ViewerAction::ToggleProjection: toggleProjection(); break;
+        case ViewerAction::ToggleColour: shading_.mode = shading_.mode == ShadingMode::Clay ? ShadingMode::Lit : ShadingMode::Clay; break;
+        case ViewerAction::ToggleUpAxis: {
+            OrbitCamera there = camera_;
+            there.standUp(camera_.up == UpAxis::Y ? UpAxis::Z : UpAxis::Y);
+            moveTo(there);
+            break;
+        }
+        case ViewerAction::ToggleFly: isFlying_ = !isFlying_; break;
         case ViewerAction::ViewFront: look(View::Front); break;
         case ViewerAction::ViewRight: look(View::Right); break;
         case ViewerAction::ViewTop: look(View::Top); break;
@@ -198,9 +269,10 @@ void Viewer::act(ViewerAction action) {
 bool Viewer::isMoving(double now) const { return now - movedAt_ < kRestSeconds; }
 
 int Viewer::reductionAt(double now) const {
-    if (options_.movingFrameMs <= 0 || fullFrameMs_ <= options_.movingFrameMs || !isMoving(now)) return 1;
-    const double wanted = std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs));
-    return static_cast<int>(std::min<double>(wanted, kLargestReduction));
+    if (options_.movingFrameMs <= 0 || !isMoving(now)) return 1;
+    if (fullFrameMs_ <= options_.movingFrameMs) return movingReduction_;
+    const int wanted = static_cast<int>(std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
+    return std::max(wanted, movingReduction_);
 }
 
 FrameRequest Viewer::requestWith(int reduction) const {
@@ -224,11 +296,12 @@ bool Viewer::refinementIsDue(double now) const {
 }
 
 Result<NextStep> Viewer::update(double now) {
+    if (dataset_) advanceCamera(now);
     now_ = now;
-    if (!hasSize() || !dataset_) return NextStep{};
+    if (!hasSize()) return NextStep{};
     if (drawn_ && !sameView(camera_, seen_)) movedAt_ = now;
     seen_ = camera_;
-    requestReduction_ = reductionAt(now);
+    requestReduction_ = movingReduction_ = reductionAt(now);
     request_ = requestWith(requestReduction_);
     auto update = renderer_->update(request_);
     if (!update) return update.error();
@@ -240,13 +313,14 @@ Result<NextStep> Viewer::update(double now) {
 
 NextStep Viewer::nextStep(double now) const {
     NextStep next;
-    // A dataset whose coarsest page cannot be read shows the background, and says why.
-    const bool canDraw = status_.update.drawable || !status_.problem.empty();
+    // Without a dataset, and where its coarsest page cannot be read, the background is shown.
+    const bool canDraw = status_.update.drawable || !status_.problem.empty() || !dataset_;
     next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now));
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
     const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
     if (isCheaper)
         next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
+    if (isSentSomewhere()) next.waitSeconds = 0;
     return next;
 }
 
@@ -255,9 +329,9 @@ Result<void> Viewer::draw() {
     if (!stats) return stats.error();
     status_.frame = *stats;
     status_.reduction = requestReduction_;
-    // The first frame also compiles; it says nothing about the next.
-    if (requestReduction_ == 1 && framesDrawn_ > 0)
-        fullFrameMs_ = stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0);
+    // The first frame also compiles; it says nothing about the next. Nor does a moving one trace occlusion.
+    if (framesDrawn_ > 0)
+        fullFrameMs_ = requestReduction_ * requestReduction_ * (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));
     ++framesDrawn_;
     drawn_ = request_;
     drawnAt_ = now_;

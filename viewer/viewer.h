@@ -7,6 +7,9 @@
 //   if (next.draw) { viewer->draw(); viewer->renderer().present(...); }
 //   wait for events, at most next.waitSeconds
 //
+// A camera that is sent somewhere (act, moveTo, centreOn) goes there smoothly, and stops where it is as soon as the
+// next press, scroll or key wants something else. In fly mode a drag turns the head and fly() moves the eye.
+//
 // Nothing is drawn unless the picture would differ: the camera, the size, the light, or the pages it is made
 // of have changed. While the camera moves and a frame is slow, frames are drawn at a part of the resolution;
 // once it rests, at all of it. Pages load in the background meanwhile and the picture refines.
@@ -32,6 +35,9 @@
 namespace vcp {
 
 enum class MouseButton { Left, Middle, Right };
+struct Modifiers {
+    bool shift = false, control = false;
+};
 
 /// What keys do; which key does it is the host's to say.
 enum class ViewerAction {
@@ -43,6 +49,9 @@ enum class ViewerAction {
     ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
     NextShading,       ///< lit, unlit, clay, normals, steps, cells, fetches, level, error
     ToggleProjection,  ///< perspective or orthographic, same size at the point of interest
+    ToggleColour,      ///< the dataset's colours, or clay
+    ToggleUpAxis,      ///< y or z
+    ToggleFly,
     ViewFront,
     ViewRight,
     ViewTop,
@@ -57,7 +66,8 @@ struct ViewerOptions {
     bool sectionCaps = false;
     PaperMarch march;  ///< of datasets of the method `paper`
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
-    double movingFrameMs = 66;
+    double movingFrameMs = 50;
+    double moveSeconds = 0.3;  ///< that a smooth move takes; 0: at once
 };
 
 /// What the host is to do next.
@@ -81,7 +91,7 @@ struct ViewerStatus {
     std::string problem;   ///< the last thing that went wrong, in one line; empty when nothing has
 };
 
-/// The status in one line, the problem first.
+/// The status in one line.
 std::string statusLine(const ViewerStatus& status);
 
 class Viewer {
@@ -97,14 +107,25 @@ public:
     /// Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);
 
-    /// Left: orbit about the point under the cursor, with shift: pan. Middle and right: pan.
-    void press(MouseButton button, glm::dvec2 pixel, bool shift);
+    /// Left: orbit about the point under the cursor, with shift: pan, with control: turn the light. Middle and
+    /// right: pan. While flying, left turns the head.
+    void press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers = {});
     void move(glm::dvec2 pixel);
     void release(MouseButton button);
     /// Zooms in on the point under the cursor by `steps` notches of a wheel; out when negative. With shift: moves the
     /// section planes, deeper into what they keep.
     void scroll(glm::dvec2 pixel, double steps, bool shift = false);
     void act(ViewerAction action);
+
+    /// Goes there smoothly. Without a dataset: nothing.
+    void moveTo(const OrbitCamera& camera);
+    /// What is under the cursor comes to the middle of the picture, smoothly. Nothing where nothing is.
+    void centreOn(glm::dvec2 pixel);
+    /// While flying: which way, in camera axes (right, up, forward), each from -1 to 1, until told otherwise.
+    void fly(glm::dvec3 direction) { flyDirection_ = direction; }
+    [[nodiscard]] bool isFlying() const { return isFlying_; }
+    /// Of flying: at 1 the dataset's diagonal takes 4 seconds.
+    [[nodiscard]] double flySpeed() const { return flySpeed_; }
 
     /// Errors: those of Renderer::update; problems of single pages go to the status instead.
     Result<NextStep> update(double now);
@@ -115,14 +136,31 @@ public:
     std::optional<glm::dvec3> pointAt(glm::dvec2 pixel);
 
     [[nodiscard]] const OrbitCamera& camera() const { return camera_; }
-    void setCamera(const OrbitCamera& camera) { camera_ = camera; }
+    /// At once.
+    void setCamera(const OrbitCamera& camera) { camera_ = camera; move_.reset(); }
+    [[nodiscard]] const Box& bounds() const { return bounds_; }
+    [[nodiscard]] const std::shared_ptr<const Dataset>& dataset() const { return dataset_; }
+    [[nodiscard]] glm::ivec2 size() const { return size_; }
+
+    /// How things look, for panels to show and to change.
+    [[nodiscard]] const Shading& shading() const { return shading_; }
+    void setShading(const Shading& shading) { shading_ = shading; }
+    [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
+    void setSections(std::vector<SectionPlane> planes) { sections_ = std::move(planes); }
+    [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
+    void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
     [[nodiscard]] const ViewerStatus& status() const { return status_; }
+    void dismissProblem() { status_.problem.clear(); }
     [[nodiscard]] uint64_t framesDrawn() const { return framesDrawn_; }
     /// For present() and the pictures.
     [[nodiscard]] Renderer& renderer() { return *renderer_; }
 
 private:
-    enum class Drag { None, Orbit, Pan };
+    enum class Drag { None, Orbit, Pan, Light, Head };
+    struct Move {
+        OrbitCamera from, to;
+        double beganAt;  ///< of the update that saw it first; not a number until then
+    };
 
     Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer);
     [[nodiscard]] bool hasSize() const { return size_.x > 0 && size_.y > 0; }
@@ -136,7 +174,10 @@ private:
     void toggleProjection();
     void toggleSection();
     void moveSections(double steps);
+    void turnLight(glm::dvec2 by);
     void look(View view);
+    void advanceCamera(double now);
+    [[nodiscard]] bool isSentSomewhere() const { return move_ || (isFlying_ && flyDirection_ != glm::dvec3(0)); }
 
     ViewerOptions options_;
     std::unique_ptr<Renderer> renderer_;
@@ -152,6 +193,10 @@ private:
     MouseButton dragButton_ = MouseButton::Left;
     glm::dvec2 cursor_{0};
     glm::dvec3 pivot_{0};
+    std::optional<Move> move_;
+    bool isFlying_ = false;
+    glm::dvec3 flyDirection_{0};
+    double flySpeed_ = 1;
 
     FrameRequest request_;                ///< of the last update
     int requestReduction_ = 1;
@@ -161,6 +206,7 @@ private:
     double drawnAt_ = -std::numeric_limits<double>::infinity();
     double now_ = 0;
     double fullFrameMs_ = 0;
+    int movingReduction_ = 1;  // grows within a motion, never shrinks: a size that flickers is worse than a small one
     bool pagesChanged_ = false;
     uint64_t framesDrawn_ = 0;
     ViewerStatus status_;

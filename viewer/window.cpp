@@ -2,17 +2,23 @@
 
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #define GLFW_INCLUDE_NONE
 #define GLFW_INCLUDE_VULKAN
 #include <GLFW/glfw3.h>
-#include <fmt/format.h>
+#include <imgui.h>
 
-#include "viewer/text_strip.h"
+#include "viewer/interface.h"
+#include "viewer/interface_painter.h"
+#include "viewer/interrupt.h"
 
 namespace vcp {
 
 namespace {
+
+constexpr double kDoubleClickSeconds = 0.4;
+constexpr double kClickPixels = 4;  // a press that moves less is a click
 
 Error displayError(const std::string& what) {
     const char* why = nullptr;
@@ -31,13 +37,13 @@ public:
         if (started_) glfwTerminate();
     }
 
-    Result<void> open(const WindowOptions& options) {
+    Result<void> open(glm::ivec2 size, const std::string& title) {
         if (!glfwInit()) return displayError("no display to open a window on");
         started_ = true;
         if (!glfwVulkanSupported()) return displayError("Vulkan cannot draw into windows here");
         glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
         glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-        window_ = glfwCreateWindow(options.size.x, options.size.y, options.title.c_str(), nullptr, nullptr);
+        window_ = glfwCreateWindow(size.x, size.y, title.c_str(), nullptr, nullptr);
         if (!window_) return displayError("the window cannot be opened");
         return {};
     }
@@ -55,23 +61,32 @@ public:
         return source;
     }
 
+    [[nodiscard]] float contentScale() const {
+        float x = 1, y = 1;
+        glfwGetWindowContentScale(window_, &x, &y);
+        return y;
+    }
+
 private:
     bool started_ = false;
     GLFWwindow* window_ = nullptr;
 };
 
-/// The viewer in its window: what the callbacks reach.
+/// The session in its window: what the callbacks reach.
 class ViewWindow {
 public:
-    ViewWindow(GLFWwindow* window, Viewer& viewer) : window_(window), viewer_(&viewer), strip_(contentScale()) {
+    ViewWindow(const WindowSystem& system, ViewSession& session, InterfacePainter& painter)
+        : system_(&system), window_(system.window()), session_(&session), painter_(&painter), interface_(session, host()) {
         glfwSetWindowUserPointer(window_, this);
         glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
         glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).mustPresent_ = true; });
         glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int b, int action, int mods) { of(w).button(b, action, mods); });
         glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).moveCursor({x, y}); });
         glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double steps) { of(w).scroll(steps); });
-        glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) { of(w).key(key, action); });
-        glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float, float) { of(w).rescale(); });
+        glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
+        glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { of(w).letGo(); });
+        glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) { of(w).session_->open({paths, paths + count}); });
+        glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float, float) { of(w).isRescaled_ = true; });
         int width = 0, height = 0;
         glfwGetFramebufferSize(window_, &width, &height);
         resize({width, height});
@@ -85,37 +100,44 @@ public:
         };
         WindowReport report;
         while (!glfwWindowShouldClose(window_)) {
-            const auto next = viewer_->update(seconds());
+            // While something is built Ctrl-C is to clean up; the loop looks often enough then.
+            if (!session_->opening()) catching_.reset();
+            else if (!catching_) catching_.emplace();
+            const auto next = session_->update(seconds());
             if (!next) return next.error();
-            if (next->draw) VCP_TRY(viewer_->draw());
+            Viewer& viewer = session_->viewer();
+            if (next->draw) VCP_TRY(viewer.draw());
             VCP_TRY(present(next->draw));
-            if (next->draw && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
-            const bool settled = viewer_->framesDrawn() > 0 && viewer_->status().update.settled;
-            if (settled && !report.settledSeconds) report.settledSeconds = seconds();
+            if (!report.windowSeconds) report.windowSeconds = seconds();
+            const bool isShown = viewer.dataset() && viewer.status().frame.pagesInCut > 0;
+            if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
+            if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
             wait(*next);
+            if (interrupted()) break;
         }
-        report.framesDrawn = viewer_->framesDrawn();
-        report.status = viewer_->status();
+        report.framesDrawn = session_->viewer().framesDrawn();
+        report.status = session_->viewer().status();
+        report.problem = session_->problem();
+        session_->collectSettings();
+        glfwGetWindowSize(window_, &session_->user().windowSize.x, &session_->user().windowSize.y);
+        report.user = session_->user();
         return report;
     }
 
 private:
     static ViewWindow& of(GLFWwindow* window) { return *static_cast<ViewWindow*>(glfwGetWindowUserPointer(window)); }
 
-    [[nodiscard]] float contentScale() const {
-        float x = 1, y = 1;
-        glfwGetWindowContentScale(window_, &x, &y);
-        return y;
-    }
-
-    void rescale() {
-        strip_ = TextStrip(contentScale());
-        mustPresent_ = true;
+    InterfaceHost host() {
+        return {[this](const std::string& text) { glfwSetClipboardString(window_, text.c_str()); },
+                [this] {
+                    const char* text = glfwGetClipboardString(window_);
+                    return std::string(text ? text : "");
+                }};
     }
 
     void resize(glm::ivec2 size) {
         framebuffer_ = size;
-        viewer_->resize(size);
+        session_->viewer().resize(size);
         mustPresent_ = true;
     }
 
@@ -126,107 +148,206 @@ private:
         return cursor * glm::dvec2(framebuffer_) / glm::max(glm::dvec2(width, height), glm::dvec2(1));
     }
 
+    /// Lays the panels out anew: after every event, so that quick clicks are not lost between frames.
+    void layOut() {
+        if (framebuffer_.x == 0 || framebuffer_.y == 0) return;
+        painter_->begin(framebuffer_);
+        interface_.layOut(framebuffer_, painter_->scale());
+        mustPresent_ = painter_->end() || mustPresent_;
+    }
+
     void moveCursor(glm::dvec2 cursor) {
         cursor_ = cursor;
-        viewer_->move(pixelAt(cursor));
+        const glm::dvec2 pixel = pixelAt(cursor);
+        ImGui::GetIO().MousePos = ImVec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y));
+        if (glm::distance(pixel, pressedAt_) > kClickPixels) isClick_ = false;
+        if (!isDragging_) layOut();
+        session_->viewer().move(pixel);
     }
 
     void button(int glfwButton, int action, int mods) {
         if (glfwButton > GLFW_MOUSE_BUTTON_MIDDLE) return;
+        const glm::dvec2 pixel = pixelAt(cursor_);
+        moveCursor(cursor_);
+        const bool isPress = action == GLFW_PRESS;
+        const bool isPanels = ImGui::GetIO().WantCaptureMouse && !isDragging_;
+        if (isPress) session_->note("");
+        if (isPanels || !isPress) ImGui::GetIO().MouseDown[glfwButton] = isPress;
+        layOut();
         const MouseButton which = glfwButton == GLFW_MOUSE_BUTTON_LEFT    ? MouseButton::Left
                                   : glfwButton == GLFW_MOUSE_BUTTON_RIGHT ? MouseButton::Right
                                                                           : MouseButton::Middle;
-        if (action == GLFW_PRESS)
-            viewer_->press(which, pixelAt(cursor_), (mods & GLFW_MOD_SHIFT) != 0);
-        else
-            viewer_->release(which);
+        if (isPress && !isPanels)
+            press(which, pixel, {(mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
+        else if (!isPress)
+            release(which, pixel);
+    }
+
+    void press(MouseButton which, glm::dvec2 pixel, Modifiers modifiers) {
+        const double now = glfwGetTime();
+        const bool plain = which == MouseButton::Left && !modifiers.shift && !modifiers.control;
+        const bool again = plain && now - pressedTime_ < kDoubleClickSeconds && glm::distance(pixel, pressedAt_) <= kClickPixels;
+        pressedAt_ = pixel;
+        pressedTime_ = again ? 0 : now;
+        isClick_ = plain;
+        isDragging_ = true;
+        session_->viewer().press(which, pixel, modifiers);
+        if (again && !session_->isMeasuring) session_->viewer().centreOn(pixel);
+    }
+
+    void release(MouseButton which, glm::dvec2 pixel) {
+        session_->viewer().release(which);
+        if (!std::exchange(isDragging_, false)) return;
+        if (isClick_ && which == MouseButton::Left && session_->isMeasuring) session_->measureAt(pixel);
     }
 
     void scroll(double steps) {
         const bool shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS || glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
-        viewer_->scroll(pixelAt(cursor_), steps, shift);
+        if (ImGui::GetIO().WantCaptureMouse) {
+            ImGui::GetIO().MouseWheel += static_cast<float>(steps);
+            layOut();
+        } else {
+            session_->viewer().scroll(pixelAt(cursor_), steps, shift);
+        }
     }
 
-    void key(int key, int action) {
-        if (action != GLFW_PRESS) return;
+    void letGo() {
+        held_ = {};
+        session_->viewer().fly({});
+    }
+
+    /// Which way a key flies, in camera axes; 0 where it does not.
+    static glm::dvec3 flightOf(int key) {
         switch (key) {
-            case GLFW_KEY_ESCAPE:
-            case GLFW_KEY_Q: glfwSetWindowShouldClose(window_, GLFW_TRUE); break;
-            case GLFW_KEY_F: viewer_->act(ViewerAction::Fit); break;
+            case GLFW_KEY_W: return {0, 0, 1};
+            case GLFW_KEY_S: return {0, 0, -1};
+            case GLFW_KEY_A: return {-1, 0, 0};
+            case GLFW_KEY_D: return {1, 0, 0};
+            case GLFW_KEY_E: return {0, 1, 0};
+            case GLFW_KEY_Q: return {0, -1, 0};
+            default: return {};
+        }
+    }
+
+    void key(int key, int action, int mods) {
+        if (action == GLFW_REPEAT) return;
+        const glm::dvec3 flight = flightOf(key);
+        if (flight != glm::dvec3(0) && (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE)) {
+            for (int axis = 0; axis < 3; ++axis)
+                if (flight[axis] != 0) held_[axis] = action == GLFW_PRESS ? flight[axis] : held_[axis] == flight[axis] ? 0 : held_[axis];
+            session_->viewer().fly(session_->viewer().isFlying() ? held_ : glm::dvec3(0));
+            return;
+        }
+        if (action != GLFW_PRESS) return;
+        session_->note("");
+        const bool isDigit = key >= GLFW_KEY_1 && key <= GLFW_KEY_9;
+        if (isDigit && (mods & GLFW_MOD_CONTROL) != 0) session_->keepBookmark(key - GLFW_KEY_0);
+        else if (isDigit && (mods & GLFW_MOD_SHIFT) != 0) session_->goToBookmark(key - GLFW_KEY_0);
+        else if ((mods & GLFW_MOD_CONTROL) != 0) controlKey(key);
+        else plainKey(key);
+    }
+
+    void controlKey(int key) {
+        if (key == GLFW_KEY_C) interface_.copyCamera();
+        if (key == GLFW_KEY_V) interface_.pasteCamera();
+        if (key == GLFW_KEY_E) session_->exportMeasurement();
+        if (key == GLFW_KEY_Q) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+    }
+
+    void plainKey(int key) {
+        Viewer& viewer = session_->viewer();
+        switch (key) {
+            case GLFW_KEY_ESCAPE: escape(); break;
+            case GLFW_KEY_F1: interface_.showsHelp = !interface_.showsHelp; break;
+            case GLFW_KEY_TAB: session_->user().panel = !session_->user().panel; break;
+            case GLFW_KEY_D: session_->isMeasuring = !session_->isMeasuring; break;
+            case GLFW_KEY_ENTER: session_->measurement().finishLine(); break;
+            case GLFW_KEY_BACKSPACE: session_->measurement().takeBack(); break;
+            case GLFW_KEY_F: viewer.act(ViewerAction::Fit); break;
             case GLFW_KEY_R:
-            case GLFW_KEY_HOME: viewer_->act(ViewerAction::Reset); break;
-            case GLFW_KEY_L: viewer_->act(ViewerAction::ToggleLight); break;
-            case GLFW_KEY_S: viewer_->act(ViewerAction::ToggleShadows); break;
-            case GLFW_KEY_O: viewer_->act(ViewerAction::ToggleOcclusion); break;
-            case GLFW_KEY_X: viewer_->act(ViewerAction::ToggleSection); break;
-            case GLFW_KEY_M: viewer_->act(ViewerAction::NextShading); break;
-            case GLFW_KEY_P: viewer_->act(ViewerAction::ToggleProjection); break;
-            case GLFW_KEY_1: viewer_->act(ViewerAction::ViewFront); break;
-            case GLFW_KEY_3: viewer_->act(ViewerAction::ViewRight); break;
-            case GLFW_KEY_7: viewer_->act(ViewerAction::ViewTop); break;
-            case GLFW_KEY_9: viewer_->act(ViewerAction::ViewIsometric); break;
+            case GLFW_KEY_HOME: viewer.act(ViewerAction::Reset); break;
+            case GLFW_KEY_L: viewer.act(ViewerAction::ToggleLight); break;
+            case GLFW_KEY_S: viewer.act(ViewerAction::ToggleShadows); break;
+            case GLFW_KEY_O: viewer.act(ViewerAction::ToggleOcclusion); break;
+            case GLFW_KEY_X: viewer.act(ViewerAction::ToggleSection); break;
+            case GLFW_KEY_M: viewer.act(ViewerAction::NextShading); break;
+            case GLFW_KEY_C: viewer.act(ViewerAction::ToggleColour); break;
+            case GLFW_KEY_P: viewer.act(ViewerAction::ToggleProjection); break;
+            case GLFW_KEY_U: viewer.act(ViewerAction::ToggleUpAxis); break;
+            case GLFW_KEY_G: toggleFly(); break;
+            case GLFW_KEY_1: viewer.act(ViewerAction::ViewFront); break;
+            case GLFW_KEY_3: viewer.act(ViewerAction::ViewRight); break;
+            case GLFW_KEY_7: viewer.act(ViewerAction::ViewTop); break;
+            case GLFW_KEY_9: viewer.act(ViewerAction::ViewIsometric); break;
             default: break;
         }
     }
 
-    /// Shows the last picture and the status line when either is new or the window was uncovered.
+    void toggleFly() {
+        letGo();
+        session_->viewer().act(ViewerAction::ToggleFly);
+    }
+
+    void escape() {
+        if (interface_.showsHelp) interface_.showsHelp = false;
+        else if (session_->opening()) session_->opening()->cancel();
+        else if (session_->viewer().isFlying()) toggleFly();
+        else if (session_->isMeasuring) session_->isMeasuring = false;
+        else glfwSetWindowShouldClose(window_, GLFW_TRUE);
+    }
+
+    /// Shows the last picture and the panels when either is new or the window was uncovered.
     Result<void> present(bool drawn) {
-        if (viewer_->framesDrawn() == 0 || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
-        std::string status = statusLine(viewer_->status());
-        if (!drawn && !mustPresent_ && status == shownStatus_) return {};
-        const Strip strip = strip_.draw(status, framebuffer_.x);
-        Picture overlay{static_cast<uint32_t>(strip.width), static_cast<uint32_t>(strip.height), {}};
-        const auto bytes = std::as_bytes(std::span(strip.pixels));
-        overlay.rgba.resize(bytes.size());
-        std::memcpy(overlay.rgba.data(), bytes.data(), bytes.size());
-        VCP_TRY(viewer_->renderer().present(static_cast<uint32_t>(framebuffer_.x), static_cast<uint32_t>(framebuffer_.y), &overlay));
-        shownStatus_ = std::move(status);
+        if (std::exchange(isRescaled_, false)) VCP_TRY(painter_->setScale(system_->contentScale()));
+        layOut();
+        if (session_->viewer().framesDrawn() == 0 || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
+        if (!drawn && !mustPresent_) return {};
         mustPresent_ = false;
-        return {};
+        return session_->viewer().renderer().present(static_cast<uint32_t>(framebuffer_.x), static_cast<uint32_t>(framebuffer_.y), painter_->drawOver());
     }
 
-    static void wait(const NextStep& next) {
-        if (std::isinf(next.waitSeconds))
-            glfwWaitEvents();
-        else if (next.waitSeconds > 0)
-            glfwWaitEventsTimeout(next.waitSeconds);
-        else
+    void wait(const NextStep& next) {
+        // Some panels take a second layout to find their size.
+        layOut();
+        if (mustPresent_ || next.waitSeconds <= 0)
             glfwPollEvents();
+        else if (std::isinf(next.waitSeconds))
+            glfwWaitEvents();
+        else
+            glfwWaitEventsTimeout(next.waitSeconds);
     }
 
+    const WindowSystem* system_;
     GLFWwindow* window_;
-    Viewer* viewer_;
-    TextStrip strip_;
+    ViewSession* session_;
+    InterfacePainter* painter_;
+    Interface interface_;
+    std::optional<InterruptScope> catching_;
     glm::ivec2 framebuffer_{0};
     // Where the cursor was at the event in hand: asked for, it would be where it is by now, and a quick drag be lost.
     glm::dvec2 cursor_{0};
-    std::string shownStatus_;
-    bool mustPresent_ = true;
+    glm::dvec2 pressedAt_{0};
+    double pressedTime_ = 0;
+    bool isClick_ = false, isDragging_ = false;
+    glm::dvec3 held_{0};
+    bool mustPresent_ = true, isRescaled_ = false;
 };
 
 }  // namespace
 
-Result<WindowReport> showWindow(const OpenDataset& open, const RenderSettings& settings, const WindowOptions& options) {
+Result<WindowReport> showWindow(const WindowOptions& options) {
     const auto start = std::chrono::steady_clock::now();
+    const std::vector<std::string>& inputs = options.session.inputs;
     WindowSystem system;
-    VCP_TRY(system.open(options));
-    glm::ivec2 size(0);
-    glfwGetFramebufferSize(system.window(), &size.x, &size.y);
-    const auto camera = settings.cameraFor(open.bounds(), size);
-    if (!camera) return camera.error();
-
-    ViewerOptions viewerOptions;
-    viewerOptions.renderer = settings.rendererOptions(open);
-    viewerOptions.renderer.surface = system.surfaceSource();
-    viewerOptions.errorPixels = settings.errorPixels;
-    viewerOptions.shading = settings.shadingChosen();
-    viewerOptions.sections = settings.sectionPlanes(open.bounds());
-    viewerOptions.sectionCaps = settings.caps;
-    viewerOptions.march = settings.march;
-    auto viewer = Viewer::create(viewerOptions);
-    if (!viewer) return viewer.error();
-    VCP_TRY((*viewer)->open(open.dataset, open.source, *camera, options.title));
-    return ViewWindow(system.window(), **viewer).run(start);
+    VCP_TRY(system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
+    auto session = ViewSession::create(options.session, system.surfaceSource());
+    if (!session) return session.error();
+    (*session)->open(inputs);
+    const auto drawing = (*session)->viewer().renderer().windowDrawing();
+    if (!drawing) return drawing.error();
+    auto painter = InterfacePainter::create(*drawing, system.contentScale());
+    if (!painter) return painter.error();
+    return ViewWindow(system, **session, **painter).run(start);
 }
 
 }  // namespace vcp

@@ -1,38 +1,36 @@
-// The window of `vcp view`: GLFW around a Viewer. It turns events into calls, waits while nothing happens,
-// and draws when the viewer says so.
-//
-//   left drag            orbit about the point under the cursor    F          fit
-//   right, middle drag,  pan                                       R, Home    reset
-//   shift + left drag                                              L          light follows or stays
-//   wheel                zoom to the cursor                        P          perspective or orthographic
-//   1 3 7 9              front, right, top, isometric              Esc, Q     quit
+// The window of `vcp view`: GLFW around a ViewSession and its panels. It turns events into calls, waits while nothing
+// happens, and draws when the session says so. What keys and the mouse do: key_map.cpp.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "octree/result.h"
-#include "viewer/render_settings.h"
-#include "viewer/viewer.h"
+#include "viewer/view_session.h"
 
 namespace vcp {
 
 struct WindowOptions {
-    glm::ivec2 size{1280, 800};  ///< in the window system's units
-    std::string title;
+    SessionOptions session;
+    std::optional<glm::ivec2> size;  ///< in the window system's units; absent: as it was last time
 };
 
 /// What happened while the window was open; times from the call of showWindow.
 struct WindowReport {
-    std::optional<double> firstPictureSeconds;  ///< absent when it was closed before
+    std::optional<double> windowSeconds;        ///< something was on the screen
+    std::optional<double> firstPictureSeconds;  ///< of a dataset; absent when it was closed before
     std::optional<double> settledSeconds;       ///< the first settled picture
     uint64_t framesDrawn = 0;
     ViewerStatus status;
+    std::string problem;  ///< what stood in the window when it was closed
+    UserSettings user;    ///< to be remembered
 };
 
-/// Opens the window and returns when it is closed. Main thread only, one at a time (GLFW).
-/// Errors: Device (no display, no Vulkan for it, and what the renderer says); those of the camera file.
-Result<WindowReport> showWindow(const OpenDataset& open, const RenderSettings& settings, const WindowOptions& options);
+/// Opens the window at once, the inputs in it as soon as they are built, and returns when it is closed. Main thread
+/// only, one at a time (GLFW). Errors: Device (no display, no Vulkan for it, and what the renderer says).
+Result<WindowReport> showWindow(const WindowOptions& options);
 
 }  // namespace vcp

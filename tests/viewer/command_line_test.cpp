@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "render/picture.h"
 #include "render/renderer.h"
 #include "tests/streaming/range_server.h"
 #include "vcp_program.h"
@@ -110,7 +111,7 @@ TEST_F(CommandLine, WrongUsageEndsWith2) {
         {{"render", mesh, "-o", "x.png", "--depth", "x.jpg"}, "x.jpg"},
         {{"render", mesh, "-o", "x.png", "--light", "moon"}, "moon"},
         {{"render", mesh, "-o", "x.png", "--error-pixels", "0"}, "--error-pixels"},
-        {{"view"}, "IN"},
+        {{"view", mesh, "--size", "big"}, "big"},
     };
     for (const auto& [arguments, named] : cases) expectFailure(run(arguments), 2, named);
 }
@@ -132,7 +133,8 @@ TEST_F(CommandLine, BadInputsEndWith1AndNameTheFile) {
     for (const fs::path& mesh : {empty, garbage, missing, *folder_ / "truncated.ply", folder_->path()}) {
         expectFailure(run({"build", mesh.string(), "-o", out.string()}), 1, mesh.string());
         expectFailure(run({"render", mesh.string(), "-o", out.string()}), 1, mesh.string());
-        expectFailure(run({"view", mesh.string()}), 1, mesh.string());
+        // Whether it is a mesh shows when it is built, in the window.
+        if (mesh == missing) expectFailure(run({"view", mesh.string()}), 1, mesh.string());
         expectFailure(run({"verify", dataset().string(), "--against", mesh.string()}), 1, mesh.string());
         EXPECT_FALSE(fs::exists(out));
         EXPECT_FALSE(fs::exists(out.string() + ".partial"));
@@ -340,8 +342,39 @@ TEST_F(CommandLine, Devices) {
     expectFailure(run({"render", dataset().string(), "-o", "x.png", "--device", "no such device"}), 1, "no such device");
 }
 
+TEST_F(CommandLine, PicturesInTilesAndSequences) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const auto render = [&](const std::string& name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o", (*folder_ / name).string(), "--size", "96x64"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    const auto picture = [&](const char* name) { return readPng(*folder_ / name).value(); };
+    ASSERT_EQ(render("tiled.png", {"--tile", "32"}).status, 0);
+    const Ran turned = render("turn.png", {"--tile", "32", "--turntable", "3", "--json"});
+    ASSERT_EQ(turned.status, 0) << turned.err;
+    EXPECT_EQ(Json::parse(turned.out)["pictures"], 3);
+    EXPECT_EQ(Json::parse(turned.out)["tiles"], 18);
+    EXPECT_EQ(picture("turn-0001.png"), picture("tiled.png")) << "it begins where the camera is";
+    EXPECT_NE(picture("turn-0002.png"), picture("turn-0001.png"));
+    EXPECT_TRUE(fs::exists(*folder_ / "turn-0003.png"));
+    EXPECT_FALSE(fs::exists(*folder_ / "turn-0004.png") || fs::exists(*folder_ / "turn.png"));
+
+    const fs::path path = *folder_ / "path.json";
+    write(path, R"([{"position":[0,0,4],"target":[0,0,0]},{"position":[3,0,4],"target":[0,0,0]}])");
+    ASSERT_EQ(render("path.png", {"--path", path.string(), "--frames", "2", "--transparent"}).status, 0);
+    EXPECT_EQ(picture("path-0001.png").rgba[3], 0);
+    EXPECT_NE(picture("path-0002.png"), picture("path-0001.png"));
+    expectFailure(render("x.png", {"--path", (*folder_ / "none.json").string()}), 1, "none.json");
+    write(path, "[{]");
+    expectFailure(render("x.png", {"--path", path.string()}), 1, path.string());
+    expectFailure(render("x.png", {"--path", path.string(), "--turntable", "3"}), 2, "--turntable");
+    expectFailure(render("x.png", {"--turntable", "3", "--depth", "x.pfm"}), 2, "--depth");
+}
+
 TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {
     expectFailure(run({"view", dataset().string()}), 1, "vcp render");
+    expectFailure(run({"view", dataset().string(), dataset().string()}), 2, "one .vcp at a time");
 }
 
 TEST_F(CommandLine, UnwritableOutputs) {

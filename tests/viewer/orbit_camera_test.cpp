@@ -245,5 +245,46 @@ TEST(Views, HaveNames) {
     EXPECT_FALSE(viewNamed(""));
 }
 
+TEST(OrbitCamera, BetweenEndsAtBothAndKeepsALengthOfView) {
+    const Box box{{-1, -2, -3}, {3, 2, 1}};
+    OrbitCamera from, to;
+    from.look(View::Front, box, {640, 480});
+    to.look(View::Isometric, box, {640, 480});
+    to.zoomAbout(box.centre(), 1e-3);
+    EXPECT_EQ(between(from, to, 0).position, from.position);
+    EXPECT_EQ(between(from, to, 1).position, to.position);
+    EXPECT_EQ(between(from, to, 1).orientation, to.orientation);
+    for (const double part : {0.1, 0.5, 0.9}) {
+        const OrbitCamera camera = between(from, to, part);
+        EXPECT_NEAR(glm::length(camera.orientation), 1, 1e-12);
+        EXPECT_LT(glm::distance(camera.focus(), box.centre()), 1e-9) << "both look at the same point, and so does all between";
+        EXPECT_NEAR(camera.focusDistance, from.focusDistance * std::pow(to.focusDistance / from.focusDistance, part), 1e-9);
+    }
+}
+
+TEST(OrbitCamera, TurningTheHeadKeepsTheEyeAndTheHorizon) {
+    OrbitCamera camera;
+    camera.look(View::Isometric, {{-1, -1, -1}, {1, 1, 1}}, {640, 480});
+    const OrbitCamera before = camera;
+    camera.turnHead(0.3, -0.2);
+    EXPECT_LT(glm::distance(camera.position, before.position), 1e-12);
+    EXPECT_NEAR(camera.rightVector().y, 0, 1e-9);
+    EXPECT_GT(glm::distance(camera.forwardVector(), before.forwardVector()), 0.1);
+    for (int i = 0; i < 100; ++i) camera.turnHead(0, 0.5);
+    EXPECT_GT(camera.upVector().y, 0) << "never upside down";
+}
+
+TEST(OrbitCamera, StandsUpAlsoWhereItLooksAlongTheAxis) {
+    for (const View view : {View::Front, View::Right, View::Top, View::Isometric}) {
+        OrbitCamera camera;
+        camera.look(view, {{-1, -1, -1}, {1, 1, 1}}, {640, 480});
+        const OrbitCamera before = camera;
+        camera.standUp(UpAxis::Z);
+        EXPECT_LT(glm::distance(camera.forwardVector(), before.forwardVector()), 1e-9);
+        EXPECT_NEAR(glm::length(camera.orientation), 1, 1e-9);
+        EXPECT_GE(camera.upVector().z, -1e-9);
+    }
+}
+
 }  // namespace
 }  // namespace vcp

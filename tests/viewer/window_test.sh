@@ -7,7 +7,7 @@ for tool in Xvfb xdotool import convert; do
     command -v $tool >/dev/null || { echo "skipped: no $tool"; exit 77; }
 done
 rm -rf "$folder"; mkdir -p "$folder"; cd "$folder"
-export XDG_CACHE_HOME=$folder/cache
+export XDG_CACHE_HOME=$folder/cache XDG_CONFIG_HOME=$folder/config
 
 fail() { echo "window_test: $*" >&2; cat log 2>/dev/null >&2; exit 1; }
 
@@ -28,15 +28,30 @@ for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
 [ -s display ] || fail "Xvfb does not start"
 export DISPLAY=:$(cat display)
 
-"$vcp" view ball.ply --size 640x480 --json >report.json 2>log &
-viewer=$!
-window=
-for _ in $(seq 200); do
-    window=$(xdotool search --name ball.ply 2>/dev/null | head -1) && [ -n "$window" ] && break
-    kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself"
-    sleep 0.1
-done
-[ -n "$window" ] || fail "no window"
+# starts NAME ARGUMENT...: opens a window whose title has NAME; sets viewer and window.
+starts() {
+    local name=$1; shift
+    "$vcp" view "$@" --json >report.json 2>log &
+    viewer=$!
+    window=
+    for _ in $(seq 200); do
+        window=$(xdotool search --name "$name" 2>/dev/null | head -1) && [ -n "$window" ] && break
+        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself"
+        sleep 0.1
+    done
+    [ -n "$window" ] || fail "no window"
+}
+# ends STATUS: Esc closes the window, which then ends with STATUS.
+ends() {
+    # The window may be gone before the key is released.
+    xdotool key --window $window Escape 2>/dev/null || true
+    for _ in $(seq 100); do kill -0 $viewer 2>/dev/null || break; sleep 0.1; done
+    kill -0 $viewer 2>/dev/null && { kill $viewer; fail "Esc does not close the window"; }
+    local status=0
+    wait $viewer || status=$?
+    [ $status = "$1" ] || fail "vcp view ended with $status"
+}
+key() { local k; for k; do xdotool key --window $window "$k"; done; }
 
 shot() { import -silent -window "$window" "$1.png"; }
 # The picture without the status line.
@@ -60,7 +75,10 @@ is_picture() { is_at_rest "$1" && [ "$(colours "$1")" -gt 50 ]; }
 differs() { waits_for "$1 and $2 are the same picture" is_other "$1" "$2"; }
 equals() { waits_for "$1 and $2 differ" is_same "$1" "$2"; }
 
-waits_for "the first picture is empty" is_picture start
+starts ball.ply ball.ply --size 640x480
+# The window shows its background and the build's progress first: wait for clay in the middle.
+is_first() { is_picture "$1" && [ "$(convert "$1.png" -format '%[fx:p{320,240}.r>0.6]' info:)" = 1 ]; }
+waits_for "the first picture is empty" is_first start
 xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 380 260 mousemove --window $window 440 280 mouseup 1
 differs start orbit
 xdotool key --window $window r
@@ -74,18 +92,66 @@ xdotool key --window $window f
 differs pan fit
 xdotool key --window $window l key --window $window 9
 differs fit light
+key ctrl+1
+differs light bookmarked
+key 7
+differs light top
+key shift+1
+equals light back
+key ctrl+c
+waits_for "nothing says that the camera was copied" is_other back copied
+key 7
+differs copied top
+key ctrl+v
+equals back pasted
+xdotool mousemove --window $window 330 250 click --repeat 2 --delay 50 1
+differs pasted centred
+key g
+xdotool keydown --window $window w sleep 0.2 keyup --window $window w
+differs centred flown
+key g F1
+differs flown help
+key F1 Tab
+differs help panel
+key Tab 1 d
+xdotool mousemove --window $window 320 240 click 1
+waits_for "a point is not shown" is_other panel point
+xdotool mousemove --window $window 330 200 click 1
+waits_for "a second point is not shown" is_other point line
+key ctrl+e
+is_exported() { [ -s measurement-1.json ]; }
+waits_for "what is measured is not written" is_exported
+# The ball's radius is between 0.9 and 1.1; both points are on it, and their distance is the segment.
+awk -F, 'NR>1 { n++; r=sqrt($3*$3+$4*$4+$5*$5); if (r<0.88 || r>1.12 || $6<=0) exit 1
+    if (n==2) { d=sqrt(($3-x)^2+($4-y)^2+($5-z)^2); if (d<0.01 || (d-$8)^2>1e-18) exit 1 } x=$3; y=$4; z=$5 }
+    END { if (n!=2) exit 1 }' measurement-1.csv || { cat measurement-1.csv; fail "what was measured is wrong"; }
+xdotool key --window $window Escape
 xdotool windowsize $window 500 300
-is_resized() { is_picture resized && [ "$(convert resized.png -format %wx%h info:)" = 500x300 ]; }
+is_resized() { is_picture resized && [ "$(convert resized.png -format '%wx%h:%[fx:p{250,150}.r>0.6]' info:)" = 500x300:1 ]; }
 waits_for "no picture of the size asked for after a resize" is_resized
 # At rest the window sleeps: how often its thread was woken in two seconds.
 wakes() { awk '/ctxt_switches/ { n += $2 } END { print n }' /proc/$viewer/status; }
 sleeps() { local before after; before=$(wakes); sleep 2; after=$(wakes); [ $((after - before)) -le 20 ]; }
 waits_for "the window is woken often at rest" sleeps
-# The window may be gone before the key is released.
-xdotool key --window $window Escape 2>/dev/null || true
-for _ in $(seq 50); do kill -0 $viewer 2>/dev/null || break; sleep 0.1; done
-kill -0 $viewer 2>/dev/null && { kill $viewer; fail "Esc does not close the window"; }
-wait $viewer || fail "vcp view ended with $?"
+ends 0
 grep -q '"settled": true' report.json || fail "not settled at the end"
 grep -q '"first_picture_seconds": [0-9]' report.json || fail "no picture was ever shown"
-echo "window_test: passed, $(grep '"frames"' report.json)"
+frames=$(grep '"frames"' report.json)
+
+# Settings are remembered: the size it was left with. A file whose disk is gone ends nothing.
+"$vcp" build ball.ply -o gone.vcp --progress none >/dev/null
+starts gone.vcp gone.vcp
+waits_for "no picture of the size it was left with" is_resized
+: >gone.vcp
+xdotool mousemove --window $window 250 150 click --repeat 9 --delay 20 4
+differs resized unplugged
+ends 0
+
+# What cannot be opened is said in the window, which stays.
+head -c 3000 ball.ply >broken.ply
+starts broken.ply broken.ply
+is_said() { shot said; [ "$(convert said.png -format '%[fx:p{300,10}.r>2*p{300,10}.g]' info:)" = 1 ]; }
+waits_for "what went wrong is not said" is_said
+ends 1
+grep -q broken.ply log || fail "the error does not name the file"
+echo "window_test: passed, $frames"

@@ -1,0 +1,98 @@
+// Picking on the finest level, against the reference caster with all pages loaded.
+#include "viewer/finest_pick.h"
+
+#include <random>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "builder/build.h"
+#include "test_folder.h"
+
+namespace vcp {
+namespace {
+
+class FinestPickTest : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        folder_ = std::make_unique<TestFolder>("vcp_finest_pick_test");
+        writeBall(*folder_ / "ball.ply", 60, 120);
+        BuildOptions options;
+        options.inputs = {*folder_ / "ball.ply"};
+        options.output = *folder_ / "ball.vcp";
+        const auto report = buildOctree(options);
+        ASSERT_TRUE(report) << report.error().line();
+    }
+    static void TearDownTestSuite() { folder_.reset(); }
+
+    void SetUp() override {
+        auto reader = openFile(*folder_ / "ball.vcp");
+        ASSERT_TRUE(reader);
+        dataset_ = readDataset(**reader).value();
+        pick_ = std::make_unique<FinestPick>(*reader, dataset_);
+    }
+
+    static std::unique_ptr<TestFolder> folder_;
+    Dataset dataset_;
+    std::unique_ptr<FinestPick> pick_;
+};
+std::unique_ptr<TestFolder> FinestPickTest::folder_;
+
+TEST_F(FinestPickTest, AgreesWithTheCasterOfAllFinestPages) {
+    PageCache all = PageCache::open(*folder_ / "ball.vcp").value();
+    const std::vector<uint64_t> cut = cutAtLevel(dataset_, dataset_.header.levels - 1);
+    ASSERT_GT(cut.size(), 4u);
+    ASSERT_TRUE(all.load(cut));
+    const auto caster = ReferenceCaster::create(all, cut);
+    ASSERT_TRUE(caster);
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> range(-1.2, 1.2);
+    int hits = 0;
+    for (int i = 0; i < 400; ++i) {
+        const glm::dvec3 from(range(random), range(random), 4), to(range(random), range(random), 0);
+        const Ray ray{from, glm::normalize(to - from)};
+        const auto expected = caster->cast(ray);
+        const auto picked = pick_->cast(ray);
+        ASSERT_TRUE(picked) << picked.error().line();
+        ASSERT_EQ(picked->has_value(), expected.has_value()) << "ray " << i;
+        if (!expected) continue;
+        ++hits;
+        EXPECT_EQ((*picked)->position, expected->position) << "ray " << i;
+        EXPECT_EQ((*picked)->level, dataset_.header.levels - 1);
+        EXPECT_LE((*picked)->certifiedError, dataset_.header.certifiedErrorMax);
+    }
+    EXPECT_GT(hits, 100);
+}
+
+TEST_F(FinestPickTest, SectionPlanesAreSeenThrough) {
+    const Ray ray{{0.1, 0.1, 4}, {0, 0, -1}};
+    const auto front = pick_->cast(ray);
+    ASSERT_TRUE(front && *front);
+    EXPECT_GT((*front)->position.z, 0.5);
+    const SectionPlane keepsBack{{0, 0, -2}, 0};
+    const auto back = pick_->cast(ray, std::span(&keepsBack, 1));
+    ASSERT_TRUE(back && *back);
+    EXPECT_LT((*back)->position.z, -0.5);
+    const SectionPlane keepsFront{{0, 0, 1}, 0};
+    EXPECT_EQ((*pick_->cast(ray, std::span(&keepsFront, 1)))->position, (*front)->position);
+    const SectionPlane both[] = {{{0, 0, 1}, 2}, {{0, 0, -1}, 0}};
+    EXPECT_FALSE(*pick_->cast(ray, both));
+    const SectionPlane aside{{1, 0, 0}, 0.5};
+    EXPECT_FALSE(*pick_->cast(ray, std::span(&aside, 1))) << "parallel to the ray, which it cuts away";
+}
+
+TEST_F(FinestPickTest, AMissReadsNothingAndABrokenFileIsSaid) {
+    EXPECT_FALSE(*pick_->cast({{5, 5, 4}, {0, 0, -1}}));
+    const auto file = *folder_ / "cut.vcp";
+    std::filesystem::copy_file(*folder_ / "ball.vcp", file, std::filesystem::copy_options::overwrite_existing);
+    auto reader = openFile(file).value();
+    FinestPick pick(reader, dataset_);
+    std::filesystem::resize_file(file, 8192);
+    EXPECT_FALSE(*pick.cast({{5, 5, 4}, {0, 0, -1}}));
+    const auto picked = pick.cast({{0, 0, 4}, {0, 0, -1}});
+    ASSERT_FALSE(picked);
+    EXPECT_NE(picked.error().line().find("cut.vcp"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vcp

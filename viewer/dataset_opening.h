@@ -1,0 +1,55 @@
+// Opens what a person points at, in a thread of its own: meshes are built into the cache first.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "viewer/build_settings.h"
+#include "viewer/source_settings.h"
+
+namespace vcp {
+
+/// "statue.ply", or "statue.ply and 2 more".
+std::string nameOf(const std::vector<std::string>& inputs);
+
+/// One thread may call; destroying it cancels and waits for the build to notice.
+class DatasetOpening {
+public:
+    struct Progress {
+        std::string stage;
+        double fraction = 0;
+        uint64_t triangles = 0;
+    };
+
+    /// `inputs`: as datasetFor and openDataset take them. `style`: told on stderr as well.
+    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style);
+    ~DatasetOpening();
+    DatasetOpening(const DatasetOpening&) = delete;
+    DatasetOpening& operator=(const DatasetOpening&) = delete;
+
+    [[nodiscard]] const std::vector<std::string>& inputs() const { return inputs_; }
+    [[nodiscard]] Progress progress() const;
+    void cancel() { cancelled_ = true; }
+    [[nodiscard]] bool isDone() const { return done_; }
+    /// Once, when it is done. Errors: those of datasetFor and openDataset; Cancelled.
+    Result<OpenDataset> take();
+
+private:
+    Result<OpenDataset> open();
+
+    std::vector<std::string> inputs_;
+    BuildSettings build_;
+    SourceSettings source_;
+    ProgressStyle style_;
+    std::atomic<bool> cancelled_ = false, done_ = false;
+    mutable std::mutex mutex_;
+    Progress progress_;                         // guarded by mutex_
+    std::optional<Result<OpenDataset>> opened_;  // of the thread until done_
+    std::thread thread_;
+};
+
+}  // namespace vcp

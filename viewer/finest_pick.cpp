@@ -1,0 +1,87 @@
+#include "viewer/finest_pick.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <vector>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace vcp {
+
+namespace {
+
+constexpr uint64_t kMostBytes = 256ull << 20;
+
+/// Where a ray is within a box, if anywhere.
+struct Stretch {
+    double enter, leave;
+};
+
+Stretch within(const Ray& ray, glm::dvec3 low, glm::dvec3 high) {
+    Stretch s{ray.tMin, ray.tMax};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double d = ray.direction[axis];
+        if (d == 0 && (ray.origin[axis] < low[axis] || ray.origin[axis] > high[axis])) return {1, 0};
+        if (d == 0) continue;
+        const double a = (low[axis] - ray.origin[axis]) / d, b = (high[axis] - ray.origin[axis]) / d;
+        s.enter = std::max(s.enter, std::min(a, b));
+        s.leave = std::min(s.leave, std::max(a, b));
+    }
+    return s;
+}
+
+struct PageOnRay {
+    uint64_t page;
+    double enter;
+};
+
+/// The finest pages whose boxes, a little widened, the ray touches, nearest first.
+std::vector<PageOnRay> finestPagesOn(const Dataset& dataset, const Ray& ray) {
+    std::vector<PageOnRay> found;
+    std::vector<uint64_t> open{0};
+    while (!open.empty()) {
+        const uint64_t page = open.back();
+        open.pop_back();
+        const PageEntry& entry = dataset.pages[page];
+        const glm::dvec3 low = dataset.originOf(entry), slack(dataset.cellOf(entry.level));
+        const Stretch s = within(ray, low - slack, low + dataset.edgeOf(entry) + slack);
+        if (s.enter > s.leave) continue;
+        if (entry.childMask == 0) found.push_back({page, s.enter});
+        for (int i = 0; i < std::popcount(entry.childMask); ++i) open.push_back(uint64_t{entry.firstChild} + static_cast<uint64_t>(i));
+    }
+    std::sort(found.begin(), found.end(), [](const PageOnRay& a, const PageOnRay& b) { return a.enter < b.enter; });
+    return found;
+}
+
+/// Shortens a ray to what a plane keeps of it.
+void clip(Ray& ray, const SectionPlane& plane) {
+    const double start = glm::dot(plane.normal, ray.origin) - plane.offset, slope = glm::dot(plane.normal, ray.direction);
+    if (slope > 0)
+        ray.tMin = std::max(ray.tMin, -start / slope);
+    else if (slope < 0)
+        ray.tMax = std::min(ray.tMax, -start / slope);
+    else if (start < 0)
+        ray.tMax = -1;
+}
+
+}  // namespace
+
+Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionPlane> sections) {
+    for (const SectionPlane& plane : sections) clip(ray, plane);
+    if (pages_.bytes() > kMostBytes) pages_ = PageCache(reader_, pages_.dataset());
+    std::optional<RayHit> nearest;
+    if (ray.tMin > ray.tMax) return nearest;
+    for (const PageOnRay& next : finestPagesOn(pages_.dataset(), ray)) {
+        if (nearest && nearest->t < next.enter) break;
+        VCP_TRY(pages_.load(next.page));
+        const auto caster = ReferenceCaster::create(pages_, std::span(&next.page, 1));
+        if (!caster) return caster.error();
+        const auto hit = caster->cast(ray);
+        if (hit && (!nearest || hit->t < nearest->t)) nearest = hit;
+    }
+    return nearest;
+}
+
+}  // namespace vcp

@@ -1,0 +1,28 @@
+// Picking on the finest level, whatever the picture shows: the pages along one ray are read, nearest first, and cast
+// in double precision (octree/reference_caster.h). Pages are kept for the next pick, up to 256 MiB.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "octree/reference_caster.h"
+#include "octree/result.h"
+#include "render/renderer.h"
+
+namespace vcp {
+
+class FinestPick {
+public:
+    FinestPick(std::shared_ptr<const ByteReader> reader, const Dataset& dataset) : reader_(std::move(reader)), pages_(reader_, dataset) {}
+
+    /// The first hit on what the section planes keep; nothing where the ray hits nothing. Reads from the file or
+    /// server, so it may take long. One thread at a time. Errors: those of readPage.
+    Result<std::optional<RayHit>> cast(Ray ray, std::span<const SectionPlane> sections = {});
+
+private:
+    std::shared_ptr<const ByteReader> reader_;
+    PageCache pages_;
+};
+
+}  // namespace vcp

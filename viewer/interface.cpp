@@ -1,0 +1,321 @@
+#include "viewer/interface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include "viewer/key_map.h"
+#include "viewer/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings;
+constexpr ImGuiWindowFlags kBare = kFixed | ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar;
+// Values are dragged, not typed: keys are the window's.
+constexpr ImGuiSliderFlags kNoTyping = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
+constexpr ImGuiColorEditFlags kColour = ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions | ImGuiColorEditFlags_Float;
+
+constexpr float kPanelWidth = 250, kMargin = 8;
+constexpr float kScaleBarLargest = 160;
+constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160), kMeasured = IM_COL32(255, 210, 60, 255);
+constexpr uint32_t kOcclusionRays = 8;
+
+constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "fetches", "level", "error"};
+
+ImVec2 vec(glm::vec2 v) { return {v.x, v.y}; }
+
+void text(const std::string& line) { ImGui::TextUnformatted(line.data(), line.data() + line.size()); }
+
+void wrapped(const std::string& line) {
+    ImGui::PushTextWrapPos(0);
+    text(line);
+    ImGui::PopTextWrapPos();
+}
+
+void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
+    list.AddText(vec(at + 1.0f), kShade, line.data(), line.data() + line.size());
+    list.AddText(vec(at), kInk, line.data(), line.data() + line.size());
+}
+
+/// Screens show colours encoded; the shading takes them linear.
+bool colourEdit(const char* label, glm::vec3& linear) {
+    float shown[3];
+    for (int i = 0; i < 3; ++i) shown[i] = std::pow(linear[i], 1 / 2.2f);
+    if (!ImGui::ColorEdit3(label, shown, kColour)) return false;
+    for (int i = 0; i < 3; ++i) linear[i] = std::pow(std::clamp(shown[i], 0.0f, 1.0f), 2.2f);
+    return true;
+}
+
+/// The largest of 1, 2, 5 times a power of ten that is at most `most`.
+double roundLength(double most) {
+    const double power = std::pow(10.0, std::floor(std::log10(most)));
+    for (const double step : {5.0, 2.0})
+        if (step * power <= most) return step * power;
+    return power;
+}
+
+std::string shortened(const std::string& path, size_t most) {
+    return path.size() <= most ? path : "..." + path.substr(path.size() - most);
+}
+
+}  // namespace
+
+void Interface::layOut(glm::ivec2 framebuffer, float scale) {
+    size_ = framebuffer;
+    scale_ = scale;
+    statusHeight_ = ImGui::GetFrameHeight();
+    if (session_->viewer().dataset()) {
+        drawScaleBar();
+        drawMeasured();
+        if (session_->user().panel) layOutPanel();
+    } else if (!session_->opening()) {
+        layOutStart();
+    }
+    layOutStatus();
+    layOutMessages();
+    if (session_->opening()) layOutOpening();
+    if (showsHelp) layOutHelp();
+}
+
+void Interface::layOutStatus() {
+    ImGui::SetNextWindowPos({0, size_.y - statusHeight_});
+    ImGui::SetNextWindowSize({size_.x, statusHeight_});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(kMargin * scale_, 3 * scale_));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0.0f);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
+    ImGui::SetNextWindowBgAlpha(1);
+    ImGui::Begin("status", nullptr, kBare | ImGuiWindowFlags_NoBringToFrontOnFocus);
+    const Viewer& viewer = session_->viewer();
+    std::string line;
+    if (viewer.isFlying()) line += fmt::format("flying, speed {:.2g} | ", viewer.flySpeed());
+    if (session_->isMeasuring) line += session_->isPicking() ? "measuring ... | " : "measuring: click | ";
+    text(line + statusLine(viewer.status()));
+    ImGui::End();
+    // A narrow window cuts the line off, not how to get on.
+    ImGui::SetNextWindowPos({size_.x, size_.y - statusHeight_}, ImGuiCond_Always, {1, 0});
+    ImGui::SetNextWindowBgAlpha(1);
+    ImGui::Begin("hint", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
+    text("F1 keys  Tab panel");
+    ImGui::End();
+    ImGui::PopStyleVar(3);
+}
+
+void Interface::layOutMessages() {
+    const std::string problem = session_->problem();
+    const std::string& said = problem.empty() ? session_->note() : problem;
+    if (said.empty()) return;
+    ImGui::SetNextWindowPos({kMargin * scale_, kMargin * scale_});
+    ImGui::SetNextWindowSize({size_.x - (2 * kMargin + (session_->user().panel && session_->viewer().dataset() ? kPanelWidth + kMargin : 0)) * scale_, 0});
+    ImGui::PushStyleColor(ImGuiCol_WindowBg, problem.empty() ? ImVec4(0.1f, 0.2f, 0.3f, 0.9f) : ImVec4(0.45f, 0.08f, 0.05f, 0.95f));
+    ImGui::Begin("message", nullptr, kBare);
+    if (!problem.empty()) {
+        if (ImGui::SmallButton("x")) session_->dismissProblem();
+        ImGui::SameLine();
+    }
+    wrapped(said);
+    ImGui::End();
+    ImGui::PopStyleColor();
+}
+
+void Interface::layOutPanel() {
+    const float width = std::min(kPanelWidth * scale_, 0.5f * size_.x);
+    ImGui::SetNextWindowPos({size_.x - width, 0});
+    ImGui::SetNextWindowSize({width, size_.y - statusHeight_});
+    ImGui::SetNextWindowBgAlpha(0.8f);
+    ImGui::Begin("panel", nullptr, kFixed | ImGuiWindowFlags_NoTitleBar);
+    ImGui::PushItemWidth(0.5f * width);
+    if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) layOutViews();
+    if (ImGui::CollapsingHeader("Look", ImGuiTreeNodeFlags_DefaultOpen)) layOutLooks();
+    if (ImGui::CollapsingHeader("Measure", ImGuiTreeNodeFlags_DefaultOpen)) layOutMeasuring();
+    if (ImGui::CollapsingHeader("Streaming", ImGuiTreeNodeFlags_DefaultOpen)) layOutLimits();
+    if (ImGui::CollapsingHeader("Recent files")) layOutFiles();
+    ImGui::PopItemWidth();
+    ImGui::End();
+}
+
+void Interface::actionButton(const char* label, ViewerAction action) {
+    if (ImGui::Button(label)) session_->viewer().act(action);
+}
+
+void Interface::layOutViews() {
+    Viewer& viewer = session_->viewer();
+    actionButton("Fit", ViewerAction::Fit);
+    ImGui::SameLine();
+    actionButton("Reset", ViewerAction::Reset);
+    ImGui::SameLine();
+    actionButton(viewer.camera().projection == Projection::Perspective ? "Orthographic" : "Perspective", ViewerAction::ToggleProjection);
+    actionButton("Front", ViewerAction::ViewFront);
+    ImGui::SameLine();
+    actionButton("Right", ViewerAction::ViewRight);
+    ImGui::SameLine();
+    actionButton("Top", ViewerAction::ViewTop);
+    ImGui::SameLine();
+    actionButton("Iso", ViewerAction::ViewIsometric);
+    actionButton(viewer.camera().up == UpAxis::Y ? "Z up" : "Y up", ViewerAction::ToggleUpAxis);
+    ImGui::SameLine();
+    actionButton(viewer.isFlying() ? "Stop flying" : "Fly", ViewerAction::ToggleFly);
+    ImGui::SameLine();
+    if (ImGui::Button("Copy")) copyCamera();
+    ImGui::SameLine();
+    if (ImGui::Button("Paste")) pasteCamera();
+    text("Bookmarks");
+    const auto* kept = session_->bookmarks();
+    for (int number = 1; kept && number <= static_cast<int>(UserSettings::kMostBookmarks); ++number) {
+        if (!kept->contains(number)) continue;
+        ImGui::SameLine();
+        if (ImGui::SmallButton(std::to_string(number).c_str())) session_->goToBookmark(number);
+    }
+    int free = 1;
+    while (kept && kept->contains(free)) ++free;
+    if (free > static_cast<int>(UserSettings::kMostBookmarks)) return;
+    ImGui::SameLine();
+    if (ImGui::SmallButton("+")) session_->keepBookmark(free);
+}
+
+void Interface::layOutLooks() {
+    Viewer& viewer = session_->viewer();
+    Shading shading = viewer.shading();
+    int mode = static_cast<int>(shading.mode);
+    if (ImGui::Combo("shading", &mode, kModes, static_cast<int>(std::size(kModes)))) shading.mode = static_cast<ShadingMode>(mode);
+    ImGui::Checkbox("shadows", &shading.shadows);
+    ImGui::SameLine();
+    bool occlusion = shading.occlusionRays > 0;
+    if (ImGui::Checkbox("occlusion", &occlusion)) shading.occlusionRays = occlusion ? kOcclusionRays : 0;
+    colourEdit("above", shading.backgroundTop);
+    ImGui::SameLine();
+    colourEdit("below", shading.backgroundBottom);
+    ImGui::SameLine();
+    text("background");
+    if (shading != viewer.shading()) viewer.setShading(shading);
+    bool follows = shading.lightFollowsCamera;
+    if (ImGui::Checkbox("light follows the camera", &follows)) viewer.act(ViewerAction::ToggleLight);
+    bool section = !viewer.sections().empty();
+    if (ImGui::Checkbox("section", &section)) viewer.act(ViewerAction::ToggleSection);
+}
+
+void Interface::layOutLimits() {
+    Viewer& viewer = session_->viewer();
+    const ViewerStatus& status = viewer.status();
+    auto error = static_cast<float>(viewer.errorPixels());
+    if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic)) viewer.setErrorPixels(static_cast<double>(error));
+    const UpdateResult& update = status.update;
+    wrapped(fmt::format("error now {:.2g} px{}", update.errorPixels, update.relaxed ? ": the budget is too small for less" : ""));
+    const float part = static_cast<float>(update.residentBytes) / static_cast<float>(std::max<uint64_t>(status.budgetBytes, 1));
+    const std::string filled = fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
+    ImGui::ProgressBar(part, ImVec2(-1, 0), filled.c_str());
+    text(fmt::format("{} subvolumes drawn, {} resident", update.pagesInCut, update.pagesResident));
+    text(update.settled ? "settled" : fmt::format("loading, {} missing", update.pagesMissing));
+    text(fmt::format("{} read", formatBytes(update.bytesRead)));
+}
+
+void Interface::layOutMeasuring() {
+    ImGui::Checkbox("click measures", &session_->isMeasuring);
+    Measurement& measured = session_->measurement();
+    if (measured.empty()) return;
+    wrapped(measurementText(measured));
+    if (ImGui::Button("Copy text")) copyMeasurement();
+    ImGui::SameLine();
+    if (ImGui::Button("CSV, JSON")) session_->exportMeasurement();
+    ImGui::SameLine();
+    if (ImGui::Button("Clear")) measured.clear();
+}
+
+void Interface::layOutFiles() {
+    // Opening one changes the list.
+    const std::vector<std::string> recent = session_->user().recent;
+    for (const std::string& file : recent) {
+        if (ImGui::Selectable(shortened(file, 34).c_str())) session_->open({file});
+        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", file.c_str());
+    }
+}
+
+void Interface::layOutStart() {
+    ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
+    ImGui::Begin("start", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
+    text("Drop a .vcp file or meshes here.");
+    const std::vector<std::string> recent = session_->user().recent;
+    if (!recent.empty()) {
+        ImGui::Separator();
+        text("Recent files");
+    }
+    for (const std::string& file : recent)
+        if (ImGui::Button(shortened(file, 60).c_str(), ImVec2(-1, 0))) session_->open({file});
+    ImGui::End();
+}
+
+void Interface::layOutOpening() {
+    DatasetOpening& opening = *session_->opening();
+    const DatasetOpening::Progress progress = opening.progress();
+    ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
+    ImGui::SetNextWindowSize({std::min(360 * scale_, size_.x), 0});
+    ImGui::Begin("opening", nullptr, kBare);
+    wrapped(nameOf(opening.inputs()) + (progress.stage.empty() ? ": opening" : ": " + progress.stage));
+    const std::string percent = fmt::format("{:.0f} %", 100 * progress.fraction);
+    ImGui::ProgressBar(static_cast<float>(progress.fraction), ImVec2(-1, 0), percent.c_str());
+    if (progress.triangles > 0) text(formatCount(progress.triangles) + " triangles");
+    if (ImGui::Button("Cancel (Esc)")) opening.cancel();
+    ImGui::End();
+}
+
+void Interface::layOutHelp() {
+    ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
+    ImGui::SetNextWindowBgAlpha(0.97f);
+    ImGui::SetNextWindowFocus();
+    ImGui::Begin("keys", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
+    text(keyMapText());
+    ImGui::End();
+}
+
+void Interface::drawScaleBar() const {
+    const Viewer& viewer = session_->viewer();
+    const double unitsPerPixel = viewer.camera().viewHeight() / std::max(1, viewer.size().y);
+    const double length = roundLength(static_cast<double>(kScaleBarLargest * scale_) * unitsPerPixel);
+    const auto pixels = static_cast<float>(length / unitsPerPixel);
+    if (!std::isfinite(pixels)) return;
+    ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    const glm::vec2 from(2 * kMargin * scale_, size_.y - statusHeight_ - 2 * kMargin * scale_);
+    for (const auto& [colour, width] : {std::pair(kShade, 4 * scale_), std::pair(kInk, 2 * scale_)}) {
+        list.AddLine(vec(from), {from.x + pixels, from.y}, colour, width);
+        for (const float x : {from.x, from.x + pixels}) list.AddLine({x, from.y - 4 * scale_}, {x, from.y + 4 * scale_}, colour, width);
+    }
+    const bool everywhere = viewer.camera().projection == Projection::Orthographic;
+    textAt(list, from + glm::vec2(0, -20 * scale_), formatLength(length) + (everywhere ? "" : " in the middle"));
+}
+
+void Interface::drawMeasured() const {
+    ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    const Viewer& viewer = session_->viewer();
+    const auto pixelOf = [&](const MeasuredPoint& p) { return viewer.camera().pixelOf(p.position, viewer.size()); };
+    for (const MeasuredLine& line : session_->measurement().lines())
+        for (size_t i = 0; i < line.size(); ++i) {
+            const auto at = pixelOf(line[i]);
+            if (!at) continue;
+            const glm::vec2 here(*at);
+            list.AddCircleFilled(vec(here), 5 * scale_, kShade);
+            list.AddCircleFilled(vec(here), 3.5f * scale_, kMeasured);
+            if (i + 1 == line.size()) continue;
+            const auto next = pixelOf(line[i + 1]);
+            if (!next) continue;
+            const glm::vec2 there(*next);
+            list.AddLine(vec(here), vec(there), kMeasured, 2 * scale_);
+            textAt(list, 0.5f * (here + there) + glm::vec2(6 * scale_, 0), formatLength(segmentLength(line, i)));
+        }
+}
+
+void Interface::copyCamera() {
+    host_.copyText(cameraToJson(session_->viewer().camera()));
+    session_->note("camera copied");
+}
+
+void Interface::pasteCamera() { session_->pasteCamera(host_.pasteText()); }
+
+void Interface::copyMeasurement() {
+    host_.copyText(measurementText(session_->measurement()));
+    session_->note("measurement copied");
+}
+
+}  // namespace vcp

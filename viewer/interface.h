@@ -1,0 +1,59 @@
+// The panels over the picture: status line, problem line, panel, keyboard map, scale bar, measured lines, start screen
+// and progress, laid out with Dear ImGui. What is clicked acts on the session at once.
+//
+// Between InterfacePainter::begin and end; the same thread.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <glm/vec2.hpp>
+
+#include "viewer/view_session.h"
+
+namespace vcp {
+
+/// What of the window's doing the panels ask for.
+struct InterfaceHost {
+    std::function<void(const std::string&)> copyText;
+    std::function<std::string()> pasteText;
+};
+
+class Interface {
+public:
+    Interface(ViewSession& session, InterfaceHost host) : session_(&session), host_(std::move(host)) {}
+
+    bool showsHelp = false;
+
+    /// Lays everything out. `scale`: pixels of the display a unit of the layout.
+    void layOut(glm::ivec2 framebuffer, float scale);
+
+    /// Copies the camera, or, with text on the clipboard, goes to the camera it describes.
+    void copyCamera();
+    void pasteCamera();
+    void copyMeasurement();
+
+private:
+    void layOutStatus();
+    void layOutMessages();
+    void layOutPanel();
+    void layOutViews();
+    void layOutLooks();
+    void layOutLimits();
+    void layOutMeasuring();
+    void layOutFiles();
+    void layOutHelp();
+    void layOutStart();
+    void layOutOpening();
+    void drawScaleBar() const;
+    void drawMeasured() const;
+    void actionButton(const char* label, ViewerAction action);
+
+    ViewSession* session_;
+    InterfaceHost host_;
+    glm::vec2 size_{0};
+    float scale_ = 1;
+    float statusHeight_ = 0;
+};
+
+}  // namespace vcp

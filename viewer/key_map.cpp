@@ -1,0 +1,53 @@
+#include "viewer/key_map.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace vcp {
+
+namespace {
+
+constexpr KeyHelp kKeyMap[] = {
+    {"left drag", "orbit about the point under the cursor"},
+    {"right drag, shift + left drag", "pan"},
+    {"wheel", "zoom to the cursor"},
+    {"double click", "centre on the point under the cursor"},
+    {"ctrl + left drag", "turn the light"},
+    {"F", "fit all into the window"},
+    {"R, Home", "the view it opened with"},
+    {"1 3 7 9", "from the front, right, top, isometric"},
+    {"P", "perspective or orthographic"},
+    {"U", "the up axis: y or z"},
+    {"G", "fly: W A S D, E up, Q down, drag to look, wheel for speed; G or Esc ends it"},
+    {"Ctrl+1 ... Ctrl+9", "keep this view as a bookmark"},
+    {"Shift+1 ... Shift+9", "go to a bookmark"},
+    {"Ctrl+C, Ctrl+V", "copy the camera as JSON, go to the copied one"},
+    {"M", "shading mode"},
+    {"C", "colours of the scan, or clay"},
+    {"L", "the light follows the camera, or stays"},
+    {"S", "shadows"},
+    {"O", "ambient occlusion"},
+    {"X", "section through the middle; shift + wheel moves it"},
+    {"D", "measure: click points; Enter ends a line, Backspace takes a point back"},
+    {"Ctrl+E", "write what is measured: measurement-1.csv, .json"},
+    {"Tab", "the panel"},
+    {"F1", "this list"},
+    {"Esc", "ends what is going on, else the program"},
+    {"Ctrl+Q", "quit"},
+};
+
+}  // namespace
+
+std::span<const KeyHelp> keyMap() { return kKeyMap; }
+
+std::string keyMapText() {
+    size_t width = 0;
+    for (const KeyHelp& each : kKeyMap) width = std::max(width, std::string_view(each.keys).size());
+    std::string text;
+    for (const KeyHelp& each : kKeyMap) text += fmt::format("{:<{}}  {}\n", each.keys, width, each.does);
+    return text;
+}
+
+}  // namespace vcp

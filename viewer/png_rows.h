@@ -1,0 +1,34 @@
+// A PNG file written a few rows at a time: pictures larger than memory.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "octree/result.h"
+
+namespace vcp {
+
+/// One thread. The file appears with finish(), whole; without it, nothing is left.
+class PngRows {
+public:
+    /// 8-bit RGBA, `width` and `height` from 1 to 2^20. Errors: Io, Usage.
+    static Result<std::unique_ptr<PngRows>> create(const std::filesystem::path& path, uint32_t width, uint32_t height);
+    ~PngRows();
+    PngRows(const PngRows&) = delete;
+    PngRows& operator=(const PngRows&) = delete;
+
+    /// Whole rows, from the upper one on: a multiple of 4 * width bytes. Errors: Io; Usage (too many).
+    Result<void> add(std::span<const uint8_t> rgba);
+    /// Errors: Io; Usage (rows are missing).
+    Result<void> finish();
+
+private:
+    struct Encoder;
+    explicit PngRows(std::unique_ptr<Encoder> encoder);
+    std::unique_ptr<Encoder> encoder_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,95 @@
+// What the window of `vcp view` shows and does, without the window: a Viewer, what is being opened into it, what is
+// measured, what is remembered. window.h turns events into calls, interface.h draws the panels.
+//
+// Errors of files end nothing: they stand in problem() until the next thing is opened or they are dismissed.
+// One thread; times as in viewer.h.
+#pragma once
+
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/dataset_opening.h"
+#include "viewer/finest_pick.h"
+#include "viewer/measurement.h"
+#include "viewer/render_settings.h"
+#include "viewer/user_settings.h"
+#include "viewer/viewer.h"
+
+namespace vcp {
+
+struct SessionOptions {
+    std::vector<std::string> inputs;  ///< what it may open first, for the renderer's threads
+    BuildSettings build;
+    RenderSettings render;
+    UserSettings user;
+    ProgressStyle progress = ProgressStyle::None;
+};
+
+class ViewSession {
+public:
+    /// Errors: those of Renderer::create.
+    static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options, SurfaceSource surface);
+    ~ViewSession();
+
+    [[nodiscard]] Viewer& viewer() { return *viewer_; }
+    [[nodiscard]] const Viewer& viewer() const { return *viewer_; }
+    [[nodiscard]] UserSettings& user() { return user_; }
+
+    /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
+    void open(std::vector<std::string> inputs);
+    /// Null when nothing is being opened.
+    [[nodiscard]] DatasetOpening* opening() { return opening_.get(); }
+
+    /// Viewer::update, and takes in what was opened or picked meanwhile.
+    Result<NextStep> update(double now);
+
+    /// What went wrong last, in one line; empty: nothing.
+    [[nodiscard]] std::string problem() const;
+    void say(std::string problem) { problem_ = std::move(problem); }
+    void dismissProblem();
+    /// A word about what was done ("copied"); it goes at the next press of a key or button.
+    [[nodiscard]] const std::string& note() const { return note_; }
+    void note(std::string text) { note_ = std::move(text); }
+
+    void keepBookmark(int number);
+    void goToBookmark(int number);
+    /// Null without any.
+    [[nodiscard]] const std::map<int, OrbitCamera>* bookmarks() const;
+    /// Goes to a camera in JSON, as cameraToJson writes it.
+    void pasteCamera(const std::string& json);
+
+    bool isMeasuring = false;
+    [[nodiscard]] Measurement& measurement() { return measurement_; }
+    [[nodiscard]] bool isPicking() const { return pick_.valid(); }
+    /// Picks on the finest level and adds the point; later, where it has to be read first.
+    void measureAt(glm::dvec2 pixel);
+    /// measurement-1.csv and .json in the working folder, or the next free number; says so.
+    void exportMeasurement();
+
+    /// Looks that are remembered, from the viewer into user().
+    void collectSettings();
+
+private:
+    using Picked = Result<std::optional<RayHit>>;
+
+    ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
+    void takeOpened();
+    Result<void> show(const OpenDataset& open, const std::vector<std::string>& inputs);
+    void takePicked();
+
+    SessionOptions options_;
+    UserSettings user_;
+    std::unique_ptr<Viewer> viewer_;
+    std::unique_ptr<DatasetOpening> opening_;
+    std::string shown_;  // rememberedName of what is shown; empty: nothing
+    bool wasShown_ = false;
+    std::string problem_, note_;
+    Measurement measurement_;
+    std::shared_ptr<FinestPick> finest_;
+    std::future<Picked> pick_;
+};
+
+}  // namespace vcp
