@@ -137,6 +137,7 @@ struct Renderer::State {
 
     const std::optional<SurfaceSource> surface;
     const ViewNumber number;
+    std::function<void()> gone;
     std::unique_ptr<Swapchain> swapchain;
     std::unique_ptr<FrameResources> resources;
     std::optional<PassTimer> timer;
@@ -241,6 +242,7 @@ Result<void> Renderer::State::attachToDevice() {
 }
 
 void Renderer::State::release() {
+    if (gone) gone();
     drawn.reset();
     timer.reset();
     swapchain.reset();
@@ -302,6 +304,7 @@ bool Renderer::State::recover(bool mayRebuild) {
     return halved;
 }
 
+void Renderer::onDeviceLoss(std::function<void()> gone) { state_->gone = std::move(gone); }
 const DeviceInfo& Renderer::device() const { return state_->info; }
 PageAccess Renderer::access() const { return state_->access; }
 std::vector<std::string> Renderer::validationMessages() const { return state_->instance->log().messages(); }

@@ -232,6 +232,10 @@ public:
     /// where the coarsest page has no room: the budgets stay as they were; Device: the dataset is closed.
     Result<void> setBudgets(uint64_t budgetBytes, uint64_t ramBytes);
 
+    /// `gone` is called before a lost device is given up: what was made with windowDrawing() is destroyed then, and
+    /// windowDrawing() asked again. Called by update() and render().
+    void onDeviceLoss(std::function<void()> gone);
+
     /// See the top of this file. Where the device runs out of memory, here or in render(), the pool is halved; where the
     /// device was lost, all is made anew, once a call, and read again. Errors: Device. Problems of single pages are in the result.
     Result<UpdateResult> update(const FrameRequest& request);

@@ -207,6 +207,12 @@ void Interface::layOutLimits() {
     const float part = static_cast<float>(update.residentBytes) / static_cast<float>(std::max<uint64_t>(status.budgetBytes, 1));
     const std::string filled = fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
     ImGui::ProgressBar(part, ImVec2(-1, 0), filled.c_str());
+    uint64_t budget = status.budgetBytes;
+    if (ImGui::SmallButton("half the budget")) budget /= 2;
+    ImGui::SameLine();
+    if (ImGui::SmallButton("double")) budget *= 2;
+    if (budget != status.budgetBytes)
+        if (const auto set = viewer.setBudget(budget); !set) session_->say(set.error().line());
     text(fmt::format("{} subvolumes drawn, {} resident", update.pagesInCut, update.pagesResident));
     text(update.settled ? "settled" : fmt::format("loading, {} missing", update.pagesMissing));
     text(fmt::format("{} read", formatBytes(update.bytesRead)));

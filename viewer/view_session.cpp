@@ -174,6 +174,7 @@ void ViewSession::collectSettings() {
     user_.backgroundTop = shading.backgroundTop;
     user_.backgroundBottom = shading.backgroundBottom;
     user_.errorPixels = viewer_->errorPixels();
+    user_.budgetBytes = viewer_->status().budgetBytes;
     if (viewer_->dataset()) user_.up = viewer_->camera().up;
 }
 

@@ -96,6 +96,12 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
     return {};
 }
 
+Result<void> Viewer::setBudget(uint64_t bytes) {
+    VCP_TRY(renderer_->setBudgets(bytes, options_.renderer.ramBytes));
+    status_.budgetBytes = bytes;
+    return {};
+}
+
 void Viewer::resize(glm::ivec2 size) { size_ = glm::clamp(size, glm::ivec2(0), glm::ivec2(16384)); }
 
 std::optional<glm::dvec3> Viewer::pointAt(glm::dvec2 pixel) {

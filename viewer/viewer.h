@@ -149,6 +149,8 @@ public:
     void setSections(std::vector<SectionPlane> planes) { sections_ = std::move(planes); }
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
+    /// Of the page pool, from now on. Errors: those of Renderer::setBudgets.
+    Result<void> setBudget(uint64_t bytes);
     [[nodiscard]] const ViewerStatus& status() const { return status_; }
     void dismissProblem() { status_.problem.clear(); }
     [[nodiscard]] uint64_t framesDrawn() const { return framesDrawn_; }

@@ -75,8 +75,9 @@ private:
 /// The session in its window: what the callbacks reach.
 class ViewWindow {
 public:
-    ViewWindow(const WindowSystem& system, ViewSession& session, InterfacePainter& painter)
-        : system_(&system), window_(system.window()), session_(&session), painter_(&painter), interface_(session, host()) {
+    ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter)
+        : system_(&system), window_(system.window()), session_(&session), painter_(std::move(painter)), interface_(session, host()) {
+        session.viewer().renderer().onDeviceLoss([this] { painter_.reset(); });
         glfwSetWindowUserPointer(window_, this);
         glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
         glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).mustPresent_ = true; });
@@ -107,6 +108,7 @@ public:
             if (!next) return next.error();
             Viewer& viewer = session_->viewer();
             if (next->draw) VCP_TRY(viewer.draw());
+            if (!painter_) VCP_TRY(makePainter());
             VCP_TRY(present(next->draw));
             if (!report.windowSeconds) report.windowSeconds = seconds();
             const bool isShown = viewer.dataset() && viewer.status().frame.pagesInCut > 0;
@@ -133,6 +135,17 @@ private:
                     const char* text = glfwGetClipboardString(window_);
                     return std::string(text ? text : "");
                 }};
+    }
+
+    /// Anew, on the device that stands in for a lost one.
+    Result<void> makePainter() {
+        const auto drawing = session_->viewer().renderer().windowDrawing();
+        if (!drawing) return drawing.error();
+        auto made = InterfacePainter::create(*drawing, system_->contentScale());
+        if (!made) return made.error();
+        painter_ = std::move(*made);
+        mustPresent_ = true;
+        return {};
     }
 
     void resize(glm::ivec2 size) {
@@ -320,7 +333,7 @@ private:
     const WindowSystem* system_;
     GLFWwindow* window_;
     ViewSession* session_;
-    InterfacePainter* painter_;
+    std::unique_ptr<InterfacePainter> painter_;
     Interface interface_;
     std::optional<InterruptScope> catching_;
     glm::ivec2 framebuffer_{0};
@@ -347,7 +360,7 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     if (!drawing) return drawing.error();
     auto painter = InterfacePainter::create(*drawing, system.contentScale());
     if (!painter) return painter.error();
-    return ViewWindow(system, **session, **painter).run(start);
+    return ViewWindow(system, **session, std::move(*painter)).run(start);
 }
 
 }  // namespace vcp

@@ -443,12 +443,14 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
             options.faults.lostAtSubmission = lostAt;
             start(options);
             show(scene);
-            uint32_t losses = 0;
+            uint32_t losses = 0, told = 0;
+            renderer_->onDeviceLoss([&] { ++told; });
             for (int i = 0; i < 20 && losses == 0; ++i) {
                 drawAllTheWay(*renderer_, request);
                 losses = renderer_->update(request)->deviceLosses;
             }
             EXPECT_EQ(losses, 1u);
+            EXPECT_EQ(told, 1u);
             EXPECT_EQ(drawAllTheWay(*renderer_, request), expected);
             EXPECT_EQ(renderer_->update(request)->deviceLosses, 1u);
             for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
