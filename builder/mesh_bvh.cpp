@@ -8,6 +8,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 namespace vcp {
 
@@ -228,6 +229,29 @@ void MeshBvh::split(uint32_t root, std::vector<glm::dvec3>& centres) {
         open.push_back(child);
         open.push_back(child + 1);
     }
+}
+
+std::vector<uint32_t> MeshBvh::trianglesNear(glm::dvec3 low, glm::dvec3 high) const {
+    std::vector<uint32_t> near, open;
+    if (!nodes_.empty()) open.push_back(0);
+    const auto touch = [&](glm::dvec3 boxLow, glm::dvec3 boxHigh) {
+        return glm::all(glm::lessThanEqual(boxLow, high)) && glm::all(glm::greaterThanEqual(boxHigh, low));
+    };
+    while (!open.empty()) {
+        const Node& node = nodes_[open.back()];
+        open.pop_back();
+        if (!touch(node.low, node.high)) continue;
+        if (node.count == 0) {
+            open.push_back(node.first);
+            open.push_back(node.first + 1);
+        }
+        for (uint32_t i = 0; i < node.count; ++i) {
+            const auto v = mesh_->corners(order_[node.first + i]);
+            if (touch(glm::min(v[0], glm::min(v[1], v[2])), glm::max(v[0], glm::max(v[1], v[2]))))
+                near.push_back(order_[node.first + i]);
+        }
+    }
+    return near;
 }
 
 std::optional<NearestPoint> MeshBvh::nearestPoint(glm::dvec3 p, double within) const {

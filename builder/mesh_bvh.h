@@ -57,6 +57,9 @@ public:
     [[nodiscard]] std::vector<MeshHit> allHits(glm::dvec3 origin, glm::dvec3 direction, double tMin = 0,
                                                double tMax = std::numeric_limits<double>::infinity()) const;
 
+    /// Triangles whose boxes touch the box low, high. Any thread.
+    [[nodiscard]] std::vector<uint32_t> trianglesNear(glm::dvec3 low, glm::dvec3 high) const;
+
     [[nodiscard]] const IndexedMesh& mesh() const { return *mesh_; }
     [[nodiscard]] glm::dvec3 low() const { return nodes_.empty() ? glm::dvec3(0) : nodes_[0].low; }
     [[nodiscard]] glm::dvec3 high() const { return nodes_.empty() ? glm::dvec3(0) : nodes_[0].high; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 
 #include <glm/geometric.hpp>
@@ -20,6 +21,18 @@ std::array<glm::dvec3, 2> perpendiculars(glm::dvec3 d) {
     const glm::dvec3 other = std::abs(d.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     const glm::dvec3 u = glm::normalize(glm::cross(d, other));
     return {u, glm::cross(d, u)};
+}
+
+/// Between the segments p0 p1 and q0 q1.
+double segmentDistance(glm::dvec3 p0, glm::dvec3 p1, glm::dvec3 q0, glm::dvec3 q1) {
+    const glm::dvec3 p = p1 - p0, q = q1 - q0, r = p0 - q0;
+    const double pp = glm::dot(p, p), pq = glm::dot(p, q), qq = glm::dot(q, q), pr = glm::dot(p, r), qr = glm::dot(q, r);
+    const auto share = [](double part, double whole) { return whole > 0 ? std::clamp(part / whole, 0.0, 1.0) : 0.0; };
+    // The nearest points of the lines, cut to one segment, then to the other, then to the first again.
+    double s = share(pq * qr - qq * pr, pp * qq - pq * pq);
+    const double t = share(pq * s + qr, qq);
+    s = share(pq * t - pr, pp);
+    return glm::length(r + s * p - t * q);
 }
 
 }  // namespace
@@ -72,7 +85,9 @@ bool RayJudge::leaks(glm::dvec3 origin, glm::dvec3 direction, double until) cons
         // Stopped within the piece: by the surface of this very crossing.
         if (until <= piece.last + radius_) return false;
         // A piece that begins behind the eye says nothing about a surface in front of it.
-        if (piece.first > 0 && parallelsCross(origin, direction, piece)) return true;
+        if (piece.first > 0 && parallelsCross(origin, direction, piece) &&
+            !borderNear(origin + piece.first * direction, origin + piece.last * direction))
+            return true;
         from = std::max(piece.last, std::nextafter(hit->t, kInfinity));
     }
     return false;
@@ -104,6 +119,26 @@ bool RayJudge::parallelsCross(glm::dvec3 origin, glm::dvec3 direction, Piece pie
         }
     }
     return true;
+}
+
+bool RayJudge::borderNear(glm::dvec3 first, glm::dvec3 last) const {
+    // Both triangles of an edge that comes so near are among these. Corners are told apart by their places.
+    const IndexedMesh& mesh = mesh_->mesh();
+    using Place = std::array<double, 3>;
+    std::map<std::pair<Place, Place>, int> triangles;
+    for (const uint32_t triangle : mesh_->trianglesNear(glm::min(first, last) - radius_, glm::max(first, last) + radius_))
+        for (int i = 0; i < 3; ++i) {
+            const auto place = [&](int corner) {
+                const glm::dvec3 p = mesh.positions[mesh.triangles[triangle][corner % 3]];
+                return Place{p.x, p.y, p.z};
+            };
+            const auto ends = std::minmax({place(i), place(i + 1)});
+            ++triangles[ends];
+        }
+    return std::ranges::any_of(triangles, [&](const auto& edge) {
+        const auto& [a, b] = edge.first;
+        return edge.second == 1 && segmentDistance(first, last, {a[0], a[1], a[2]}, {b[0], b[1], b[2]}) <= radius_;
+    });
 }
 
 Quantiles quantilesOf(std::vector<float> values) {

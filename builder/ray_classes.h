@@ -12,10 +12,11 @@
 //
 //   hole      The ray crosses the mesh, has no surface hit there, and every surface within e of the mesh
 //             that has no opening would have been hit: all parallels of the ray at distances up to e
-//             (kParallels directions, three distances) cross the mesh there too. "There" is the ray's
-//             piece around the crossing on which it stays within 1.1 e of the mesh. So it passes no
-//             silhouette and no border by e or less, and enters the mesh's e-neighbourhood and leaves it
-//             again, without being stopped. All crossings up to the surface hit are judged, so that
+//             (kParallels directions, three distances) cross the mesh there too, and no border of the mesh
+//             (an edge of one triangle alone) comes within e of it there: of two parts that touch and share no
+//             edge, each may recede by e. "There" is the ray's piece around the crossing on which it stays
+//             within 1.1 e of the mesh. So it passes no silhouette and no border by e or less, and enters the
+//             mesh's e-neighbourhood and leaves it again, without being stopped. All crossings up to the surface hit are judged, so that
 //             missed and wrong-sheet rays are treated alike.
 //   too far   A surface hit, of whatever class, farther from the mesh than its page's certified error.
 //
@@ -78,6 +79,7 @@ private:
     };
     [[nodiscard]] Piece pieceNearMesh(glm::dvec3 origin, glm::dvec3 direction, double t) const;
     [[nodiscard]] bool parallelsCross(glm::dvec3 origin, glm::dvec3 direction, Piece piece) const;
+    [[nodiscard]] bool borderNear(glm::dvec3 first, glm::dvec3 last) const;
 
     const MeshBvh* mesh_;
     double cell_;

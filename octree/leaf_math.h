@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -18,10 +19,12 @@ using uint4 = glm::u32vec4;
 #include "octree/shared/page_layout.h"
 
 #define INLINE inline
+#define DONT_UNROLL
 namespace f32 {
 using namespace glm;
 using uint = uint32_t;
 using Real = float;
+using Real2 = glm::vec2;
 using Real3 = glm::vec3;
 using Real4 = glm::vec4;
 #define ROOT_RESIDUAL 1e-5f
@@ -33,6 +36,7 @@ namespace f64 {
 using namespace glm;
 using uint = uint32_t;
 using Real = double;
+using Real2 = glm::dvec2;
 using Real3 = glm::dvec3;
 using Real4 = glm::dvec4;
 #define ROOT_RESIDUAL 1e-14
@@ -40,5 +44,6 @@ using Real4 = glm::dvec4;
 #undef ROOT_RESIDUAL
 }  // namespace f64
 #undef INLINE
+#undef DONT_UNROLL
 
 }  // namespace vcp

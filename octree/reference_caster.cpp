@@ -72,22 +72,22 @@ uint32_t softAxis(uint32_t node) { return node >> kSoftAxisShift & 3u; }
 std::optional<LeafHit> castSoftF64(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 d, double wallIn,
                                    double wallOut, int steps) {
     const uint32_t face = node & kLeafIndexMask;
-    const f64::LeafField leaf = f64::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
-    const f64::RayField ray = f64::restrictToRay(leaf, p, d);
+    const f64::RayField ray = f64::restrictToRay(view.faces[face], view.faces[face + 1], softAxis(node), p, d);
     const double u = f64::firstCrossing(ray, wallIn, wallOut, f64::dipBound(node), steps);
     if (!(u >= 0)) return {};
-    const glm::dvec3 normal = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, f64::rayValue(ray, 0));
+    const f64::LeafField leaf = f64::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
+    const glm::dvec3 normal = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, ray.c.x);
     return LeafHit{u, normal, 0, u == 0 || u == 1};
 }
 
 std::optional<LeafHit> castSoftF32(const PageView& view, uint32_t node, glm::vec3 p, glm::vec3 d, float wallIn,
                                    float wallOut, int steps) {
     const uint32_t face = node & kLeafIndexMask;
-    const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
-    const f32::RayField ray = f32::restrictToRay(leaf, p, d);
+    const f32::RayField ray = f32::restrictToRay(view.faces[face], view.faces[face + 1], softAxis(node), p, d);
     const float u = f32::firstCrossing(ray, wallIn, wallOut, f32::dipBound(node), steps);
     if (!(u >= 0)) return {};
-    const glm::vec3 normal = f32::facingNormal(f32::leafNormal(leaf, p + u * d), d, f32::rayValue(ray, 0));
+    const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
+    const glm::vec3 normal = f32::facingNormal(f32::leafNormal(leaf, p + u * d), d, ray.c.x);
     return LeafHit{u, normal, 0, u == 0 || u == 1};
 }
 

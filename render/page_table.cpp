@@ -25,9 +25,10 @@ std::vector<Part> partsOf(const Dataset& dataset, std::span<const uint64_t> cut)
 void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, float errorCells) {
     const PageSections sections = pageSections(page.header);
     const auto texelOf = [&](uint64_t byte) { return page.texel + static_cast<uint32_t>(byte / 16); };
-    record[0] = {frame::kRecordResident, 0, page.header.root, page.texel};
+    const uint32_t error = (std::bit_cast<uint32_t>(errorCells) + ~frame::kRecordErrorMask) & frame::kRecordErrorMask;
+    record[0] = {frame::kRecordResident | error, 0, page.header.root, page.texel};
     record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices), texelOf(sections.normals)};
-    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), std::bit_cast<uint32_t>(errorCells)};
+    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), 0};
 }
 
 }  // namespace

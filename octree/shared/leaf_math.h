@@ -134,28 +134,63 @@ INLINE Real3 facingNormal(Real3 n, Real3 d, Real first) {
     return away ? -n : n;
 }
 
-// f restricted to the segment p + u d, u in [0, 1]: sum w_i(p + u d) (A_i + u B_i). The members p and d
-// are rotated to the leaf's axis.
+// f on the segment p + u d, u in [0, 1]: sum c_k u^k + fourth u^4. At the end it is `last`: taken from the corners, so that two
+// leaves agree on it at the wall between them.
 struct RayField {
-    Real4 A0, A1, B0, B1;
-    Real3 p, d;
+    Real4 c;
+    Real fourth, last;
 };
 
-INLINE RayField restrictToRay(LeafField leaf, Real3 p, Real3 d) {
+// A corner's plane on the segment: value at its start, given from the corner, and slope.
+INLINE Real2 cornerOnRay(uint code, Real3 fromCorner, Real3 d) {
+    Real3 n = decodeDirection(code >> 11);
+    return Real2(decodeDistance(code) + Real(0.5) * dot(n, fromCorner), Real(0.5) * dot(n, d)) * decodeSide(code);
+}
+
+// (1 - x - u dx) a(u) + (x + u dx) b(u) of polynomials a and b, least power first.
+INLINE Real3 blendLines(Real2 a, Real2 b, Real x, Real dx) {
+    Real2 e = b - a;
+    return Real3((Real(1.0) - x) * a.x + x * b.x, a.y + x * e.y + dx * e.x, dx * e.y);
+}
+INLINE Real4 blendParabolas(Real3 a, Real3 b, Real x, Real dx) {
+    Real3 e = b - a;
+    return Real4((Real(1.0) - x) * a.x + x * b.x, a.y + x * e.y + dx * e.x, a.z + x * e.z + dx * e.y, dx * e.z);
+}
+
+// From the corners' planes on the segment, faces as in LeafField; r and s: its start and extent, rotated to the axis.
+INLINE RayField blendOnRay(Real4 value0, Real4 slope0, Real4 value1, Real4 slope1, Real3 r, Real3 s) {
+    Real3 low0 = blendLines(Real2(value0.x, slope0.x), Real2(value0.y, slope0.y), r.y, s.y);
+    Real3 low1 = blendLines(Real2(value0.z, slope0.z), Real2(value0.w, slope0.w), r.y, s.y);
+    Real3 high0 = blendLines(Real2(value1.x, slope1.x), Real2(value1.y, slope1.y), r.y, s.y);
+    Real3 high1 = blendLines(Real2(value1.z, slope1.z), Real2(value1.w, slope1.w), r.y, s.y);
+    Real4 low = blendParabolas(low0, low1, r.z, s.z), high = blendParabolas(high0, high1, r.z, s.z);
+    Real4 e = high - low;
     RayField ray;
-    ray.A0 = leaf.a0 + leaf.gx0 * p.x + leaf.gy0 * p.y + leaf.gz0 * p.z;
-    ray.A1 = leaf.a1 + leaf.gx1 * p.x + leaf.gy1 * p.y + leaf.gz1 * p.z;
-    ray.B0 = leaf.gx0 * d.x + leaf.gy0 * d.y + leaf.gz0 * d.z;
-    ray.B1 = leaf.gx1 * d.x + leaf.gy1 * d.y + leaf.gz1 * d.z;
-    ray.p = rotateToAxis(p, leaf.axis);
-    ray.d = rotateToAxis(d, leaf.axis);
+    ray.c = Real4((Real(1.0) - r.x) * low.x + r.x * high.x, low.y + r.x * e.y + s.x * e.x, low.z + r.x * e.z + s.x * e.y,
+                  low.w + r.x * e.w + s.x * e.z);
+    ray.fourth = s.x * e.w;
+    Real3 t = r + s;
+    Real4 w = faceWeights(t.y, t.z);
+    ray.last = dot(w, value0 + slope0) * (Real(1.0) - t.x) + dot(w, value1 + slope1) * t.x;
     return ray;
 }
 
+INLINE RayField restrictToRay(uint4 face0, uint4 face1, uint axis, Real3 p, Real3 d) {
+    // Corners are named by their bits along the axis and the next two.
+    bvec3 along = bvec3(axis == 0u, axis == 1u, axis == 2u);
+    bvec3 next = bvec3(along.z, along.x, along.y), last = bvec3(along.y, along.z, along.x);
+    Real3 q = p - Real3(1.0);
+    Real2 v000 = cornerOnRay(face0.x, p, d), v010 = cornerOnRay(face0.y, mix(p, q, next), d);
+    Real2 v001 = cornerOnRay(face0.z, mix(p, q, last), d), v011 = cornerOnRay(face0.w, mix(q, p, along), d);
+    Real2 v100 = cornerOnRay(face1.x, mix(p, q, along), d), v110 = cornerOnRay(face1.y, mix(q, p, last), d);
+    Real2 v101 = cornerOnRay(face1.z, mix(q, p, next), d), v111 = cornerOnRay(face1.w, q, d);
+    return blendOnRay(Real4(v000.x, v010.x, v001.x, v011.x), Real4(v000.y, v010.y, v001.y, v011.y),
+                      Real4(v100.x, v110.x, v101.x, v111.x), Real4(v100.y, v110.y, v101.y, v111.y), rotateToAxis(p, axis),
+                      rotateToAxis(d, axis));
+}
+
 INLINE Real rayValue(RayField ray, Real u) {
-    Real4 w = faceWeights(ray.p.y + u * ray.d.y, ray.p.z + u * ray.d.z);
-    Real x = ray.p.x + u * ray.d.x;
-    return dot(w, ray.A0 + ray.B0 * u) * (Real(1.0) - x) + dot(w, ray.A1 + ray.B1 * u) * x;
+    return ray.c.x + u * (ray.c.y + u * (ray.c.z + u * (ray.c.w + u * ray.fourth)));
 }
 
 INLINE Real wallTolerance(uint node) {
@@ -174,9 +209,9 @@ INLINE Real dipBound(uint node) {
 // The bracket is refined by the Illinois variant of false position, at most `steps` times, and until f is
 // within ROOT_RESIDUAL leaf edges of zero.
 INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int steps) {
-    Real fa = rayValue(ray, Real(0.0));
+    Real fa = ray.c.x;
     if (abs(fa) <= wallIn) return Real(0.0);
-    Real fb = rayValue(ray, Real(1.0));
+    Real fb = ray.last;
     Real a = Real(0.0), b = Real(1.0);
     bool below = fa < Real(0.0);
     if ((fb < Real(0.0)) == below) {
@@ -197,7 +232,7 @@ INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int
         fb = fm;
     }
     int side = 0;
-    for (int i = 0; i < steps; i++) {
+    DONT_UNROLL for (int i = 0; i < steps; i++) {
         Real u = a + (b - a) * (fa / (fa - fb));
         Real fu = rayValue(ray, u);
         if (abs(fu) <= Real(ROOT_RESIDUAL)) return u;

@@ -185,7 +185,7 @@ void main() {
     tileStarts[number] = floatBitsToUint(start);
     if (start < kTileEmpty) {
         uint at = atomicAdd(tileList[3], 1u);
-        tileList[kTileListHeader + at] = number;
+        tileList[kTileListHeader + at] = tile.y << 16 | tile.x;
         if (at % kTileRow == 0u) atomicAdd(tileList[1], 1u);
     }
 }

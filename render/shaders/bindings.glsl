@@ -1,9 +1,12 @@
 // The one descriptor set of all passes, and the one way to read pages and tables: fetchTexel and its like.
 // Read-only data is bound twice, as texel buffers (the fast path of software devices, whose storage
 // buffer loads are scalar loops) and as storage buffers; kTexelAccess chooses.
+#extension GL_EXT_control_flow_attributes : require
 #define INLINE
+#define DONT_UNROLL [[dont_unroll]]
 #define ROOT_RESIDUAL 1e-5
 #define Real float
+#define Real2 vec2
 #define Real3 vec3
 #define Real4 vec4
 #define uint4 uvec4

@@ -9,7 +9,7 @@ const int kIllinoisSteps = 8;
 const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
 const float kIntervalSlack = 1e-4;
 const float kLastBelowOne = 0.99999994;
-const float kSeamErrors = 8.0;  // how far a coarser surface goes on beyond its page, in its certified errors
+const float kSeamErrors = 8.0;  // how far a coarser surface goes on beyond its page, in certified errors of the two pages
 
 struct Hit {
     float depth;  // finest cells; kNoHit
@@ -64,6 +64,7 @@ struct Region {
     ivec3 corner;
     int bits;
     bool isPage;
+    float error;  // certified, of the page; finest cells
 };
 const int kNoRegion = 64;  // bits before the first one
 
@@ -109,6 +110,7 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
             }
         }
         region.isPage = exists;
+        region.error = exists ? uintBitsToFloat(record.x & kRecordErrorMask) : 0.0;
         found = exists || levelChanges(before, region);
         if (!found) {
             before = region;
@@ -122,26 +124,56 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
     return inside;
 }
 
-// The page of the coarser of two regions' level that holds the finer one; it is above pages of the cut, or there is
-// none. False: not resident.
-bool coarserPage(Region before, Region after, inout Page page, inout uint steps) {
-    ivec3 place = before.isPage && after.bits < before.bits ? after.corner : before.corner;
-    int bits = max(before.bits, after.bits);
+// A part of the ray beside a change of level, where the coarser surface counts as well.
+struct Seam {
+    ivec3 corner;  // of a box of the coarser level's pages that the part runs through
+    int bits;
+    bool behind;   // the coarser region lies ahead: boxes are looked at from its wall backwards
+    float first, last;
+};
+
+// Between two levels the surfaces are apart by as much as their errors, and a ray could pass between them. So the
+// coarser one goes on for a while beyond the wall, in the finer one's region.
+Seam seamBetween(Region before, Region after, float wall) {
+    float reach = kSeamErrors * max(before.error, after.error);
+    Seam seam;
+    seam.behind = after.isPage && after.bits > before.bits;
+    seam.bits = max(before.bits, after.bits);
+    seam.corner = (seam.behind ? before.corner : after.corner) >> seam.bits << seam.bits;
+    seam.first = seam.behind ? max(wall - reach, 0.0) : wall;
+    seam.last = seam.behind ? wall : wall + reach;
+    return seam;
+}
+
+// To the next box of the seam. False: there is none.
+bool nextBox(Ray ray, inout Seam seam) {
+    ivec3 edge = ivec3(1 << seam.bits), far = seam.corner + edge;
+    bvec3 upward = notEqual(greaterThan(ray.direction, vec3(0.0)), bvec3(seam.behind));
+    vec3 t = planeDistances(ray, mix(seam.corner, far, upward));
+    float wall = seam.behind ? maxOf(t) : minOf(t);
+    bvec3 through = equal(t, vec3(wall));
+    through = bvec3(through.x, through.y && !through.x, through.z && !through.y && !through.x);
+    seam.corner += mix(ivec3(0), mix(-edge, edge, upward), through);
+    return seam.behind ? wall > seam.first : wall < seam.last;
+}
+
+// The page of the box of a seam; it is above pages of the cut, or there is none. False: not resident.
+bool coarserPage(Seam seam, inout Page page, inout uint steps) {
     uint node = 0u;
     uvec4 record = uvec4(0u);
-    bool exists = true;
+    bool exists = all(greaterThanEqual(seam.corner, ivec3(0))) && all(lessThan(seam.corner, ivec3(1 << kLatticeBits)));
     page.bits = int(kLatticeBits) + 1;
-    while (exists && page.bits > bits) {
+    while (exists && page.bits > seam.bits) {
         record = fetchTable(node * kRecordTexels);
         if (kCountSteps != 0u) steps++;
         page.bits--;
-        if (page.bits > bits) {
-            uint octant = octantAt(place, page.bits - 1);
+        if (page.bits > seam.bits) {
+            uint octant = octantAt(seam.corner, page.bits - 1);
             exists = (record.x >> octant & 1u) != 0u;
             node = record.y + bitCount(record.x & ((1u << octant) - 1u));
         }
     }
-    page.corner = place >> bits << bits;
+    page.corner = seam.corner;
     usePage(node, record, page);
     return exists && (record.x & kRecordResident) != 0u;
 }
@@ -177,7 +209,7 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
 // Distance along the page's ray of the crossing in a soft leaf, or -1.
 float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
     uint face = page.sections.x + (node & kLeafIndexMask);
-    LeafField leaf = decodeLeaf(fetchTexel(face), fetchTexel(face + 1u), node >> kSoftAxisShift & 3u);
+    uvec4 face0 = fetchTexel(face), face1 = fetchTexel(face + 1u);
     if (kCountSteps != 0u) {
         work.cells++;
         work.fetches += 2u;
@@ -186,9 +218,9 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     vec3 p = (s.from - lo) * scale;
     vec3 d = (s.to - s.from) * scale;
     float wall = wallTolerance(node);
-    RayField ray = restrictToRay(leaf, p, d);
+    RayField ray = restrictToRay(face0, face1, node >> kSoftAxisShift & 3u, p, d);
     float u = firstCrossing(ray, s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
-    hit.at = vec4(p + u * d, rayValue(ray, 0.0));
+    hit.at = vec4(p + u * d, ray.c.x);
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 
@@ -284,7 +316,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     PageRay local = enterPage(ray, page, sStart);
     Place at;
     at.tau = max(0.0, (s - sStart) / page.cell);
-    at.subcell = clamp(ivec3(floor((local.start + at.tau * local.direction) * kSubcells)), ivec3(0), ivec3(int(local.cells * kSubcells) - 1));
+    at.subcell = clamp(ivec3((local.start + at.tau * local.direction) * kSubcells), ivec3(0), ivec3(int(local.cells * kSubcells) - 1));
     at.inPage = true;
     float tauUntil = (until - sStart) / page.cell;
 
@@ -344,39 +376,34 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
     vec3 reached = vec3(max(max(first, 0.0), from));
 
     Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), 0u);
-    Region before = Region(ivec3(0), kNoRegion, false), region;
-    bool inside = reached.x < last, seam = true;
+    Region before = Region(ivec3(0), kNoRegion, false, 0.0), region;
+    Seam seam;
+    bool inside = reached.x < last, fromNew = true, onSeam = false;
     while (inside) {
         Page page;
         if (!findPage(ray, reached, last, before, region, page, work.steps)) break;
-        // Between two levels the surfaces are apart by as much as their errors, and a ray could pass between them. So the
-        // coarser one goes on for a while beyond the wall, in the finer one's region.
-        seam = seam && levelChanges(before, region);
-        float start = reached.x, until = kNoHit;
-        bool look = region.isPage;
-        if (seam) {
-            look = coarserPage(before, region, page, work.steps);
-            float reach = kSeamErrors * uintBitsToFloat(fetchTable(page.record * kRecordTexels + 2u).w);
-            bool behind = region.isPage && region.bits > before.bits;
-            until = behind ? start : start + reach;
-            start = behind ? max(start - reach, 0.0) : start;
-        }
+        if (fromNew) seam = seamBetween(before, region, reached.x);
+        onSeam = fromNew ? levelChanges(before, region) : onSeam;
+        float first = onSeam ? seam.first : 0.0, start = onSeam ? seam.first : reached.x, stop = onSeam ? seam.last : kNoHit;
+        bool look = onSeam ? coarserPage(seam, page, work.steps) : region.isPage;
         if (look) {
             Hit found = hit;
             found.record = page.record;
             found.pageBits = page.bits;
-            found.depth = castPage(ray, page, start, until, found, work);
-            if (found.depth < hit.depth && found.depth <= until + kIntervalSlack * page.cell) hit = found;
+            found.depth = castPage(ray, page, start, stop, found, work);
+            float slack = kIntervalSlack * page.cell;
+            if (found.depth < hit.depth && found.depth >= first - slack && found.depth <= stop + slack) hit = found;
         }
-        if (seam) {
-            // The region itself is next.
-            seam = false;
+        if (onSeam) {
+            // Its next box, or the region itself.
+            onSeam = nextBox(ray, seam);
+            fromNew = false;
             inside = hit.depth > reached.x;
         } else {
             before = region;
             reached = leaveLatticeBox(ray, region.corner, region.bits);
             inside = reached.x < last && hit.depth > reached.x;
-            seam = true;
+            fromNew = true;
         }
     }
     return hit;

@@ -13,6 +13,8 @@ struct PageRay {
 };
 
 const float kSubcells = 8.0;  // 2^kMaxSubcellDepth
+// Walls are whole numbers of clearances, and not below 0: with this added, cutting rounds up subcells.
+const float kRoundUp = 1.0 - kSubcells / kClearancePerCell;
 
 // A place on the ray: distance from the page's start, and the subcell.
 struct Place {
@@ -84,8 +86,8 @@ Place leaveBox(PageRay ray, Place from, vec3 lo, vec3 hi) {
     Place to;
     to.tau = max(from.tau, nearest);
     vec3 p = clamp(ray.start + to.tau * ray.direction, lo, hi);
-    ivec3 sideways = clamp(ivec3(floor(p * kSubcells)), ivec3(floor(lo * kSubcells)), ivec3(ceil(hi * kSubcells)) - 1);
-    ivec3 across = mix(ivec3(ceil(walls * kSubcells)) - 1, ivec3(floor(walls * kSubcells)), ahead);
+    ivec3 sideways = clamp(ivec3(p * kSubcells), ivec3(lo * kSubcells), ivec3(hi * kSubcells + kRoundUp) - 1);
+    ivec3 across = mix(ivec3(walls * kSubcells + kRoundUp) - 1, ivec3(walls * kSubcells), ahead);
     to.subcell = mix(sideways, across, through);
     bvec3 outer = equal(walls, ray.farWalls);
     to.inPage = !((through.x && outer.x) || (through.y && outer.y) || (through.z && outer.z));

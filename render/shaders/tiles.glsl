@@ -7,11 +7,15 @@ uvec2 pixelInTile() {
 }
 
 // Software devices give each thread an equal run of consecutive workgroups: neighbours in the list go to
-// different threads, so that all have the same share of sky and statue.
+// different threads, so that all have the same share of sky and statue. They divide integers one by one: in
+// floats the quotient is as exact, below 2^23.
+uint quotient(uint a, uint b) { return uint((float(a) + 0.5) / float(b)); }
+
 uint stripedIndex(uint i, uint count) {
     uint stripes = frame.mode.z;
-    uint run = count / stripes;
-    return i < run * stripes ? (i % run) * stripes + i / run : i;
+    uint run = quotient(count, stripes);
+    uint stripe = quotient(i, max(run, 1u));
+    return i < run * stripes ? (i - stripe * run) * stripes + stripe : i;
 }
 
 // The invocation's tile of the list and its pixel; false where there is none.
@@ -21,7 +25,9 @@ bool listedPixel(out uint tile, out uvec2 pixel) {
     tile = 0u;
     pixel = uvec2(0u);
     if (index >= count) return false;
-    tile = fetchTileList(kTileListHeader + stripedIndex(index, count));
-    pixel = uvec2(tile % frame.picture.z, tile / frame.picture.z) * kTileSize + pixelInTile();
+    uint packed = fetchTileList(kTileListHeader + stripedIndex(index, count));
+    uvec2 place = uvec2(packed & 0xffffu, packed >> 16);
+    tile = place.y * frame.picture.z + place.x;
+    pixel = place * kTileSize + pixelInTile();
     return all(lessThan(pixel, frame.picture.xy));
 }

@@ -64,7 +64,7 @@ Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work wor
 // What a false colour shows of a hit, 0 to 1 (ShadingMode).
 float falseColour(Hit hit, Work work) {
     int level = int(kLatticeBits) - hit.pageBits;
-    float error = uintBitsToFloat(fetchTable(hit.record * kRecordTexels + 2u).w);
+    float error = uintBitsToFloat(fetchTable(hit.record * kRecordTexels).x & kRecordErrorMask);
     float pixels = error / max(frame.pixel.x + frame.pixel.y * hit.depth, 1e-30);
     return frame.mode.w == kShadeSteps     ? float(work.steps) / kMostShownSteps
            : frame.mode.w == kShadeCells   ? float(work.cells) / kMostShownCells

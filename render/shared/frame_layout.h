@@ -61,15 +61,15 @@ struct FrameConstants {
 // A node of the frame's page tree: three texels of the table.
 //   0: flags, first child (number in the table), root word of the page, texel of the page in the pool
 //   1: texels of faces, triangles, vertices, normals
-//   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory, certified
-//      error in finest cells (float bits)
+//   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory
 // flags: bits 0..7 octants that have a child; bit 8: this page is in the cut; bit 9: it is resident, so that its
-// fields are there.
+// fields are there; bits 16..31: its certified error in finest cells, the upper half of a float, rounded up.
 const uint kRecordTexels = 3u;
 const uint kRecordInCut = 256u;
 const uint kRecordResident = 512u;
+const uint kRecordErrorMask = 0xffff0000u;
 
-// The list of tiles to trace. Three words of an indirect dispatch, the count, then tile numbers.
+// The list of tiles to trace. Three words of an indirect dispatch, the count, then each tile's place: x + 2^16 y.
 const uint kTileListHeader = 4u;
 
 // Start distance of a tile in which no ray can hit.

@@ -139,6 +139,25 @@ TEST(RayClasses, OpenBorderMayRecede) {
     }
 }
 
+TEST(RayClasses, PartsThatTouchMayRecede) {
+    // Two squares end to end: with an edge of their own each, and with one in common.
+    IndexedMesh apart;
+    apart.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}};
+    apart.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+    IndexedMesh joined = apart;
+    apart.positions[4].y = -0.1;
+    apart.positions[7].y = 1.1;
+    const MeshBvh apartBvh(apart), joinedBvh(joined);
+    const glm::dvec3 d = glm::normalize(glm::dvec3(0.2, 0.1, -1));
+    for (const double x : {1 - 0.5 * kError, 1.0, 1 + 0.5 * kError}) {
+        const glm::dvec3 o = glm::dvec3(x, 0.5, 0) - 2.0 * d;
+        EXPECT_FALSE(RayJudge(apartBvh, kCell, kError).judge(o, d, {}).hole) << x;
+        EXPECT_TRUE(RayJudge(joinedBvh, kCell, kError).judge(o, d, {}).hole) << x;
+    }
+    const glm::dvec3 inner = glm::dvec3(1 - 3 * kError, 0.5, 0) - 2.0 * d;
+    EXPECT_TRUE(RayJudge(apartBvh, kCell, kError).judge(inner, d, {}).hole);
+}
+
 TEST(RayClasses, HitBehindACrossingNearbyIsNoHole) {
     const IndexedMesh mesh = test::boxMesh({-1, -1, -1}, {1, 1, 1}, 4);
     const MeshBvh bvh(mesh);

@@ -134,12 +134,11 @@ TEST(LeafMath, RayValueIsTheValueOnTheRay) {
         const uint32_t axis = i % 3;
         const auto faces = packFaces(r.sphere(2), axis);
         const f64::LeafField leaf = f64::decodeLeaf(faces[0], faces[1], axis);
-        const f32::LeafField single = f32::decodeLeaf(faces[0], faces[1], axis);
         const glm::dvec3 a = r.inside(), b = r.inside();
         const double u = r.unit(r.random);
         const double f = f64::leafValue(leaf, a + u * (b - a));
-        ASSERT_NEAR(f64::rayValue(f64::restrictToRay(leaf, a, b - a), u), f, 1e-13);
-        ASSERT_NEAR(f32::rayValue(f32::restrictToRay(single, glm::vec3(a), glm::vec3(b - a)), float(u)), f, 3e-6);
+        ASSERT_NEAR(f64::rayValue(f64::restrictToRay(faces[0], faces[1], axis, a, b - a), u), f, 1e-13);
+        ASSERT_NEAR(f32::rayValue(f32::restrictToRay(faces[0], faces[1], axis, glm::vec3(a), glm::vec3(b - a)), float(u)), f, 3e-6);
     }
 }
 
@@ -251,6 +250,11 @@ TEST(LeafMath, ContinuousOverFacesOfAllAxes) {
             ASSERT_LT(glm::distance(f64::leafNormal(leafA, x), f64::leafNormal(leafB, y)), 1e-13);
             ASSERT_NEAR(f32::leafValue(singleA, glm::vec3(x)), f32::leafValue(singleB, glm::vec3(y)),
                         float(kWallRounding));
+            // A ray that leaves one enters the other with the same value.
+            const glm::vec3 from(r.inside()), to(r.inside());
+            const f32::RayField leaving = f32::restrictToRay(facesA[0], facesA[1], axisA, from, glm::vec3(x) - from);
+            const f32::RayField entering = f32::restrictToRay(facesB[0], facesB[1], axisB, glm::vec3(y), to - glm::vec3(y));
+            ASSERT_NEAR(leaving.last, entering.c.x, float(kWallRounding));
         }
     }
 }
@@ -265,8 +269,9 @@ TEST(LeafMath, FlippingAllSidesFlipsTheField) {
         const glm::vec3 p(r.inside()), d(r.inside() - glm::dvec3(p));
         ASSERT_EQ(f32::leafValue(a, p), -f32::leafValue(b, p));
         const float wall = i % 2 == 0 ? 0.0f : 0.01f;
-        ASSERT_EQ(f32::firstCrossing(f32::restrictToRay(a, p, d), wall, wall, 1e30f, 5),
-                  f32::firstCrossing(f32::restrictToRay(b, p, d), wall, wall, 1e30f, 5));
+        const f32::RayField rayA = f32::restrictToRay(faces[0], faces[1], i % 3, p, d);
+        const f32::RayField rayB = f32::restrictToRay(flipped[0], flipped[1], i % 3, p, d);
+        ASSERT_EQ(f32::firstCrossing(rayA, wall, wall, 1e30f, 5), f32::firstCrossing(rayB, wall, wall, 1e30f, 5));
     }
 }
 
@@ -278,9 +283,8 @@ TEST(LeafMath, FirstCrossingAgainstDenseSampling) {
     for (int i = 0; i < 8000; ++i) {
         const uint32_t axis = i % 3;
         const auto faces = packFaces(r.sphere(i % 2 == 0 ? 1.5 : 0.4), axis);
-        const f64::LeafField leaf = f64::decodeLeaf(faces[0], faces[1], axis);
         const glm::dvec3 p = r.inside(), d = r.inside() - p;
-        const f64::RayField ray = f64::restrictToRay(leaf, p, d);
+        const f64::RayField ray = f64::restrictToRay(faces[0], faces[1], axis, p, d);
         const double u = f64::firstCrossing(ray, 0, 0, 1e30, 64);
         int first = -1, changes = 0;
         for (int k = 0; k < kSamples; ++k) {
@@ -301,10 +305,9 @@ TEST(LeafMath, FirstCrossingAgainstDenseSampling) {
             ASSERT_LE(u, double(first + 1) / kSamples + 1e-12) << i;
             ASSERT_NEAR(f64::rayValue(ray, u), 0, 1e-13) << i;
             // In float with few steps the crossing is nearly the same.
-            const f32::LeafField single = f32::decodeLeaf(faces[0], faces[1], axis);
             if (i % 2 == 1) continue;
-            const float v =
-                f32::firstCrossing(f32::restrictToRay(single, glm::vec3(p), glm::vec3(d)), 0.0f, 0.0f, 1e30f, 4);
+            const f32::RayField single = f32::restrictToRay(faces[0], faces[1], axis, glm::vec3(p), glm::vec3(d));
+            const float v = f32::firstCrossing(single, 0.0f, 0.0f, 1e30f, 4);
             singleWorst = std::max(singleWorst, std::abs(f64::rayValue(ray, v)));
         } else {
             ++doubles;
@@ -323,8 +326,10 @@ TEST(LeafMath, WallsCountWithinTheirTolerance) {
     for (int i = 0; i < 8; ++i) corners[i] = {(cornerOf(i).z - 0.5) * 1.0, {0, 0, 1}};
     const f64::LeafField leaf = exactLeaf(corners, 0);
     const auto cross = [&](double from, double to, double wallIn, double wallOut) {
-        return f64::firstCrossing(f64::restrictToRay(leaf, {0.3, 0.3, from}, {0, 0, to - from}), wallIn, wallOut, 0.02,
-                                  32);
+        const glm::dvec3 p(0.3, 0.3, from), d(0, 0, to - from);
+        const f64::RayField ray = f64::blendOnRay(leaf.a0 + leaf.gx0 * p.x + leaf.gy0 * p.y + leaf.gz0 * p.z, leaf.gz0 * d.z,
+                                                  leaf.a1 + leaf.gx1 * p.x + leaf.gy1 * p.y + leaf.gz1 * p.z, leaf.gz1 * d.z, p, d);
+        return f64::firstCrossing(ray, wallIn, wallOut, 0.02, 32);
     };
     EXPECT_NEAR(cross(0.9, 0.1, 0, 0), 0.5, 1e-12);
     EXPECT_EQ(cross(0.9, 0.51, 0, 0.02), 1);

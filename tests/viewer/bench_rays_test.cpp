@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <iterator>
 #include <map>
+#include <random>
 #include <set>
 #include <sstream>
 #include <string>
@@ -220,6 +221,43 @@ TEST(BenchStability, FloatsStayWithDoubles) {
     }
     EXPECT_TRUE(fs::is_empty(folder / "."));
     EXPECT_NE(stabilityMarkdown(*rows).find("| 1e+06 | 1e+07 |"), std::string::npos) << stabilityMarkdown(*rows);
+}
+
+/// A plain half, whose pages stay coarse, beside one full of balls and posts, whose pages do not.
+IndexedMesh plainBesideDetail() {
+    std::mt19937_64 random(3);
+    const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    IndexedMesh mesh = test::boxMesh({-2.5, -1.1, -0.053}, {2.5, 1.1, 0}, 1);
+    for (int i = 0; i < 60; ++i) {
+        const double x = between(-2.4, -0.6), y = between(-0.95, 0.95), radius = between(0.01, 0.05);
+        test::append(mesh, test::sphereMesh({x, y, 0.6 * radius}, radius, 5));
+    }
+    for (int i = 0; i < 40; ++i) {
+        const double x = between(-2.4, -0.6), y = between(-0.9, 0.9);
+        test::append(mesh, test::boxMesh({x, y, -0.02}, {x + 0.06, y + 0.04, 0.11}, 1));
+    }
+    return mesh;
+}
+
+TEST_F(BenchRays, NothingLeaksWherePagesAndLevelsMeet) {
+    if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    BenchRaysOptions options;
+    options.models = {folder_ / "steps.ply"};
+    ASSERT_TRUE(writePly(plainBesideDetail(), options.models[0]));
+    options.methods = {"certified"};
+    options.cameras = {"lattice"};
+    options.views = 13;
+    options.size = {160, 100};
+    options.repetitions = 1;
+    options.cell = 0.01;
+    options.out = folder_ / "report";
+    const auto report = benchRays(options);
+    ASSERT_TRUE(report) << report.error().line();
+    for (const BenchRaysRow& row : report->rows) {
+        EXPECT_EQ(row.classes.judged, 13u * 160 * 100);
+        EXPECT_EQ(row.classes.holes, 0u) << row.camera;
+        EXPECT_EQ(row.classes.beyondCertified, 0u) << row.camera << ", " << row.classes.maxOverCertified;
+    }
 }
 
 TEST_F(BenchRays, UnknownMethodsAndCamerasAreNamed) {
