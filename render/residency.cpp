@@ -134,7 +134,7 @@ Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber num
     }
     policy_->look(view, steadySeconds(), number);
     for (const LoadedPage& page : loaded) {
-        if (!page.bytes) continue;
+        if (!page.bytes || isBlock(page.page)) continue;
         if (auto placed = place(page); !placed) return placed.error();
     }
     VCP_TRY(pool_->flush());
