@@ -43,9 +43,10 @@ PageLoader::~PageLoader() {
     for (std::thread& thread : threads_) thread.join();
 }
 
-void PageLoader::request(std::vector<PageRequest> wishes) {
+void PageLoader::request(std::vector<PageRequest> wishes, uint64_t mostDone) {
     {
         const std::lock_guard lock(mutex_);
+        mostDone_ = mostDone;
         queue_.replace(std::move(wishes));
     }
     work_.notify_all();
@@ -63,6 +64,7 @@ std::vector<LoadedPage> PageLoader::collect(uint64_t mostBytes) {
         done_.erase(done_.begin(), end);
         for (const LoadedPage& page : pages) queue_.delivered(page.page);
         stats_.heldBytes -= bytes;
+        doneBytes_ -= bytes;
     }
     work_.notify_all();
     return pages;
@@ -87,6 +89,7 @@ LoaderStats PageLoader::stats() const {
 /// Reserves memory for the most urgent page and those read with it; nothing where none may begin now. A run of
 /// no pages: one was handed over unread.
 std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
+    if (doneBytes_ >= mostDone_) return std::nullopt;
     const auto wish = queue_.next(now);
     if (!wish) return std::nullopt;
     const uint64_t first = wish->page;
@@ -115,6 +118,7 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
 void PageLoader::handOver(uint64_t page, Result<PageBytes> bytes) {
     done_.push_back({page, std::move(bytes)});
     stats_.heldBytes += sizeOf(done_.back());
+    doneBytes_ += sizeOf(done_.back());
     ready_.notify_all();
 }
 

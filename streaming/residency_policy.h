@@ -112,6 +112,8 @@ public:
     /// cannot be read.
     void setPool(PoolShape pool);
     [[nodiscard]] bool hasLooked(ViewNumber number = 0) const { return motions_.contains(number); }
+    /// Whether a view moved when it was last looked at.
+    [[nodiscard]] bool isMoving() const { return moving_; }
     /// Counts up with all that can change a cut or a page's place.
     [[nodiscard]] uint64_t version() const { return version_; }
     /// Memory that this takes, near enough: bounded by the dataset, whatever the number of rounds.

@@ -99,6 +99,17 @@ TEST(PageLoader, DeliversEveryWishOnce) {
     EXPECT_FALSE(loader.waitForPage(kLong)) << "nothing is under way: it must not wait";
 }
 
+TEST(PageLoader, ReadsNoFurtherThanTheNextUpdateTakesIn) {
+    PageLoader loader(std::make_shared<FakeSource>(), options(false, 1, 1 << 20));
+    std::vector<PageRequest> wishes;
+    for (uint64_t page = 0; page < 2000; ++page) wishes.push_back({page, 1});
+    loader.request(wishes, 5 * sizeof(uint4));
+    for (uint64_t round = 1; round <= 100; ++round) {
+        while (loader.stats().pagesRead < 5 * round) std::this_thread::yield();
+        EXPECT_EQ(loader.collect().size(), 5u);
+    }
+}
+
 TEST(PageLoader, UrgentFirstOfEqualsInOrder) {
     const auto source = std::make_shared<FakeSource>();
     source->hold(true);
