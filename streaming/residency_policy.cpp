@@ -17,6 +17,8 @@ namespace {
 constexpr double kAheadUrgency = 1e-9;
 // Of blocks of the directory: nothing but the coarsest page comes before.
 constexpr double kBlockUrgency = std::numeric_limits<double>::max();
+// Moving pages aside costs a frame its time: so many times a page's units are moved for it before what nobody wants goes.
+constexpr uint64_t kCheapMoves = 2;
 // Motion is continued for no more steps than this.
 constexpr double kMostAhead = 20;
 
@@ -191,8 +193,9 @@ void ResidencyPolicy::evict(uint64_t page) {
     ++counts_.evictions;
 }
 
-/// Moves pages down until `units` free ones are on end, as few units as possible. False: no chunk has so many.
-bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
+/// Moves pages down until `units` free ones are on end, as few units as possible. False: no chunk has so many, or it takes
+/// more than `most` units.
+bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves) {
     struct Window {
         uint64_t begin = 0, end = 0, cost = UINT64_MAX;  // units
     } best;
@@ -215,7 +218,7 @@ bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
             if (free >= units && cost < best.cost) best = {gaps[first].firstUnit, gaps[last].end(), cost};
         }
     }
-    if (best.cost == UINT64_MAX) return false;
+    if (best.cost == UINT64_MAX || best.cost > most) return false;
     uint64_t to = best.begin;
     for (auto at = pageAt_.lower_bound(best.begin); at != pageAt_.end() && at->first < best.end;) {
         const uint64_t page = at->second;
@@ -231,6 +234,7 @@ bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
         moves.push_back({page, from, slot});
         ++version_;
         ++counts_.moves;
+        counts_.unitsMoved += slot.units;
     }
     return true;
 }
@@ -243,8 +247,10 @@ Placement ResidencyPolicy::place(uint64_t page) {
     placement.slot = allocator_.allocate(units);
     // What nobody wants any more takes no work.
     while (!placement.slot && rank != Rank::Stale) {
-        const bool gathered = allocator_.unitsFree() >= units && gather(units, placement.moves);
-        if (!gathered && !evictOne(rank)) break;
+        const bool isEnough = allocator_.unitsFree() >= units;
+        const bool hasRoom = (isEnough && gather(units, kCheapMoves * units, placement.moves)) || evictOne(rank) ||
+                             (isEnough && gather(units, UINT64_MAX, placement.moves));
+        if (!hasRoom) break;
         placement.slot = allocator_.allocate(units);
     }
     if (!placement.slot) {
@@ -256,6 +262,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     resident_[page] = 1;
     ++version_;
     ++counts_.loads;
+    counts_.unitsLoaded += units;
     if (loadedIn_[page] == stillSince_ && !emptied_) ++counts_.reloads;
     loadedIn_[page] = stillSince_;
     return placement;

@@ -72,6 +72,7 @@ struct Placement {
 
 struct PolicyCounts {
     uint64_t loads = 0, evictions = 0, moves = 0;
+    uint64_t unitsLoaded = 0, unitsMoved = 0;
     uint64_t refused = 0;   ///< pages that were read and had no place
     uint64_t reloads = 0;   ///< pages placed twice in one still view: must stay 0
 };
@@ -149,7 +150,7 @@ private:
     [[nodiscard]] bool mayEvict(uint64_t page, const Resident& resident, Rank forRank) const;
     bool evictOne(Rank forRank);
     void evict(uint64_t page);
-    bool gather(uint64_t units, std::vector<PageMove>& moves);
+    bool gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves);
     void planFor(PoolShape pool);
     void learnBlocks();
     void choose();
