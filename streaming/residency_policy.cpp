@@ -56,7 +56,7 @@ uint64_t pageUnits(const PageEntry& page, bool withColour) {
 
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes) {
     const uint64_t chunk = chunkBytes / kPoolUnitBytes;
-    if (!isWhole(dataset)) return {std::min(unitsOf(kMostGrowth * dataset.header.fileBytes), budgetBytes / kPoolUnitBytes), chunk};
+    if (!isWhole(dataset)) return {std::min(unitsOf(kMostGrowth * dataset.header.fileBytes) + dataset.pages.size(), budgetBytes / kPoolUnitBytes), chunk};
     uint64_t all = 0, largest = 1;
     for (const PageEntry& page : dataset.pages) {
         all += pageUnits(page, withColour);

@@ -52,7 +52,7 @@ struct PoolShape {
 };
 
 /// The largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only part of its
-/// directory is known, no more than kMostGrowth times the file's bytes.
+/// directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes);
 
 inline constexpr uint64_t kMostGrowth = 8;
