@@ -352,7 +352,7 @@ std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level) {
 Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::span<const uint64_t> cut,
                                                 CastOptions options) {
     ReferenceCaster caster(cache, options);
-    const std::vector<PageEntry>& pages = cache.dataset().pages;
+    const PageDirectory& pages = cache.dataset().pages;
     caster.marks_.assign(pages.size(), Mark::None);
     for (const uint64_t page : cut) {
         if (!cache.view(page))

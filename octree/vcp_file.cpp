@@ -1,10 +1,13 @@
 #include "octree/vcp_file.h"
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>
+#include <mutex>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -52,12 +55,12 @@ private:
     std::string name_;
 };
 
+Error broken(const std::string& file, std::string element, uint64_t byte, std::string message) {
+    return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = file, .element = std::move(element), .byte = byte};
+}
+
 Error broken(const ByteReader& reader, std::string element, uint64_t byte, std::string message) {
-    return {.code = ErrorCode::InvalidInput,
-            .message = std::move(message),
-            .file = reader.name(),
-            .element = std::move(element),
-            .byte = byte};
+    return broken(reader.name(), std::move(element), byte, std::move(message));
 }
 
 bool finite(const double* values, int count) { return std::all_of(values, values + count, [](double v) { return std::isfinite(v); }); }
@@ -97,57 +100,85 @@ Result<void> checkHeader(const ByteReader& reader, const FileHeader& h, std::spa
     return {};
 }
 
-/// Offsets ascend without overlap, sizes fit the file, the tree is one.
-class DirectoryCheck {
-public:
-    DirectoryCheck(const ByteReader& reader, const Dataset& dataset) : reader_(reader), d_(dataset) {}
+constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock; }
 
-    Result<void> run() {
-        end_ = kDirectoryOffset + (d_.header.pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes;
-        nextChild_ = d_.header.levels > 1 ? d_.header.level[1].firstEntry : d_.header.pages;
-        for (uint32_t l = 0; l < d_.header.levels; ++l)
-            for (uint64_t i = 0; i < d_.header.level[l].pages; ++i) VCP_TRY(entry(d_.header.level[l].firstEntry + i, l));
-        if (nextChild_ != d_.header.pages) return fail(0, "pages without a parent");
+Error brokenEntry(const std::string& file, uint64_t index, std::string message) {
+    return broken(file, fmt::format("directory entry {}", index), blockOffset(index / kEntriesPerBlock) + index % kEntriesPerBlock * sizeof(PageEntry), std::move(message));
+}
+
+/// What an entry says for itself: sizes fit the file, offsets ascend from one entry to the next.
+class EntryCheck {
+public:
+    EntryCheck(const std::string& file, const Dataset& dataset)
+        : file_(file), header_(dataset.header), hasColour_(dataset.hasColour()), end_(blockOffset(blocksOf(dataset.header.pages))) {}
+
+    Result<void> check(uint64_t index, const PageEntry& e, uint32_t level) {
+        if (e.level != level) return brokenEntry(file_, index, "wrong level");
+        VCP_TRY(extent(index, e.offset, e.storedBytes, e.pageBytes));
+        if (e.colourStoredBytes == 0 && (e.colourBytes != 0 || (hasColour_ && e.leaves != 0))) return brokenEntry(file_, index, "colour is missing");
+        if (e.colourStoredBytes != 0) VCP_TRY(extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes));
+        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError) || e.hardLeaves > e.leaves)
+            return brokenEntry(file_, index, "certified error or counts out of range");
+        if (level == 0 && e.morton != 0) return brokenEntry(file_, index, "the root is not at the origin");
         return {};
     }
 
 private:
-    Result<void> entry(uint64_t index, uint32_t level) {
-        const PageEntry& e = d_.pages[index];
-        if (e.level != level) return fail(index, "wrong level");
-        VCP_TRY(extent(index, e.offset, e.storedBytes, e.pageBytes));
-        if (e.colourStoredBytes == 0 && (e.colourBytes != 0 || (d_.hasColour() && e.leaves != 0))) return fail(index, "colour is missing");
-        if (e.colourStoredBytes != 0) VCP_TRY(extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes));
-        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError) || e.hardLeaves > e.leaves) return fail(index, "certified error or counts out of range");
-        if (level == 0 && e.morton != 0) return fail(index, "the root is not at the origin");
-        if (e.childMask == 0) return {};
-        if (level + 1 >= d_.header.levels || e.firstChild != nextChild_) return fail(index, "wrong child pages");
-        for (uint32_t octant = 0; octant < 8; ++octant) {
-            if (!(e.childMask >> octant & 1)) continue;
-            if (nextChild_ >= d_.header.pages || d_.pages[nextChild_].level != level + 1 || d_.pages[nextChild_].morton != (e.morton << 3 | octant))
-                return fail(index, "child pages do not match");
-            ++nextChild_;
-        }
-        return {};
-    }
-
     Result<void> extent(uint64_t index, uint64_t offset, uint64_t stored, uint64_t bytes) {
-        if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > reader_.size() || offset > reader_.size() - stored)
-            return fail(index, "page lies outside the file or overlaps another");
-        if (bytes == 0 || bytes > kMaxPageBytes || bytes % 16 != 0) return fail(index, "page size out of range");
+        const uint64_t fileBytes = header_.fileBytes;
+        if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > fileBytes || offset > fileBytes - stored)
+            return brokenEntry(file_, index, "page lies outside the file or overlaps another");
+        if (bytes == 0 || bytes > kMaxPageBytes || bytes % 16 != 0) return brokenEntry(file_, index, "page size out of range");
         end_ = offset + stored;
         return {};
     }
 
-    Error fail(uint64_t index, std::string message) const {
-        return broken(reader_, fmt::format("directory entry {}", index),
-                      kDirectoryOffset + index / kEntriesPerBlock * kBlockBytes + index % kEntriesPerBlock * sizeof(PageEntry), std::move(message));
-    }
-
-    const ByteReader& reader_;
-    const Dataset& d_;
-    uint64_t end_ = 0, nextChild_ = 0;
+    const std::string& file_;
+    const FileHeader& header_;
+    bool hasColour_;
+    uint64_t end_;
 };
+
+/// Calls visit(page, octant) for each child, until one gives an error.
+template <class Visit>
+Result<void> eachChild(const PageEntry& parent, Visit&& visit) {
+    uint64_t child = parent.firstChild;
+    for (uint32_t octant = 0; octant < 8; ++octant)
+        if (parent.childMask >> octant & 1) VCP_TRY(visit(child++, octant));
+    return {};
+}
+
+bool isChildAt(const PageEntry& child, const PageEntry& parent, uint32_t octant) {
+    return child.level == parent.level + 1 && child.morton == (parent.morton << 3 | octant);
+}
+
+/// A directory that is there as a whole: every entry, and that the tree is one.
+Result<void> checkDirectory(const std::string& file, const Dataset& d) {
+    EntryCheck entries(file, d);
+    uint64_t next = d.header.levels > 1 ? d.header.level[1].firstEntry : d.header.pages;
+    uint64_t index = 0;
+    for (uint32_t level = 0; level < d.header.levels; ++level)
+        for (uint64_t i = 0; i < d.header.level[level].pages; ++i, ++index) {
+            const PageEntry& e = d.pages[index];
+            VCP_TRY(entries.check(index, e, level));
+            if (e.childMask == 0) continue;
+            if (level + 1 >= d.header.levels || e.firstChild != next) return brokenEntry(file, index, "wrong child pages");
+            VCP_TRY(eachChild(e, [&](uint64_t child, uint32_t octant) -> Result<void> {
+                if (child >= d.header.pages || !isChildAt(d.pages[child], e, octant)) return brokenEntry(file, index, "child pages do not match");
+                return {};
+            }));
+            next += static_cast<uint64_t>(std::popcount(e.childMask));
+        }
+    if (next != d.header.pages) return brokenEntry(file, 0, "pages without a parent");
+    return {};
+}
+
+Result<void> checkBlockHash(const std::string& file, uint64_t block, std::span<const std::byte> bytes) {
+    uint64_t hash = 0;
+    std::memcpy(&hash, bytes.data() + kBlockBytes - 8, 8);
+    if (hashBytes(bytes.first(kBlockBytes - 8)) == hash) return {};
+    return broken(file, fmt::format("directory block {}", block), blockOffset(block), "hash does not match: the file was changed or damaged");
+}
 
 /// The stored bytes of a page, checked against their hash.
 Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset, uint32_t stored, uint64_t hash) {
@@ -158,6 +189,116 @@ Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::s
 }
 
 }  // namespace
+
+/// What a directory that comes in parts must know beside its entries.
+struct PageDirectory::Parts {
+    explicit Parts(size_t pages) : known(blocksOf(pages)), parents(pages, kNoPage) {}
+    static constexpr uint32_t kNoPage = UINT32_MAX;
+
+    std::mutex mutex;  // of admissions
+    std::vector<std::atomic<uint8_t>> known;  // by block; 1 after its entries were written
+    std::atomic<uint64_t> blocksKnown{0};
+    std::vector<uint32_t> parents;  // as known blocks say: a page has one
+};
+
+PageDirectory::PageDirectory() = default;
+PageDirectory::PageDirectory(const PageDirectory& other) { *this = other; }
+PageDirectory::PageDirectory(PageDirectory&& other) noexcept = default;
+PageDirectory& PageDirectory::operator=(PageDirectory&& other) noexcept = default;
+PageDirectory::~PageDirectory() = default;
+
+PageDirectory& PageDirectory::operator=(const PageDirectory& other) {
+    if (this == &other) return *this;
+    if (!other.parts_) {
+        parts_.reset();
+        entries_ = other.entries_;
+        return *this;
+    }
+    const std::lock_guard lock(other.parts_->mutex);
+    expect(other.size());
+    entries_ = other.entries_;
+    parts_->parents = other.parts_->parents;
+    for (size_t b = 0; b < parts_->known.size(); ++b) parts_->known[b] = other.parts_->known[b].load();
+    parts_->blocksKnown = other.parts_->blocksKnown.load();
+    return *this;
+}
+
+void PageDirectory::expect(size_t pages) {
+    entries_.assign(pages, {});
+    parts_ = std::make_unique<Parts>(pages);
+}
+
+bool PageDirectory::knowsBlock(uint64_t block) const { return !parts_ || parts_->known[block].load(std::memory_order_acquire) != 0; }
+uint64_t PageDirectory::blocksKnown() const { return parts_ ? parts_->blocksKnown.load(std::memory_order_acquire) : blocks(); }
+
+/// Takes one block in: its entries for themselves, then with the parents and children that are known. Each page has one
+/// parent, on the level above: so what is known is a tree, whatever the rest will be.
+class BlockAdmission {
+public:
+    BlockAdmission(const Dataset& dataset, const std::string& file, uint64_t block)
+        : d_(dataset), directory_(dataset.pages), file_(file), block_(block), first_(block * kEntriesPerBlock),
+          count_(std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - first_)) {}
+
+    Result<void> run(std::span<const std::byte> bytes) {
+        PageDirectory::Parts& parts = *directory_.parts_;
+        const std::lock_guard lock(parts.mutex);
+        if (directory_.knowsBlock(block_)) return {};
+        std::memcpy(&directory_.entries_[first_], bytes.data(), count_ * sizeof(PageEntry));
+        EntryCheck entries(file_, d_);
+        for (uint64_t page = first_; page < first_ + count_; ++page) {
+            VCP_TRY(entries.check(page, directory_[page], levelOf(page)));
+            VCP_TRY(linkChildren(page));
+            VCP_TRY(checkParent(page));
+        }
+        parts.known[block_].store(1, std::memory_order_release);
+        parts.blocksKnown.fetch_add(1, std::memory_order_release);
+        return {};
+    }
+
+private:
+    [[nodiscard]] uint32_t levelOf(uint64_t page) const {
+        uint32_t level = 0;
+        while (page >= d_.header.level[level].firstEntry + d_.header.level[level].pages) ++level;
+        return level;
+    }
+    [[nodiscard]] bool isThere(uint64_t page) const { return page / kEntriesPerBlock == block_ || directory_.knows(page); }
+
+    Result<void> linkChildren(uint64_t page) const {
+        const PageEntry& e = directory_[page];
+        if (e.childMask == 0) return {};
+        if (e.level + 1u >= d_.header.levels) return brokenEntry(file_, page, "wrong child pages");
+        const LevelRow& below = d_.header.level[e.level + 1];
+        const uint64_t end = uint64_t{e.firstChild} + static_cast<uint64_t>(std::popcount(e.childMask));
+        if (e.firstChild < below.firstEntry || end > below.firstEntry + below.pages) return brokenEntry(file_, page, "wrong child pages");
+        return eachChild(e, [&](uint64_t child, uint32_t octant) -> Result<void> {
+            uint32_t& parent = directory_.parts_->parents[child];
+            if (parent != PageDirectory::Parts::kNoPage && parent != page) return brokenEntry(file_, page, "wrong child pages");
+            parent = static_cast<uint32_t>(page);
+            if (isThere(child) && !isChildAt(directory_[child], e, octant)) return brokenEntry(file_, page, "child pages do not match");
+            return {};
+        });
+    }
+
+    Result<void> checkParent(uint64_t page) const {
+        const uint32_t parent = directory_.parts_->parents[page];
+        if (parent == PageDirectory::Parts::kNoPage || !isThere(parent)) return {};
+        return eachChild(directory_[parent], [&](uint64_t child, uint32_t octant) -> Result<void> {
+            if (child == page && !isChildAt(directory_[page], directory_[parent], octant)) return brokenEntry(file_, page, "child pages do not match");
+            return {};
+        });
+    }
+
+    const Dataset& d_;
+    const PageDirectory& directory_;
+    const std::string& file_;
+    uint64_t block_, first_, count_;
+};
+
+Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block, std::span<const std::byte> bytes) {
+    if (dataset.pages.knowsBlock(block)) return {};
+    VCP_TRY(checkBlockHash(file, block, bytes));
+    return BlockAdmission(dataset, file, block).run(bytes);
+}
 
 double Dataset::cellOf(uint32_t level) const { return std::ldexp(header.cell, static_cast<int>(header.levels - 1 - level)); }
 
@@ -179,37 +320,67 @@ Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) 
     return std::shared_ptr<ByteReader>(std::make_shared<LocalFile>(fd, static_cast<uint64_t>(info.st_size), path.string()));
 }
 
-Result<Dataset> readDataset(const ByteReader& reader) {
+namespace {
+
+Result<FileHeader> readHeader(const ByteReader& reader) {
     if (reader.size() < kDirectoryOffset + kBlockBytes + sizeof(CommitRecord))
         return broken(reader, "header", reader.size(), reader.size() == 0 ? "the file is empty" : "the file is too short for a .vcp file");
-    Dataset dataset;
+    FileHeader header;
     std::vector<std::byte> first(kDirectoryOffset);
     VCP_TRY(reader.read(0, first));
-    std::memcpy(&dataset.header, first.data(), sizeof(FileHeader));
-    VCP_TRY(checkHeader(reader, dataset.header, first));
+    std::memcpy(&header, first.data(), sizeof(FileHeader));
+    VCP_TRY(checkHeader(reader, header, first));
+    if (blocksOf(header.pages) * kBlockBytes > reader.size() - kDirectoryOffset - sizeof(CommitRecord))
+        return broken(reader, "header", 24, "the directory does not fit the file");
+    return header;
+}
 
-    const uint64_t blocks = (dataset.header.pages + kEntriesPerBlock - 1) / kEntriesPerBlock;
-    if (blocks * kBlockBytes > reader.size() - kDirectoryOffset - sizeof(CommitRecord)) return broken(reader, "header", 24, "the directory does not fit the file");
-    std::vector<std::byte> directory(blocks * kBlockBytes);
+/// `directory`: its bytes where all of them are there, else nothing.
+Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header, std::span<const std::byte> directory) {
+    CommitRecord commit;
+    const uint64_t offset = reader.size() - sizeof commit;
+    VCP_TRY(reader.read(offset, std::as_writable_bytes(std::span(&commit, 1))));
+    if (std::memcmp(commit.magic, CommitRecord{}.magic, 8) != 0 || commit.fileBytes != reader.size() || commit.headerHash != header.hash ||
+        (!directory.empty() && commit.directoryHash != hashBytes(directory)) ||
+        commit.hash != hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash))))
+        return broken(reader, "commit record", offset, "does not match the file: it was not finished, changed or damaged");
+    return {};
+}
+
+Result<Dataset> readWhole(const ByteReader& reader, const FileHeader& header) {
+    Dataset dataset{header, {}};
+    std::vector<std::byte> directory(blocksOf(header.pages) * kBlockBytes);
     VCP_TRY(reader.read(kDirectoryOffset, directory));
-    dataset.pages.resize(dataset.header.pages);
-    for (uint64_t b = 0; b < blocks; ++b) {
+    dataset.pages.resize(header.pages);
+    for (uint64_t b = 0; b < dataset.pages.blocks(); ++b) {
         const std::span block = std::span(directory).subspan(b * kBlockBytes, kBlockBytes);
-        uint64_t hash = 0;
-        std::memcpy(&hash, block.data() + kBlockBytes - 8, 8);
-        if (hashBytes(block.first(kBlockBytes - 8)) != hash)
-            return broken(reader, fmt::format("directory block {}", b), kDirectoryOffset + b * kBlockBytes, "hash does not match: the file was changed or damaged");
-        const uint64_t count = std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - b * kEntriesPerBlock);
+        VCP_TRY(checkBlockHash(reader.name(), b, block));
+        const uint64_t count = std::min<uint64_t>(kEntriesPerBlock, header.pages - b * kEntriesPerBlock);
         std::memcpy(&dataset.pages[b * kEntriesPerBlock], block.data(), count * sizeof(PageEntry));
     }
-    CommitRecord commit;
-    const uint64_t commitOffset = reader.size() - sizeof commit;
-    VCP_TRY(reader.read(commitOffset, std::as_writable_bytes(std::span(&commit, 1))));
-    if (std::memcmp(commit.magic, CommitRecord{}.magic, 8) != 0 || commit.fileBytes != reader.size() || commit.headerHash != dataset.header.hash ||
-        commit.directoryHash != hashBytes(directory) ||
-        commit.hash != hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash))))
-        return broken(reader, "commit record", commitOffset, "does not match the file: it was not finished, changed or damaged");
-    VCP_TRY(DirectoryCheck(reader, dataset).run());
+    VCP_TRY(checkCommitRecord(reader, header, directory));
+    VCP_TRY(checkDirectory(reader.name(), dataset));
+    return dataset;
+}
+
+}  // namespace
+
+Result<Dataset> readDataset(const ByteReader& reader) {
+    const auto header = readHeader(reader);
+    if (!header) return header.error();
+    return readWhole(reader, *header);
+}
+
+Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes) {
+    const auto header = readHeader(reader);
+    if (!header) return header.error();
+    if (blocksOf(header->pages) * kBlockBytes <= wholeDirectoryBytes(leadBytes)) return readWhole(reader, *header);
+    Dataset dataset{*header, {}};
+    std::vector<std::byte> lead(leadBytes - kDirectoryOffset);
+    VCP_TRY(reader.read(kDirectoryOffset, lead));
+    VCP_TRY(checkCommitRecord(reader, *header, {}));
+    dataset.pages.expect(header->pages);
+    for (uint64_t b = 0; b < lead.size() / kBlockBytes; ++b) VCP_TRY(admitBlock(dataset, reader.name(), b, std::span(lead).subspan(b * kBlockBytes, kBlockBytes)));
     return dataset;
 }
 
@@ -243,7 +414,7 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
 Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t), void* user) {
     auto dataset = readDataset(reader);
     if (!dataset) return dataset.error();
-    uint64_t end = kDirectoryOffset + (dataset->header.pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes;
+    uint64_t end = blockOffset(dataset->pages.blocks());
     const auto gap = [&](uint64_t to) -> Result<void> {
         if (to < end || to - end > kBlockBytes) return broken(reader, "padding", end, "unexpected bytes between pages");
         std::vector<std::byte> bytes(to - end);

@@ -111,10 +111,46 @@ struct CommitRecord {
 };
 static_assert(sizeof(CommitRecord) == 64);
 
-/// Header and directory of a .vcp file, checked. Plain data: copy, share, read from any thread.
+/// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those of
+/// some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any thread may
+/// read it; the entry of a page that is not known must not be read.
+class PageDirectory {
+public:
+    PageDirectory();
+    PageDirectory(const PageDirectory& other);
+    PageDirectory(PageDirectory&& other) noexcept;
+    PageDirectory& operator=(const PageDirectory& other);
+    PageDirectory& operator=(PageDirectory&& other) noexcept;
+    ~PageDirectory();
+
+    [[nodiscard]] size_t size() const { return entries_.size(); }
+    [[nodiscard]] bool empty() const { return entries_.empty(); }
+    [[nodiscard]] const PageEntry& operator[](size_t page) const { return entries_[page]; }
+    [[nodiscard]] PageEntry& operator[](size_t page) { return entries_[page]; }
+    [[nodiscard]] auto begin() const { return entries_.cbegin(); }
+    [[nodiscard]] auto end() const { return entries_.cend(); }
+    [[nodiscard]] const PageEntry* data() const { return entries_.data(); }
+    void push_back(const PageEntry& entry) { entries_.push_back(entry); }
+    void resize(size_t pages) { entries_.resize(pages); }
+
+    /// So many pages, none of them known.
+    void expect(size_t pages);
+    [[nodiscard]] bool knows(uint64_t page) const { return !parts_ || knowsBlock(page / kEntriesPerBlock); }
+    [[nodiscard]] bool knowsBlock(uint64_t block) const;
+    [[nodiscard]] uint64_t blocks() const { return (size() + kEntriesPerBlock - 1) / kEntriesPerBlock; }
+    [[nodiscard]] uint64_t blocksKnown() const;
+
+private:
+    friend class BlockAdmission;
+    struct Parts;
+    mutable std::vector<PageEntry> entries_;
+    std::unique_ptr<Parts> parts_;  // nothing: all is known
+};
+
+/// Header and directory of a .vcp file, checked. Copy it, share it, read from any thread.
 struct Dataset {
     FileHeader header;
-    std::vector<PageEntry> pages;
+    PageDirectory pages;
 
     [[nodiscard]] bool hasColour() const { return (header.flags & kFlagColour) != 0; }
     /// Edge of a cell of `level`, world units.
@@ -146,6 +182,19 @@ Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 /// each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
+inline constexpr uint64_t kLeadBytes = 64 << 10;
+
+/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so that
+/// what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of kBlockBytes,
+/// more than kDirectoryOffset.
+Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
+constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
+
+/// Checks a block of the directory, by its hash and against the blocks that are known, and makes its entries known; nothing
+/// where they are. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`. Any thread. Errors: InvalidInput.
+Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block, std::span<const std::byte> bytes);
+constexpr uint64_t blockOffset(uint64_t block) { return kDirectoryOffset + block * kBlockBytes; }
+
 /// A page's decoded bytes, 16-byte aligned.
 struct PageBytes {
     std::vector<uint4> geometry;
@@ -156,7 +205,7 @@ struct PageBytes {
 };
 
 /// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage) one page. Safe on hostile bytes: allocates
-/// at most a few times the entry's pageBytes, which readDataset has bounded. Any thread.
+/// at most a few times the entry's pageBytes, which readDataset has bounded. The page's entry is known. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 
 /// Reads every byte of the file and checks it, also those between pages. Calls `progress(bytes done)` now and

@@ -1,6 +1,8 @@
 #include "render/page_table.h"
 
+#include <algorithm>
 #include <bit>
+#include <unordered_map>
 
 #include "render/frame.h"
 
@@ -10,15 +12,29 @@ namespace {
 
 enum class Part : uint8_t { None, Above, Cut };
 
-std::vector<Part> partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
-    std::vector<Part> parts(dataset.pages.size(), Part::None);
-    for (const uint64_t page : cut) parts[page] = Part::Cut;
-    // Children follow their parents in the directory.
-    for (uint64_t page = parts.size(); page-- > 0;) {
+using Parts = std::unordered_map<uint64_t, Part>;
+
+Part partOf(const Parts& parts, uint64_t page) {
+    const auto found = parts.find(page);
+    return found != parts.end() ? found->second : Part::None;
+}
+
+/// Looks at the pages above the cut alone, and at nothing behind the last page of it.
+Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
+    Parts parts;
+    parts.reserve(2 * cut.size());
+    for (const uint64_t page : cut) parts.emplace(page, Part::Cut);
+    const uint64_t last = *std::max_element(cut.begin(), cut.end());
+    const auto visit = [&](const auto& self, uint64_t page) -> bool {
+        if (parts.contains(page)) return true;
+        if (page > last || !dataset.pages.knows(page)) return false;
         const PageEntry& entry = dataset.pages[page];
-        for (int i = 0; i < std::popcount(entry.childMask) && parts[page] == Part::None; ++i)
-            if (parts[entry.firstChild + i] != Part::None) parts[page] = Part::Above;
-    }
+        bool isAbove = false;
+        for (int i = 0; i < std::popcount(entry.childMask); ++i) isAbove = self(self, uint64_t{entry.firstChild} + static_cast<uint64_t>(i)) || isAbove;
+        if (isAbove) parts.emplace(page, Part::Above);
+        return isAbove;
+    };
+    visit(visit, 0);
     return parts;
 }
 
@@ -36,7 +52,7 @@ void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, flo
 std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
                                   const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf) {
     if (cut.empty()) return std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
-    const std::vector<Part> parts = partsOf(dataset, cut);
+    const Parts parts = partsOf(dataset, cut);
     // Breadth first, so that the children of a page stand together.
     std::vector<uint64_t> order{0};
     std::vector<glm::uvec4> table;
@@ -46,14 +62,14 @@ std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64
         const PageEntry& entry = dataset.pages[page];
         if (const auto resident = pageOf(page))
             writePage(record, *resident, page, static_cast<float>(double(entry.certifiedError) / dataset.header.cell));
-        if (parts[page] == Part::Cut) {
+        if (partOf(parts, page) == Part::Cut) {
             record[0].x |= frame::kRecordInCut;
         } else {
             record[0].y = static_cast<uint32_t>(order.size());
             uint64_t child = entry.firstChild;
             for (uint32_t octant = 0; octant < 8; ++octant) {
                 if ((entry.childMask >> octant & 1) == 0) continue;
-                if (parts[child] != Part::None) {
+                if (partOf(parts, child) != Part::None) {
                     record[0].x |= 1u << octant;
                     order.push_back(child);
                 }

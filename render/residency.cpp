@@ -126,7 +126,7 @@ const std::vector<uint64_t>& Residency::cut(ViewNumber number) {
 }
 
 Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber number) {
-    std::vector<LoadedPage> loaded = loader_->collect(options_.uploadBytes);
+    std::vector<LoadedPage> loaded = loader_->collect(uploadBytes());
     for (const LoadedPage& page : loaded) {
         if (page.bytes || !policy_->giveUp(page.page)) continue;
         problems_.push_back(page.bytes.error());
@@ -134,12 +134,12 @@ Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber num
     }
     policy_->look(view, steadySeconds(), number);
     for (const LoadedPage& page : loaded) {
-        if (!page.bytes) continue;
+        if (!page.bytes || isBlock(page.page)) continue;
         if (auto placed = place(page); !placed) return placed.error();
     }
     VCP_TRY(pool_->flush());
     PolicyOutcome outcome = policy_->finish(number);
-    loader_->request(std::move(outcome.wishes));
+    loader_->request(std::move(outcome.wishes), uploadBytes());
     listens_ = outcome.missing > 0 && options_.order == LoadOrder::Feedback;
     UpdateResult result = report(outcome);
     ViewCut& cut = cuts_[number];

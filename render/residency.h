@@ -22,7 +22,7 @@ namespace vcp {
 
 struct ResidencyOptions {
     uint64_t budgetBytes = 512ull << 20;  ///< of the pool
-    uint64_t uploadBytes = 16ull << 20;   ///< that one update takes in; one page at least
+    uint64_t uploadBytes = 16ull << 20;   ///< that one update takes in, half of it while a view moves; one page at least
     LoadOrder order = LoadOrder::Feedback;
     LoaderOptions loader;
 };
@@ -86,6 +86,8 @@ private:
         uint64_t version = UINT64_MAX;
         std::vector<uint64_t> reported;  // as of its last update
     };
+    /// What one update takes in, and the loader reads before it.
+    [[nodiscard]] uint64_t uploadBytes() const { return policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes; }
     UpdateResult report(const PolicyOutcome& outcome) const;
 
     ResidencyOptions options_;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint64_t kTailBytes = sizeof(CommitRecord);
 constexpr uint64_t kPartsOverhead = 4096;  // headers between the parts of an answer
-constexpr uint64_t kMostAtOpening = 256ull << 20;
+constexpr uint64_t kMostAtOpening = 16ull << 20;
 
 bool startsWith(std::string_view text, std::string_view start) {
     return text.size() >= start.size() &&
@@ -25,18 +25,25 @@ bool startsWith(std::string_view text, std::string_view start) {
 
 std::string rangeText(ByteRange range) { return fmt::format("{}-{}", range.first, range.last); }
 
-/// How far a .vcp file must be read for its directory and its coarsest page; 0 where this is no such file.
-uint64_t endOfFirstView(std::span<const std::byte> head) {
-    if (head.size() < kDirectoryOffset + sizeof(PageEntry)) return 0;
+/// What a first view needs of a .vcp file beside its first bytes and its last: the coarsest page, and the directory where
+/// it is small. Nothing where this is no such file, or all of that is in the first bytes.
+std::optional<ByteRange> restOfFirstView(std::span<const std::byte> head) {
+    if (head.size() < kDirectoryOffset + sizeof(PageEntry)) return std::nullopt;
     FileHeader header;
     PageEntry root;
     std::memcpy(&header, head.data(), sizeof header);
     std::memcpy(&root, head.data() + kDirectoryOffset, sizeof root);
-    if (std::memcmp(header.magic, FileHeader{}.magic, sizeof header.magic) != 0 || header.version < kFileVersion || header.version > kMethodFileVersion) return 0;
-    if (header.pages > kMostAtOpening / sizeof(PageEntry)) return 0;
-    const uint64_t directory = kDirectoryOffset + (header.pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes;
-    const uint64_t page = std::max(root.offset + root.storedBytes, root.colourOffset + root.colourStoredBytes);
-    return page < kMostAtOpening ? std::max(directory, page) : directory;
+    if (std::memcmp(header.magic, FileHeader{}.magic, sizeof header.magic) != 0 || header.version < kFileVersion || header.version > kMethodFileVersion) return std::nullopt;
+    const uint64_t blocks = header.pages / kEntriesPerBlock + (header.pages % kEntriesPerBlock != 0 ? 1 : 0);
+    const bool isWhole = blocks <= wholeDirectoryBytes(kLeadBytes) / kBlockBytes;
+    const uint64_t lead = isWhole ? blockOffset(blocks) : kLeadBytes;
+    const uint64_t rootEnd = std::max(root.offset + root.storedBytes, root.colourOffset + root.colourStoredBytes);
+    // Behind a large directory the coarsest page is a range of its own.
+    const bool isApart = !isWhole && head.size() >= lead;
+    const uint64_t first = isApart ? std::max<uint64_t>(root.offset, head.size()) : head.size();
+    const uint64_t end = (isWhole || isApart) && rootEnd > first && rootEnd - first < kMostAtOpening ? rootEnd : lead;
+    if (end <= first) return std::nullopt;
+    return ByteRange{first, end - 1};
 }
 
 }  // namespace
@@ -53,14 +60,21 @@ struct HttpReader::State {
     std::mutex mutex;
     std::vector<std::unique_ptr<HttpConnection>> idle;
     std::optional<Error> changed;  // once it has, every read fails at once
-    std::shared_ptr<const std::vector<std::byte>> head;  // the first bytes, until all have been read
-    std::vector<std::byte> tail;                         // the last bytes
+    struct Stretch {
+        uint64_t begin = 0;
+        std::vector<std::byte> bytes;
+    };
+    // What came at opening, until the coarsest page has been taken over; and the last bytes.
+    std::vector<std::shared_ptr<const Stretch>> held;
+    uint64_t heldEnd = 0;  // of the coarsest page
+    std::vector<std::byte> tail;
 
     Result<HttpAnswer> get(const std::string& ranges, uint64_t most);
     Result<void> begin();
     Result<void> readAhead();
     Result<void> readRange(ByteRange range, std::byte* bytes);
     Result<void> checkVersion(const HttpAnswer& answer, uint64_t fileBytes);
+    void hold(const BodyPart& part);
     bool copyHeld(uint64_t offset, std::span<std::byte> bytes);
 
     [[nodiscard]] Error fail(ErrorCode code, std::string message, std::optional<uint64_t> byte = {}) const {
@@ -133,20 +147,19 @@ Result<void> HttpReader::State::begin() {
     // A weak tag never matches in If-Match.
     if (!entityTag.empty() && !entityTag.starts_with("W/")) condition = "If-Match: " + entityTag;
     else if (!lastModified.empty()) condition = "If-Unmodified-Since: " + lastModified;
-    head = std::make_shared<const std::vector<std::byte>>(std::move(answer->body));
+    heldEnd = answer->body.size();
+    held = {std::make_shared<const Stretch>(Stretch{0, std::move(answer->body)})};
     return readAhead();
 }
 
-/// The rest of the directory, the coarsest page and the commit record, in one request where the server puts
-/// several ranges into an answer; else they are read when they are needed.
+/// What else a first view needs and the commit record, in one request where the server puts several ranges into an answer;
+/// else they are read when they are needed.
 Result<void> HttpReader::State::readAhead() {
-    const uint64_t end = endOfFirstView(*head);
-    if (end == 0 || head->size() >= size || end > size - kTailBytes) return {};
-    const ByteRange last{size - kTailBytes, size - 1};
-    std::vector<ByteRange> wanted;
-    if (end > head->size()) wanted.push_back({head->size(), end - 1});
-    if (last.first >= head->size()) wanted.push_back(last);
-    if (wanted.size() < 2) return {};
+    const uint64_t headBytes = held[0]->bytes.size();
+    const auto rest = restOfFirstView(held[0]->bytes);
+    const ByteRange last{size - std::min(size, kTailBytes), size - 1};
+    if (!rest || last.first < headBytes || rest->last >= last.first) return {};
+    const ByteRange wanted[] = {*rest, last};
     const auto answer = get(rangeText(wanted[0]) + "," + rangeText(wanted[1]), wanted[0].size() + wanted[1].size() + kPartsOverhead);
     if (!answer || answer->status != 206) return {};
     std::vector<BodyPart> parts = parseBodyParts(answer->body, answer->type);
@@ -155,26 +168,35 @@ Result<void> HttpReader::State::readAhead() {
         parts.push_back({only->range, answer->body});
     VCP_TRY(checkVersion(*answer, size));
     for (const BodyPart& part : parts) {
-        if (part.range == wanted[0]) {
-            auto longer = *head;
-            longer.insert(longer.end(), part.bytes.begin(), part.bytes.end());
-            head = std::make_shared<const std::vector<std::byte>>(std::move(longer));
-        }
+        if (part.range == wanted[0]) hold(part);
         if (part.range == last) tail.assign(part.bytes.begin(), part.bytes.end());
     }
     return {};
 }
 
+/// Behind the first bytes, or apart from them.
+void HttpReader::State::hold(const BodyPart& part) {
+    Stretch stretch{part.range.first, {}};
+    if (part.range.first == held[0]->bytes.size()) {
+        stretch = *held[0];
+        held.clear();
+    }
+    stretch.bytes.insert(stretch.bytes.end(), part.bytes.begin(), part.bytes.end());
+    held.push_back(std::make_shared<const Stretch>(std::move(stretch)));
+    heldEnd = part.range.last + 1;
+}
+
 bool HttpReader::State::copyHeld(uint64_t offset, std::span<std::byte> bytes) {
-    std::shared_ptr<const std::vector<std::byte>> held;
+    std::shared_ptr<const Stretch> from;
     {
         const std::lock_guard lock(mutex);
-        held = head;
+        for (const auto& stretch : held)
+            if (offset >= stretch->begin && offset + bytes.size() <= stretch->begin + stretch->bytes.size()) from = stretch;
         // The coarsest page is last: once it has been taken over, nothing here is needed again.
-        if (held && offset + bytes.size() == held->size()) head.reset();
+        if (from && offset + bytes.size() == heldEnd) held.clear();
     }
-    if (held && offset + bytes.size() <= held->size()) {
-        std::memcpy(bytes.data(), held->data() + offset, bytes.size());
+    if (from) {
+        std::memcpy(bytes.data(), from->bytes.data() + (offset - from->begin), bytes.size());
         return true;
     }
     if (offset + bytes.size() == size && bytes.size() <= tail.size()) {

@@ -1,8 +1,8 @@
 // A file behind http:// or https://, read by range requests (RFC 9110, section 14).
 //
 // open() asks for the first bytes, which say how large the file is and which version of it this is. Where
-// they begin a .vcp file, a second request brings the rest of the directory, the coarsest page and the
-// commit record in two ranges; so a first picture takes two requests. Every later request carries If-Match
+// they begin a .vcp file, a second request brings the coarsest page (with the rest of a small directory) and the
+// commit record in two ranges; so a first picture takes two requests, whatever the file's size. Every later request carries If-Match
 // with the entity tag of the first answer (If-Unmodified-Since without a strong tag), and every answer's tag
 // and size are compared with the first: a file that changes on the server while it is read is an error, not
 // a mixture.

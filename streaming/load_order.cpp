@@ -60,10 +60,14 @@ std::string_view nameOf(LoadOrder order) { return kNames[static_cast<size_t>(ord
 
 LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::vector<uint64_t> pageUnits, LoadOrder order)
     : dataset_(std::move(dataset)), pageUnits_(std::move(pageUnits)), parents_(dataset_->pages.size(), 0), order_(order) {
-    for (uint32_t page = 0; page < parents_.size(); ++page) {
-        const PageEntry& entry = dataset_->pages[page];
-        for (uint32_t i = 0; i < uint32_t(std::popcount(entry.childMask)); ++i) parents_[entry.firstChild + i] = page;
-    }
+    for (uint64_t page = 0; page < pageUnits_.size(); ++page)
+        if (pageUnits_[page] != 0) learn(page, pageUnits_[page]);
+}
+
+void LoadPriorities::learn(uint64_t page, uint64_t units) {
+    const PageEntry& entry = dataset_->pages[page];
+    pageUnits_[page] = units;
+    for (uint32_t i = 0; i < uint32_t(std::popcount(entry.childMask)); ++i) parents_[entry.firstChild + i] = static_cast<uint32_t>(page);
 }
 
 void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view, size_t views) {
@@ -77,6 +81,7 @@ void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view
     for (const RayFeedback::Hit& hit : feedback.hits) {
         const double distance = view.orthographic ? 1 : glm::length(corner + glm::dvec3(hit.place) * unit - view.eye);
         const auto errorOf = [&](uint64_t page) {
+            if (pageUnits_[page] == 0) return 0.0;
             return double(dataset_->pages[page].certifiedError) * view.pixelsPerUnit / std::max(distance, unit);
         };
         std::optional<uint64_t> page = hit.page;

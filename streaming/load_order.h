@@ -61,11 +61,14 @@ struct RayFeedback {
 
 class LoadPriorities {
 public:
-    /// `pageUnits[i]`: what page i takes of the pool.
+    /// `pageUnits[i]`: what page i takes of the pool; 0 where its entry is not known yet.
     LoadPriorities(std::shared_ptr<const Dataset> dataset, std::vector<uint64_t> pageUnits, LoadOrder order);
 
     [[nodiscard]] LoadOrder order() const { return order_; }
     void setOrder(LoadOrder order) { order_ = order; }
+
+    /// The page's entry is known now: it takes so many units of the pool.
+    void learn(uint64_t page, uint64_t units);
 
     /// Takes in what the rays of a frame of `view` met; `views` such frames in turn are a round of all views.
     void hear(const RayFeedback& feedback, const SelectionView& view, size_t views = 1);

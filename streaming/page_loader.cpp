@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -15,6 +17,13 @@ constexpr double kRunUrgency = 0.5;
 
 uint64_t sizeOf(const LoadedPage& page) {
     return page.bytes ? page.bytes->geometryBytes().size() + page.bytes->colourBytes().size() : 0;
+}
+
+// Of this thread, from now on, so many steps of the system's niceness less urgent than what started it.
+void giveWay() {
+    constexpr int kSteps = 8;
+    const auto thread = static_cast<id_t>(::gettid());
+    ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + kSteps);
 }
 
 double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
@@ -43,9 +52,10 @@ PageLoader::~PageLoader() {
     for (std::thread& thread : threads_) thread.join();
 }
 
-void PageLoader::request(std::vector<PageRequest> wishes) {
+void PageLoader::request(std::vector<PageRequest> wishes, uint64_t mostDone) {
     {
         const std::lock_guard lock(mutex_);
+        mostDone_ = mostDone;
         queue_.replace(std::move(wishes));
     }
     work_.notify_all();
@@ -63,6 +73,7 @@ std::vector<LoadedPage> PageLoader::collect(uint64_t mostBytes) {
         done_.erase(done_.begin(), end);
         for (const LoadedPage& page : pages) queue_.delivered(page.page);
         stats_.heldBytes -= bytes;
+        doneBytes_ -= bytes;
     }
     work_.notify_all();
     return pages;
@@ -87,6 +98,7 @@ LoaderStats PageLoader::stats() const {
 /// Reserves memory for the most urgent page and those read with it; nothing where none may begin now. A run of
 /// no pages: one was handed over unread.
 std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
+    if (doneBytes_ >= mostDone_) return std::nullopt;
     const auto wish = queue_.next(now);
     if (!wish) return std::nullopt;
     const uint64_t first = wish->page;
@@ -115,6 +127,7 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
 void PageLoader::handOver(uint64_t page, Result<PageBytes> bytes) {
     done_.push_back({page, std::move(bytes)});
     stats_.heldBytes += sizeOf(done_.back());
+    doneBytes_ += sizeOf(done_.back());
     ready_.notify_all();
 }
 
@@ -136,6 +149,7 @@ void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
 }
 
 void PageLoader::work() {
+    giveWay();
     std::unique_lock lock(mutex_);
     while (!stop_) {
         const double now = steadySeconds();

@@ -1,10 +1,14 @@
-// Background threads that read pages.
+// Background threads that read pages. They give way to the threads that draw: where these keep the processor busy, as a
+// software device does, a frame takes about as long with loads as without.
 //
 // A page's way: wished for in request(), read and checked by a thread, fetched with collect(). request()
 // replaces all wishes before it, but those that a thread has begun with; so what no view wants any more is
 // not read. What fails is tried again after a while, and given up after a few attempts (request_queue.h);
 // meanwhile the threads read other pages. Pages that lie together and are about as urgent are read together
 // where the source says so.
+//
+// No read begins while as many bytes are done as the next collect() would take: what a moving view wants changes before
+// more could be of use, and it would have been read in vain.
 //
 // Memory is reserved before a page is read and given back when it is collected: heldBytes() never exceeds the
 // limit. Nothing here waits but waitForPage() and the destructor, which interrupts reads in progress.
@@ -51,8 +55,9 @@ public:
     PageLoader(const PageLoader&) = delete;
     PageLoader& operator=(const PageLoader&) = delete;
 
-    /// Replaces the list of wishes. Pages being read or waiting to be collected are not read again.
-    void request(std::vector<PageRequest> wishes);
+    /// Replaces the list of wishes. Pages being read or waiting to be collected are not read again. While pages of `mostDone`
+    /// bytes wait to be collected, no further read begins.
+    void request(std::vector<PageRequest> wishes, uint64_t mostDone = UINT64_MAX);
 
     /// Pages that are done, in the order they were; as many as have `mostBytes` together, but one at least.
     /// Never waits for a read.
@@ -84,6 +89,7 @@ private:
     std::condition_variable work_, ready_;
     RequestQueue queue_;
     std::vector<LoadedPage> done_;
+    uint64_t doneBytes_ = 0, mostDone_ = UINT64_MAX;
     LoaderStats stats_;
     bool stop_ = false;
     uint32_t working_ = 0;  // threads that have not ended

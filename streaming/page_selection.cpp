@@ -82,17 +82,32 @@ double excessOf(const Dataset& dataset, uint64_t page, std::span<const Selection
     return excess;
 }
 
-bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> unavailable) {
-    return page.childMask != 0 && allOf(childrenOf(page), [&](uint64_t child) { return unavailable[child] == 0; });
+bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> states) {
+    return page.childMask != 0 && allOf(childrenOf(page), [&](uint64_t child) { return states[child] != kUnavailable; });
+}
+
+struct ChildrenBytes {
+    uint64_t bytes = 0;
+    bool areKnown = true;
+};
+/// Of children that are not known: about as large as their parent.
+ChildrenBytes bytesOf(Children children, uint64_t parentBytes, std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
+    ChildrenBytes sum;
+    for (uint64_t child = children.first; child < children.end; ++child) {
+        const bool isKnown = states[child] != kUnknown;
+        sum.bytes += isKnown ? pageBytes[child] : parentBytes;
+        sum.areKnown = sum.areKnown && isKnown;
+    }
+    return sum;
 }
 
 }  // namespace
 
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
-                       std::span<const uint8_t> unavailable) {
+                       std::span<const uint8_t> states) {
     PageChoice choice;
-    choice.refined.assign(dataset.pages.size(), 0);
-    if (dataset.pages.empty() || unavailable[0] != 0 || pageBytes[0] > budgetBytes) return choice;
+    choice.refined.assign(dataset.pages.size(), kNotRefined);
+    if (dataset.pages.empty() || states[0] != kAvailable || pageBytes[0] > budgetBytes) return choice;
     std::priority_queue<Candidate> open;
     uint64_t bytes = pageBytes[0];
     choice.wanted.push_back({0, kInfinity});
@@ -102,16 +117,21 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
         open.pop();
         if (next.error <= 0) break;
         const PageEntry& entry = dataset.pages[next.page];
-        if (!mayBeRefined(entry, unavailable)) continue;
+        if (!mayBeRefined(entry, states)) continue;
         const Children children = childrenOf(entry);
-        uint64_t more = 0;
-        for (uint64_t child = children.first; child < children.end; ++child) more += pageBytes[child];
-        if (bytes + more > budgetBytes) {
-            choice.relaxed = true;
+        const ChildrenBytes more = bytesOf(children, pageBytes[next.page], pageBytes, states);
+        if (!more.areKnown) {
+            choice.awaited.push_back(next.page);
+            choice.refined[next.page] = kAwaited;
+        }
+        if (bytes + more.bytes > budgetBytes) {
+            choice.relaxed = more.areKnown;
             break;
         }
-        bytes += more;
-        choice.refined[next.page] = 1;
+        // Room is kept for children to come: what is less urgent does not take it.
+        bytes += more.bytes;
+        if (!more.areKnown) continue;
+        choice.refined[next.page] = kRefined;
         for (uint64_t child = children.first; child < children.end; ++child) {
             choice.wanted.push_back({child, next.error});
             open.push({excessOf(dataset, child, views), child});
@@ -141,7 +161,11 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
         const PageEntry& entry = dataset.pages[at.page];
         const Children children = childrenOf(entry);
         const double error = errorInView(dataset, at.page, view);
-        const bool refined = choice.refined[at.page] != 0 && isTooCoarse(error, view);
+        const bool refined = choice.refined[at.page] == kRefined && isTooCoarse(error, view);
+        if (choice.refined[at.page] == kAwaited && isTooCoarse(error, view)) {
+            drawable.pagesWanted += children.end - children.first;
+            drawable.pagesMissing += children.end - children.first;
+        }
         const bool drawn = !at.isCovered && !(refined && allOf(children, [&](uint64_t child) { return resident[child] != 0; }));
         if (refined)
             for (uint64_t child = children.first; child < children.end; ++child) walk.push_back({child, at.isCovered || drawn});
@@ -159,9 +183,9 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
 
 Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
-                      std::span<const uint8_t> unavailable) {
+                      std::span<const uint8_t> states) {
     Selection selection;
-    static_cast<PageChoice&>(selection) = choosePages(dataset, {&view, 1}, budgetBytes, pageBytes, unavailable);
+    static_cast<PageChoice&>(selection) = choosePages(dataset, {&view, 1}, budgetBytes, pageBytes, states);
     static_cast<DrawableCut&>(selection) = drawableCut(dataset, view, selection, resident);
     return selection;
 }

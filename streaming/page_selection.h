@@ -4,7 +4,8 @@
 // A page is refined, that is replaced by all its children, where its certified error projects to more than
 // errorPixels at the point of its box nearest to the eye. The largest projected error goes first, while the
 // children fit into the budget; so a budget too small for the view relaxes the error evenly over the
-// picture. Pages outside of the view's frustum are not refined. A refined page stays wanted beneath its
+// picture. Where the directory has come in part (octree/vcp_file.h), a page whose children are not known yet counts as
+// missing them. Pages outside of the view's frustum are not refined. A refined page stays wanted beneath its
 // children: it is what is drawn when they have to go.
 //
 // Several views share one choice and one budget: a page is refined where any of them needs it, the largest error as
@@ -44,18 +45,32 @@ struct WantedPage {
     double priority;  ///< projected error of what is drawn without it, as a multiple of what views allow; the root's is infinite
 };
 
+/// Whether a page's children may be drawn in its place.
+enum PageState : uint8_t {
+    kAvailable,
+    kUnavailable,  ///< it cannot be read: its parent is drawn in its place
+    kUnknown,      ///< its entry is not known yet
+};
+/// Whether a choice replaces a page by its children.
+enum Refinement : uint8_t {
+    kNotRefined,
+    kRefined,
+    kAwaited,  ///< it would, once they are known
+};
+
 /// What views want, whatever is resident.
 struct PageChoice {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
-    std::vector<uint8_t> refined;  ///< one a page of the dataset: replaced by its children
+    std::vector<uint64_t> awaited; ///< pages that would be refined next, were their children known; most urgent first
+    std::vector<uint8_t> refined;  ///< a Refinement for each page of the dataset
     bool relaxed = false;          ///< the budget kept a page from being refined
 };
 
-/// `pageBytes[i]`: what page i takes of the budget (any unit). `unavailable[i]`: it cannot be read; its parent is
-/// drawn in its place. Both have one element a page of the dataset.
+/// `pageBytes[i]`: what page i takes of the budget (any unit). `states[i]`: a PageState. Both have one element a page of
+/// the dataset.
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
-                       std::span<const uint8_t> unavailable);
+                       std::span<const uint8_t> states);
 
 /// What one view can draw of a choice.
 struct DrawableCut {
@@ -73,7 +88,7 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
 struct Selection : PageChoice, DrawableCut {};
 Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
-                      std::span<const uint8_t> unavailable);
+                      std::span<const uint8_t> states);
 
 /// Certified error of a page in pixels, at the point of its box nearest to the eye; infinite where the eye
 /// is inside of the box.

@@ -49,6 +49,7 @@ std::vector<Result<PageBytes>> PageSource::readRun(uint64_t first, uint32_t coun
 uint32_t PageSource::runFrom(uint64_t, uint32_t, bool) const { return 1; }
 
 Result<PageBytes> FilePageSource::read(uint64_t page, bool withColour) const {
+    if (isBlock(page)) return std::move(readBlocks(page - kFirstBlockNumber, 1).front());
     if (runBytes_ == 0) return readFrom(*reader_, page, withColour);
     return std::move(readRun(page, 1, withColour).front());
 }
@@ -62,7 +63,20 @@ Result<PageBytes> FilePageSource::readFrom(const ByteReader& bytes, uint64_t pag
     return read;
 }
 
+std::vector<Result<PageBytes>> FilePageSource::readBlocks(uint64_t first, uint32_t count) const {
+    std::vector<std::byte> stored(count * kBlockBytes);
+    if (const auto got = reader_->read(blockOffset(first), stored); !got) return std::vector<Result<PageBytes>>(count, got.error());
+    std::vector<Result<PageBytes>> blocks;
+    for (uint64_t i = 0; i < count; ++i) {
+        const auto admitted = admitBlock(*dataset_, reader_->name(), first + i, std::span(stored).subspan(i * kBlockBytes, kBlockBytes));
+        if (!admitted) reader_->distrust(blockOffset(first + i), kBlockBytes);
+        blocks.push_back(admitted ? Result<PageBytes>(PageBytes{}) : admitted.error());
+    }
+    return blocks;
+}
+
 std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t count, bool withColour) const {
+    if (isBlock(first)) return readBlocks(first - kFirstBlockNumber, count);
     if (runBytes_ == 0) return PageSource::readRun(first, count, withColour);
     const uint64_t begin = dataset_->pages[first].offset, end = extentOf(dataset_->pages[first + count - 1], withColour).end;
     std::vector<std::byte> stored(end - begin);
@@ -74,9 +88,10 @@ std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t 
 }
 
 uint32_t FilePageSource::runFrom(uint64_t first, uint32_t most, bool withColour) const {
+    if (isBlock(first)) return static_cast<uint32_t>(std::min<uint64_t>(most, kFirstBlockNumber + dataset_->pages.blocks() - first));
     uint32_t count = 1;
     const Extent start = extentOf(dataset_->pages[first], withColour);
-    for (uint64_t last = start.end; count < most && first + count < dataset_->pages.size(); ++count) {
+    for (uint64_t last = start.end; count < most && first + count < dataset_->pages.size() && dataset_->pages.knows(first + count); ++count) {
         const Extent next = extentOf(dataset_->pages[first + count], withColour);
         if (next.begin > last + kLargestGap || next.end - start.begin > runBytes_) break;
         last = next.end;
@@ -85,6 +100,7 @@ uint32_t FilePageSource::runFrom(uint64_t first, uint32_t most, bool withColour)
 }
 
 uint64_t FilePageSource::bytesToRead(uint64_t page, bool withColour) const {
+    if (isBlock(page)) return kBlockBytes;
     const PageEntry& entry = dataset_->pages[page];
     const uint64_t geometry = 2 * uint64_t{entry.storedBytes} + entry.pageBytes;
     return withColour ? geometry + 2 * uint64_t{entry.colourStoredBytes} + entry.colourBytes : geometry;

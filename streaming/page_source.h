@@ -9,7 +9,13 @@
 
 namespace vcp {
 
-/// Delivers checked pages. Any thread may call, several at once.
+/// A block of the directory (octree/vcp_file.h) is asked for as a page of this number or above; it takes no bytes when it has
+/// been read, but its entries are known then.
+inline constexpr uint64_t kFirstBlockNumber = uint64_t{1} << 63;
+constexpr bool isBlock(uint64_t number) { return number >= kFirstBlockNumber; }
+constexpr uint64_t numberOfBlock(uint64_t block) { return kFirstBlockNumber + block; }
+
+/// Delivers checked pages. Any thread may call, several at once. Entries of pages that are asked for are known.
 class PageSource {
 public:
     virtual ~PageSource() = default;
@@ -44,6 +50,7 @@ public:
 
 private:
     Result<PageBytes> readFrom(const ByteReader& bytes, uint64_t page, bool withColour) const;
+    std::vector<Result<PageBytes>> readBlocks(uint64_t first, uint32_t count) const;
 
     std::shared_ptr<const ByteReader> reader_;
     std::shared_ptr<const Dataset> dataset_;

@@ -1,8 +1,13 @@
 #include "streaming/residency_policy.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <iterator>
+#include <limits>
+#include <set>
+
+#include "streaming/page_source.h"
 
 namespace vcp {
 
@@ -10,6 +15,10 @@ namespace {
 
 // Wishes for what comes later are less urgent than any for what is in view.
 constexpr double kAheadUrgency = 1e-9;
+// Of blocks of the directory: nothing but the coarsest page comes before.
+constexpr double kBlockUrgency = std::numeric_limits<double>::max();
+// Moving pages aside costs a frame its time: so many times a page's units are moved for it before what nobody wants goes.
+constexpr uint64_t kCheapMoves = 2;
 // Motion is continued for no more steps than this.
 constexpr double kMostAhead = 20;
 
@@ -18,12 +27,6 @@ constexpr double kMostAhead = 20;
 uint64_t unusableUnits(PoolShape pool, uint64_t largestPage) {
     const uint64_t chunks = (pool.units + pool.unitsPerChunk - 1) / pool.unitsPerChunk;
     return chunks > 1 ? chunks * (largestPage - 1) : 0;
-}
-
-uint64_t largestPageUnits(const Dataset& dataset, bool withColour) {
-    uint64_t largest = 1;
-    for (const PageEntry& page : dataset.pages) largest = std::max(largest, pageUnits(page, withColour));
-    return largest;
 }
 
 /// Where a view that went from `before` to `view` in so many seconds will be.
@@ -36,9 +39,12 @@ std::optional<SelectionView> aheadOf(const SelectionView& view, const SelectionV
     return later;
 }
 
+bool isWhole(const Dataset& dataset) { return dataset.pages.blocksKnown() == dataset.pages.blocks(); }
+
+/// Nothing but zeros where the directory comes in parts: look() learns what there is.
 std::vector<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
-    std::vector<uint64_t> units;
-    for (const PageEntry& page : dataset.pages) units.push_back(pageUnits(page, withColour));
+    std::vector<uint64_t> units(dataset.pages.size(), 0);
+    if (isWhole(dataset)) std::transform(dataset.pages.begin(), dataset.pages.end(), units.begin(), [&](const PageEntry& page) { return pageUnits(page, withColour); });
     return units;
 }
 
@@ -49,9 +55,13 @@ uint64_t pageUnits(const PageEntry& page, bool withColour) {
 }
 
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes) {
-    uint64_t all = 0;
-    for (const PageEntry& page : dataset.pages) all += pageUnits(page, withColour);
-    const uint64_t chunk = chunkBytes / kPoolUnitBytes, largest = largestPageUnits(dataset, withColour);
+    const uint64_t chunk = chunkBytes / kPoolUnitBytes;
+    if (!isWhole(dataset)) return {std::min(unitsOf(kMostGrowth * dataset.header.fileBytes) + dataset.pages.size(), budgetBytes / kPoolUnitBytes), chunk};
+    uint64_t all = 0, largest = 1;
+    for (const PageEntry& page : dataset.pages) {
+        all += pageUnits(page, withColour);
+        largest = std::max(largest, pageUnits(page, withColour));
+    }
     uint64_t useful = std::max<uint64_t>(all, 1);
     if (all > chunk && chunk > largest) {
         const uint64_t chunks = (all + chunk - largest) / (chunk - largest + 1);
@@ -63,15 +73,44 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
 ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order)
     : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk), pageUnits_(unitsOfAll(*dataset_, withColour)),
       priorities_(dataset_, pageUnits_, order) {
-    planFor(pool);
+    pool_ = pool;
     const size_t pages = dataset_->pages.size();
     resident_.assign(pages, 0);
-    unavailable_.assign(pages, 0);
+    states_.assign(pages, kAvailable);
+    withColour_ = withColour;
+    if (!isWhole(*dataset_)) {
+        blocksSeen_.assign(dataset_->pages.blocks(), 0);
+        states_.assign(pages, kUnknown);
+        learnBlocks();
+    }
+    planFor(pool);
     loadedIn_.assign(pages, 0);
     ranks_.assign(pages, Rank::Stale);
 }
 
+/// Takes over what is known of the directory since the last time.
+void ResidencyPolicy::learnBlocks() {
+    const PageDirectory& pages = dataset_->pages;
+    if (blocksSeen_.empty() || blocksKnown_ == pages.blocksKnown()) return;
+    for (uint64_t block = 0; block < blocksSeen_.size(); ++block) {
+        if (blocksSeen_[block] != 0 || !pages.knowsBlock(block)) continue;
+        blocksSeen_[block] = 1;
+        ++blocksKnown_;
+        const uint64_t first = block * kEntriesPerBlock, end = std::min<uint64_t>(first + kEntriesPerBlock, pages.size());
+        for (uint64_t page = first; page < end; ++page) {
+            pageUnits_[page] = pageUnits(pages[page], withColour_);
+            priorities_.learn(page, pageUnits_[page]);
+            states_[page] = kAvailable;
+        }
+    }
+    stale_ = true;
+    planFor(pool_);
+    // A page too large for a pool of several parts is refused; the coarsest has its place.
+    if (pool_.units > 0) planned_ = std::max(planned_, pageUnits_[0]);
+}
+
 void ResidencyPolicy::planFor(PoolShape pool) {
+    pool_ = pool;
     const uint64_t largest = pageUnits_.empty() ? 1 : *std::max_element(pageUnits_.begin(), pageUnits_.end());
     const uint64_t unusable = unusableUnits(pool, largest);
     planned_ = pool.units > unusable ? pool.units - unusable : 0;
@@ -87,6 +126,7 @@ void ResidencyPolicy::setPool(PoolShape pool) {
 void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber number) {
     ++round_;
     seconds_ = seconds;
+    learnBlocks();
     const auto known = motions_.find(number);
     Motion next{view, seconds, std::nullopt, known == motions_.end() || known->second.view != view};
     if (next.moves && known != motions_.end()) next.later = aheadOf(view, known->second.view, seconds - known->second.seconds);
@@ -113,10 +153,10 @@ void ResidencyPolicy::choose() {
         views_.push_back(motion.view);
         later.push_back(motion.later.value_or(motion.view));
     }
-    choice_ = choosePages(*dataset_, views_, planned_, pageUnits_, unavailable_);
+    choice_ = choosePages(*dataset_, views_, planned_, pageUnits_, states_);
     std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
     ahead_.clear();
-    if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, unavailable_).wanted;
+    if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, states_).wanted;
     for (const WantedPage& wanted : ahead_) ranks_[wanted.page] = Rank::Ahead;
     for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
     stale_ = false;
@@ -153,8 +193,9 @@ void ResidencyPolicy::evict(uint64_t page) {
     ++counts_.evictions;
 }
 
-/// Moves pages down until `units` free ones are on end, as few units as possible. False: no chunk has so many.
-bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
+/// Moves pages down until `units` free ones are on end, as few units as possible. False: no chunk has so many, or it takes
+/// more than `most` units.
+bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves) {
     struct Window {
         uint64_t begin = 0, end = 0, cost = UINT64_MAX;  // units
     } best;
@@ -177,7 +218,7 @@ bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
             if (free >= units && cost < best.cost) best = {gaps[first].firstUnit, gaps[last].end(), cost};
         }
     }
-    if (best.cost == UINT64_MAX) return false;
+    if (best.cost == UINT64_MAX || best.cost > most) return false;
     uint64_t to = best.begin;
     for (auto at = pageAt_.lower_bound(best.begin); at != pageAt_.end() && at->first < best.end;) {
         const uint64_t page = at->second;
@@ -193,20 +234,23 @@ bool ResidencyPolicy::gather(uint64_t units, std::vector<PageMove>& moves) {
         moves.push_back({page, from, slot});
         ++version_;
         ++counts_.moves;
+        counts_.unitsMoved += slot.units;
     }
     return true;
 }
 
 Placement ResidencyPolicy::place(uint64_t page) {
     Placement placement;
-    if (isResident(page) || unavailable_[page] != 0) return placement;
+    if (isResident(page) || states_[page] != kAvailable) return placement;
     const uint64_t units = pageUnits_[page];
     const Rank rank = rankOf(page);
     placement.slot = allocator_.allocate(units);
     // What nobody wants any more takes no work.
     while (!placement.slot && rank != Rank::Stale) {
-        const bool gathered = allocator_.unitsFree() >= units && gather(units, placement.moves);
-        if (!gathered && !evictOne(rank)) break;
+        const bool isEnough = allocator_.unitsFree() >= units;
+        const bool hasRoom = (isEnough && gather(units, kCheapMoves * units, placement.moves)) || evictOne(rank) ||
+                             (isEnough && gather(units, UINT64_MAX, placement.moves));
+        if (!hasRoom) break;
         placement.slot = allocator_.allocate(units);
     }
     if (!placement.slot) {
@@ -218,6 +262,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     resident_[page] = 1;
     ++version_;
     ++counts_.loads;
+    counts_.unitsLoaded += units;
     if (loadedIn_[page] == stillSince_ && !emptied_) ++counts_.reloads;
     loadedIn_[page] = stillSince_;
     return placement;
@@ -242,10 +287,11 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     std::vector<WantedPage> missing;
     std::copy_if(choice_.wanted.begin(), choice_.wanted.end(), std::back_inserter(missing),
                  [&](const WantedPage& wanted) { return !isResident(wanted.page); });
-    outcome.missing = missing.size();
+    outcome.missing = missing.size() + choice_.awaited.size();
     // Wishes in order of urgency, as long as there is room for them.
     uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
     bool full = false;
+    wishForBlocks(outcome.wishes);
     for (const WantedPage& wanted : priorities_.ordered(std::move(missing), views_)) {
         full = full || reserved + pageUnits_[wanted.page] > room;
         if (full) continue;
@@ -266,9 +312,34 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     return outcome;
 }
 
+/// Those that hold children of the pages that wait for them.
+void ResidencyPolicy::wishForBlocks(std::vector<PageRequest>& wishes) const {
+    uint64_t last = UINT64_MAX;
+    std::set<uint64_t> blocks;
+    for (const uint64_t page : choice_.awaited) {
+        const PageEntry& entry = dataset_->pages[page];
+        const uint64_t end = uint64_t{entry.firstChild} + static_cast<uint64_t>(std::popcount(entry.childMask));
+        for (uint64_t child = entry.firstChild; child < end; ++child) {
+            const uint64_t block = child / kEntriesPerBlock;
+            if (block == last || blocksSeen_[block] != 0 || !blocks.insert(block).second) continue;
+            last = block;
+            wishes.push_back({numberOfBlock(block), kBlockUrgency});
+        }
+    }
+}
+
+/// Of a page, or of all in a block of the directory.
+std::span<uint8_t> ResidencyPolicy::statesOf(uint64_t number) {
+    const std::span<uint8_t> states(states_);
+    if (!isBlock(number)) return states.subspan(number, 1);
+    const uint64_t first = (number - kFirstBlockNumber) * kEntriesPerBlock;
+    return states.subspan(first, std::min<uint64_t>(kEntriesPerBlock, states.size() - first));
+}
+
 bool ResidencyPolicy::giveUp(uint64_t page) {
-    if (unavailable_[page] != 0) return false;
-    unavailable_[page] = 1;
+    const std::span<uint8_t> states = statesOf(page);
+    if (states[0] == kUnavailable) return false;
+    std::fill(states.begin(), states.end(), uint8_t{kUnavailable});
     stale_ = true;
     return true;
 }
@@ -276,14 +347,15 @@ bool ResidencyPolicy::giveUp(uint64_t page) {
 uint64_t ResidencyPolicy::bytesHeld() const {
     constexpr uint64_t kNode = 4 * sizeof(void*);  // of a map, beside its value
     const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-    uint64_t bytes = bytesOf(pageUnits_) + bytesOf(resident_) + bytesOf(unavailable_) + bytesOf(loadedIn_) + bytesOf(views_) + bytesOf(ahead_) + bytesOf(ranks_);
+    uint64_t bytes = bytesOf(pageUnits_) + bytesOf(resident_) + bytesOf(states_) + bytesOf(blocksSeen_) + bytesOf(loadedIn_) + bytesOf(views_) + bytesOf(ahead_) + bytesOf(ranks_);
     bytes += bytesOf(choice_.wanted) + bytesOf(choice_.refined) + priorities_.bytesHeld() + allocator_.bytesHeld();
     bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);
 }
 
 void ResidencyPolicy::restore(uint64_t page) {
-    unavailable_[page] = 0;
+    const std::span<uint8_t> states = statesOf(page);
+    std::fill(states.begin(), states.end(), uint8_t{isBlock(page) ? kUnknown : kAvailable});
     stale_ = true;
 }
 

@@ -20,6 +20,8 @@
 //   still views load no page twice. The coarsest page is wanted by all views.
 // - Hysteresis: while a view moves, a page that came less than kSettlingSeconds ago is not evicted
 //   for another, and what would need its place is not wished for.
+// - Where the directory comes in parts, views wish for the blocks that they must know, before all pages but the coarsest.
+//   What has come counts from the next look() on. A view whose pages may have children that are not known has not settled.
 // - While a view moves, what it would want a little later (its motion continued for kAheadSeconds) is
 //   wished for last, and only into places that are free or hold what no view wants.
 #pragma once
@@ -49,8 +51,11 @@ struct PoolShape {
     uint64_t units = 0, unitsPerChunk = 0;
 };
 
-/// The largest useful pool within a budget: never more bytes, and no more than the dataset can fill.
+/// The largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only part of its
+/// directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes);
+
+inline constexpr uint64_t kMostGrowth = 8;
 
 /// Units of a page: its geometry and, where asked for, its colour behind it, in one slot.
 uint64_t pageUnits(const PageEntry& page, bool withColour);
@@ -67,6 +72,7 @@ struct Placement {
 
 struct PolicyCounts {
     uint64_t loads = 0, evictions = 0, moves = 0;
+    uint64_t unitsLoaded = 0, unitsMoved = 0;
     uint64_t refused = 0;   ///< pages that were read and had no place
     uint64_t reloads = 0;   ///< pages placed twice in one still view: must stay 0
 };
@@ -96,7 +102,8 @@ public:
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
     [[nodiscard]] DrawableCut drawable(ViewNumber number) const;
 
-    /// The page cannot be read: from the next look() its parent is drawn in its place. True the first time.
+    /// The page, or block of the directory (numberOfBlock), cannot be read: from the next look() its parents are drawn in its
+    /// place. True the first time.
     bool giveUp(uint64_t page);
     /// It can be read after all.
     void restore(uint64_t page);
@@ -106,6 +113,8 @@ public:
     /// cannot be read.
     void setPool(PoolShape pool);
     [[nodiscard]] bool hasLooked(ViewNumber number = 0) const { return motions_.contains(number); }
+    /// Whether a view moved when it was last looked at.
+    [[nodiscard]] bool isMoving() const { return moving_; }
     /// Counts up with all that can change a cut or a page's place.
     [[nodiscard]] uint64_t version() const { return version_; }
     /// Memory that this takes, near enough: bounded by the dataset, whatever the number of rounds.
@@ -141,19 +150,27 @@ private:
     [[nodiscard]] bool mayEvict(uint64_t page, const Resident& resident, Rank forRank) const;
     bool evictOne(Rank forRank);
     void evict(uint64_t page);
-    bool gather(uint64_t units, std::vector<PageMove>& moves);
+    bool gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves);
     void planFor(PoolShape pool);
+    void learnBlocks();
     void choose();
+    [[nodiscard]] std::span<uint8_t> statesOf(uint64_t number);
+    void wishForBlocks(std::vector<PageRequest>& wishes) const;
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
     std::shared_ptr<const Dataset> dataset_;
     SlotAllocator allocator_;
     std::vector<uint64_t> pageUnits_;
+    bool withColour_ = false;
     LoadPriorities priorities_;
+    PoolShape pool_;
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
     std::map<uint64_t, uint64_t> pageAt_;  // by the slot's first unit
-    std::vector<uint8_t> resident_, unavailable_;
+    std::vector<uint8_t> resident_;
+    std::vector<uint8_t> states_;       // PageState
+    std::vector<uint8_t> blocksSeen_;   // of the directory; empty: all
+    uint64_t blocksKnown_ = 0;          // of these, seen
     std::vector<uint64_t> loadedIn_;  // the still view that a page was last placed in: its stillSince_
 
     std::map<ViewNumber, Motion> motions_;

@@ -37,8 +37,19 @@ struct PageOnRay {
     double enter;
 };
 
+/// Reads what part of the directory a page's children need.
+Result<void> learnChildren(const ByteReader& reader, const Dataset& dataset, const PageEntry& page) {
+    for (uint64_t child = page.firstChild; child < uint64_t{page.firstChild} + static_cast<uint64_t>(std::popcount(page.childMask)); ++child) {
+        if (dataset.pages.knows(child)) continue;
+        std::vector<std::byte> block(kBlockBytes);
+        VCP_TRY(reader.read(blockOffset(child / kEntriesPerBlock), block));
+        VCP_TRY(admitBlock(dataset, reader.name(), child / kEntriesPerBlock, block));
+    }
+    return {};
+}
+
 /// The finest pages whose boxes, a little widened, the ray touches, nearest first.
-std::vector<PageOnRay> finestPagesOn(const Dataset& dataset, const Ray& ray) {
+Result<std::vector<PageOnRay>> finestPagesOn(const ByteReader& reader, const Dataset& dataset, const Ray& ray) {
     std::vector<PageOnRay> found;
     std::vector<uint64_t> open{0};
     while (!open.empty()) {
@@ -49,6 +60,7 @@ std::vector<PageOnRay> finestPagesOn(const Dataset& dataset, const Ray& ray) {
         const Stretch s = within(ray, low - slack, low + dataset.edgeOf(entry) + slack);
         if (s.enter > s.leave) continue;
         if (entry.childMask == 0) found.push_back({page, s.enter});
+        VCP_TRY(learnChildren(reader, dataset, entry));
         for (int i = 0; i < std::popcount(entry.childMask); ++i) open.push_back(uint64_t{entry.firstChild} + static_cast<uint64_t>(i));
     }
     std::sort(found.begin(), found.end(), [](const PageOnRay& a, const PageOnRay& b) { return a.enter < b.enter; });
@@ -73,7 +85,9 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
     if (pages_.bytes() > kMostBytes) pages_ = PageCache(reader_, pages_.dataset());
     std::optional<RayHit> nearest;
     if (ray.tMin > ray.tMax) return nearest;
-    for (const PageOnRay& next : finestPagesOn(pages_.dataset(), ray)) {
+    const auto pages = finestPagesOn(*reader_, pages_.dataset(), ray);
+    if (!pages) return pages.error();
+    for (const PageOnRay& next : *pages) {
         if (nearest && nearest->t < next.enter) break;
         VCP_TRY(pages_.load(next.page));
         const auto caster = ReferenceCaster::create(pages_, std::span(&next.page, 1));

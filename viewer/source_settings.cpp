@@ -41,7 +41,7 @@ Box OpenDataset::bounds() const {
 Result<OpenDataset> openDataset(const std::string& where, const SourceSettings& settings) {
     auto reader = openReader(where, settings);
     if (!reader) return reader.error();
-    auto dataset = readDataset(**reader);
+    auto dataset = readDatasetStart(**reader);
     if (!dataset) return dataset.error();
     OpenDataset open;
     open.isRemote = isHttpUrl(where);

@@ -24,7 +24,7 @@ void addSourceSettings(CLI::App& app, SourceSettings& settings);
 /// HttpReader::open and CachingReader::open.
 Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceSettings& settings);
 
-/// A dataset opened for showing.
+/// A dataset opened for showing: of a large directory the beginning, more as pages are asked for.
 struct OpenDataset {
     std::shared_ptr<const ByteReader> reader;
     std::shared_ptr<const Dataset> dataset;
@@ -38,7 +38,7 @@ struct OpenDataset {
     [[nodiscard]] uint64_t runBytes() const { return isRemote ? 256 << 10 : 0; }
 };
 
-/// Errors: those of openReader and readDataset.
+/// Errors: those of openReader and readDatasetStart.
 Result<OpenDataset> openDataset(const std::string& where, const SourceSettings& settings);
 
 }  // namespace vcp

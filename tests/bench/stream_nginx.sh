@@ -1,23 +1,41 @@
 #!/usr/bin/env bash
 # Streams a file from disk and from nginx on the loopback, and writes what it took as a Markdown table.
 #
-# usage: tests/bench/stream_nginx.sh FILE.vcp [OUT_FOLDER]
+# usage: tests/bench/stream_nginx.sh [--sources "disk http https 20mbit 50ms"] [--budgets "64M 256M 1G"] [--frames 24]
+#                                    [--size 320x200] [--path fly] FILE.vcp [OUT_FOLDER]
 #
+# What is in brackets is what it takes without; a run of one source and budget takes some 20 s on two cores.
 # nginx runs with a configuration of its own, in a temporary folder, on free ports: plain, with TLS (a certificate made
 # here), at 20 Mbit/s (8 connections, each limited to an eighth), and behind a proxy that delays answers by 50 ms.
-# Needs nginx (Debian: nginx-light), openssl and python3. Variables, and what they are without:
-#   VCP=build/release/vcp  BUDGETS="64M 256M 1G"  SOURCES="disk http https 20mbit 50ms"
-#   STRESS="--path fly --frames 60 --size 640x400"
+# Needs nginx (Debian: nginx-light), openssl and python3. The program is $VCP, or build/release/vcp.
 # Exit status 1 when a run fails or an invariant breaks.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-[ $# -ge 1 ] || { sed -n '4p' "${BASH_SOURCE[0]}" >&2; exit 2; }
+usage() {
+    sed -n '4,5p' "${BASH_SOURCE[0]}" >&2
+    exit 2
+}
+sources="disk http https 20mbit 50ms"
+budgets="64M 256M 1G"
+frames=24
+size=320x200
+path=fly
+while [[ ${1:-} == --* ]]; do
+    [ $# -ge 2 ] || usage
+    case $1 in
+        --sources) sources=$2 ;;
+        --budgets) budgets=$2 ;;
+        --frames) frames=$2 ;;
+        --size) size=$2 ;;
+        --path) path=$2 ;;
+        *) usage ;;
+    esac
+    shift 2
+done
+[ $# -ge 1 ] || usage
 file=$(realpath "$1")
 out=${2:-$(mktemp -d)}
 vcp=${VCP:-$here/../../build/release/vcp}
-budgets=${BUDGETS:-64M 256M 1G}
-sources=${SOURCES:-disk http https 20mbit 50ms}
-read -ra stress <<<"${STRESS:---path fly --frames 60 --size 640x400}"
 nginx=$(PATH=$PATH:/usr/sbin command -v nginx) || { echo "nginx is missing; on Debian: apt-get install nginx-light" >&2; exit 1; }
 
 work=$(mktemp -d)
@@ -90,7 +108,7 @@ for source in $sources; do
         more=()
         [ "$source" != https ] || more=(--ca-file "$work/certificate.pem")
         echo "$source, $budget" >&2
-        "$vcp" stress "$(address "$source")" --budget "$budget" "${stress[@]}" ${more[@]+"${more[@]}"} --progress none --json \
+        "$vcp" stress "$(address "$source")" --budget "$budget" --path "$path" --frames "$frames" --size "$size" ${more[@]+"${more[@]}"} --progress none --json \
             >"$out/$source-$budget.json" || status=1
     done
 done

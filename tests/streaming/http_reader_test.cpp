@@ -8,8 +8,10 @@
 
 #include "streaming/http_exchange.h"
 #include "streaming/page_source.h"
+#include "tests/streaming/directory_files.h"
 #include "tests/streaming/range_server.h"
 #include "tests/streaming/test_files.h"
+#include "tests/streaming/test_trees.h"
 #include "tests/viewer/test_folder.h"
 
 namespace vcp {
@@ -70,6 +72,26 @@ TEST_F(HttpReaderTest, TheFirstViewTakesTwoRequests) {
         EXPECT_LE((*reader)->requests(), 2u);
         EXPECT_LT((*reader)->bytesReceived(), dataset->header.fileBytes);
     }
+}
+
+TEST_F(HttpReaderTest, TheFirstViewOfALargeFileTakesTwoRequestsToo) {
+    Dataset tree = test::randomTree(1, 6, 0.7, 256);
+    const std::vector<std::byte> bytes = test::directoryFile(tree);
+    ASSERT_GT(tree.pages.blocks() * kBlockBytes, wholeDirectoryBytes(kLeadBytes));
+    std::ofstream(folder_ / "large.vcp", std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const auto reader = open("large.vcp");
+    ASSERT_TRUE(reader) << reader.error().line();
+    const auto dataset = readDatasetStart(**reader);
+    ASSERT_TRUE(dataset) << dataset.error().line();
+    std::vector<std::byte> root(tree.pages[0].colourOffset + tree.pages[0].colourStoredBytes - tree.pages[0].offset);
+    ASSERT_TRUE((*reader)->read(tree.pages[0].offset, root));
+    EXPECT_EQ((*reader)->requests(), 2u);
+    EXPECT_LT((*reader)->bytesReceived(), kLeadBytes + root.size() + 4096);
+    // A block that comes later is a request of its own.
+    const FilePageSource source(*reader, std::make_shared<const Dataset>(*dataset));
+    ASSERT_TRUE(source.read(numberOfBlock(dataset->pages.blocks() - 1), true));
+    EXPECT_EQ((*reader)->requests(), 3u);
+    EXPECT_EQ(readDataset(**reader)->pages.blocksKnown(), tree.pages.blocks());
 }
 
 TEST_F(HttpReaderTest, WithoutSeveralRangesInAnAnswerItTakesAFewMore) {

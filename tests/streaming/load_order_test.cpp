@@ -98,7 +98,7 @@ TEST(LoadOrder, EveryOrderHasAllPagesAndParentsFirst) {
 
 TEST(LoadOrder, ARayGainsWhatRefinementTakesOffItsError) {
     Dataset tree = test::randomTree(2, 3, 1, 16384);
-    for (PageEntry& page : tree.pages) page.certifiedError = float(0.016 * std::pow(0.25, page.level));
+    for (size_t i = 0; i < tree.pages.size(); ++i) tree.pages[i].certifiedError = float(0.016 * std::pow(0.25, tree.pages[i].level));
     Fixture f(std::move(tree));
     LoadPriorities priorities = f.priorities(LoadOrder::Feedback);
     const uint64_t finest = f.units.size() - 1, above = f.parents[finest];

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <set>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -25,6 +27,7 @@ public:
             changed_.notify_all();
             changed_.wait(lock, [&] { return !held_ && (page != stalling || interrupted_); });
         }
+        niceness = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
         if (page == failing) return Error{.code = ErrorCode::Io, .message = "broken", .element = "page 13"};
         PageBytes bytes;
         bytes.geometry.assign(words_, uint4(static_cast<uint32_t>(page)));
@@ -53,6 +56,7 @@ public:
     }
     void letGo() const { interrupt(); }
 
+    mutable std::atomic<int> niceness{0};
     uint64_t failing = UINT64_MAX, stalling = UINT64_MAX;
 
 private:
@@ -97,6 +101,26 @@ TEST(PageLoader, DeliversEveryWishOnce) {
     EXPECT_EQ(loader.pending(), 0u);
     EXPECT_EQ(loader.stats().bytesRead, 100u * 32);
     EXPECT_FALSE(loader.waitForPage(kLong)) << "nothing is under way: it must not wait";
+}
+
+TEST(PageLoader, ItsThreadsGiveWayToThoseThatDraw) {
+    const auto source = std::make_shared<FakeSource>();
+    PageLoader loader(source, options(false, 1, 1 << 20));
+    loader.request({{3, 1}});
+    collectAll(loader, 1);
+    const int own = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
+    EXPECT_EQ(source->niceness, std::min(own + 8, 19));
+}
+
+TEST(PageLoader, ReadsNoFurtherThanTheNextUpdateTakesIn) {
+    PageLoader loader(std::make_shared<FakeSource>(), options(false, 1, 1 << 20));
+    std::vector<PageRequest> wishes;
+    for (uint64_t page = 0; page < 2000; ++page) wishes.push_back({page, 1});
+    loader.request(wishes, 5 * sizeof(uint4));
+    for (uint64_t round = 1; round <= 100; ++round) {
+        while (loader.stats().pagesRead < 5 * round) std::this_thread::yield();
+        EXPECT_EQ(loader.collect().size(), 5u);
+    }
 }
 
 TEST(PageLoader, UrgentFirstOfEqualsInOrder) {

@@ -23,6 +23,7 @@ struct Conditions {
     uint64_t seed = 0;       // order of arrival
     size_t perRound = 3;     // pages that arrive
     LoadOrder order = LoadOrder::Feedback;
+    uint64_t chunkBytes = kChunkBytes;
 };
 
 /// A pool that remembers which page's bytes are in each unit, a queue, and reads that end in any order.
@@ -30,7 +31,7 @@ class Simulation {
 public:
     Simulation(std::shared_ptr<const Dataset> dataset, Conditions conditions)
         : dataset_(std::move(dataset)), c_(std::move(conditions)), random_(c_.seed),
-          shape_(poolShapeFor(*dataset_, dataset_->hasColour(), c_.budgetBytes, kChunkBytes)),
+          shape_(poolShapeFor(*dataset_, dataset_->hasColour(), c_.budgetBytes, c_.chunkBytes)),
           policy(dataset_, dataset_->hasColour(), shape_, c_.order), queue_({.attempts = 12, .damagedAttempts = 12}), content_(shape_.units, kNothing) {
         EXPECT_LE(shape_.units * kPoolUnitBytes, c_.budgetBytes);
     }
@@ -85,7 +86,7 @@ public:
 
     /// Another pool; its content is lost.
     void setBudget(uint64_t budgetBytes) {
-        shape_ = poolShapeFor(*dataset_, dataset_->hasColour(), budgetBytes, kChunkBytes);
+        shape_ = poolShapeFor(*dataset_, dataset_->hasColour(), budgetBytes, c_.chunkBytes);
         content_.assign(shape_.units, kNothing);
         policy.setPool(shape_);
         EXPECT_EQ(policy.unitsTaken(), 0u);
@@ -99,7 +100,7 @@ private:
     static constexpr uint64_t kNothing = UINT64_MAX;
 
     void begin() {
-        while (underWay_.size() < 4) {
+        while (underWay_.size() < 4u) {
             const auto wish = queue_.next(now_);
             if (!wish) return;
             EXPECT_FALSE(policy.isResident(wish->page)) << "what is there is not read";
@@ -178,6 +179,26 @@ std::vector<uint64_t> idealCut(const Dataset& dataset, const SelectionView& view
     for (const PageEntry& page : dataset.pages) units.push_back(pageUnits(page, dataset.hasColour()));
     for (const uint64_t page : bad) unavailable[page] = 1, all[page] = 0;
     return selectPages(dataset, view, UINT64_MAX, units, all, unavailable).cut;
+}
+
+TEST(ResidencyPolicy, MovesLittleMoreThanItLoads) {
+    uint64_t loaded = 0, moved = 0;
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+        const auto dataset = std::make_shared<const Dataset>(test::randomTree(seed, 5, 0.6, 6 * 16384));
+        Simulation fly(dataset, {.budgetBytes = allBytes(*dataset) / 4, .failRate = 0, .bad = {}, .seed = seed, .perRound = 40, .order = LoadOrder::Feedback, .chunkBytes = uint64_t{1} << 40});
+        std::mt19937_64 random(seed);
+        SelectionView view = test::randomView(random, 0.1);
+        for (int i = 0; i < 60; ++i) {
+            if (i % 20 == 0) view = test::randomView(random, 0.1);
+            view.eye += glm::dvec3(0.02, 0.01, 0.015);
+            fly.round(view);
+        }
+        fly.settle(view);
+        loaded += fly.policy.counts().unitsLoaded;
+        moved += fly.policy.counts().unitsMoved;
+    }
+    EXPECT_GT(loaded, 2000u);
+    EXPECT_LT(moved, loaded) << loaded;
 }
 
 TEST(ResidencyPolicy, SettlesOnTheSamePagesWhateverTheHistoryOrderAndFaults) {
