@@ -149,7 +149,7 @@ void Viewer::move(glm::dvec2 pixel) {
     const double perPixel = std::numbers::pi / std::max(1, size_.y);
     const double headPerPixel = camera_.fovY / std::max(1, size_.y);
     switch (drag_) {
-        case Drag::None: hovered_ = grabAt(sectionHandles(), pixel, handleScale_); break;
+        case Drag::None: break;
         case Drag::Section: dragSection(pixel); break;
         case Drag::Orbit: camera_.orbit(pivot_, -by.x * perPixel, -by.y * perPixel); break;
         case Drag::Pan: camera_.pan(cursor_, pixel, camera_.depthOf(pivot_), size_); break;
@@ -168,7 +168,6 @@ void Viewer::release(MouseButton button) {
 void Viewer::setSections(std::vector<SectionPlane> planes) {
     sections_ = std::move(planes);
     if (std::exchange(sectionDrag_, std::nullopt)) drag_ = Drag::None;
-    hovered_ = {};
     sectionAnchors_.clear();
 }
 
@@ -182,14 +181,19 @@ std::vector<SectionHandle> Viewer::sectionHandles() const {
     return handles;
 }
 
+SectionGrab Viewer::sectionGrab() const {
+    if (sectionDrag_) return sectionDrag_->grab();
+    return drag_ == Drag::None ? grabAt(sectionHandles(), cursor_, handleScale_) : SectionGrab{};
+}
+
 bool Viewer::gripSection(glm::dvec2 pixel) {
     const std::vector<SectionHandle> handles = sectionHandles();
-    hovered_ = grabAt(handles, pixel, handleScale_);
-    if (hovered_.grip == SectionGrip::None) return false;
-    const auto handle = std::find_if(handles.begin(), handles.end(), [&](const SectionHandle& each) { return each.plane == hovered_.plane; });
+    const SectionGrab grab = grabAt(handles, pixel, handleScale_);
+    if (grab.grip == SectionGrip::None) return false;
+    const auto handle = std::find_if(handles.begin(), handles.end(), [&](const SectionHandle& each) { return each.plane == grab.plane; });
     sectionAnchors_.resize(std::max(sectionAnchors_.size(), sections_.size()), bounds_.centre());
     sectionAnchors_[handle->plane] = handle->anchor;
-    sectionDrag_.emplace(*handle, hovered_.grip, sections_[handle->plane], pixel, camera_, size_, handleScale_);
+    sectionDrag_.emplace(*handle, grab.grip, sections_[handle->plane], pixel, camera_, size_, handleScale_);
     drag_ = Drag::Section;
     return true;
 }

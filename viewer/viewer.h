@@ -156,7 +156,7 @@ public:
     /// To be drawn over the picture.
     [[nodiscard]] std::vector<SectionHandle> sectionHandles() const;
     /// The part of a handle in the hand, else under the cursor as of the last move().
-    [[nodiscard]] SectionGrab sectionGrab() const { return sectionDrag_ ? sectionDrag_->grab() : hovered_; }
+    [[nodiscard]] SectionGrab sectionGrab() const;
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
     /// Of the page pool, from now on. Errors: those of Renderer::setBudgets.
@@ -203,7 +203,6 @@ private:
     std::vector<glm::dvec3> sectionAnchors_;  // of the planes' handles, as they were turned last; may be fewer
     double handleScale_ = 0;
     std::optional<SectionDrag> sectionDrag_;
-    SectionGrab hovered_;
     bool sectionCaps_ = false;
     glm::ivec2 size_{0};
 
