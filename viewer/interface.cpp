@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 #include <imgui.h>
 
 #include "viewer/key_map.h"
@@ -22,9 +23,10 @@ constexpr ImGuiColorEditFlags kColour = ImGuiColorEditFlags_NoInputs | ImGuiColo
 constexpr float kPanelWidth = 250, kMargin = 8;
 constexpr float kScaleBarLargest = 160;
 constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160), kMeasured = IM_COL32(255, 210, 60, 255);
+constexpr ImU32 kHandle = IM_COL32(90, 190, 255, 255), kGripped = IM_COL32(255, 210, 60, 255);
 constexpr uint32_t kOcclusionRays = 8;
 
-constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "fetches", "level", "error"};
+constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "cells", "fetches", "level", "error"};
 
 ImVec2 vec(glm::vec2 v) { return {v.x, v.y}; }
 
@@ -71,6 +73,7 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     if (session_->viewer().dataset()) {
         drawScaleBar();
         drawMeasured();
+        drawSectionHandles();
         if (session_->user().panel) layOutPanel();
     } else if (!session_->opening()) {
         layOutStart();
@@ -310,6 +313,28 @@ void Interface::drawMeasured() const {
             list.AddLine(vec(here), vec(there), kMeasured, 2 * scale_);
             textAt(list, 0.5f * (here + there) + glm::vec2(6 * scale_, 0), formatLength(segmentLength(line, i)));
         }
+}
+
+void Interface::drawSectionHandles() const {
+    ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    const SectionGrab grab = session_->viewer().sectionGrab();
+    for (const SectionHandle& handle : session_->viewer().sectionHandles()) {
+        const auto colourOf = [&](SectionGrip part) { return grab == SectionGrab{part, handle.plane} ? kGripped : kHandle; };
+        std::vector<ImVec2> ring;
+        for (const glm::dvec2 at : handle.ring) ring.push_back(vec(glm::vec2(at)));
+        list.AddPolyline(ring.data(), static_cast<int>(ring.size()), kShade, ImDrawFlags_Closed, 5 * scale_);
+        list.AddPolyline(ring.data(), static_cast<int>(ring.size()), colourOf(SectionGrip::Turn), ImDrawFlags_Closed, 2.5f * scale_);
+        const glm::vec2 foot(handle.foot), tip(handle.tip);
+        const ImU32 colour = colourOf(SectionGrip::Move);
+        list.AddCircleFilled(vec(foot), 8 * scale_, kShade);
+        list.AddCircleFilled(vec(foot), 6.5f * scale_, colour);
+        if (handle.isAlongView) continue;
+        const glm::vec2 along = glm::normalize(tip - foot), across(-along.y, along.x);
+        const glm::vec2 neck = tip - 12 * scale_ * along;
+        list.AddLine(vec(foot), vec(neck), kShade, 5 * scale_);
+        list.AddLine(vec(foot), vec(neck), colour, 3 * scale_);
+        list.AddTriangleFilled(vec(tip), vec(neck + 6 * scale_ * across), vec(neck - 6 * scale_ * across), colour);
+    }
 }
 
 void Interface::copyCamera() {

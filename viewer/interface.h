@@ -47,6 +47,7 @@ private:
     void layOutOpening();
     void drawScaleBar() const;
     void drawMeasured() const;
+    void drawSectionHandles() const;
     void actionButton(const char* label, ViewerAction action);
 
     ViewSession* session_;

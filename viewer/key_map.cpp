@@ -29,7 +29,7 @@ constexpr KeyHelp kKeyMap[] = {
     {"L", "the light follows the camera, or stays"},
     {"S", "shadows"},
     {"O", "ambient occlusion"},
-    {"X", "section through the middle; shift + wheel moves it"},
+    {"X", "section through the middle; its arrow and shift + wheel move it, its ring turns it"},
     {"D", "measure: click points; Enter ends a line, Backspace takes a point back"},
     {"Ctrl+E", "write what is measured: measurement-1.csv, .json"},
     {"Tab", "the panel"},

@@ -26,6 +26,7 @@ constexpr double kRefineFrames = 3;
 constexpr int kLargestReduction = 4;
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
+constexpr double kFarthestSection = 4;  // of the diagonal, that a drag moves a plane
 constexpr double kFlySeconds = 4;    // for the dataset's diagonal, at speed 1
 constexpr double kLongestFlyStep = 0.1;  // seconds: a hiccup is no leap
 constexpr double kFlySpeedPerNotch = 1.25;
@@ -96,6 +97,8 @@ void Viewer::show(std::shared_ptr<const Dataset> dataset, const OrbitCamera& cam
     drawn_.reset();
     drag_ = Drag::None;
     move_.reset();
+    sectionDrag_.reset();
+    sectionAnchors_.clear();
     flySpeed_ = 1;
     status_.name = std::move(name);
     status_.triangles = header.triangles;
@@ -142,6 +145,7 @@ void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
     dragButton_ = button;
     cursor_ = pixel;
     const bool left = button == MouseButton::Left;
+    if (left && !modifiers.shift && !modifiers.control && gripSection(pixel)) return;
     drag_ = !left || modifiers.shift ? Drag::Pan : modifiers.control ? Drag::Light : isFlying_ ? Drag::Head : Drag::Orbit;
     const bool onSurface = drag_ == Drag::Pan || pointAt(pixel);
     pivot_ = onSurface ? pointOfInterest(pixel) : bounds_.centre();
@@ -154,6 +158,7 @@ void Viewer::move(glm::dvec2 pixel) {
     const double headPerPixel = camera_.fovY / std::max(1, size_.y);
     switch (drag_) {
         case Drag::None: break;
+        case Drag::Section: dragSection(pixel); break;
         case Drag::Orbit: camera_.orbit(pivot_, -by.x * perPixel, -by.y * perPixel); break;
         case Drag::Pan: camera_.pan(cursor_, pixel, camera_.depthOf(pivot_), size_); break;
         case Drag::Light: turnLight(by * perPixel); break;
@@ -163,7 +168,55 @@ void Viewer::move(glm::dvec2 pixel) {
 }
 
 void Viewer::release(MouseButton button) {
-    if (button == dragButton_) drag_ = Drag::None;
+    if (button != dragButton_) return;
+    drag_ = Drag::None;
+    sectionDrag_.reset();
+}
+
+void Viewer::setSections(std::vector<SectionPlane> planes) {
+    sections_ = std::move(planes);
+    if (std::exchange(sectionDrag_, std::nullopt)) drag_ = Drag::None;
+    sectionAnchors_.clear();
+}
+
+std::vector<SectionHandle> Viewer::sectionHandles() const {
+    std::vector<SectionHandle> handles;
+    if (handleScale_ <= 0 || !dataset_ || !hasSize()) return handles;
+    for (size_t i = 0; i < sections_.size(); ++i) {
+        const glm::dvec3 anchor = onPlane(sections_[i], i < sectionAnchors_.size() ? sectionAnchors_[i] : bounds_.centre());
+        if (auto handle = sectionHandle(sections_[i], i, anchor, camera_, size_, handleScale_)) handles.push_back(*std::move(handle));
+    }
+    return handles;
+}
+
+SectionGrab Viewer::sectionGrab() const {
+    if (sectionDrag_) return sectionDrag_->grab();
+    return drag_ == Drag::None ? grabAt(sectionHandles(), cursor_, handleScale_) : SectionGrab{};
+}
+
+bool Viewer::gripSection(glm::dvec2 pixel) {
+    const std::vector<SectionHandle> handles = sectionHandles();
+    const SectionGrab grab = grabAt(handles, pixel, handleScale_);
+    if (grab.grip == SectionGrip::None) return false;
+    const auto handle = std::find_if(handles.begin(), handles.end(), [&](const SectionHandle& each) { return each.plane == grab.plane; });
+    sectionAnchors_.resize(std::max(sectionAnchors_.size(), sections_.size()), bounds_.centre());
+    sectionAnchors_[handle->plane] = handle->anchor;
+    sectionDrag_.emplace(*handle, grab.grip, sections_[handle->plane], pixel, camera_, size_, handleScale_);
+    drag_ = Drag::Section;
+    return true;
+}
+
+void Viewer::dragSection(glm::dvec2 pixel) {
+    const size_t plane = sectionDrag_->grab().plane;
+    sections_[plane] = sectionDrag_->at(pixel, kFarthestSection * bounds_.diagonal());
+}
+
+bool Viewer::cancelSectionDrag() {
+    if (!sectionDrag_) return false;
+    sections_[sectionDrag_->grab().plane] = sectionDrag_->before();
+    sectionDrag_.reset();
+    drag_ = Drag::None;
+    return true;
 }
 
 void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
@@ -237,10 +290,10 @@ void Viewer::toggleProjection() {
 void Viewer::toggleSection() {
     if (sections_.empty()) {
         const glm::dvec3 ahead = camera_.forwardVector();
-        sections_ = {{ahead, glm::dot(ahead, bounds_.centre())}};
+        setSections({{ahead, glm::dot(ahead, bounds_.centre())}});
         sectionCaps_ = true;
     } else {
-        sections_.clear();
+        setSections({});
     }
 }
 
@@ -313,7 +366,7 @@ Result<NextStep> Viewer::update(double now) {
     if (dataset_) advanceCamera(now);
     now_ = now;
     if (!hasSize()) return NextStep{};
-    if (drawn_ && !sameView(camera_, seen_)) movedAt_ = now;
+    if (drawn_ && (!sameView(camera_, seen_) || (sectionDrag_ && sections_ != request_.sections))) movedAt_ = now;
     seen_ = camera_;
     requestReduction_ = movingReduction_ = reductionAt(now);
     request_ = requestWith(requestReduction_);

@@ -31,6 +31,7 @@
 #include "octree/result.h"
 #include "render/renderer.h"
 #include "viewer/orbit_camera.h"
+#include "viewer/section_handle.h"
 
 namespace vcp {
 
@@ -113,10 +114,12 @@ public:
     void resize(glm::ivec2 size);
 
     /// Left: orbit about the point under the cursor, with shift: pan, with control: turn the light. Middle and
-    /// right: pan. While flying, left turns the head.
+    /// right: pan. While flying, left turns the head. Left on the handle of a section moves or turns the plane.
     void press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers = {});
     void move(glm::dvec2 pixel);
     void release(MouseButton button);
+    /// Puts a section plane that is in the hand back where it was gripped. False where none is.
+    bool cancelSectionDrag();
     /// Zooms in on the point under the cursor by `steps` notches of a wheel; out when negative. With shift: moves the
     /// section planes, deeper into what they keep.
     void scroll(glm::dvec2 pixel, double steps, bool shift = false);
@@ -151,7 +154,14 @@ public:
     [[nodiscard]] const Shading& shading() const { return shading_; }
     void setShading(const Shading& shading) { shading_ = shading; }
     [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
-    void setSections(std::vector<SectionPlane> planes) { sections_ = std::move(planes); }
+    void setSections(std::vector<SectionPlane> planes);
+    /// Section planes can be gripped from now on; for a host that draws the handles. `scale`: as of sectionHandle(); 0: no
+    /// longer.
+    void showSectionHandles(double scale) { handleScale_ = scale; }
+    /// To be drawn over the picture.
+    [[nodiscard]] std::vector<SectionHandle> sectionHandles() const;
+    /// The part of a handle in the hand, else under the cursor as of the last move().
+    [[nodiscard]] SectionGrab sectionGrab() const;
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
     /// Of the page pool, from now on. Errors: those of Renderer::setBudgets.
@@ -163,7 +173,7 @@ public:
     [[nodiscard]] Renderer& renderer() { return *renderer_; }
 
 private:
-    enum class Drag { None, Orbit, Pan, Light, Head };
+    enum class Drag { None, Orbit, Pan, Light, Head, Section };
     struct Move {
         OrbitCamera from, to;
         double beganAt;  ///< of the update that saw it first; not a number until then
@@ -182,6 +192,8 @@ private:
     void toggleSection();
     void moveSections(double steps);
     void turnLight(glm::dvec2 by);
+    bool gripSection(glm::dvec2 pixel);
+    void dragSection(glm::dvec2 pixel);
     void look(View view);
     void advanceCamera(double now);
     [[nodiscard]] bool isSentSomewhere() const { return move_ || (isFlying_ && flyDirection_ != glm::dvec3(0)); }
@@ -193,6 +205,9 @@ private:
     OrbitCamera camera_, home_;
     Shading shading_;
     std::vector<SectionPlane> sections_;
+    std::vector<glm::dvec3> sectionAnchors_;  // of the planes' handles, as they were turned last; may be fewer
+    double handleScale_ = 0;
+    std::optional<SectionDrag> sectionDrag_;
     bool sectionCaps_ = false;
     glm::ivec2 size_{0};
 

@@ -165,6 +165,7 @@ private:
     void layOut() {
         if (framebuffer_.x == 0 || framebuffer_.y == 0) return;
         painter_->begin(framebuffer_);
+        session_->viewer().showSectionHandles(static_cast<double>(painter_->scale()));
         interface_.layOut(framebuffer_, painter_->scale());
         mustPresent_ = painter_->end() || mustPresent_;
     }
@@ -174,8 +175,8 @@ private:
         const glm::dvec2 pixel = pixelAt(cursor);
         ImGui::GetIO().MousePos = ImVec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y));
         if (glm::distance(pixel, pressedAt_) > kClickPixels) isClick_ = false;
-        if (!isDragging_) layOut();
         session_->viewer().move(pixel);
+        if (!isDragging_) layOut();
     }
 
     void button(int glfwButton, int action, int mods) {
@@ -302,6 +303,7 @@ private:
     }
 
     void escape() {
+        if (session_->viewer().cancelSectionDrag()) return;
         if (interface_.showsHelp) interface_.showsHelp = false;
         else if (session_->opening()) session_->opening()->cancel();
         else if (session_->viewer().isFlying()) toggleFly();

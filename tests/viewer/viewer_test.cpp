@@ -1,6 +1,7 @@
 // The viewer driven as a window drives it, without one: real pages, real frames, a clock that tests set.
 #include "viewer/viewer.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -156,6 +157,79 @@ TEST_F(ViewerTest, OcclusionWaitsForRest) {
     viewer_->release(MouseButton::Left);
     EXPECT_TRUE(turn(0.5)) << "once more, with occlusion";
     EXPECT_FALSE(turn(0.1));
+}
+
+// The handle of a section plane: its tip stays under the cursor, its foot where it is while the ring turns.
+TEST_F(ViewerTest, SectionIsMovedByItsArrow) {
+    openViewer();
+    viewer_->setSections({{{2, 0, 0}, 0.1}});
+    settle();
+    EXPECT_TRUE(viewer_->sectionHandles().empty()) << "nobody draws them yet";
+    viewer_->showSectionHandles(1);
+    ASSERT_EQ(viewer_->sectionHandles().size(), 1u);
+    const SectionHandle handle = viewer_->sectionHandles().front();
+    const OrbitCamera camera = viewer_->camera();
+    viewer_->move({5, 5});
+    EXPECT_EQ(viewer_->sectionGrab(), SectionGrab{});
+    viewer_->move(handle.tip);
+    EXPECT_EQ(viewer_->sectionGrab(), (SectionGrab{SectionGrip::Move, 0}));
+    viewer_->press(MouseButton::Left, handle.tip);
+    viewer_->move(handle.tip + glm::dvec2(25, 7));
+    EXPECT_TRUE(turn(0.1));
+    EXPECT_NEAR(viewer_->sectionHandles().front().tip.x, handle.tip.x + 25, 0.5);
+    EXPECT_GT(viewer_->sections().front().offset, 0.1);
+    EXPECT_EQ(viewer_->sections().front().normal, glm::dvec3(2, 0, 0));
+    viewer_->move(handle.tip);
+    EXPECT_DOUBLE_EQ(viewer_->sections().front().offset, 0.1);
+    viewer_->move(handle.tip + glm::dvec2(-30, 0));
+    EXPECT_TRUE(viewer_->cancelSectionDrag());
+    EXPECT_EQ(viewer_->sections().front(), (SectionPlane{{2, 0, 0}, 0.1}));
+    EXPECT_FALSE(viewer_->cancelSectionDrag());
+    viewer_->move(handle.tip + glm::dvec2(-60, 0));
+    viewer_->release(MouseButton::Left);
+    EXPECT_EQ(viewer_->sections().front().offset, 0.1) << "what was cancelled is over";
+    EXPECT_EQ(viewer_->camera().position, camera.position);
+}
+
+TEST_F(ViewerTest, SectionAlongTheViewIsMovedUpAndDown) {
+    openViewer();
+    viewer_->showSectionHandles(1);
+    viewer_->act(ViewerAction::ToggleSection);
+    settle();
+    const SectionHandle handle = viewer_->sectionHandles().front();
+    ASSERT_TRUE(handle.isAlongView);
+    const glm::dvec3 before = viewer_->pointAt(handle.foot).value();
+    viewer_->press(MouseButton::Left, handle.foot);
+    viewer_->move(handle.foot - glm::dvec2(0, 30));
+    viewer_->release(MouseButton::Left);
+    settle();
+    const double unitsPerPixel = viewer_->camera().viewHeight() / kSize.y;
+    EXPECT_NEAR(glm::dot(viewer_->pointAt(handle.foot).value() - before, viewer_->camera().forwardVector()), 30 * unitsPerPixel, 0.01);
+}
+
+TEST_F(ViewerTest, SectionIsTurnedByItsRingAboutItsFoot) {
+    openViewer();
+    viewer_->showSectionHandles(1);
+    viewer_->setSections({{{0, 0, -1}, 0.2}});
+    settle();
+    const SectionHandle handle = viewer_->sectionHandles().front();
+    const glm::dvec2 grip = *std::max_element(handle.ring.begin(), handle.ring.end(), [](auto a, auto b) { return a.x < b.x; });
+    viewer_->press(MouseButton::Left, grip);
+    EXPECT_EQ(viewer_->sectionGrab().grip, SectionGrip::Turn);
+    viewer_->move(grip + glm::dvec2(24, 0));
+    EXPECT_TRUE(turn(0.1));
+    const SectionPlane turned = viewer_->sections().front();
+    EXPECT_NEAR(glm::dot(turned.normal, handle.anchor), turned.offset, 1e-9);
+    EXPECT_NEAR(std::acos(glm::dot(turned.normal, glm::dvec3(0, 0, -1))), 0.5, 1e-9) << "half the ring's radius is half a radian";
+    EXPECT_NEAR(turned.normal.y, 0, 1e-6);
+    viewer_->release(MouseButton::Left);
+    EXPECT_LT(glm::distance(viewer_->sectionHandles().front().anchor, handle.anchor), 1e-9);
+    // The way back ends where it began, and another drag turns about the same foot.
+    const SectionHandle now = viewer_->sectionHandles().front();
+    viewer_->press(MouseButton::Left, now.foot);
+    EXPECT_EQ(viewer_->sectionGrab().grip, SectionGrip::Move);
+    viewer_->release(MouseButton::Left);
+    EXPECT_EQ(viewer_->sections().front(), turned);
 }
 
 TEST_F(ViewerTest, PictureShowsTheDatasetAndBackground) {

@@ -113,7 +113,20 @@ key g F1
 differs flown help
 key F1 Tab
 differs help panel
-key Tab 1 d
+xdotool mousemove --window $window 320 240
+key Tab 1
+differs panel front
+key x
+# The section's handle is in the middle of the window; Esc puts the plane back, and the window stays.
+waits_for "no section" is_other front section
+xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 320 190
+waits_for "the section does not move" is_other section moved
+key Escape
+xdotool mousemove --window $window 320 240
+waits_for "Esc does not put the section back" is_same section unmoved
+xdotool mouseup 1 mousemove --window $window 320 240
+key x d
+waits_for "the section stays" is_other section panel
 xdotool mousemove --window $window 320 240 click 1
 waits_for "a point is not shown" is_other panel point
 xdotool mousemove --window $window 330 200 click 1
