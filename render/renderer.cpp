@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include "render/frame_setup.h"
+#include "render/picture_scaling.h"
 #include "render/passes/beam.h"
 #include "render/passes/feedback.h"
 #include "render/passes/light.h"
@@ -139,6 +140,7 @@ struct Renderer::State {
     const ViewNumber number;
     std::function<void()> gone;
     std::unique_ptr<Swapchain> swapchain;
+    std::unique_ptr<PictureScaling> scaling;  // to the host's images; made on first use
     std::unique_ptr<FrameResources> resources;
     std::optional<PassTimer> timer;
     bool tableStale = true;
@@ -187,10 +189,14 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
         return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", options.budgetBytes, kLeastBudget)};
     auto shared = std::make_shared<Shared>();
     shared->options = options;
-    auto instance = Instance::create(options.validation, options.surface ? options.surface->instanceExtensions : std::vector<std::string>{});
-    if (!instance) return instance.error();
-    shared->instance = std::move(*instance);
-    auto state = std::make_unique<State>(shared, options.surface);
+    if (options.host) {
+        shared->instance = Instance::borrow(options.host->instance);
+    } else {
+        auto instance = Instance::create(options.validation, options.surface ? options.surface->instanceExtensions : options.windowExtensions);
+        if (!instance) return instance.error();
+        shared->instance = std::move(*instance);
+    }
+    auto state = std::make_unique<State>(shared, options.host ? std::nullopt : options.surface);
     VCP_TRY(state->createDevice(options.faults));
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
@@ -210,9 +216,11 @@ Result<VkSurfaceKHR> Renderer::State::createSurface() const {
 }
 
 Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
+    if (options.host && losses > 0) return Error{.code = ErrorCode::Device, .message = "the host's device was lost"};
     const auto window = createSurface();
     if (!window) return window.error();
-    auto made = Device::create(*instance, options.device, *window, faults);
+    const bool forWindows = *window != VK_NULL_HANDLE || !options.windowExtensions.empty();
+    auto made = options.host ? Device::borrow(*options.host, faults) : Device::create(*instance, options.device, *window, forWindows, faults);
     if (!made) {
         if (*window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
         return made.error();
@@ -246,6 +254,7 @@ void Renderer::State::release() {
     drawn.reset();
     timer.reset();
     swapchain.reset();
+    scaling.reset();
     resources.reset();
 }
 
@@ -605,6 +614,22 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
     hit.position = ray.origin + ray.direction * hit.depth;
     hit.normal = unpackNormal(words[2]);
     return std::optional<PixelHit>(hit);
+}
+
+Result<void> Renderer::copyPicture(const ImageTarget& target) {
+    State& s = *state_;
+    if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
+    if (target.image == VK_NULL_HANDLE || target.width == 0 || target.height == 0)
+        return Error{.code = ErrorCode::Usage, .message = "there is no image, or it has no area"};
+    if (!s.device->hasGraphics()) return Error{.code = ErrorCode::Usage, .message = "pictures are scaled to images by queues with graphics, which this is not"};
+    if (!s.scaling) s.scaling = std::make_unique<PictureScaling>(*s.device);
+    VCP_TRY(s.scaling->prepare(s.resources->size()));
+    auto commands = s.device->beginCommands();
+    if (!commands) return commands.error();
+    s.scaling->record(*commands, s.resources->picture(), target.image, {target.width, target.height});
+    changeLayout(*commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter, VK_ACCESS_TRANSFER_WRITE_BIT,
+                 VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
+    return s.device->endCommandsAndWait(target.wait, target.signal);
 }
 
 Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& drawOver) {

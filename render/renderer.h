@@ -67,6 +67,16 @@ struct SurfaceSource {
     std::function<VkResult(VkInstance, VkSurfaceKHR*)> createSurface;
 };
 
+/// A device that the host made and keeps. Vulkan 1.2; no feature is needed. Where views have windows: the extension
+/// VK_KHR_swapchain, and a queue with graphics that can show pictures in them.
+struct HostDevice {
+    VkInstance instance = VK_NULL_HANDLE;
+    VkPhysicalDevice physical = VK_NULL_HANDLE;
+    VkDevice device = VK_NULL_HANDLE;
+    VkQueue queue = VK_NULL_HANDLE;  ///< used by calls of the renderer, in the thread that calls, and at no other time
+    uint32_t queueFamily = 0;        ///< computes
+};
+
 /// What goes wrong, or is lacking, on purpose: for tests.
 struct DeviceFaults {
     bool separateMemory = false;        ///< the CPU does not see the device's memory, as on a discrete GPU
@@ -98,6 +108,11 @@ struct RendererOptions {
     uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
     DeviceFaults faults;
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
+    /// Instance extensions for windows of views that are added later; the queue then has graphics.
+    std::vector<std::string> windowExtensions;
+    /// In place of a device of our own: `device`, `validation`, `surface` and `windowExtensions` are not looked at then.
+    /// When it is lost it is not made anew: Errors from then on.
+    std::optional<HostDevice> host;
 };
 
 enum class ShadingMode {
@@ -200,6 +215,16 @@ struct FrameStats {
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 
+/// An image of the host's on the renderer's device: colour, not multisampled, a format of the kind UNORM, usage
+/// TRANSFER_DST.
+struct ImageTarget {
+    VkImage image = VK_NULL_HANDLE;
+    uint32_t width = 0, height = 0;
+    VkImageLayout layoutAfter = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
+    VkSemaphore wait = VK_NULL_HANDLE;    ///< where given: the image is written after it is signalled
+    VkSemaphore signal = VK_NULL_HANDLE;  ///< where given: signalled when the image is written
+};
+
 /// What one pixel shows.
 struct PixelHit {
     double depth;         ///< distance from the ray's origin, world units
@@ -216,7 +241,8 @@ public:
     Renderer& operator=(const Renderer&) = delete;
 
     /// Another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for a window:
-    /// the options of create() must have had one too. Errors: Device.
+    /// the options of create() must have had one too, or windowExtensions, or the
+    /// host's device what it takes. Errors: Device.
     Result<std::unique_ptr<Renderer>> addView(const std::optional<SurfaceSource>& surface = {});
 
     [[nodiscard]] const DeviceInfo& device() const;
@@ -260,6 +286,10 @@ public:
     Result<std::vector<uint32_t>> readWork();
     /// One pixel of the last render(); nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
+
+    /// Copies the last picture into the host's image, scaled to it, sRGB-encoded; what was in the image is lost. Waits for
+    /// the GPU. Errors: Usage, where nothing was drawn yet or the queue has no graphics; Device.
+    Result<void> copyPicture(const ImageTarget& target);
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.

@@ -6,30 +6,9 @@
 
 namespace vcp {
 
-namespace {
-
-constexpr VkImageSubresourceLayers kLayer{VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-
-void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to, VkAccessFlags wrote, VkAccessFlags next) {
-    VkImageMemoryBarrier barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER};
-    barrier.srcAccessMask = wrote;
-    barrier.dstAccessMask = next;
-    barrier.oldLayout = from;
-    barrier.newLayout = to;
-    barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.image = image;
-    barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0, nullptr, 0, nullptr, 1, &barrier);
-}
-
-VkOffset3D farCorner(uint32_t width, uint32_t height) { return {static_cast<int32_t>(width), static_cast<int32_t>(height), 1}; }
-
-}  // namespace
-
 Swapchain::~Swapchain() {
     vkDeviceWaitIdle(device_.handle());
     destroySwapchain();
-    destroyPictureImage();
     if (renderPass_ != VK_NULL_HANDLE) vkDestroyRenderPass(device_.handle(), renderPass_, nullptr);
     vkDestroySurfaceKHR(instance_, surface_, nullptr);
 }
@@ -45,14 +24,6 @@ void Swapchain::destroySwapchain() {
     acquired_ = VK_NULL_HANDLE;
     if (swapchain_ != VK_NULL_HANDLE) vkDestroySwapchainKHR(device_.handle(), swapchain_, nullptr);
     swapchain_ = VK_NULL_HANDLE;
-}
-
-void Swapchain::destroyPictureImage() {
-    if (pictureImage_ != VK_NULL_HANDLE) vkDestroyImage(device_.handle(), pictureImage_, nullptr);
-    if (pictureMemory_ != VK_NULL_HANDLE) vkFreeMemory(device_.handle(), pictureMemory_, nullptr);
-    pictureImage_ = VK_NULL_HANDLE;
-    pictureMemory_ = VK_NULL_HANDLE;
-    pictureSize_ = {};
 }
 
 Result<void> Swapchain::chooseFormat() {
@@ -161,43 +132,6 @@ Result<void> Swapchain::recreate(PictureSize window) {
     return {};
 }
 
-Result<void> Swapchain::makePictureImage(PictureSize size) {
-    if (size == pictureSize_) return {};
-    destroyPictureImage();
-    VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO};
-    info.imageType = VK_IMAGE_TYPE_2D;
-    info.format = VK_FORMAT_R8G8B8A8_UNORM;
-    info.extent = {size.width, size.height, 1};
-    info.mipLevels = info.arrayLayers = 1;
-    info.samples = VK_SAMPLE_COUNT_1_BIT;
-    info.usage = VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
-    VCP_VK(vkCreateImage, device_.handle(), &info, nullptr, &pictureImage_);
-    VkMemoryRequirements needs;
-    vkGetImageMemoryRequirements(device_.handle(), pictureImage_, &needs);
-    auto type = device_.memoryType(needs.memoryTypeBits, MemoryUse::Local);
-    if (!type) return type.error();
-    VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
-    allocation.allocationSize = needs.size;
-    allocation.memoryTypeIndex = *type;
-    VCP_VK(vkAllocateMemory, device_.handle(), &allocation, nullptr, &pictureMemory_);
-    VCP_VK(vkBindImageMemory, device_.handle(), pictureImage_, pictureMemory_, 0);
-    pictureSize_ = size;
-    return {};
-}
-
-void Swapchain::recordPicture(VkCommandBuffer commands, const Buffer& picture, VkImage target) const {
-    constexpr VkImageLayout kTo = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, kFrom = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
-    changeLayout(commands, pictureImage_, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
-    const VkBufferImageCopy copy{0, 0, 0, kLayer, {0, 0, 0}, {pictureSize_.width, pictureSize_.height, 1}};
-    vkCmdCopyBufferToImage(commands, picture.handle(), pictureImage_, kTo, 1, &copy);
-    changeLayout(commands, pictureImage_, kTo, kFrom, VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT);
-    changeLayout(commands, target, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
-    const VkImageBlit blit{kLayer, {{0, 0, 0}, farCorner(pictureSize_.width, pictureSize_.height)}, kLayer,
-                           {{0, 0, 0}, farCorner(extent_.width, extent_.height)}};
-    const bool same = pictureSize_.width == extent_.width && pictureSize_.height == extent_.height;
-    vkCmdBlitImage(commands, pictureImage_, kFrom, target, kTo, 1, &blit, same ? VK_FILTER_NEAREST : VK_FILTER_LINEAR);
-}
-
 void Swapchain::recordOver(VkCommandBuffer commands, const DrawOver& drawOver, uint32_t image) const {
     VkRenderPassBeginInfo begin{VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO};
     begin.renderPass = renderPass_;
@@ -221,11 +155,11 @@ Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, Pic
     }
     if (acquired == VK_ERROR_OUT_OF_DATE_KHR) return {};
     if (acquired != VK_SUCCESS && acquired != VK_SUBOPTIMAL_KHR) return vulkanError("vkAcquireNextImageKHR", acquired);
-    VCP_TRY(makePictureImage(pictureSize));
+    VCP_TRY(scaling_.prepare(pictureSize));
     if (drawOver) VCP_TRY(makeFramebuffers());
     auto commands = device_.beginCommands();
     if (!commands) return commands.error();
-    recordPicture(*commands, picture, images_[image]);
+    scaling_.record(*commands, picture, images_[image], extent_);
     if (drawOver)
         recordOver(*commands, drawOver, image);
     else

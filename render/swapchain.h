@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "render/passes/frame_resources.h"
+#include "render/picture_scaling.h"
 #include "render/vulkan/device.h"
 
 namespace vcp {
@@ -13,7 +14,7 @@ namespace vcp {
 class Swapchain {
 public:
     /// Takes the surface over.
-    Swapchain(VkInstance instance, Device& device, VkSurfaceKHR surface) : instance_(instance), device_(device), surface_(surface) {}
+    Swapchain(VkInstance instance, Device& device, VkSurfaceKHR surface) : instance_(instance), device_(device), surface_(surface), scaling_(device) {}
     ~Swapchain();
     Swapchain(const Swapchain&) = delete;
     Swapchain& operator=(const Swapchain&) = delete;
@@ -27,13 +28,10 @@ public:
 
 private:
     Result<void> recreate(PictureSize window);
-    Result<void> makePictureImage(PictureSize size);
     void destroySwapchain();
     void destroyAfterResize();
-    void destroyPictureImage();
     Result<void> chooseFormat();
     Result<void> makeFramebuffers();
-    void recordPicture(VkCommandBuffer commands, const Buffer& picture, VkImage target) const;
     void recordOver(VkCommandBuffer commands, const DrawOver& drawOver, uint32_t image) const;
 
     VkInstance instance_;
@@ -49,9 +47,7 @@ private:
     VkSemaphore acquired_ = VK_NULL_HANDLE;
     PictureSize window_;  // as asked for
     VkExtent2D extent_{};
-    VkImage pictureImage_ = VK_NULL_HANDLE;  // the picture, as something that can be scaled
-    VkDeviceMemory pictureMemory_ = VK_NULL_HANDLE;
-    PictureSize pictureSize_;
+    PictureScaling scaling_;
 };
 
 }  // namespace vcp

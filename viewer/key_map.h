@@ -1,9 +1,13 @@
-// What keys and the mouse do in the window, for people: F1, `vcp help view` and docs/window.md show this table, and a
+// What keys do, and what keys and the mouse do in the window, for people: F1, `vcp help view` and docs/window.md show this table, and a
 // test holds the last of them to it.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+
+#include "viewer/viewer.h"
 
 namespace vcp {
 
@@ -13,6 +17,11 @@ struct KeyHelp {
 };
 
 std::span<const KeyHelp> keyMap();
+
+/// What a key does to the view: the character on it in capitals. Keys of the window itself (measuring, panels) have none.
+std::optional<ViewerAction> actionOf(uint32_t key);
+/// Which way a key flies: camera axes, as Viewer::fly(); 0: nowhere.
+glm::dvec3 flyDirectionOf(uint32_t key);
 
 /// Two columns of plain text.
 std::string keyMapText();

@@ -26,14 +26,6 @@ constexpr double kFitMargin = 1.04;
 
 glm::dvec3 axisOf(UpAxis up) { return up == UpAxis::Y ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1); }
 
-/// World from camera for an eye that looks along `forward`, with `up` as near to the picture's up as it gets.
-/// Precondition: the two are not parallel.
-glm::dquat facing(glm::dvec3 forward, glm::dvec3 up) {
-    const glm::dvec3 back = -glm::normalize(forward);
-    const glm::dvec3 right = glm::normalize(glm::cross(up, back));
-    return glm::normalize(glm::quat_cast(glm::dmat3(right, glm::cross(back, right), back)));
-}
-
 glm::dvec2 tangents(double fovY, glm::ivec2 size) {
     const double y = std::tan(0.5 * fovY);
     return {y * size.x / std::max(size.y, 1), y};
@@ -55,6 +47,12 @@ std::array<glm::dvec3, 8> cornersOf(const Box& box) {
 bool finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 }  // namespace
+
+glm::dquat facing(glm::dvec3 forward, glm::dvec3 up) {
+    const glm::dvec3 back = -glm::normalize(forward);
+    const glm::dvec3 right = glm::normalize(glm::cross(up, back));
+    return glm::normalize(glm::quat_cast(glm::dmat3(right, glm::cross(back, right), back)));
+}
 
 double Box::diagonal() const { return glm::length(high - low); }
 

@@ -97,6 +97,10 @@ struct OrbitCamera {
     void standUp(UpAxis axis);
 };
 
+/// World from camera for an eye that looks along `forward`, with `up` as near to the picture's up as it gets.
+/// Precondition: the two are not parallel.
+glm::dquat facing(glm::dvec3 forward, glm::dvec3 up);
+
 /// Between two cameras, `part` in [0, 1] of the way: the focus moves on a line, the distance to it geometrically,
 /// the orientation on the shorter arc. 0 and 1 are `from` and `to` themselves; the projection is `to`'s.
 OrbitCamera between(const OrbitCamera& from, const OrbitCamera& to, double part);

@@ -69,6 +69,10 @@ Result<std::unique_ptr<Viewer>> Viewer::create(const ViewerOptions& options) {
     return std::unique_ptr<Viewer>(new Viewer(options, *std::move(renderer)));
 }
 
+std::unique_ptr<Viewer> Viewer::on(std::unique_ptr<Renderer> view, const ViewerOptions& options) {
+    return std::unique_ptr<Viewer>(new Viewer(options, std::move(view)));
+}
+
 Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
     : options_(options), renderer_(std::move(renderer)), shading_(options.shading), sections_(options.sections), sectionCaps_(options.sectionCaps) {
     status_.device = renderer_->device().name;
@@ -79,6 +83,11 @@ Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
 Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source,
                           const OrbitCamera& camera, std::string name) {
     VCP_TRY(renderer_->open(dataset, std::move(source)));
+    show(std::move(dataset), camera, std::move(name));
+    return {};
+}
+
+void Viewer::show(std::shared_ptr<const Dataset> dataset, const OrbitCamera& camera, std::string name) {
     dataset_ = std::move(dataset);
     const FileHeader& header = dataset_->header;
     bounds_ = {{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
@@ -93,7 +102,6 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
     status_.levels = header.levels;
     status_.update = {};
     status_.problem.clear();
-    return {};
 }
 
 Result<void> Viewer::setBudget(uint64_t bytes) {

@@ -98,11 +98,16 @@ class Viewer {
 public:
     /// Errors: those of Renderer::create.
     static Result<std::unique_ptr<Viewer>> create(const ViewerOptions& options);
+    /// On a view that shares its device with others (Renderer::addView).
+    static std::unique_ptr<Viewer> on(std::unique_ptr<Renderer> view, const ViewerOptions& options);
 
     /// Shows a dataset from `camera`, which also is where Reset goes. `name` is for the status line.
     /// Errors: those of Renderer::open.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source,
                       const OrbitCamera& camera, std::string name);
+
+    /// The same, where a view that shares the device has opened the dataset already.
+    void show(std::shared_ptr<const Dataset> dataset, const OrbitCamera& camera, std::string name);
 
     /// Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);

@@ -38,7 +38,18 @@ void TexelView::destroy() {
     if (device_ != VK_NULL_HANDLE) vkDestroyBufferView(device_, view_, nullptr);
 }
 
-Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface, const DeviceFaults& faults) {
+void Device::describe(VkPhysicalDevice physical, const DeviceInfo& info) {
+    physical_ = physical;
+    info_ = info;
+    info_.chosen = true;
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(physical_, &properties);
+    limits_ = properties.limits;
+    vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
+}
+
+Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface, bool forWindows,
+                                               const DeviceFaults& faults) {
     auto physical = instance.physicalDevices();
     if (!physical) return physical.error();
     std::vector<DeviceInfo> infos;
@@ -47,34 +58,62 @@ Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const s
     if (!chosen) return chosen.error();
 
     std::unique_ptr<Device> made(new Device);
-    made->physical_ = (*physical)[*chosen];
-    made->info_ = infos[*chosen];
-    made->info_.chosen = true;
     made->faults_ = faults;
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(made->physical_, &properties);
-    made->limits_ = properties.limits;
-    vkGetPhysicalDeviceMemoryProperties(made->physical_, &made->memory_);
-    VCP_TRY(made->chooseQueue(surface));
-    VCP_TRY(made->createDevice(surface != VK_NULL_HANDLE));
+    made->describe((*physical)[*chosen], infos[*chosen]);
+    VCP_TRY(made->chooseQueue(surface, forWindows));
+    made->hasSwapchain_ = forWindows;
+    VCP_TRY(made->createDevice());
+    VCP_TRY(made->createObjects());
     return made;
 }
 
-Result<void> Device::chooseQueue(VkSurfaceKHR surface) {
+Result<std::unique_ptr<Device>> Device::borrow(const HostDevice& host, const DeviceFaults& faults) {
+    if (host.instance == VK_NULL_HANDLE || host.physical == VK_NULL_HANDLE || host.device == VK_NULL_HANDLE || host.queue == VK_NULL_HANDLE)
+        return Error{.code = ErrorCode::Usage, .message = "the host's device lacks its instance, physical device, device or queue"};
+    std::unique_ptr<Device> made(new Device);
+    made->borrowed_ = true;
+    made->faults_ = faults;
+    made->describe(host.physical, describeDevice(host.physical, 0));
+    if (!made->info_.usable) return Error{.code = ErrorCode::Device, .message = "device '" + made->info_.name + "' has no Vulkan 1.2 with compute"};
+    const auto families = made->queueFamilies();
+    if (host.queueFamily >= families.size() || (families[host.queueFamily].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0)
+        return Error{.code = ErrorCode::Device, .message = "queue family " + std::to_string(host.queueFamily) + " of device '" + made->info_.name + "' does not compute"};
+    made->useFamily(host.queueFamily, families[host.queueFamily]);
+    made->device_ = host.device;
+    made->queue_ = host.queue;
+    made->hasSwapchain_ = vkGetDeviceProcAddr(host.device, "vkCreateSwapchainKHR") != nullptr;
+    VCP_TRY(made->createObjects());
+    return made;
+}
+
+std::vector<VkQueueFamilyProperties> Device::queueFamilies() const {
     uint32_t count = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(physical_, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
     vkGetPhysicalDeviceQueueFamilyProperties(physical_, &count, families.data());
-    for (uint32_t i = 0; i < count; ++i) {
-        // Blits to a window's pictures need a graphics queue.
-        const VkQueueFlags wanted = surface != VK_NULL_HANDLE ? VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT : VK_QUEUE_COMPUTE_BIT;
-        if ((families[i].queueFlags & wanted) != wanted) continue;
-        VkBool32 shows = VK_TRUE;
-        if (surface != VK_NULL_HANDLE) VCP_VK(vkGetPhysicalDeviceSurfaceSupportKHR, physical_, i, surface, &shows);
-        if (shows != VK_TRUE) continue;
-        family_ = i;
-        timestampNanoseconds_ = families[i].timestampValidBits > 0 ? double(limits_.timestampPeriod) : 0;
-        return {};
+    return families;
+}
+
+void Device::useFamily(uint32_t index, const VkQueueFamilyProperties& family) {
+    family_ = index;
+    hasGraphics_ = (family.queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
+    timestampNanoseconds_ = family.timestampValidBits > 0 ? double(limits_.timestampPeriod) : 0;
+}
+
+Result<void> Device::chooseQueue(VkSurfaceKHR surface, bool forWindows) {
+    const auto families = queueFamilies();
+    // Pictures are scaled to windows and to the host's images on queues with graphics: these are the first choice anyhow.
+    for (const bool graphics : {true, false}) {
+        for (uint32_t i = 0; i < families.size(); ++i) {
+            const VkQueueFlags wanted = graphics ? VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT : VK_QUEUE_COMPUTE_BIT;
+            if ((families[i].queueFlags & wanted) != wanted) continue;
+            VkBool32 shows = VK_TRUE;
+            if (surface != VK_NULL_HANDLE) VCP_VK(vkGetPhysicalDeviceSurfaceSupportKHR, physical_, i, surface, &shows);
+            if (shows != VK_TRUE) continue;
+            useFamily(i, families[i]);
+            return {};
+        }
+        if (forWindows) break;
     }
     return Error{.code = ErrorCode::Device, .message = "device '" + info_.name + "' has no queue that computes and shows pictures"};
 }
@@ -84,8 +123,7 @@ bool Device::shows(VkSurfaceKHR surface) const {
     return hasSwapchain_ && vkGetPhysicalDeviceSurfaceSupportKHR(physical_, family_, surface, &shows) == VK_SUCCESS && shows == VK_TRUE;
 }
 
-Result<void> Device::createDevice(bool withSwapchain) {
-    hasSwapchain_ = withSwapchain;
+Result<void> Device::createDevice() {
     const float priority = 1;
     VkDeviceQueueCreateInfo queue{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
     queue.queueFamilyIndex = family_;
@@ -96,11 +134,14 @@ Result<void> Device::createDevice(bool withSwapchain) {
     VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
     info.queueCreateInfoCount = 1;
     info.pQueueCreateInfos = &queue;
-    info.enabledExtensionCount = withSwapchain ? 1 : 0;
+    info.enabledExtensionCount = hasSwapchain_ ? 1 : 0;
     info.ppEnabledExtensionNames = &swapchain;
     VCP_VK(vkCreateDevice, physical_, &info, nullptr, &device_);
     vkGetDeviceQueue(device_, family_, 0, &queue_);
+    return {};
+}
 
+Result<void> Device::createObjects() {
     VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     pool.queueFamilyIndex = family_;
@@ -122,7 +163,7 @@ Device::~Device() {
     vkDestroyPipelineCache(device_, pipelineCache_, nullptr);
     vkDestroyFence(device_, fence_, nullptr);
     vkDestroyCommandPool(device_, commandPool_, nullptr);
-    vkDestroyDevice(device_, nullptr);
+    if (!borrowed_) vkDestroyDevice(device_, nullptr);
 }
 
 Result<uint32_t> Device::memoryType(uint32_t allowed, MemoryUse use) const {

@@ -67,10 +67,12 @@ enum class MemoryUse { Local, Upload, Readback };
 
 class Device {
 public:
-    /// `choice` as in RendererOptions::device; a surface asks for the swapchain extension and a queue that
-    /// can show pictures. Errors: Device.
-    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface,
+    /// `choice` as in RendererOptions::device. `forWindows` asks for the swapchain extension and a queue with graphics, a
+    /// surface for a queue that can show pictures in it. Errors: Device.
+    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface, bool forWindows,
                                                   const DeviceFaults& faults = {});
+    /// The host's device, which it keeps. Errors: Usage (something is missing), Device (too old, no such queue).
+    static Result<std::unique_ptr<Device>> borrow(const HostDevice& host, const DeviceFaults& faults = {});
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
@@ -80,6 +82,8 @@ public:
     [[nodiscard]] VkQueue queue() const { return queue_; }
     [[nodiscard]] uint32_t queueFamily() const { return family_; }
     [[nodiscard]] VkPipelineCache pipelineCache() const { return pipelineCache_; }
+    /// Whether the queue can scale pictures.
+    [[nodiscard]] bool hasGraphics() const { return hasGraphics_; }
     [[nodiscard]] const DeviceInfo& info() const { return info_; }
     [[nodiscard]] const VkPhysicalDeviceLimits& limits() const { return limits_; }
     /// Nanoseconds a timestamp step, 0 where the queue has no timestamps.
@@ -113,8 +117,12 @@ public:
 private:
     Device() = default;
     Result<void> allocate(Buffer& buffer, VkBufferUsageFlags usage, MemoryUse use) const;
-    Result<void> chooseQueue(VkSurfaceKHR surface);
-    Result<void> createDevice(bool withSwapchain);
+    void describe(VkPhysicalDevice physical, const DeviceInfo& info);
+    [[nodiscard]] std::vector<VkQueueFamilyProperties> queueFamilies() const;
+    void useFamily(uint32_t index, const VkQueueFamilyProperties& family);
+    Result<void> chooseQueue(VkSurfaceKHR surface, bool forWindows);
+    Result<void> createDevice();
+    Result<void> createObjects();
 
     VkPhysicalDevice physical_ = VK_NULL_HANDLE;
     VkDevice device_ = VK_NULL_HANDLE;
@@ -133,7 +141,7 @@ private:
     mutable uint64_t allocated_ = 0;
     mutable bool outOfMemory_ = false;
     bool lost_ = false;
-    bool hasSwapchain_ = false;
+    bool hasSwapchain_ = false, hasGraphics_ = false, borrowed_ = false;
 };
 
 }  // namespace vcp

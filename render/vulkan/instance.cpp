@@ -124,7 +124,15 @@ Result<void> Instance::connectLog() {
     return {};
 }
 
+std::unique_ptr<Instance> Instance::borrow(VkInstance instance) {
+    std::unique_ptr<Instance> made(new Instance);
+    made->instance_ = instance;
+    made->borrowed_ = true;
+    return made;
+}
+
 Instance::~Instance() {
+    if (borrowed_) return;
     if (messenger_ != VK_NULL_HANDLE) {
         const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
             vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));

@@ -28,6 +28,8 @@ class Instance {
 public:
     /// Vulkan 1.2. With `validation`: core and synchronization checks into log(). Errors: Device.
     static Result<std::unique_ptr<Instance>> create(bool validation, const std::vector<std::string>& extensions);
+    /// The host's instance, which it keeps.
+    static std::unique_ptr<Instance> borrow(VkInstance instance);
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
@@ -41,6 +43,7 @@ private:
     Result<void> connectLog();
 
     VkInstance instance_ = VK_NULL_HANDLE;
+    bool borrowed_ = false;
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     std::unique_ptr<ValidationLog> log_ = std::make_unique<ValidationLog>();
 };

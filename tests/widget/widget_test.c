@@ -1,0 +1,480 @@
+/* The widget from plain C: test_widget CASE FOLDER. Exit status 0 done, 1 failed, 77 no Vulkan device. */
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "vcp.h"
+
+#define CHECK(condition)                                                     \
+    do {                                                                     \
+        if (!(condition)) {                                                  \
+            fprintf(stderr, "line %d: %s\n", __LINE__, #condition);          \
+            exit(1);                                                         \
+        }                                                                    \
+    } while (0)
+#define OK(call) check_ok(call, #call, __LINE__)
+
+enum { WIDTH = 96, HEIGHT = 64, PIXELS = WIDTH * HEIGHT };
+
+static char ply[4096], tree[4096];
+
+static void check_ok(vcp_status status, const char* call, int line) {
+    if (status == VCP_OK) return;
+    fprintf(stderr, "line %d: %s: %s\n", line, call, vcp_status_text(status));
+    exit(1);
+}
+
+/* A ball of radius 1 about (x, 0, 0). */
+static void write_ball(double x) {
+    enum { RINGS = 24, SECTORS = 48 };
+    const double pi = 3.14159265358979323846;
+    FILE* file = fopen(ply, "w");
+    CHECK(file);
+    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n", (RINGS + 1) * SECTORS);
+    fprintf(file, "element face %d\nproperty list uchar int vertex_indices\nend_header\n", 2 * RINGS * SECTORS);
+    for (int i = 0; i <= RINGS; ++i)
+        for (int j = 0; j < SECTORS; ++j) {
+            const double a = pi * i / RINGS, b = 2 * pi * j / SECTORS;
+            fprintf(file, "%.17g %.17g %.17g\n", x + sin(a) * cos(b), cos(a), sin(a) * sin(b));
+        }
+    for (int i = 0; i < RINGS; ++i)
+        for (int j = 0; j < SECTORS; ++j) {
+            const int p = i * SECTORS + j, q = i * SECTORS + (j + 1) % SECTORS;
+            fprintf(file, "3 %d %d %d\n3 %d %d %d\n", p, q, p + SECTORS, q, q + SECTORS, p + SECTORS);
+        }
+    CHECK(fclose(file) == 0);
+}
+
+static void build_ball(double x) {
+    write_ball(x);
+    const char* inputs[] = {ply};
+    char text[256] = "";
+    vcp_build_options options = VCP_INIT(vcp_build_options);
+    options.inputs = inputs;
+    options.input_count = 1;
+    options.output = tree;
+    options.error_text = text;
+    options.error_text_size = sizeof(text);
+    vcp_build_report report = VCP_INIT(vcp_build_report);
+    if (vcp_build(&options, &report) != VCP_OK) {
+        fprintf(stderr, "%s\n", text);
+        exit(1);
+    }
+    CHECK(report.triangles == 2 * 24 * 48 && report.levels >= 1 && report.file_bytes > 4096);
+}
+
+static vcp_context* make_context(const vcp_context_options* options) {
+    vcp_context* context = NULL;
+    OK(vcp_context_create(options, &context));
+    return context;
+}
+
+static vcp_view* make_view(vcp_context* context) {
+    vcp_view_options options = VCP_INIT(vcp_view_options);
+    options.width = WIDTH;
+    options.height = HEIGHT;
+    vcp_view* view = NULL;
+    OK(vcp_view_create(context, &options, &view));
+    return view;
+}
+
+static void read_frame(vcp_view* view, uint8_t* rgba, float* depth) {
+    vcp_frame frame = VCP_INIT(vcp_frame);
+    frame.rgba = rgba;
+    frame.rgba_size = 4 * PIXELS;
+    frame.depth = depth;
+    frame.depth_size = PIXELS;
+    OK(vcp_view_read(view, &frame));
+    CHECK(frame.width == WIDTH && frame.height == HEIGHT);
+}
+
+/* Colour, depth and pick of one view agree, and with the ball. */
+static void picture(void) {
+    build_ball(1e6);
+    vcp_context* context = make_context(NULL);
+    vcp_view* view = make_view(context);
+    OK(vcp_context_open(context, tree, NULL));
+    OK(vcp_view_settle(view, 60));
+    static uint8_t rgba[4 * PIXELS];
+    static float depth[PIXELS];
+    read_frame(view, rgba, depth);
+    vcp_stats stats = VCP_INIT(vcp_stats);
+    OK(vcp_view_stats(view, &stats));
+    uint64_t hits = 0;
+    for (int i = 0; i < PIXELS; ++i) hits += isfinite(depth[i]) ? 1 : 0;
+    CHECK(hits > 500 && hits == stats.hit_pixels && stats.rays == PIXELS && stats.settled && stats.frames == 1 && stats.frame_ms > 0);
+    CHECK(isinf(depth[0]) && memcmp(rgba, rgba + 4 * (PIXELS / 2 + WIDTH / 2), 4) != 0 && rgba[3] == 255);
+
+    vcp_camera camera = VCP_INIT(vcp_camera);
+    OK(vcp_view_get_camera(view, &camera));
+    vcp_pick pick = VCP_INIT(vcp_pick);
+    OK(vcp_view_pick(view, WIDTH / 2 + 0.5, HEIGHT / 2 + 0.5, &pick));
+    vcp_dataset_info info = VCP_INIT(vcp_dataset_info);
+    OK(vcp_context_dataset(context, &info));
+    CHECK(pick.hit && fabs(pick.distance - depth[PIXELS / 2 + WIDTH / 2]) < 1e-4);
+    const double* p = pick.position;
+    const double radius = sqrt((p[0] - 1e6) * (p[0] - 1e6) + p[1] * p[1] + p[2] * p[2]);
+    CHECK(fabs(radius - 1) < 0.01 && pick.error > 0 && pick.error <= info.certified_error && pick.level == info.levels - 1);
+    CHECK(fabs(pick.normal[2]) > 0.99 && camera.position[2] * pick.normal[2] > 0);
+    OK(vcp_view_pick(view, 0, 0, &pick));
+    CHECK(!pick.hit);
+    OK(vcp_view_pick(view, -1, 1e9, &pick));
+    CHECK(!pick.hit);
+
+    /* Nothing changed: nothing is drawn. Something did: it is. */
+    vcp_step step = VCP_INIT(vcp_step);
+    OK(vcp_view_update(view, &step));
+    CHECK(!step.draw && step.settled && isinf(step.wait_seconds));
+    vcp_look look = VCP_INIT(vcp_look);
+    OK(vcp_view_get_look(view, &look));
+    look.shading = VCP_SHADING_NORMALS;
+    look.section_count = 1;
+    look.sections[0][0] = 1;
+    look.sections[0][3] = 1e6;
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_update(view, &step));
+    CHECK(step.draw);
+    OK(vcp_view_settle(view, 60));
+    static uint8_t cut[4 * PIXELS];
+    read_frame(view, cut, depth);
+    CHECK(memcmp(cut, rgba, sizeof(cut)) != 0);
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(context));
+}
+
+/* The host's hands: mouse, keys, camera. */
+static void input(void) {
+    build_ball(0);
+    vcp_context* context = make_context(NULL);
+    OK(vcp_context_open(context, tree, NULL));
+    vcp_view* view = make_view(context);
+    OK(vcp_view_settle(view, 60));
+    vcp_camera before = VCP_INIT(vcp_camera), after = VCP_INIT(vcp_camera);
+    OK(vcp_view_get_camera(view, &before));
+    OK(vcp_view_mouse_press(view, VCP_LEFT, 40, 30, 0));
+    OK(vcp_view_mouse_move(view, 60, 35));
+    OK(vcp_view_mouse_release(view, VCP_LEFT));
+    OK(vcp_view_get_camera(view, &after));
+    CHECK(memcmp(before.position, after.position, sizeof(before.position)) != 0);
+    OK(vcp_view_mouse_move(view, 10, 10));
+    OK(vcp_view_get_camera(view, &before));
+    CHECK(memcmp(&before, &after, sizeof(before)) == 0);
+    OK(vcp_view_mouse_scroll(view, 48, 32, 2, 0));
+    OK(vcp_view_get_camera(view, &after));
+    CHECK(memcmp(before.position, after.position, sizeof(before.position)) != 0);
+    OK(vcp_view_key(view, 'P', 1));
+    OK(vcp_view_get_camera(view, &after));
+    CHECK(after.orthographic);
+    OK(vcp_view_act(view, VCP_RESET));
+    vcp_camera wanted = VCP_INIT(vcp_camera);
+    wanted.position[2] = 5;
+    OK(vcp_view_set_camera(view, &wanted));
+    OK(vcp_view_get_camera(view, &after));
+    CHECK(after.position[2] == 5 && fabs(after.target[2]) < 1e-12 && after.up[1] > 0.999 && fabs(after.fov_y - 0.785398) < 1e-5 && !after.orthographic);
+    OK(vcp_view_resize(view, 32, 16));
+    OK(vcp_view_settle(view, 60));
+    vcp_frame frame = VCP_INIT(vcp_frame);
+    OK(vcp_view_read(view, &frame));
+    CHECK(frame.width == 32 && frame.height == 16);
+    OK(vcp_view_resize(view, 0, 0));
+    OK(vcp_view_settle(view, 60));
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(context));
+}
+
+/* What callbacks were told, and by what they were answered. */
+typedef struct told {
+    int logs, errors, redraws, settled, progress, cancel_at;
+    vcp_status last_error, answer;
+    vcp_context* context;
+} told;
+
+static void on_log(void* user, vcp_log_level level, const char* text) {
+    CHECK(level <= VCP_LOG_ERROR && text[0]);
+    ++((told*)user)->logs;
+}
+static void on_error(void* user, vcp_status status, const char* text) {
+    CHECK(text[0]);
+    ((told*)user)->last_error = status;
+    ++((told*)user)->errors;
+}
+static void on_redraw(void* user, vcp_view* view) {
+    CHECK(view);
+    ++((told*)user)->redraws;
+}
+static void on_settled(void* user, vcp_view* view) {
+    told* t = user;
+    ++t->settled;
+    t->answer = vcp_view_render(view);
+    CHECK(vcp_context_destroy(t->context) == VCP_BUSY && vcp_view_destroy(view) == VCP_BUSY);
+}
+static int on_progress(void* user, const vcp_progress* progress) {
+    told* t = user;
+    CHECK(progress->stage && progress->fraction >= 0 && progress->fraction <= 1);
+    return ++t->progress != t->cancel_at;
+}
+
+static void callbacks(void) {
+    build_ball(0);
+    told t = {0};
+    vcp_callbacks call = VCP_INIT(vcp_callbacks);
+    call.user = &t;
+    call.log = on_log;
+    call.error = on_error;
+    call.needs_redraw = on_redraw;
+    call.settled = on_settled;
+    vcp_context_options options = VCP_INIT(vcp_context_options);
+    options.callbacks = &call;
+    t.context = make_context(&options);
+    CHECK(t.logs == 1);
+    vcp_view* view = make_view(t.context);
+    OK(vcp_context_open(t.context, tree, NULL));
+    CHECK(t.logs == 2 && t.redraws == 1);
+    OK(vcp_view_settle(view, 60));
+    CHECK(t.settled == 1 && t.answer == VCP_BUSY);
+    OK(vcp_view_settle(view, 60));
+    CHECK(t.settled == 1);
+    OK(vcp_view_key(view, 'M', 1));
+    CHECK(t.redraws == 2 && t.errors == 0);
+    CHECK(vcp_context_open(t.context, "/nowhere/at.vcp", NULL) == VCP_IO && t.errors == 1 && t.last_error == VCP_IO);
+    CHECK(strstr(vcp_context_last_error(t.context), "/nowhere/at.vcp"));
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(t.context));
+
+    const char* inputs[] = {ply};
+    vcp_build_options build = VCP_INIT(vcp_build_options);
+    build.inputs = inputs;
+    build.input_count = 1;
+    build.output = tree;
+    build.progress = on_progress;
+    build.user = &t;
+    OK(vcp_build(&build, NULL));
+    CHECK(t.progress >= 1);
+    t.progress = 0;
+    t.cancel_at = 1;
+    build.cell = 0.005; /* takes long enough to be cancelled */
+    CHECK(vcp_build(&build, NULL) == VCP_CANCELLED && t.progress >= 1);
+}
+
+/* Wrong calls give errors, and change nothing. */
+static void wrong_calls(void) {
+    build_ball(0);
+    vcp_context* context = NULL;
+    vcp_view* view = NULL;
+    vcp_step step = VCP_INIT(vcp_step);
+    char text[64] = "";
+    CHECK(vcp_context_create(NULL, NULL) == VCP_USAGE);
+    vcp_context_options options = VCP_INIT(vcp_context_options);
+    options.struct_size = 0;
+    CHECK(vcp_context_create(&options, &context) == VCP_USAGE && !context);
+    options.struct_size = sizeof(options);
+    options.device = "no such device";
+    options.error_text = text;
+    options.error_text_size = sizeof(text);
+    CHECK(vcp_context_create(&options, &context) == VCP_DEVICE && !context && strstr(text, "no such device"));
+    options.device = NULL;
+    options.gpu_bytes = 1;
+    CHECK(vcp_context_create(&options, &context) == VCP_USAGE);
+    vcp_host_device nothing = VCP_INIT(vcp_host_device);
+    options.gpu_bytes = 0;
+    options.host_device = &nothing;
+    CHECK(vcp_context_create(&options, &context) == VCP_USAGE);
+
+    /* A struct of a later version: what is zero is no matter, what is not is refused. */
+    struct {
+        vcp_context_options known;
+        uint64_t later;
+    } large = {{.struct_size = sizeof(large)}, 1};
+    CHECK(vcp_context_create(&large.known, &context) == VCP_USAGE);
+    large.later = 0;
+    OK(vcp_context_create(&large.known, &context));
+
+    CHECK(vcp_context_open(NULL, tree, NULL) == VCP_USAGE && vcp_context_open(context, NULL, NULL) == VCP_USAGE);
+    CHECK(vcp_context_open(context, ply, NULL) == VCP_INVALID_INPUT);
+    CHECK(strstr(vcp_context_last_error(context), ply));
+    vcp_dataset_info info = VCP_INIT(vcp_dataset_info);
+    CHECK(vcp_context_dataset(context, &info) == VCP_USAGE && vcp_context_dataset(context, NULL) == VCP_USAGE);
+    CHECK(vcp_context_wait(context, -1) == VCP_USAGE && vcp_context_wait(context, NAN) == VCP_USAGE);
+    CHECK(vcp_context_set_budgets(context, 1, 0) == VCP_USAGE);
+
+    vcp_view_options window = VCP_INIT(vcp_view_options);
+    CHECK(vcp_view_create(context, NULL, NULL) == VCP_USAGE && vcp_view_create(NULL, NULL, &view) == VCP_USAGE);
+    window.width = 1000000;
+    CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE && !view);
+    window.width = 0;
+    window.window_system = 99;
+    CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE);
+    window.window_system = VCP_WINDOW_XCB;
+    CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE);
+    window.display = &window;
+    window.window = 1;
+    CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE && strstr(vcp_context_last_error(context), "without windows"));
+
+    view = make_view(context);
+    CHECK(vcp_context_destroy(context) == VCP_USAGE);
+    vcp_frame frame = VCP_INIT(vcp_frame);
+    CHECK(vcp_view_read(view, &frame) == VCP_USAGE);
+    vcp_pick pick = VCP_INIT(vcp_pick);
+    CHECK(vcp_view_pick(view, 1, 1, &pick) == VCP_USAGE);
+    OK(vcp_context_open(context, tree, NULL));
+    CHECK(vcp_view_settle(view, NAN) == VCP_USAGE);
+    OK(vcp_view_settle(view, 60));
+    CHECK(vcp_view_update(view, NULL) == VCP_USAGE && vcp_view_update(NULL, &step) == VCP_USAGE);
+    CHECK(vcp_view_pick(view, 1, 1, NULL) == VCP_USAGE);
+    uint8_t pixel[4];
+    frame.rgba = pixel;
+    frame.rgba_size = 4;
+    CHECK(vcp_view_read(view, &frame) == VCP_LIMIT && frame.width == WIDTH && frame.height == HEIGHT);
+    vcp_host_image image = VCP_INIT(vcp_host_image);
+    CHECK(vcp_view_copy_to_image(view, NULL) == VCP_USAGE && vcp_view_copy_to_image(view, &image) == VCP_USAGE);
+    CHECK(vcp_view_resize(view, 16385, 1) == VCP_USAGE);
+    CHECK(vcp_view_mouse_press(view, 17, 1, 1, 0) == VCP_USAGE && vcp_view_mouse_press(view, VCP_LEFT, NAN, 1, 0) == VCP_USAGE);
+    CHECK(vcp_view_mouse_move(view, INFINITY, 0) == VCP_USAGE && vcp_view_mouse_release(view, -1) == VCP_USAGE);
+    CHECK(vcp_view_mouse_scroll(view, 1, 1, NAN, 0) == VCP_USAGE && vcp_view_act(view, 999) == VCP_USAGE && vcp_view_act(view, -1) == VCP_USAGE);
+    OK(vcp_view_key(view, 0xffffffffu, 1));
+    vcp_camera camera = VCP_INIT(vcp_camera);
+    CHECK(vcp_view_set_camera(view, &camera) == VCP_USAGE && vcp_view_set_camera(view, NULL) == VCP_USAGE);
+    camera.target[0] = NAN;
+    CHECK(vcp_view_move_camera(view, &camera) == VCP_USAGE);
+    camera.target[0] = 0;
+    camera.target[1] = camera.up[1] = 1;
+    CHECK(vcp_view_set_camera(view, &camera) == VCP_USAGE);
+    vcp_look look = VCP_INIT(vcp_look);
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE && vcp_view_set_look(view, NULL) == VCP_USAGE);
+    OK(vcp_view_get_look(view, &look));
+    look.section_count = 7;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    look.section_count = 1;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    look.section_count = 0;
+    look.shading = -1;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    OK(vcp_view_update(view, &step));
+    CHECK(!step.draw);
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(context));
+    OK(vcp_view_destroy(NULL));
+    OK(vcp_context_destroy(NULL));
+
+    vcp_build_options build = VCP_INIT(vcp_build_options);
+    CHECK(vcp_build(NULL, NULL) == VCP_USAGE && vcp_build(&build, NULL) == VCP_USAGE);
+    const char* inputs[] = {"/nowhere.ply", NULL};
+    build.inputs = inputs;
+    build.input_count = 2;
+    build.output = tree;
+    CHECK(vcp_build(&build, NULL) == VCP_USAGE);
+    build.input_count = 1;
+    CHECK(vcp_build(&build, NULL) == VCP_IO);
+    CHECK(vcp_version()[0] && vcp_status_text(-5)[0] && vcp_context_last_error(NULL)[0] && vcp_view_last_error(NULL)[0]);
+}
+
+/* Views of one context share its budget, and what one loads the other has. */
+static void sharing(void) {
+    build_ball(0);
+    vcp_context_options options = VCP_INIT(vcp_context_options);
+    options.gpu_bytes = 8 << 20;
+    vcp_context* context = make_context(&options);
+    vcp_view* first = make_view(context);
+    vcp_view* second = make_view(context);
+    OK(vcp_context_open(context, tree, NULL));
+    OK(vcp_view_settle(first, 60));
+    vcp_stats stats = VCP_INIT(vcp_stats), again = VCP_INIT(vcp_stats);
+    OK(vcp_view_stats(first, &stats));
+    OK(vcp_view_settle(second, 60));
+    OK(vcp_view_stats(second, &again));
+    CHECK(stats.bytes_read > 0 && again.bytes_read == stats.bytes_read && again.pool_bytes == stats.pool_bytes && stats.pool_bytes <= options.gpu_bytes);
+    static uint8_t a[4 * PIXELS], b[4 * PIXELS];
+    static float depth[PIXELS];
+    read_frame(first, a, depth);
+    read_frame(second, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) == 0);
+    OK(vcp_context_set_budgets(context, 4 << 20, 0));
+    OK(vcp_view_destroy(first));
+    OK(vcp_view_settle(second, 60));
+    OK(vcp_view_stats(second, &again));
+    CHECK(again.resident_bytes <= 4 << 20);
+    read_frame(second, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) == 0);
+    OK(vcp_view_destroy(second));
+    OK(vcp_context_destroy(context));
+}
+
+/* Made and destroyed again and again: VCP_TEST_CYCLES times. */
+static void cycles(void) {
+    build_ball(0);
+    const char* wanted = getenv("VCP_TEST_CYCLES");
+    const int count = wanted ? atoi(wanted) : 20;
+    CHECK(count > 0);
+    vcp_context* shared = make_context(NULL);
+    OK(vcp_context_open(shared, tree, NULL));
+    for (int i = 0; i < count; ++i) {
+        vcp_context* own = i % 2 ? make_context(NULL) : NULL;
+        if (own) OK(vcp_context_open(own, tree, NULL));
+        vcp_view* view = make_view(own ? own : shared);
+        vcp_step step = VCP_INIT(vcp_step);
+        /* Destroyed before anything is loaded, while it loads, or when it is settled and drawn. */
+        if (i % 3 == 1) OK(vcp_view_update(view, &step));
+        if (i % 10 == 2) OK(vcp_view_settle(view, 60));
+        OK(vcp_view_destroy(view));
+        OK(vcp_context_destroy(own));
+    }
+    OK(vcp_context_destroy(shared));
+}
+
+static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER;
+static vcp_context *handed, *contended;
+
+/* A context of the thread's own, and one that goes from thread to thread. */
+static void* work(void* unused) {
+    (void)unused;
+    vcp_context* own = make_context(NULL);
+    OK(vcp_context_open(own, tree, NULL));
+    vcp_view* view = make_view(own);
+    OK(vcp_view_settle(view, 60));
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(own));
+    for (int i = 0; i < 3; ++i) {
+        CHECK(pthread_mutex_lock(&turn) == 0);
+        view = make_view(handed);
+        OK(vcp_view_settle(view, 60));
+        OK(vcp_view_destroy(view));
+        CHECK(pthread_mutex_unlock(&turn) == 0);
+    }
+    /* Out of turn: done or refused, never anything else. */
+    for (int i = 0; i < 200; ++i) {
+        vcp_device_info info = VCP_INIT(vcp_device_info);
+        const vcp_status status = vcp_context_device(contended, &info);
+        CHECK(status == VCP_BUSY || (status == VCP_OK && info.name[0]));
+    }
+    return NULL;
+}
+
+static void threads(void) {
+    build_ball(0);
+    handed = make_context(NULL);
+    contended = make_context(NULL);
+    OK(vcp_context_open(handed, tree, NULL));
+    pthread_t all[3];
+    for (int i = 0; i < 3; ++i) CHECK(pthread_create(&all[i], NULL, work, NULL) == 0);
+    for (int i = 0; i < 3; ++i) CHECK(pthread_join(all[i], NULL) == 0);
+    OK(vcp_context_destroy(handed));
+    OK(vcp_context_destroy(contended));
+}
+
+int main(int argc, char** argv) {
+    static const struct {
+        const char* name;
+        void (*run)(void);
+    } cases[] = {{"picture", picture}, {"input", input}, {"callbacks", callbacks}, {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"cycles", cycles}, {"threads", threads}};
+    if (argc != 3) return 2;
+    snprintf(ply, sizeof(ply), "%s/ball-%s.ply", argv[2], argv[1]);
+    snprintf(tree, sizeof(tree), "%s/ball-%s.vcp", argv[2], argv[1]);
+    vcp_context* probe = NULL;
+    if (vcp_context_create(NULL, &probe) != VCP_OK) return 77;
+    OK(vcp_context_destroy(probe));
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); ++i)
+        if (strcmp(cases[i].name, argv[1]) == 0) return cases[i].run(), 0;
+    return 2;
+}

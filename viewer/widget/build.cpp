@@ -1,0 +1,127 @@
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "builder/build.h"
+#include "viewer/widget/handles.h"
+
+namespace vcp::widget {
+
+namespace {
+
+constexpr std::chrono::milliseconds kProgressEvery{50};
+
+/// A build in a thread of its own, so that the host hears of it in the one that called.
+class BuildRun {
+public:
+    explicit BuildRun(BuildOptions options) : options_(std::move(options)) {
+        options_.progress = [this](const BuildProgress& at) { return hear(at); };
+    }
+
+    /// Until it is done. `tell` returns false to cancel.
+    template <class Tell>
+    Result<BuildReport> run(Tell tell) {
+        std::thread thread([this] {
+            Outcome thrown = outcomeOf([&] { report_ = buildOctree(options_); return Outcome(); });
+            const std::lock_guard lock(mutex_);
+            if (thrown.status != VCP_OK) report_ = Error{.code = ErrorCode::Limit, .message = thrown.text};
+            done_ = true;
+            news_.notify_one();
+        });
+        std::unique_lock lock(mutex_);
+        while (!done_) {
+            news_.wait_for(lock, kProgressEvery, [this] { return done_; });
+            const BuildProgress at = at_;
+            lock.unlock();
+            const bool goesOn = tell(at);
+            lock.lock();
+            cancelled_ = cancelled_ || !goesOn;
+        }
+        lock.unlock();
+        thread.join();
+        return *std::move(report_);
+    }
+
+private:
+    bool hear(const BuildProgress& at) {
+        const std::lock_guard lock(mutex_);
+        at_ = at;
+        return !cancelled_;
+    }
+
+    BuildOptions options_;
+    std::mutex mutex_;
+    std::condition_variable news_;
+    BuildProgress at_;         // guarded by mutex_, like the next two
+    bool cancelled_ = false, done_ = false;
+    std::optional<Result<BuildReport>> report_;  // of the thread until done_
+};
+
+Result<BuildOptions> buildOptions(const vcp_build_options& given) {
+    BuildOptions options;
+    if (given.input_count == 0 || !given.inputs) return wrong("there is nothing to build from");
+    for (uint32_t i = 0; i < given.input_count; ++i) {
+        // Standard input is the program's own, not the library's to read.
+        const std::string input = textOf(given.inputs[i]);
+        if (input.empty() || input == "-") return wrong("an input has no path");
+        options.inputs.emplace_back(input);
+    }
+    if (!given.output || *given.output == '\0') return wrong("there is no path to write to");
+    if (!(given.cell >= 0) || !(given.error >= 0)) return wrong("cell or error is below 0 or not a number");
+    options.output = given.output;
+    options.temp = textOf(given.temp_folder);
+    options.cell = given.cell;
+    options.error = given.error;
+    options.memoryBytes = given.memory_bytes;
+    options.threads = given.threads;
+    options.resume = given.resume != 0;
+    return options;
+}
+
+/// False where the host cancels. What its callback throws ends the build as well.
+bool tellHost(const vcp_build_options& given, const BuildProgress& at) {
+    if (!given.progress) return true;
+    const vcp_progress progress{sizeof(vcp_progress), at.stage, at.fraction, at.triangles, at.seconds};
+    bool goesOn = false;
+    const Outcome outcome = outcomeOf([&] {
+        goesOn = given.progress(given.user, &progress) != 0;
+        return Outcome();
+    });
+    return goesOn && outcome.status == VCP_OK;
+}
+
+Result<void> buildFor(const vcp_build_options& given, vcp_build_report* out) {
+    auto options = buildOptions(given);
+    if (!options) return options.error();
+    if (out)
+        if (const auto size = structSize(out); !size) return size.error();
+    const auto report = BuildRun(*std::move(options)).run([&](const BuildProgress& at) { return tellHost(given, at); });
+    if (!report) return report.error();
+    if (!out) return {};
+    vcp_build_report made{};
+    made.levels = report->levels;
+    made.triangles = report->triangles;
+    made.file_bytes = report->fileBytes;
+    made.cell = report->cell;
+    made.certified_error = report->certifiedErrorMax;
+    made.seconds = report->seconds;
+    return give(out, made);
+}
+
+}  // namespace
+
+}  // namespace vcp::widget
+
+using namespace vcp::widget;
+
+extern "C" vcp_status vcp_build(const vcp_build_options* given, vcp_build_report* report) {
+    vcp_build_options options{};
+    const Outcome outcome = outcomeOf([&]() -> Outcome {
+        const auto read = taken(given);
+        if (!read) return read.error();
+        options = *read;
+        return buildFor(options, report);
+    });
+    copyText(options.error_text, options.error_text_size, outcome.text);
+    return outcome.status;
+}

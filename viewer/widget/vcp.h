@@ -1,0 +1,396 @@
+/* vcp.h: the viewer of .vcp files as a part of your own program, in C.
+ *
+ *   vcp_context   a device, its budgets and one dataset; as many as you like, independent of each other
+ *   vcp_view      a picture of the context's dataset: in a window of yours, in your memory or in your Vulkan image;
+ *                 the views of a context share its device, its budgets and what is read
+ *
+ *   vcp_context_create(&options, &context);          vcp_context_open(context, "statue.vcp", NULL);
+ *   vcp_view_create(context, &viewOptions, &view);
+ *   each time round:
+ *     vcp_view_mouse_move(view, x, y); ...           what happened; vcp_view_resize, vcp_view_key, ...
+ *     vcp_view_update(view, &step);                  never waits: takes in what was read, says what to do
+ *     if (step.draw) vcp_view_render(view);          draws, and shows it in the window
+ *     wait for events, at most step.wait_seconds
+ *   vcp_view_destroy(view);                          vcp_context_destroy(context);
+ *
+ * Structs begin with struct_size, which you set to sizeof the struct: VCP_INIT(vcp_step) does. All else may be zero,
+ * and is then what the comment says. A pointer to an options struct may be NULL: all of it is zero.
+ *
+ * Errors: every function returns a vcp_status; no call aborts, prints, exits, or writes outside the paths it was given, and
+ * no exception leaves one. What went wrong is a line of text: vcp_context_last_error, vcp_view_last_error, or the
+ * error_text of the options where there is no handle yet. A handle or a pointer that is needed and NULL gives VCP_USAGE;
+ * a handle that was destroyed must not be used.
+ *
+ * Threads: calls for a context and its views come one at a time, from any threads; a call that comes while another is
+ * under way does nothing but give VCP_BUSY. So do calls from within a callback. Different contexts may be used in
+ * different threads at once. vcp_build and vcp_version need no context and may be called from any thread. Callbacks come from
+ * within a call of yours, in its thread, and must not throw. There is no global state.
+ *
+ * Texts are UTF-8. Pixels have their origin at the upper left, y down. Lengths are in the dataset's own unit. */
+#ifndef VCP_H
+#define VCP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(VCP_BUILDING) && defined(__GNUC__)
+#define VCP_API __attribute__((visibility("default")))
+#else
+#define VCP_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* vcp_step step = VCP_INIT(vcp_step); */
+#define VCP_INIT(type) {.struct_size = sizeof(type)}
+
+typedef struct vcp_context vcp_context;
+typedef struct vcp_view vcp_view;
+
+typedef int32_t vcp_status;
+enum {
+    VCP_OK = 0,
+    VCP_INVALID_INPUT = 1, /* the bytes of a file are wrong */
+    VCP_IO = 2,            /* open, read, write, no space, no connection */
+    VCP_UNSUPPORTED = 3,   /* valid, but of a version or kind that this library does not know */
+    VCP_LIMIT = 4,         /* a budget or a limit is too small for it */
+    VCP_DEVICE = 5,        /* Vulkan: no device, out of memory, lost */
+    VCP_USAGE = 6,         /* a wrong call: what it asks for makes no sense */
+    VCP_CANCELLED = 7,     /* you asked to stop, or the time was over */
+    VCP_BUSY = 8,          /* another call for this context is under way */
+    VCP_OUT_OF_MEMORY = 9,
+    VCP_INTERNAL = 10      /* a defect of the library */
+};
+
+/* The status in a word or two; never NULL. */
+VCP_API const char* vcp_status_text(vcp_status status);
+/* "0.1.0". */
+VCP_API const char* vcp_version(void);
+
+/* ---- Context ---- */
+
+typedef int32_t vcp_log_level;
+enum { VCP_LOG_INFO = 0, VCP_LOG_WARNING = 1, VCP_LOG_ERROR = 2 };
+
+/* Each may be NULL. */
+typedef struct vcp_callbacks {
+    uint32_t struct_size;
+    void* user; /* handed back */
+    void (*log)(void* user, vcp_log_level level, const char* text);
+    /* A call failed; text is what last_error says. */
+    void (*error)(void* user, vcp_status status, const char* text);
+    /* The view's picture would differ: update it soon. From calls that change the view, and from updates of
+     * others that share its pages. */
+    void (*needs_redraw)(void* user, vcp_view* view);
+    /* An update found nothing missing, loading or queued, for the first time since it was otherwise. */
+    void (*settled)(void* user, vcp_view* view);
+} vcp_callbacks;
+
+/* A Vulkan device of yours. It outlives the context, has Vulkan 1.2, and the instance was made for that version; no feature
+ * is needed. For views in windows it has VK_KHR_swapchain. A device that is lost is not made anew: VCP_DEVICE from then on. */
+typedef struct vcp_host_device {
+    uint32_t struct_size;
+    uint32_t queue_family; /* computes; for windows and images it has graphics as well */
+    struct VkInstance_T* instance;
+    struct VkPhysicalDevice_T* physical_device;
+    struct VkDevice_T* device;
+    struct VkQueue_T* queue; /* used within calls for this context, in their thread; not by you at that time */
+} vcp_host_device;
+
+typedef struct vcp_context_options {
+    uint32_t struct_size;
+    uint32_t windows;          /* 1: views may have windows */
+    const char* device;        /* index, or a part of the name; NULL: the best one */
+    const vcp_host_device* host_device; /* NULL: the context makes a device of its own */
+    uint64_t gpu_bytes;        /* budget of the pages on the device, never exceeded; 0: 512 MiB */
+    uint64_t ram_bytes;        /* budget of pages being read, never exceeded; 0: 256 MiB */
+    uint32_t loader_threads;   /* 0: 2; from a server more help: 8 */
+    uint32_t without_colour;   /* 1: colours are neither read nor kept */
+    const vcp_callbacks* callbacks; /* NULL: none; copied */
+    char* error_text;          /* NULL, or where it is written why there is no context */
+    size_t error_text_size;
+} vcp_context_options;
+
+VCP_API vcp_status vcp_context_create(const vcp_context_options* options, vcp_context** context);
+/* VCP_USAGE while it has views. NULL: nothing is done. */
+VCP_API vcp_status vcp_context_destroy(vcp_context* context);
+/* The last line of what went wrong for the context; "" when nothing has. Lives until the next call. */
+VCP_API const char* vcp_context_last_error(const vcp_context* context);
+
+typedef struct vcp_open_options {
+    uint32_t struct_size;
+    const char* ca_file;      /* PEM of authorities to trust for https; NULL: the system's */
+    const char* cache_folder; /* keeps what a server sends; NULL: nothing is kept */
+    uint64_t cache_bytes;     /* limit of the folder; 0: 4 GiB */
+} vcp_open_options;
+
+/* Opens a .vcp file, or its http:// or https:// address, and shows all of it in all views, in place of what was open. A
+ * mesh is built first: vcp_build. When it fails nothing is open, or what was open before. */
+VCP_API vcp_status vcp_context_open(vcp_context* context, const char* path, const vcp_open_options* options);
+
+typedef struct vcp_dataset_info {
+    uint32_t struct_size;
+    uint32_t levels;
+    uint64_t triangles;
+    double bounds_min[3], bounds_max[3];
+    double cell;            /* edge of the finest cells */
+    double certified_error; /* of the finest level: at most so far from the mesh */
+} vcp_dataset_info;
+
+/* VCP_USAGE where nothing is open. */
+VCP_API vcp_status vcp_context_dataset(vcp_context* context, vcp_dataset_info* info);
+
+typedef struct vcp_device_info {
+    uint32_t struct_size;
+    uint32_t software; /* 1: a processor does it all */
+    char name[256];
+} vcp_device_info;
+VCP_API vcp_status vcp_context_device(vcp_context* context, vcp_device_info* info);
+
+/* Other budgets, from now on; 0: as it is. VCP_LIMIT where the coarsest page has no room: all stays as it was. */
+VCP_API vcp_status vcp_context_set_budgets(vcp_context* context, uint64_t gpu_bytes, uint64_t ram_bytes);
+/* Waits until something was read, there is nothing to read, or the time is over. */
+VCP_API vcp_status vcp_context_wait(vcp_context* context, double seconds);
+
+/* ---- View ---- */
+
+typedef int32_t vcp_window_system;
+enum {
+    VCP_WINDOW_NONE = 0,     /* frames for your memory or your image */
+    VCP_WINDOW_CALLBACK = 1, /* create_surface makes the surface, as glfwCreateWindowSurface does */
+    VCP_WINDOW_XCB = 2,      /* display: xcb_connection_t*, window: xcb_window_t */
+    VCP_WINDOW_XLIB = 3,     /* display: Display*, window: Window */
+    VCP_WINDOW_WAYLAND = 4   /* display: wl_display*, window: wl_surface* */
+};
+
+typedef struct vcp_view_options {
+    uint32_t struct_size;
+    vcp_window_system window_system; /* the context was made with windows = 1, or on your device */
+    void* display;
+    uint64_t window;
+    /* Makes a VkSurfaceKHR, which the view destroys; not VK_SUCCESS (0): the view is not made. Called by
+     * vcp_view_create, and again when a lost device is made anew. */
+    int32_t (*create_surface)(void* user, struct VkInstance_T* instance, uint64_t* surface);
+    void* create_surface_user;
+    uint32_t width, height;   /* pixels of the framebuffer; 0: minimized */
+    double moving_frame_ms;   /* while the camera moves, frames that would take longer are drawn smaller; 0: never */
+    double move_seconds;      /* that a smooth move takes; 0: at once */
+    uint32_t z_is_up;         /* 0: y is up */
+    char* error_text;         /* NULL, or where it is written why there is no view */
+    size_t error_text_size;
+} vcp_view_options;
+
+VCP_API vcp_status vcp_view_create(vcp_context* context, const vcp_view_options* options, vcp_view** view);
+/* Before its window goes. NULL: nothing is done. */
+VCP_API vcp_status vcp_view_destroy(vcp_view* view);
+/* As vcp_context_last_error, for the view. */
+VCP_API const char* vcp_view_last_error(const vcp_view* view);
+
+/* Pixels of the framebuffer, at most 16384 a side; 0: minimized, nothing is drawn. */
+VCP_API vcp_status vcp_view_resize(vcp_view* view, uint32_t width, uint32_t height);
+
+typedef int32_t vcp_button;
+enum { VCP_LEFT = 0, VCP_MIDDLE = 1, VCP_RIGHT = 2 };
+enum { VCP_SHIFT = 1, VCP_CONTROL = 2 };
+
+/* Left: orbit about what is under the cursor; with shift, or the others: pan; with control: turn the light. */
+VCP_API vcp_status vcp_view_mouse_press(vcp_view* view, vcp_button button, double x, double y, uint32_t modifiers);
+VCP_API vcp_status vcp_view_mouse_move(vcp_view* view, double x, double y);
+VCP_API vcp_status vcp_view_mouse_release(vcp_view* view, vcp_button button);
+/* Zooms to what is under the cursor, in when positive; with shift: moves the section planes. */
+VCP_API vcp_status vcp_view_mouse_scroll(vcp_view* view, double x, double y, double notches, uint32_t modifiers);
+
+typedef int32_t vcp_action;
+enum {
+    VCP_FIT = 0,                /* all of the dataset into the picture */
+    VCP_RESET = 1,              /* the view it opened with */
+    VCP_TOGGLE_LIGHT = 2,       /* follows the camera, or stays */
+    VCP_TOGGLE_SHADOWS = 3,
+    VCP_TOGGLE_OCCLUSION = 4,
+    VCP_TOGGLE_SECTION = 5,     /* cuts through the middle */
+    VCP_NEXT_SHADING = 6,
+    VCP_TOGGLE_PROJECTION = 7,
+    VCP_TOGGLE_COLOUR = 8,
+    VCP_TOGGLE_UP_AXIS = 9,
+    VCP_TOGGLE_FLY = 10,
+    VCP_VIEW_FRONT = 11,
+    VCP_VIEW_RIGHT = 12,
+    VCP_VIEW_TOP = 13,
+    VCP_VIEW_ISOMETRIC = 14,
+    VCP_CENTRE = 15             /* what was last under the cursor comes to the middle */
+};
+VCP_API vcp_status vcp_view_act(vcp_view* view, vcp_action action);
+/* A key of a keyboard, as the character on it in capitals: what it does in the window of `vcp view` (F fit, R reset, M
+ * shading, G fly with W A S D E Q, ...). Others do nothing. */
+VCP_API vcp_status vcp_view_key(vcp_view* view, uint32_t key, uint32_t pressed);
+
+/* position, target and up in the dataset's coordinates. */
+typedef struct vcp_camera {
+    uint32_t struct_size;
+    uint32_t orthographic; /* 1: parallel rays; the height shown is that at the target */
+    double position[3];
+    double target[3];      /* what orbiting turns about where nothing is under the cursor */
+    double up[3];          /* zero: the up axis */
+    double fov_y;          /* full vertical angle in radians; 0: 45 degrees */
+} vcp_camera;
+
+VCP_API vcp_status vcp_view_get_camera(vcp_view* view, vcp_camera* camera);
+/* VCP_USAGE, and nothing changes: a number that is not finite, target at the position, up along the view, fov_y not
+ * between 1e-5 and 3.12. */
+VCP_API vcp_status vcp_view_set_camera(vcp_view* view, const vcp_camera* camera);
+/* The same, smoothly. */
+VCP_API vcp_status vcp_view_move_camera(vcp_view* view, const vcp_camera* camera);
+
+typedef int32_t vcp_shading;
+enum {
+    VCP_SHADING_LIT = 0,
+    VCP_SHADING_CLAY = 1,
+    VCP_SHADING_UNLIT = 2,
+    VCP_SHADING_NORMALS = 3,
+    VCP_SHADING_STEPS = 4, /* false colours: work of the rays */
+    VCP_SHADING_CELLS = 5,
+    VCP_SHADING_FETCHES = 6,
+    VCP_SHADING_LEVEL = 7, /* false colours: level and certified error of what was hit */
+    VCP_SHADING_ERROR = 8
+};
+
+/* How things look: get it, change it, set it. */
+typedef struct vcp_look {
+    uint32_t struct_size;
+    vcp_shading shading;
+    double error_pixels;       /* refined until the certified error is below, in pixels; above 0 */
+    uint32_t shadows;          /* 1: hard shadows */
+    uint32_t occlusion_rays;   /* a pixel, at most 64; 0: no ambient occlusion */
+    double occlusion_radius;   /* 0: a tenth of the diagonal */
+    uint32_t light_in_world;   /* 0: the light follows the camera */
+    uint32_t transparent;      /* 1: the background is black with alpha 0 */
+    float light[3];            /* towards it; camera axes (right, up, back), or the world's */
+    float background_top[3], background_bottom[3]; /* linear, 0 to 1 */
+    uint32_t section_count;    /* at most 6 planes; what lies beyond them is cut away */
+    double sections[6][4];     /* n, d: kept is where dot(n, x) >= d */
+} vcp_look;
+
+VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
+VCP_API vcp_status vcp_view_set_look(vcp_view* view, const vcp_look* look);
+
+typedef struct vcp_step {
+    uint32_t struct_size;
+    uint32_t draw;       /* 1: vcp_view_render is due */
+    uint32_t settled;    /* 1: nothing that the view wants is missing, loading or queued */
+    uint32_t reserved;
+    double wait_seconds; /* come back after this time even if nothing happens; infinity: nothing is going on */
+} vcp_step;
+
+VCP_API vcp_status vcp_view_update(vcp_view* view, vcp_step* step);
+/* Draws what the last update chose, where that differs from the last picture; shows it in the view's window. Waits for
+ * the GPU, never for a file. */
+VCP_API vcp_status vcp_view_render(vcp_view* view);
+/* Updates until nothing is missing and nothing moves, then renders. VCP_CANCELLED when it takes longer than `seconds`;
+ * what there is then is rendered. */
+VCP_API vcp_status vcp_view_settle(vcp_view* view, double seconds);
+
+/* The last picture. Where frames are drawn smaller while the camera moves, it is smaller than the view. */
+typedef struct vcp_frame {
+    uint32_t struct_size;
+    uint32_t width, height; /* written */
+    uint32_t reserved;
+    uint8_t* rgba;          /* NULL, or room for the picture: upper row first, no padding, sRGB-encoded */
+    size_t rgba_size;       /* bytes */
+    float* depth;           /* NULL, or room: distance from the eye along each pixel's ray; infinity: nothing is hit */
+    size_t depth_size;      /* floats */
+} vcp_frame;
+
+/* VCP_USAGE where nothing was rendered yet; VCP_LIMIT, with width and height written, where the room is too small. */
+VCP_API vcp_status vcp_view_read(vcp_view* view, vcp_frame* frame);
+
+/* An image on your device: colour, one sample, a UNORM format, with usage TRANSFER_DST. */
+typedef struct vcp_host_image {
+    uint32_t struct_size;
+    int32_t layout_after; /* VkImageLayout; 0: SHADER_READ_ONLY_OPTIMAL */
+    uint64_t image;       /* VkImage */
+    uint32_t width, height;
+    uint64_t wait;        /* VkSemaphore that is signalled before the image is written, or 0 */
+    uint64_t signal;      /* VkSemaphore to signal when it is written, or 0 */
+} vcp_host_image;
+
+/* Copies the last picture into it, scaled to it; what was in the image is lost. */
+VCP_API vcp_status vcp_view_copy_to_image(vcp_view* view, const vcp_host_image* image);
+
+typedef struct vcp_pick {
+    uint32_t struct_size;
+    uint32_t hit;     /* 0: nothing is there, and the rest is zero */
+    double position[3];
+    double normal[3]; /* unit, towards the eye */
+    double distance;  /* from the eye's ray's origin */
+    double error;     /* certified: the mesh is at most so far from `position`'s surface */
+    uint32_t level;   /* of the page that was asked: the finest there is */
+    uint32_t reserved;
+} vcp_pick;
+
+/* What is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads from the file
+ * or the server what it needs: may wait. */
+VCP_API vcp_status vcp_view_pick(vcp_view* view, double x, double y, vcp_pick* pick);
+
+/* Of the last update and the last picture. */
+typedef struct vcp_stats {
+    uint32_t struct_size;
+    uint32_t settled, drawable;
+    uint32_t relaxed;       /* 1: the budget is too small for the look's error_pixels */
+    uint32_t reduction;     /* the picture has 1/reduction of the width and height */
+    uint32_t device_losses; /* that were made good */
+    uint64_t frames;        /* rendered */
+    double frame_ms;
+    double error_pixels;    /* largest projected certified error in the picture */
+    uint64_t rays, hit_pixels;
+    uint64_t resident_bytes, pool_bytes, bytes_read;
+    uint64_t read_failures; /* tried again */
+    uint32_t pages_resident, pages_drawn, pages_wanted, pages_missing;
+    uint32_t coarsest_level, finest_level;
+} vcp_stats;
+
+VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);
+
+/* ---- Building ---- */
+
+typedef struct vcp_progress {
+    uint32_t struct_size;
+    const char* stage;
+    double fraction; /* of the whole, 0 to 1 */
+    uint64_t triangles;
+    double seconds;
+} vcp_progress;
+
+typedef struct vcp_build_options {
+    uint32_t struct_size;
+    uint32_t input_count;
+    const char* const* inputs; /* meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco; joined into one dataset */
+    const char* output;        /* OUT.vcp: whole or absent */
+    const char* temp_folder;   /* NULL: beside the output */
+    double cell;               /* finest cell edge; 0: chosen from the mesh */
+    double error;              /* tolerated distance to the mesh; 0: 0.08 cells */
+    uint64_t memory_bytes;     /* cap; 0: a part of what the machine has */
+    uint32_t threads;          /* 0: one a processor */
+    uint32_t resume;           /* 1: goes on where an interrupted build of the same output was */
+    /* About ten times a second, in the calling thread; 0 cancels. */
+    int (*progress)(void* user, const vcp_progress* progress);
+    void* user;
+    char* error_text;
+    size_t error_text_size;
+} vcp_build_options;
+
+typedef struct vcp_build_report {
+    uint32_t struct_size;
+    uint32_t levels;
+    uint64_t triangles, file_bytes;
+    double cell, certified_error, seconds;
+} vcp_build_report;
+
+/* Blocks. `report` may be NULL. */
+VCP_API vcp_status vcp_build(const vcp_build_options* options, vcp_build_report* report);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

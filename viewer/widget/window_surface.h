@@ -1,0 +1,15 @@
+// Vulkan surfaces of the host's windows.
+#pragma once
+
+#include "render/renderer.h"
+#include "viewer/widget/vcp.h"
+
+namespace vcp::widget {
+
+/// Instance extensions for windows, of those that vcp.h knows and this machine has. Errors: Device.
+Result<std::vector<std::string>> windowExtensions();
+
+/// Nothing for views without a window. Errors: Usage.
+Result<std::optional<SurfaceSource>> surfaceSource(const vcp_view_options& options);
+
+}  // namespace vcp::widget
