@@ -53,6 +53,30 @@ endforeach()
 list(REMOVE_DUPLICATES VCP_DEPENDENCIES)
 list(JOIN VCP_DEPENDENCIES "\n" VCP_DEPENDENCIES)
 
+# The widget: one header for C, one for C++, and the library. Targets vcp::vcp and vcp::vcp_static.
+set(vcp_package ${CMAKE_INSTALL_LIBDIR}/cmake/vcp)
+if(TARGET vcp_widget)
+    set_target_properties(vcp_widget PROPERTIES EXPORT_NAME vcp)
+    set_target_properties(vcp_widget_static PROPERTIES EXPORT_NAME vcp_static)
+    if(BUILD_SHARED_LIBS)
+        set_target_properties(vcp_widget PROPERTIES INSTALL_RPATH "$ORIGIN")
+    endif()
+    list(APPEND vcp_installed vcp_widget_static)
+    install(FILES ${PROJECT_SOURCE_DIR}/viewer/widget/vcp.h ${PROJECT_SOURCE_DIR}/viewer/widget/vcp.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vcp)
+    install(TARGETS vcp_widget EXPORT vcpWidgetTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+    install(EXPORT vcpWidgetTargets NAMESPACE vcp:: DESTINATION ${vcp_package})
+    file(RELATIVE_PATH VCP_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+    configure_file(${CMAKE_CURRENT_LIST_DIR}/vcp.pc.in ${PROJECT_BINARY_DIR}/vcp.pc @ONLY)
+    install(FILES ${PROJECT_BINARY_DIR}/vcp.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endif()
+
+if(TARGET vcp_python)
+    # In the prefix's own folder of Python: PYTHONPATH=PREFIX/lib/python3/dist-packages.
+    set(vcp_python ${CMAKE_INSTALL_LIBDIR}/python3/dist-packages)
+    set_target_properties(vcp_python PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
+    install(TARGETS vcp_python LIBRARY DESTINATION ${vcp_python})
+endif()
+
 if(TARGET vcp)
     if(BUILD_SHARED_LIBS)
         set_target_properties(vcp PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
@@ -60,7 +84,6 @@ if(TARGET vcp)
     install(TARGETS vcp RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
-set(vcp_package ${CMAKE_INSTALL_LIBDIR}/cmake/vcp)
 install(TARGETS ${vcp_installed} EXPORT vcpTargets
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT vcpTargets NAMESPACE vcp:: DESTINATION ${vcp_package})

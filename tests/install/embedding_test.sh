@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# Embeds the installed widget as a stranger would: builds and runs viewer/examples, and the code in docs/embedding.md.
+# usage: embedding_test.sh PREFIX SOURCE WORK CC CXX LIBDIR
+set -euo pipefail
+prefix=$1 source=$2 work=$3 cc=$4 cxx=$5 libdir=$6
+rm -rf "$work"
+mkdir -p "$work/docs"
+
+# A mesh to look at: an octahedron.
+cat >"$work/octahedron.off" <<'OFF'
+OFF
+6 8 0
+1 0 0
+-1 0 0
+0 1 0
+0 -1 0
+0 0 1
+0 0 -1
+3 0 2 4
+3 2 1 4
+3 1 3 4
+3 3 0 4
+3 2 0 5
+3 1 2 5
+3 3 1 5
+3 0 3 5
+OFF
+tree=$work/octahedron.vcp
+"$prefix/bin/vcp" build "$work/octahedron.off" -o "$tree" --cell 0.05 --progress none
+
+run() {
+    echo "== $*"
+    "$@"
+}
+
+# shows COMMAND...: runs a host; most of its pixels must show the surface, but not all.
+shows() {
+    local output
+    output=$(run "$@") || { echo "$output"; exit 1; }
+    echo "$output"
+    local pixels
+    pixels=$(grep -o '[0-9]* pixels show the surface' <<<"$output" | cut -d ' ' -f 1)
+    [ "${pixels:-0}" -gt 5000 ] || { echo "too few pixels show the surface"; exit 1; }
+}
+
+run cmake -S "$source/viewer/examples" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_C_COMPILER="$cc" -DCMAKE_CXX_COMPILER="$cxx" \
+    -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" >"$work/configure.log" || { cat "$work/configure.log"; exit 1; }
+run cmake --build "$work/build"
+cd "$work"
+offscreen=$(run "$work/build/offscreen" "$tree" "$work/offscreen.ppm")
+echo "$offscreen"
+grep "in the middle: " <<<"$offscreen" >/dev/null
+[ "$(head -c 15 offscreen.ppm | tr '\n' ' ')" = "P6 640 480 255 " ] && [ "$(stat -c %s offscreen.ppm)" -eq 921615 ]
+# The C library exports its functions and nothing else.
+if nm -D --defined-only "$prefix/$libdir/libvcp.so" | grep -v ' vcp_[a-z_]*$'; then
+    echo "libvcp.so exports more than its functions"
+    exit 1
+fi
+[ ! -x build/host_device ] || shows build/host_device "$tree"
+if command -v xvfb-run >/dev/null; then
+    display=(xvfb-run -a -s "-screen 0 1280x1024x24")
+    [ ! -x build/glfw_host ] || shows "${display[@]}" build/glfw_host "$tree" --frames 5
+    [ ! -x build/qt_widget ] || QT_QPA_PLATFORM=xcb shows "${display[@]}" build/qt_widget "$tree" --frames 3
+else
+    echo "no xvfb-run: the windows are not opened"
+fi
+
+# With pkg-config, and no CMake.
+export PKG_CONFIG_PATH=$prefix/$libdir/pkgconfig LD_LIBRARY_PATH=$prefix/$libdir
+read -r -a flags <<<"$(pkg-config --cflags --libs vcp)"
+run "$cc" -std=c99 -pedantic -Wall -Wextra -Werror "$source/viewer/examples/offscreen.c" "${flags[@]}" -o offscreen
+run ./offscreen "$tree" >/dev/null
+
+# Python, where the module was built.
+if [ -d "$prefix/$libdir/python3/dist-packages" ] && python3 -c 'import numpy' 2>/dev/null; then
+    run env PYTHONPATH="$prefix/$libdir/python3/dist-packages" python3 "$source/viewer/examples/notebook.py" octahedron.off "$work/docs"
+    rm docs/octahedron.vcp
+fi
+
+# Each program of the page: a block that begins with ```c or ```cpp and has a main.
+awk -v folder="$work/docs" '/^```(c|cpp)$/ { file = sprintf("%s/program%d.%s", folder, ++n, substr($0, 4)); next } /^```/ { file = "" } file { print > file }' "$source/docs/embedding.md"
+[ "$(ls docs | wc -l)" -ge 2 ]
+for program in docs/program*.c docs/program*.cpp; do
+    if [ "${program##*.}" = c ]; then run "$cc" -std=c99 "$program" "${flags[@]}" -o "$program.out"; else run "$cxx" -std=c++20 "$program" "${flags[@]}" -o "$program.out"; fi
+    run "./$program.out" "$tree"
+done

@@ -1,0 +1,201 @@
+// vcp.hpp: vcp.h for C++17, header only. Handles that clean up after themselves, functions as members, errors as exceptions
+// of type vcp::widget::Error; callbacks are std::function. What calls mean, and in which threads, says vcp.h.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vcp.h"
+
+namespace vcp::widget {
+
+class Error : public std::runtime_error {
+public:
+    Error(vcp_status status, const std::string& what) : std::runtime_error(what.empty() ? vcp_status_text(status) : what), status_(status) {}
+    [[nodiscard]] vcp_status status() const { return status_; }
+
+private:
+    vcp_status status_;
+};
+
+/// A struct of vcp.h with its size set and the rest zero.
+template <class T>
+T sized() {
+    T made{};
+    made.struct_size = sizeof(T);
+    return made;
+}
+
+struct Callbacks {
+    std::function<void(vcp_log_level, const char*)> log;
+    std::function<void(vcp_status, const char*)> error;
+    std::function<void(vcp_view*)> needsRedraw, settled;
+};
+
+/// A picture: RGBA, and the distance of each pixel.
+struct Frame {
+    uint32_t width = 0, height = 0;
+    std::vector<uint8_t> rgba;
+    std::vector<float> depth;
+};
+
+/// Shared by its views and copies: destroyed with the last of them.
+class Context {
+public:
+    /// `options.callbacks` is not looked at.
+    explicit Context(vcp_context_options options = sized<vcp_context_options>(), Callbacks callbacks = {}) : shared_(std::make_shared<Shared>()) {
+        shared_->callbacks = std::move(callbacks);
+        vcp_callbacks calls = sized<vcp_callbacks>();
+        calls.user = &shared_->callbacks;
+        calls.log = [](void* user, vcp_log_level level, const char* text) { call(static_cast<Callbacks*>(user)->log, level, text); };
+        calls.error = [](void* user, vcp_status status, const char* text) { call(static_cast<Callbacks*>(user)->error, status, text); };
+        calls.needs_redraw = [](void* user, vcp_view* view) { call(static_cast<Callbacks*>(user)->needsRedraw, view); };
+        calls.settled = [](void* user, vcp_view* view) { call(static_cast<Callbacks*>(user)->settled, view); };
+        std::array<char, 512> text{};
+        options.callbacks = &calls;
+        options.error_text = text.data();
+        options.error_text_size = text.size();
+        if (const vcp_status status = vcp_context_create(&options, &shared_->handle); status != VCP_OK) throw Error(status, text.data());
+    }
+
+    void open(const std::string& path, const vcp_open_options* options = nullptr) { check(vcp_context_open(handle(), path.c_str(), options)); }
+    [[nodiscard]] vcp_dataset_info dataset() const { return got(vcp_context_dataset); }
+    [[nodiscard]] vcp_device_info device() const { return got(vcp_context_device); }
+    /// 0: as it is.
+    void setBudgets(uint64_t gpuBytes, uint64_t ramBytes = 0) { check(vcp_context_set_budgets(handle(), gpuBytes, ramBytes)); }
+    void wait(double seconds) { check(vcp_context_wait(handle(), seconds)); }
+    [[nodiscard]] vcp_context* handle() const { return shared_->handle; }
+
+private:
+    struct Shared {
+        Callbacks callbacks;
+        vcp_context* handle = nullptr;
+        Shared() = default;
+        Shared(const Shared&) = delete;
+        Shared& operator=(const Shared&) = delete;
+        ~Shared() { vcp_context_destroy(handle); }
+    };
+
+    // No exception crosses the library.
+    template <class F, class... T>
+    static void call(const F& f, T... values) noexcept {
+        if (f) f(values...);
+    }
+    void check(vcp_status status) const {
+        if (status != VCP_OK) throw Error(status, vcp_context_last_error(handle()));
+    }
+    template <class T>
+    T got(vcp_status (*get)(vcp_context*, T*)) const {
+        T value = sized<T>();
+        check(get(handle(), &value));
+        return value;
+    }
+
+    std::shared_ptr<Shared> shared_;
+};
+
+class View {
+public:
+    View(Context context, vcp_view_options options) : context_(std::move(context)) {
+        vcp_view* made = nullptr;
+        if (const vcp_status status = vcp_view_create(context_.handle(), &options, &made); status != VCP_OK)
+            throw Error(status, vcp_context_last_error(context_.handle()));
+        view_.reset(made);
+    }
+    /// Without a window.
+    View(Context context, uint32_t width, uint32_t height) : View(std::move(context), offscreen(width, height)) {}
+
+    void resize(uint32_t width, uint32_t height) { check(vcp_view_resize(handle(), width, height)); }
+    void press(vcp_button button, double x, double y, uint32_t modifiers = 0) { check(vcp_view_mouse_press(handle(), button, x, y, modifiers)); }
+    void move(double x, double y) { check(vcp_view_mouse_move(handle(), x, y)); }
+    void release(vcp_button button) { check(vcp_view_mouse_release(handle(), button)); }
+    void scroll(double x, double y, double notches, uint32_t modifiers = 0) { check(vcp_view_mouse_scroll(handle(), x, y, notches, modifiers)); }
+    void key(uint32_t character, bool pressed) { check(vcp_view_key(handle(), character, pressed ? 1 : 0)); }
+    void act(vcp_action action) { check(vcp_view_act(handle(), action)); }
+
+    [[nodiscard]] vcp_camera camera() const { return got(vcp_view_get_camera); }
+    void setCamera(const vcp_camera& camera) { check(vcp_view_set_camera(handle(), &camera)); }
+    void moveCamera(const vcp_camera& camera) { check(vcp_view_move_camera(handle(), &camera)); }
+    [[nodiscard]] vcp_look look() const { return got(vcp_view_get_look); }
+    void setLook(const vcp_look& look) { check(vcp_view_set_look(handle(), &look)); }
+
+    vcp_step update() { return got(vcp_view_update); }
+    void render() { check(vcp_view_render(handle())); }
+    /// False where the time was over before it was settled.
+    bool settle(double seconds) {
+        const vcp_status status = vcp_view_settle(handle(), seconds);
+        if (status != VCP_CANCELLED) check(status);
+        return status == VCP_OK;
+    }
+    [[nodiscard]] Frame read(bool withDepth = true) const {
+        vcp_frame frame = sized<vcp_frame>();
+        check(vcp_view_read(handle(), &frame));
+        const size_t pixels = size_t{frame.width} * frame.height;
+        Frame read{frame.width, frame.height, std::vector<uint8_t>(4 * pixels), std::vector<float>(withDepth ? pixels : 0)};
+        frame.rgba = read.rgba.data();
+        frame.rgba_size = read.rgba.size();
+        frame.depth = withDepth ? read.depth.data() : nullptr;
+        frame.depth_size = read.depth.size();
+        check(vcp_view_read(handle(), &frame));
+        return read;
+    }
+    void copyTo(const vcp_host_image& image) { check(vcp_view_copy_to_image(handle(), &image)); }
+    [[nodiscard]] vcp_pick pick(double x, double y) {
+        vcp_pick picked = sized<vcp_pick>();
+        check(vcp_view_pick(handle(), x, y, &picked));
+        return picked;
+    }
+    [[nodiscard]] vcp_stats stats() const { return got(vcp_view_stats); }
+    [[nodiscard]] const Context& context() const { return context_; }
+    [[nodiscard]] vcp_view* handle() const { return view_.get(); }
+
+private:
+    struct Destroy {
+        void operator()(vcp_view* view) const { vcp_view_destroy(view); }
+    };
+
+    static vcp_view_options offscreen(uint32_t width, uint32_t height) {
+        vcp_view_options options = sized<vcp_view_options>();
+        options.width = width;
+        options.height = height;
+        return options;
+    }
+    void check(vcp_status status) const {
+        if (status != VCP_OK) throw Error(status, vcp_view_last_error(handle()));
+    }
+    template <class T>
+    T got(vcp_status (*get)(vcp_view*, T*)) const {
+        T value = sized<T>();
+        check(get(handle(), &value));
+        return value;
+    }
+
+    Context context_;
+    std::unique_ptr<vcp_view, Destroy> view_;
+};
+
+/// Meshes to one .vcp file. `options.inputs` and `output` come from the arguments; `progress` returns false to cancel.
+inline vcp_build_report build(const std::vector<std::string>& inputs, const std::string& output, const std::function<bool(const vcp_progress&)>& progress = {},
+                              vcp_build_options options = sized<vcp_build_options>()) {
+    std::vector<const char*> paths;
+    for (const std::string& input : inputs) paths.push_back(input.c_str());
+    std::array<char, 512> text{};
+    options.inputs = paths.data();
+    options.input_count = static_cast<uint32_t>(paths.size());
+    options.output = output.c_str();
+    options.user = const_cast<void*>(static_cast<const void*>(&progress));
+    if (progress) options.progress = [](void* user, const vcp_progress* at) { return (*static_cast<const std::function<bool(const vcp_progress&)>*>(user))(*at) ? 1 : 0; };
+    options.error_text = text.data();
+    options.error_text_size = text.size();
+    vcp_build_report report = sized<vcp_build_report>();
+    if (const vcp_status status = vcp_build(&options, &report); status != VCP_OK) throw Error(status, text.data());
+    return report;
+}
+
+}  // namespace vcp::widget
