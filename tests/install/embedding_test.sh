@@ -71,10 +71,14 @@ read -r -a flags <<<"$(pkg-config --cflags --libs vcp)"
 run "$cc" -std=c99 -pedantic -Wall -Wextra -Werror "$source/viewer/examples/offscreen.c" "${flags[@]}" -o offscreen
 run ./offscreen "$tree" >/dev/null
 
-# Python, where the module was built.
-if [ -d "$prefix/$libdir/python3/dist-packages" ] && python3 -c 'import numpy' 2>/dev/null; then
-    run env PYTHONPATH="$prefix/$libdir/python3/dist-packages" python3 "$source/viewer/examples/notebook.py" octahedron.off "$work/docs"
-    rm docs/octahedron.vcp
+# Python, where the module was built and there is NumPy.
+export PYTHONPATH=$prefix/$libdir/python3/dist-packages
+if [ -d "$PYTHONPATH" ]; then
+    for python in python3 /usr/bin/python3; do
+        "$python" -c 'import numpy' 2>/dev/null || continue
+        run "$python" "$source/viewer/examples/notebook.py" octahedron.off "$work"
+        break
+    done
 fi
 
 # Each program of the page: a block that begins with ```c or ```cpp and has a main.
