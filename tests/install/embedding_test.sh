@@ -7,7 +7,7 @@ rm -rf "$work"
 mkdir -p "$work/docs"
 
 # A mesh to look at: an octahedron.
-cat >"$work/octahedron.off" <<'OFF'
+cat >"$work/octahedron.off" <<'MESH'
 OFF
 6 8 0
 1 0 0
@@ -24,7 +24,7 @@ OFF
 3 1 2 5
 3 3 1 5
 3 0 3 5
-OFF
+MESH
 tree=$work/octahedron.vcp
 "$prefix/bin/vcp" build "$work/octahedron.off" -o "$tree" --cell 0.05 --progress none
 

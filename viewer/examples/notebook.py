@@ -33,10 +33,10 @@ print(f"nearest: {picked['position']}, within {picked['error']:.2g}")
 assert np.isclose(picked["distance"], depth[y, x], rtol=1e-3)
 
 # %% Another camera, another picture
-view.act(vcp.TOP)
+view.act(vcp.ISOMETRIC)
 view.settle()
-top, _ = view.render()
-assert not np.array_equal(top, rgba)
+other, _ = view.render()
+assert not np.array_equal(other, rgba)
 camera = view.camera
 view.set_camera(position=(2 * np.array(camera["position"]) - camera["target"]).tolist())
 view.settle()
