@@ -424,7 +424,8 @@ static void cycles(void) {
 }
 
 static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER;
-static vcp_context *handed, *contended;
+static vcp_context* handed;
+static vcp_view* contended;
 
 /* A context of the thread's own, and one that goes from thread to thread. */
 static void* work(void* unused) {
@@ -444,9 +445,8 @@ static void* work(void* unused) {
     }
     /* Out of turn: done or refused, never anything else. */
     for (int i = 0; i < 200; ++i) {
-        vcp_device_info info = VCP_INIT(vcp_device_info);
-        const vcp_status status = vcp_context_device(contended, &info);
-        CHECK(status == VCP_BUSY || (status == VCP_OK && info.name[0]));
+        const vcp_status status = vcp_view_resize(contended, (uint32_t)i + 1, 8);
+        CHECK(status == VCP_BUSY || status == VCP_OK);
     }
     return NULL;
 }
@@ -454,13 +454,15 @@ static void* work(void* unused) {
 static void threads(void) {
     build_ball(0);
     handed = make_context(NULL);
-    contended = make_context(NULL);
+    vcp_context* disputed = make_context(NULL);
+    contended = make_view(disputed);
     OK(vcp_context_open(handed, tree, NULL));
     pthread_t all[3];
     for (int i = 0; i < 3; ++i) CHECK(pthread_create(&all[i], NULL, work, NULL) == 0);
     for (int i = 0; i < 3; ++i) CHECK(pthread_join(all[i], NULL) == 0);
     OK(vcp_context_destroy(handed));
-    OK(vcp_context_destroy(contended));
+    OK(vcp_view_destroy(contended));
+    OK(vcp_context_destroy(disputed));
 }
 
 int main(int argc, char** argv) {
