@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>
-#include <mutex>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -190,12 +189,33 @@ Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::s
 
 }  // namespace
 
+namespace {
+
+/// Held by one at a time; others wait.
+class Turn {
+public:
+    explicit Turn(std::atomic_flag& taken) : taken_(taken) {
+        while (taken_.test_and_set(std::memory_order_acquire)) taken_.wait(true, std::memory_order_relaxed);
+    }
+    ~Turn() {
+        taken_.clear(std::memory_order_release);
+        taken_.notify_one();
+    }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+private:
+    std::atomic_flag& taken_;
+};
+
+}  // namespace
+
 /// What a directory that comes in parts must know beside its entries.
 struct PageDirectory::Parts {
     explicit Parts(size_t pages) : known(blocksOf(pages)), parents(pages, kNoPage) {}
     static constexpr uint32_t kNoPage = UINT32_MAX;
 
-    std::mutex mutex;  // of admissions
+    std::atomic_flag admitting;
     std::vector<std::atomic<uint8_t>> known;  // by block; 1 after its entries were written
     std::atomic<uint64_t> blocksKnown{0};
     std::vector<uint32_t> parents;  // as known blocks say: a page has one
@@ -214,7 +234,7 @@ PageDirectory& PageDirectory::operator=(const PageDirectory& other) {
         entries_ = other.entries_;
         return *this;
     }
-    const std::lock_guard lock(other.parts_->mutex);
+    const Turn turn(other.parts_->admitting);
     expect(other.size());
     entries_ = other.entries_;
     parts_->parents = other.parts_->parents;
@@ -241,7 +261,7 @@ public:
 
     Result<void> run(std::span<const std::byte> bytes) {
         PageDirectory::Parts& parts = *directory_.parts_;
-        const std::lock_guard lock(parts.mutex);
+        const Turn turn(parts.admitting);
         if (directory_.knowsBlock(block_)) return {};
         std::memcpy(&directory_.entries_[first_], bytes.data(), count_ * sizeof(PageEntry));
         EntryCheck entries(file_, d_);
