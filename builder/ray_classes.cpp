@@ -132,8 +132,8 @@ bool RayJudge::borderNear(glm::dvec3 first, glm::dvec3 last) const {
                 const glm::dvec3 p = mesh.positions[mesh.triangles[triangle][corner % 3]];
                 return Place{p.x, p.y, p.z};
             };
-            const auto ends = std::minmax({place(i), place(i + 1)});
-            ++triangles[ends];
+            const bool isSegment = place(0) == place(1) || place(1) == place(2) || place(2) == place(0);
+            if (!isSegment) ++triangles[std::minmax({place(i), place(i + 1)})];
         }
     return std::ranges::any_of(triangles, [&](const auto& edge) {
         const auto& [a, b] = edge.first;

@@ -264,11 +264,10 @@ public:
         const Turn turn(parts.admitting);
         if (directory_.knowsBlock(block_)) return {};
         std::memcpy(&directory_.entries_[first_], bytes.data(), count_ * sizeof(PageEntry));
-        EntryCheck entries(file_, d_);
-        for (uint64_t page = first_; page < first_ + count_; ++page) {
-            VCP_TRY(entries.check(page, directory_[page], levelOf(page)));
-            VCP_TRY(linkChildren(page));
-            VCP_TRY(checkParent(page));
+        if (auto sound = check(); !sound) {
+            // Nobody is to come across what was refused.
+            std::fill_n(&directory_.entries_[first_], count_, PageEntry{});
+            return sound;
         }
         parts.known[block_].store(1, std::memory_order_release);
         parts.blocksKnown.fetch_add(1, std::memory_order_release);
@@ -276,6 +275,15 @@ public:
     }
 
 private:
+    Result<void> check() const {
+        EntryCheck entries(file_, d_);
+        for (uint64_t page = first_; page < first_ + count_; ++page) {
+            VCP_TRY(entries.check(page, directory_[page], levelOf(page)));
+            VCP_TRY(linkChildren(page));
+            VCP_TRY(checkParent(page));
+        }
+        return {};
+    }
     [[nodiscard]] uint32_t levelOf(uint64_t page) const {
         uint32_t level = 0;
         while (page >= d_.header.level[level].firstEntry + d_.header.level[level].pages) ++level;

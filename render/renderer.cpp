@@ -619,6 +619,7 @@ Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
 Result<void> Renderer::copyPicture(const ImageTarget& target) {
     State& s = *state_;
     if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
+    if (!s.options.host) return Error{.code = ErrorCode::Usage, .message = "images are those of a device of the host, and there is none"};
     if (target.image == VK_NULL_HANDLE || target.width == 0 || target.height == 0)
         return Error{.code = ErrorCode::Usage, .message = "there is no image, or it has no area"};
     if (!s.device->hasGraphics()) return Error{.code = ErrorCode::Usage, .message = "pictures are scaled to images by queues with graphics, which this is not"};

@@ -7,6 +7,7 @@
 // of its own and a cut of its own; an update of one may change the others' cuts.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <unordered_map>
@@ -87,7 +88,7 @@ private:
         std::vector<uint64_t> reported;  // as of its last update
     };
     /// What one update takes in, and the loader reads before it.
-    [[nodiscard]] uint64_t uploadBytes() const { return policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes; }
+    [[nodiscard]] uint64_t uploadBytes() const { return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes); }
     UpdateResult report(const PolicyOutcome& outcome) const;
 
     ResidencyOptions options_;

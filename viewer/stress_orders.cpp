@@ -51,16 +51,19 @@ public:
 private:
     Result<void> start() {
         // Memory for one page on its way: none is read before those drawn so far could ask for others.
-        const auto source = std::make_shared<FilePageSource>(open_.reader, open_.dataset, 0);
-        const bool colour = options_.colour && open_.dataset->hasColour();
+        auto whole = readDataset(*open_.reader);
+        if (!whole) return whole.error();
+        const auto dataset = std::make_shared<const Dataset>(*std::move(whole));
+        const auto source = std::make_shared<FilePageSource>(open_.reader, dataset, 0);
+        const bool colour = options_.colour && dataset->hasColour();
         options_.loaderThreads = 1;
         options_.ramBytes = options_.uploadBytes = 1;
-        for (uint64_t page = 0; page < open_.dataset->pages.size(); ++page) options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
+        for (uint64_t page = 0; page < dataset->pages.size(); ++page) options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
         auto made = Renderer::create(options_);
         if (!made) return made.error();
         renderer_ = std::move(*made);
         start_ = Clock::now();
-        return renderer_->open(open_.dataset, source);
+        return renderer_->open(dataset, source);
     }
 
     Result<void> draw(const UpdateResult& update) {

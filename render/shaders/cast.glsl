@@ -135,10 +135,12 @@ struct Seam {
 // Between two levels the surfaces are apart by as much as their errors, and a ray could pass between them. So the
 // coarser one goes on for a while beyond the wall, in the finer one's region.
 Seam seamBetween(Region before, Region after, float wall) {
-    float reach = kSeamErrors * max(before.error, after.error);
     Seam seam;
     seam.behind = after.isPage && after.bits > before.bits;
     seam.bits = max(before.bits, after.bits);
+    // No farther than a page's edge, whatever a file says.
+    float edge = powerOfTwo(int(frame.mode.y + frame.mode.x) + seam.bits - int(kLatticeBits));
+    float reach = min(kSeamErrors * max(before.error, after.error), edge);
     seam.corner = (seam.behind ? before.corner : after.corner) >> seam.bits << seam.bits;
     seam.first = seam.behind ? max(wall - reach, 0.0) : wall;
     seam.last = seam.behind ? wall : wall + reach;
@@ -154,14 +156,15 @@ bool nextBox(Ray ray, inout Seam seam) {
     bvec3 through = equal(t, vec3(wall));
     through = bvec3(through.x, through.y && !through.x, through.z && !through.y && !through.x);
     seam.corner += mix(ivec3(0), mix(-edge, edge, upward), through);
-    return seam.behind ? wall > seam.first : wall < seam.last;
+    bool inLattice = all(greaterThanEqual(seam.corner, ivec3(0))) && all(lessThan(seam.corner, ivec3(1 << kLatticeBits)));
+    return inLattice && (seam.behind ? wall > seam.first : wall < seam.last);
 }
 
 // The page of the box of a seam; it is above pages of the cut, or there is none. False: not resident.
 bool coarserPage(Seam seam, inout Page page, inout uint steps) {
     uint node = 0u;
     uvec4 record = uvec4(0u);
-    bool exists = all(greaterThanEqual(seam.corner, ivec3(0))) && all(lessThan(seam.corner, ivec3(1 << kLatticeBits)));
+    bool exists = true;
     page.bits = int(kLatticeBits) + 1;
     while (exists && page.bits > seam.bits) {
         record = fetchTable(node * kRecordTexels);
@@ -398,7 +401,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
             // Its next box, or the region itself.
             onSeam = nextBox(ray, seam);
             fromNew = false;
-            inside = hit.depth > reached.x;
+            inside = onSeam || hit.depth > reached.x;
         } else {
             before = region;
             reached = leaveLatticeBox(ray, region.corner, region.bits);

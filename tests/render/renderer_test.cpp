@@ -3,6 +3,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <set>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -597,7 +598,14 @@ TEST_F(RendererTest, ABrokenPageIsReportedOnceAndDrawnFromItsParent) {
     EXPECT_TRUE(update->settled);
     ASSERT_GE(update->problems.size(), 1u);
     EXPECT_EQ(update->problems[0].message, "broken");
-    for (int i = 0; i < 5; ++i) EXPECT_TRUE(renderer_->update(request)->problems.empty());
+    // A page that was on its way when its parent was given up may be reported later: once, too.
+    std::set<std::string> reported;
+    for (const Error& problem : update->problems) EXPECT_TRUE(reported.insert(problem.element).second) << problem.line();
+    for (int i = 0; i < 5; ++i) {
+        const auto later = renderer_->update(request);
+        ASSERT_TRUE(later);
+        for (const Error& problem : later->problems) EXPECT_TRUE(reported.insert(problem.element).second) << problem.line();
+    }
     const auto stats = renderer_->render(request);
     ASSERT_TRUE(stats);
     EXPECT_GT(stats->hitPixels, 2500u);

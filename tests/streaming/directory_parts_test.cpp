@@ -166,6 +166,19 @@ Result<void> admitAll(const std::vector<std::byte>& bytes, uint64_t seed) {
     return {};
 }
 
+TEST(DirectoryParts, WhatWasRefusedIsNotKept) {
+    const Scan scan = scanOf(4);
+    const auto start = scan.start();
+    const uint64_t block = start->pages.blocks() - 1, page = block * kEntriesPerBlock;
+    PageEntry lie = scan.whole->pages[page];
+    lie.firstChild = UINT32_MAX;
+    lie.childMask = 0xff;
+    std::memcpy(&scan.file->bytes[blockOffset(block)], &lie, sizeof lie);
+    test::sealFile(scan.file->bytes);
+    EXPECT_FALSE(admitBlock(*start, "lie.vcp", block, std::span(scan.file->bytes).subspan(blockOffset(block), kBlockBytes)));
+    for (uint64_t i = page; i < start->pages.size(); ++i) EXPECT_EQ(start->pages[i].childMask, 0) << i;
+}
+
 TEST(DirectoryParts, LiesBehindValidHashesAreFoundInAnyOrder) {
     const Scan scan = scanOf(4);
     const Dataset& d = *scan.whole;

@@ -253,6 +253,7 @@ TEST_F(BenchRays, NothingLeaksWherePagesAndLevelsMeet) {
     options.out = folder_ / "report";
     const auto report = benchRays(options);
     ASSERT_TRUE(report) << report.error().line();
+    ASSERT_EQ(report->rows.size(), 1u);
     for (const BenchRaysRow& row : report->rows) {
         EXPECT_EQ(row.classes.judged, 13u * 160 * 100);
         EXPECT_EQ(row.classes.holes, 0u) << row.camera;

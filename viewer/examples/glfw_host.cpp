@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <string>
 
 #include <vcp/vcp.hpp>
@@ -32,23 +33,41 @@ void cursor(GLFWwindow* window, double& x, double& y) {
 
 uint32_t modifiers(int mods) { return ((mods & GLFW_MOD_SHIFT) ? VCP_SHIFT : 0) | ((mods & GLFW_MOD_CONTROL) ? VCP_CONTROL : 0); }
 
+// What a callback throws waits here: GLFW is C, nothing may pass through it.
+std::exception_ptr thrown;
+
+template <class F>
+void guarded(GLFWwindow* window, F call) {
+    try {
+        call(viewOf(window));
+    } catch (...) {
+        thrown = std::current_exception();
+        glfwSetWindowShouldClose(window, GLFW_TRUE);
+    }
+}
+
 void listen(GLFWwindow* window) {
-    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int x, int y) { viewOf(w).resize(uint32_t(x), uint32_t(y)); });
-    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { cursor(w, x, y), viewOf(w).move(x, y); });
+    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int x, int y) {
+        guarded(w, [=](vcp::widget::View& view) { view.resize(uint32_t(x), uint32_t(y)); });
+    });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+        cursor(w, x, y);
+        guarded(w, [=](vcp::widget::View& view) { view.move(x, y); });
+    });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double, double notches) {
         double x, y;
-        cursor(w, x, y), viewOf(w).scroll(x, y, notches);
+        cursor(w, x, y);
+        guarded(w, [=](vcp::widget::View& view) { view.scroll(x, y, notches); });
     });
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int mods) {
         const vcp_button which = button == GLFW_MOUSE_BUTTON_LEFT ? VCP_LEFT : button == GLFW_MOUSE_BUTTON_RIGHT ? VCP_RIGHT : VCP_MIDDLE;
         double x, y;
         cursor(w, x, y);
-        if (action == GLFW_PRESS) viewOf(w).press(which, x, y, modifiers(mods));
-        else viewOf(w).release(which);
+        guarded(w, [=](vcp::widget::View& view) { action == GLFW_PRESS ? view.press(which, x, y, modifiers(mods)) : view.release(which); });
     });
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
         if (key == GLFW_KEY_ESCAPE) glfwSetWindowShouldClose(w, GLFW_TRUE);
-        else if (action != GLFW_REPEAT) viewOf(w).key(uint32_t(key), action == GLFW_PRESS);
+        else if (action != GLFW_REPEAT) guarded(w, [=](vcp::widget::View& view) { view.key(uint32_t(key), action == GLFW_PRESS); });
     });
 }
 
@@ -78,6 +97,7 @@ void run(GLFWwindow* window, const char* file, int frames) {
         if (step.settled) ++settled;
         glfwWaitEventsTimeout(frames >= 0 ? 0.01 : std::clamp(step.wait_seconds, 0.001, 1.0));
     }
+    if (thrown) std::rethrow_exception(thrown);
     const vcp_stats stats = view.stats();
     std::printf("%llu frames, %llu pixels show the surface\n", (unsigned long long)stats.frames, (unsigned long long)stats.hit_pixels);
 }

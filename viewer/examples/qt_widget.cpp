@@ -81,8 +81,23 @@ private:
     QTimer timer_;
 };
 
+// What an event's handler throws must not pass through Qt.
+class Application : public QApplication {
+public:
+    using QApplication::QApplication;
+    bool notify(QObject* receiver, QEvent* event) override {
+        try {
+            return QApplication::notify(receiver, event);
+        } catch (const std::exception& e) {
+            std::fprintf(stderr, "%s\n", e.what());
+            exit(1);
+            return false;
+        }
+    }
+};
+
 int main(int argc, char** argv) {
-    QApplication app(argc, argv);
+    Application app(argc, argv);
     const QStringList arguments = app.arguments();
     if (arguments.size() < 2) return std::fprintf(stderr, "usage: qt_widget FILE.vcp [--frames N]\n"), 1;
     const int frames = arguments.size() > 3 && arguments[2] == "--frames" ? arguments[3].toInt() : -1;

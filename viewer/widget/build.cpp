@@ -29,11 +29,13 @@ public:
             news_.notify_one();
         });
         std::unique_lock lock(mutex_);
+        bool told = true;  // not asked again once it has cancelled
         while (!done_) {
             news_.wait_for(lock, kProgressEvery, [this] { return done_; });
             const BuildProgress at = at_;
             lock.unlock();
-            const bool goesOn = tell(at);
+            const bool goesOn = !told || tell(at);
+            told = goesOn;
             lock.lock();
             cancelled_ = cancelled_ || !goesOn;
         }

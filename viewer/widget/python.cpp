@@ -94,9 +94,9 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
         const py::gil_scoped_release others;
         report = build(inputs, output, tell, options);
     } catch (const Error&) {
-        if (thrown) std::rethrow_exception(thrown);
-        throw;
+        if (!thrown) throw;
     }
+    if (thrown) std::rethrow_exception(thrown);
     return py::dict("triangles"_a = report.triangles, "levels"_a = report.levels, "file_bytes"_a = report.file_bytes, "cell"_a = report.cell,
                     "certified_error"_a = report.certified_error, "seconds"_a = report.seconds);
 }

@@ -88,6 +88,8 @@ private:
         if (f) f(values...);
     }
     void check(vcp_status status) const {
+        // Whose turn it is may be writing the text just now.
+        if (status == VCP_BUSY) throw Error(status, "a call for this context has not ended yet");
         if (status != VCP_OK) throw Error(status, vcp_context_last_error(handle()));
     }
     template <class T>
@@ -107,6 +109,15 @@ public:
         if (const vcp_status status = vcp_view_create(context_.handle(), &options, &made); status != VCP_OK)
             throw Error(status, vcp_context_last_error(context_.handle()));
         view_.reset(made);
+    }
+    View(View&&) = default;
+    /// The view of before goes before its context.
+    View& operator=(View&& other) noexcept {
+        if (this == &other) return *this;
+        view_.reset();
+        context_ = std::move(other.context_);
+        view_ = std::move(other.view_);
+        return *this;
     }
     /// Without a window.
     View(Context context, uint32_t width, uint32_t height) : View(std::move(context), offscreen(width, height)) {}
@@ -167,6 +178,7 @@ private:
         return options;
     }
     void check(vcp_status status) const {
+        if (status == VCP_BUSY) throw Error(status, "a call for this context has not ended yet");
         if (status != VCP_OK) throw Error(status, vcp_view_last_error(handle()));
     }
     template <class T>

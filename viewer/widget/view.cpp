@@ -303,13 +303,15 @@ Result<void> act(vcp_view& view, vcp_action action) {
     }
     if (action < VCP_FIT || action > VCP_VIEW_ISOMETRIC) return wrong("there is no such action");
     view.viewer->act(static_cast<ViewerAction>(action));
+    if (!view.viewer->isFlying()) view.fly = glm::dvec3(0);
     return {};
 }
 
 void pressKey(vcp_view& view, uint32_t key, bool isPressed) {
     if (view.viewer->isFlying()) {
         const glm::dvec3 way = flyDirectionOf(key);
-        view.fly = glm::clamp(view.fly + (isPressed ? way : -way), -1.0, 1.0);
+        for (int axis = 0; axis < 3; ++axis)
+            if (way[axis] != 0 && (isPressed || view.fly[axis] == way[axis])) view.fly[axis] = isPressed ? way[axis] : 0;
         if (way != glm::dvec3(0)) return;
     }
     const auto action = actionOf(key);
