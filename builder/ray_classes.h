@@ -16,8 +16,8 @@
 //             (an edge of one triangle alone) comes within e of it there: of two parts that touch and share no
 //             edge, each may recede by e. "There" is the ray's piece around the crossing on which it stays
 //             within 1.1 e of the mesh. So it passes no silhouette and no border by e or less, and enters the
-//             mesh's e-neighbourhood and leaves it again, without being stopped. All crossings up to the surface hit are judged, so that
-//             missed and wrong-sheet rays are treated alike.
+//             mesh's e-neighbourhood and leaves it again, without being stopped. All crossings up to the
+//             surface hit are judged, so that missed and wrong-sheet rays are treated alike.
 //   too far   A surface hit, of whatever class, farther from the mesh than its page's certified error.
 //
 // Here e is the certified error widened by 1 % and a millionth of a cell. Both counts must be zero.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -177,8 +176,7 @@ private:
             best = std::min(best, cells * cell);
             return;
         }
-        for (int child = 0; child < std::popcount(entry.childMask); ++child)
-            visitPage(entry.firstChild + child, p, best);
+        for (const uint64_t child : childrenOf(entry)) visitPage(child, p, best);
     }
 
     void visitNode(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 lowest, double edge,

@@ -364,9 +364,8 @@ Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::spa
     // Children come after their parents in the directory: backwards, every mark below a page is known.
     for (uint64_t page = pages.size(); page-- > 0;) {
         if (!pages.knows(page)) continue;
-        const int children = std::popcount(pages[page].childMask);
-        for (int i = 0; i < children; ++i) {
-            if (caster.marks_[pages[page].firstChild + i] == Mark::None) continue;
+        for (const uint64_t child : childrenOf(pages[page])) {
+            if (caster.marks_[child] == Mark::None) continue;
             if (caster.marks_[page] == Mark::Chosen)
                 return Error{.code = ErrorCode::Usage,
                              .message = "the cut names a page and one below it",

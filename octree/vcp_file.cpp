@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -166,7 +165,7 @@ Result<void> checkDirectory(const std::string& file, const Dataset& d) {
                 if (child >= d.header.pages || !isChildAt(d.pages[child], e, octant)) return brokenEntry(file, index, "child pages do not match");
                 return {};
             }));
-            next += static_cast<uint64_t>(std::popcount(e.childMask));
+            next += childrenOf(e).size();
         }
     if (next != d.header.pages) return brokenEntry(file, 0, "pages without a parent");
     return {};
@@ -186,10 +185,6 @@ Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::s
     if (hashBytes(packed) != hash) return broken(reader, element, offset, "hash does not match: the page was changed or damaged");
     return packed;
 }
-
-}  // namespace
-
-namespace {
 
 /// Held by one at a time; others wait.
 class Turn {
@@ -296,8 +291,7 @@ private:
         if (e.childMask == 0) return {};
         if (e.level + 1u >= d_.header.levels) return brokenEntry(file_, page, "wrong child pages");
         const LevelRow& below = d_.header.level[e.level + 1];
-        const uint64_t end = uint64_t{e.firstChild} + static_cast<uint64_t>(std::popcount(e.childMask));
-        if (e.firstChild < below.firstEntry || end > below.firstEntry + below.pages) return brokenEntry(file_, page, "wrong child pages");
+        if (e.firstChild < below.firstEntry || *childrenOf(e).end() > below.firstEntry + below.pages) return brokenEntry(file_, page, "wrong child pages");
         return eachChild(e, [&](uint64_t child, uint32_t octant) -> Result<void> {
             uint32_t& parent = directory_.parts_->parents[child];
             if (parent != PageDirectory::Parts::kNoPage && parent != page) return brokenEntry(file_, page, "wrong child pages");

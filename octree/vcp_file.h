@@ -14,10 +14,12 @@
 // neither memory nor time. All numbers little endian. Readers refuse versions they do not know.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <ranges>
 #include <span>
 #include <string>
 #include <vector>
@@ -100,6 +102,11 @@ struct PageEntry {
     uint8_t reserved[6] = {};
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 && offsetof(PageEntry, childMask) == 72);
+
+/// The entries of a page's children, in octant order.
+inline std::ranges::iota_view<uint64_t, uint64_t> childrenOf(const PageEntry& page) {
+    return {page.firstChild, uint64_t{page.firstChild} + static_cast<uint64_t>(std::popcount(page.childMask))};
+}
 
 struct CommitRecord {
     char magic[8] = {'V', 'C', 'P', 'c', 'o', 'm', 'm', 't'};

@@ -28,9 +28,8 @@ Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
     const auto visit = [&](const auto& self, uint64_t page) -> bool {
         if (parts.contains(page)) return true;
         if (page > last || !dataset.pages.knows(page)) return false;
-        const PageEntry& entry = dataset.pages[page];
         bool isAbove = false;
-        for (int i = 0; i < std::popcount(entry.childMask); ++i) isAbove = self(self, uint64_t{entry.firstChild} + static_cast<uint64_t>(i)) || isAbove;
+        for (const uint64_t child : childrenOf(dataset.pages[page])) isAbove = self(self, child) || isAbove;
         if (isAbove) parts.emplace(page, Part::Above);
         return isAbove;
     };

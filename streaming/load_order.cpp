@@ -65,9 +65,8 @@ LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::vect
 }
 
 void LoadPriorities::learn(uint64_t page, uint64_t units) {
-    const PageEntry& entry = dataset_->pages[page];
     pageUnits_[page] = units;
-    for (uint32_t i = 0; i < uint32_t(std::popcount(entry.childMask)); ++i) parents_[entry.firstChild + i] = static_cast<uint32_t>(page);
+    for (const uint64_t child : childrenOf(dataset_->pages[page])) parents_[child] = static_cast<uint32_t>(page);
 }
 
 void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view, size_t views) {

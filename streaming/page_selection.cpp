@@ -1,7 +1,6 @@
 #include "streaming/page_selection.h"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 #include <queue>
 
@@ -23,21 +22,6 @@ struct Candidate {
         return error != other.error ? error < other.error : page > other.page;
     }
 };
-
-/// Numbers of a page's children.
-struct Children {
-    uint64_t first, end;
-};
-Children childrenOf(const PageEntry& page) {
-    return {page.firstChild, uint64_t{page.firstChild} + std::popcount(page.childMask)};
-}
-
-template <class Test>
-bool allOf(Children children, Test test) {
-    for (uint64_t child = children.first; child < children.end; ++child)
-        if (!test(child)) return false;
-    return true;
-}
 
 }  // namespace
 
@@ -83,7 +67,7 @@ double excessOf(const Dataset& dataset, uint64_t page, std::span<const Selection
 }
 
 bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> states) {
-    return page.childMask != 0 && allOf(childrenOf(page), [&](uint64_t child) { return states[child] != kUnavailable; });
+    return page.childMask != 0 && std::ranges::all_of(childrenOf(page), [&](uint64_t child) { return states[child] != kUnavailable; });
 }
 
 struct ChildrenBytes {
@@ -91,9 +75,9 @@ struct ChildrenBytes {
     bool areKnown = true;
 };
 /// Of children that are not known: about as large as their parent.
-ChildrenBytes bytesOf(Children children, uint64_t parentBytes, std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
+ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
     ChildrenBytes sum;
-    for (uint64_t child = children.first; child < children.end; ++child) {
+    for (const uint64_t child : childrenOf(parent)) {
         const bool isKnown = states[child] != kUnknown;
         sum.bytes += isKnown ? pageBytes[child] : parentBytes;
         sum.areKnown = sum.areKnown && isKnown;
@@ -118,8 +102,7 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
         if (next.error <= 0) break;
         const PageEntry& entry = dataset.pages[next.page];
         if (!mayBeRefined(entry, states)) continue;
-        const Children children = childrenOf(entry);
-        const ChildrenBytes more = bytesOf(children, pageBytes[next.page], pageBytes, states);
+        const ChildrenBytes more = bytesOf(entry, pageBytes[next.page], pageBytes, states);
         if (!more.areKnown) {
             choice.awaited.push_back(next.page);
             choice.refined[next.page] = kAwaited;
@@ -132,7 +115,7 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
         bytes += more.bytes;
         if (!more.areKnown) continue;
         choice.refined[next.page] = kRefined;
-        for (uint64_t child = children.first; child < children.end; ++child) {
+        for (const uint64_t child : childrenOf(entry)) {
             choice.wanted.push_back({child, next.error});
             open.push({excessOf(dataset, child, views), child});
         }
@@ -159,16 +142,16 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
         ++drawable.pagesWanted;
         drawable.pagesMissing += resident[at.page] != 0 ? 0 : 1;
         const PageEntry& entry = dataset.pages[at.page];
-        const Children children = childrenOf(entry);
+        const auto children = childrenOf(entry);
         const double error = errorInView(dataset, at.page, view);
         const bool refined = choice.refined[at.page] == kRefined && isTooCoarse(error, view);
         if (choice.refined[at.page] == kAwaited && isTooCoarse(error, view)) {
-            drawable.pagesWanted += children.end - children.first;
-            drawable.pagesMissing += children.end - children.first;
+            drawable.pagesWanted += children.size();
+            drawable.pagesMissing += children.size();
         }
-        const bool drawn = !at.isCovered && !(refined && allOf(children, [&](uint64_t child) { return resident[child] != 0; }));
+        const bool drawn = !at.isCovered && !(refined && std::ranges::all_of(children, [&](uint64_t child) { return resident[child] != 0; }));
         if (refined)
-            for (uint64_t child = children.first; child < children.end; ++child) walk.push_back({child, at.isCovered || drawn});
+            for (const uint64_t child : children) walk.push_back({child, at.isCovered || drawn});
         if (!refined && isTooCoarse(error, view) && entry.childMask != 0) drawable.isRelaxed = drawable.isRelaxed || choice.relaxed;
         if (!drawn) continue;
         drawable.cut.push_back(at.page);

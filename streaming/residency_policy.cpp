@@ -1,7 +1,6 @@
 #include "streaming/residency_policy.h"
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
 #include <iterator>
 #include <limits>
@@ -317,9 +316,7 @@ void ResidencyPolicy::wishForBlocks(std::vector<PageRequest>& wishes) const {
     uint64_t last = UINT64_MAX;
     std::set<uint64_t> blocks;
     for (const uint64_t page : choice_.awaited) {
-        const PageEntry& entry = dataset_->pages[page];
-        const uint64_t end = uint64_t{entry.firstChild} + static_cast<uint64_t>(std::popcount(entry.childMask));
-        for (uint64_t child = entry.firstChild; child < end; ++child) {
+        for (const uint64_t child : childrenOf(dataset_->pages[page])) {
             const uint64_t block = child / kEntriesPerBlock;
             if (block == last || blocksSeen_[block] != 0 || !blocks.insert(block).second) continue;
             last = block;

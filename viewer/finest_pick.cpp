@@ -1,7 +1,6 @@
 #include "viewer/finest_pick.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <vector>
 
@@ -39,7 +38,7 @@ struct PageOnRay {
 
 /// Reads what part of the directory a page's children need.
 Result<void> learnChildren(const ByteReader& reader, const Dataset& dataset, const PageEntry& page) {
-    for (uint64_t child = page.firstChild; child < uint64_t{page.firstChild} + static_cast<uint64_t>(std::popcount(page.childMask)); ++child) {
+    for (const uint64_t child : childrenOf(page)) {
         if (dataset.pages.knows(child)) continue;
         std::vector<std::byte> block(kBlockBytes);
         VCP_TRY(reader.read(blockOffset(child / kEntriesPerBlock), block));
@@ -61,7 +60,7 @@ Result<std::vector<PageOnRay>> finestPagesOn(const ByteReader& reader, const Dat
         if (s.enter > s.leave) continue;
         if (entry.childMask == 0) found.push_back({page, s.enter});
         VCP_TRY(learnChildren(reader, dataset, entry));
-        for (int i = 0; i < std::popcount(entry.childMask); ++i) open.push_back(uint64_t{entry.firstChild} + static_cast<uint64_t>(i));
+        for (const uint64_t child : childrenOf(entry)) open.push_back(child);
     }
     std::sort(found.begin(), found.end(), [](const PageOnRay& a, const PageOnRay& b) { return a.enter < b.enter; });
     return found;

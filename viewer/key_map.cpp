@@ -38,6 +38,19 @@ constexpr KeyHelp kKeyMap[] = {
     {"Ctrl+Q", "quit"},
 };
 
+/// Camera axes, as Viewer::fly(); 0: nowhere.
+glm::dvec3 flyDirectionOf(uint32_t key) {
+    switch (key) {
+        case 'W': return {0, 0, 1};
+        case 'S': return {0, 0, -1};
+        case 'A': return {-1, 0, 0};
+        case 'D': return {1, 0, 0};
+        case 'E': return {0, 1, 0};
+        case 'Q': return {0, -1, 0};
+        default: return {0, 0, 0};
+    }
+}
+
 }  // namespace
 
 std::span<const KeyHelp> keyMap() { return kKeyMap; }
@@ -63,16 +76,11 @@ std::optional<ViewerAction> actionOf(uint32_t key) {
     }
 }
 
-glm::dvec3 flyDirectionOf(uint32_t key) {
-    switch (key) {
-        case 'W': return {0, 0, 1};
-        case 'S': return {0, 0, -1};
-        case 'A': return {-1, 0, 0};
-        case 'D': return {1, 0, 0};
-        case 'E': return {0, 1, 0};
-        case 'Q': return {0, -1, 0};
-        default: return {0, 0, 0};
-    }
+bool holdFlyKey(glm::dvec3& held, uint32_t key, bool isPressed) {
+    const glm::dvec3 way = flyDirectionOf(key);
+    for (int axis = 0; axis < 3; ++axis)
+        if (way[axis] != 0 && (isPressed || held[axis] == way[axis])) held[axis] = isPressed ? way[axis] : 0;
+    return way != glm::dvec3(0);
 }
 
 std::string keyMapText() {

@@ -20,8 +20,8 @@ std::span<const KeyHelp> keyMap();
 
 /// What a key does to the view: the character on it in capitals. Keys of the window itself (measuring, panels) have none.
 std::optional<ViewerAction> actionOf(uint32_t key);
-/// Which way a key flies: camera axes, as Viewer::fly(); 0: nowhere.
-glm::dvec3 flyDirectionOf(uint32_t key);
+/// The keys that fly, W A S D E Q, held together: `held` is which way they go (Viewer::fly). False: the key is none of them.
+bool holdFlyKey(glm::dvec3& held, uint32_t key, bool isPressed);
 
 /// Two columns of plain text.
 std::string keyMapText();

@@ -51,19 +51,16 @@ public:
 private:
     Result<void> start() {
         // Memory for one page on its way: none is read before those drawn so far could ask for others.
-        auto whole = readDataset(*open_.reader);
-        if (!whole) return whole.error();
-        const auto dataset = std::make_shared<const Dataset>(*std::move(whole));
-        const auto source = std::make_shared<FilePageSource>(open_.reader, dataset, 0);
-        const bool colour = options_.colour && dataset->hasColour();
+        const auto source = std::make_shared<FilePageSource>(open_.reader, open_.dataset, 0);
+        const bool colour = options_.colour && open_.dataset->hasColour();
         options_.loaderThreads = 1;
         options_.ramBytes = options_.uploadBytes = 1;
-        for (uint64_t page = 0; page < dataset->pages.size(); ++page) options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
+        for (uint64_t page = 0; page < open_.dataset->pages.size(); ++page) options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
         auto made = Renderer::create(options_);
         if (!made) return made.error();
         renderer_ = std::move(*made);
         start_ = Clock::now();
-        return renderer_->open(dataset, source);
+        return renderer_->open(open_.dataset, source);
     }
 
     Result<void> draw(const UpdateResult& update) {
@@ -105,10 +102,15 @@ private:
 Result<std::vector<OrderCurve>> compareOrders(const OpenDataset& open, const RendererOptions& options, const FrameRequest& request,
                                               const std::vector<LoadOrder>& orders, int draws,
                                               const std::function<bool(const std::string& what, double fraction)>& progress) {
+    // Every entry: the largest page says how much memory one takes.
+    auto dataset = readDataset(*open.reader);
+    if (!dataset) return dataset.error();
+    OpenDataset whole = open;
+    whole.dataset = std::make_shared<const Dataset>(*std::move(dataset));
     std::vector<OrderCurve> curves;
     for (const LoadOrder order : orders) {
         const std::string what = fmt::format("order {}", nameOf(order));
-        auto curve = OrderRun(open, options, request, order, draws).run([&](double fraction) { return !progress || progress(what, fraction); });
+        auto curve = OrderRun(whole, options, request, order, draws).run([&](double fraction) { return !progress || progress(what, fraction); });
         if (!curve) return curve.error();
         curves.push_back(*std::move(curve));
     }

@@ -12,6 +12,7 @@
 #include "viewer/interface.h"
 #include "viewer/interface_painter.h"
 #include "viewer/interrupt.h"
+#include "viewer/key_map.h"
 
 namespace vcp {
 
@@ -230,25 +231,10 @@ private:
         session_->viewer().fly({});
     }
 
-    /// Which way a key flies, in camera axes; 0 where it does not.
-    static glm::dvec3 flightOf(int key) {
-        switch (key) {
-            case GLFW_KEY_W: return {0, 0, 1};
-            case GLFW_KEY_S: return {0, 0, -1};
-            case GLFW_KEY_A: return {-1, 0, 0};
-            case GLFW_KEY_D: return {1, 0, 0};
-            case GLFW_KEY_E: return {0, 1, 0};
-            case GLFW_KEY_Q: return {0, -1, 0};
-            default: return {};
-        }
-    }
-
     void key(int key, int action, int mods) {
         if (action == GLFW_REPEAT) return;
-        const glm::dvec3 flight = flightOf(key);
-        if (flight != glm::dvec3(0) && (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE)) {
-            for (int axis = 0; axis < 3; ++axis)
-                if (flight[axis] != 0) held_[axis] = action == GLFW_PRESS ? flight[axis] : held_[axis] == flight[axis] ? 0 : held_[axis];
+        const bool mayFly = (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE);
+        if (mayFly && holdFlyKey(held_, static_cast<uint32_t>(key), action == GLFW_PRESS)) {
             session_->viewer().fly(session_->viewer().isFlying() ? held_ : glm::dvec3(0));
             return;
         }
@@ -277,23 +263,11 @@ private:
             case GLFW_KEY_D: session_->isMeasuring = !session_->isMeasuring; break;
             case GLFW_KEY_ENTER: session_->measurement().finishLine(); break;
             case GLFW_KEY_BACKSPACE: session_->measurement().takeBack(); break;
-            case GLFW_KEY_F: viewer.act(ViewerAction::Fit); break;
-            case GLFW_KEY_R:
             case GLFW_KEY_HOME: viewer.act(ViewerAction::Reset); break;
-            case GLFW_KEY_L: viewer.act(ViewerAction::ToggleLight); break;
-            case GLFW_KEY_S: viewer.act(ViewerAction::ToggleShadows); break;
-            case GLFW_KEY_O: viewer.act(ViewerAction::ToggleOcclusion); break;
-            case GLFW_KEY_X: viewer.act(ViewerAction::ToggleSection); break;
-            case GLFW_KEY_M: viewer.act(ViewerAction::NextShading); break;
-            case GLFW_KEY_C: viewer.act(ViewerAction::ToggleColour); break;
-            case GLFW_KEY_P: viewer.act(ViewerAction::ToggleProjection); break;
-            case GLFW_KEY_U: viewer.act(ViewerAction::ToggleUpAxis); break;
             case GLFW_KEY_G: toggleFly(); break;
-            case GLFW_KEY_1: viewer.act(ViewerAction::ViewFront); break;
-            case GLFW_KEY_3: viewer.act(ViewerAction::ViewRight); break;
-            case GLFW_KEY_7: viewer.act(ViewerAction::ViewTop); break;
-            case GLFW_KEY_9: viewer.act(ViewerAction::ViewIsometric); break;
-            default: break;
+            default:
+                // GLFW names keys by the capitals on them.
+                if (const auto action = actionOf(static_cast<uint32_t>(key))) viewer.act(*action);
         }
     }
 

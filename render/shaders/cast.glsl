@@ -153,9 +153,7 @@ bool nextBox(Ray ray, inout Seam seam) {
     bvec3 upward = notEqual(greaterThan(ray.direction, vec3(0.0)), bvec3(seam.behind));
     vec3 t = planeDistances(ray, mix(seam.corner, far, upward));
     float wall = seam.behind ? maxOf(t) : minOf(t);
-    bvec3 through = equal(t, vec3(wall));
-    through = bvec3(through.x, through.y && !through.x, through.z && !through.y && !through.x);
-    seam.corner += mix(ivec3(0), mix(-edge, edge, upward), through);
+    seam.corner += mix(ivec3(0), mix(-edge, edge, upward), oneOf(equal(t, vec3(wall))));
     bool inLattice = all(greaterThanEqual(seam.corner, ivec3(0))) && all(lessThan(seam.corner, ivec3(1 << kLatticeBits)));
     return inLattice && (seam.behind ? wall > seam.first : wall < seam.last);
 }

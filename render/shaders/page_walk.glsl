@@ -73,6 +73,9 @@ void ascend(inout Descent at, ivec3 from, ivec3 to, uint rootGroup, int rootBits
     at.bits = lost ? rootBits : at.bits + max(up, 0);
 }
 
+// One of those that are true.
+bvec3 oneOf(bvec3 b) { return bvec3(b.x, b.y && !b.x, b.z && !b.y && !b.x); }
+
 // Leaves the box lo..hi, which the ray is in, by the wall it meets first; by one wall where it meets several at once:
 // what bridges the difference between two leaves at their common wall is in these two, so a ray through an edge has
 // to meet a leaf beside it.
@@ -81,8 +84,7 @@ Place leaveBox(PageRay ray, Place from, vec3 lo, vec3 hi) {
     vec3 walls = mix(lo, hi, ahead);
     vec3 t = (walls - ray.start) * ray.inverse;
     float nearest = minOf(t);
-    bvec3 through = equal(t, vec3(nearest));
-    through = bvec3(through.x, through.y && !through.x, through.z && !through.y && !through.x);
+    bvec3 through = oneOf(equal(t, vec3(nearest)));
     Place to;
     to.tau = max(from.tau, nearest);
     vec3 p = clamp(ray.start + to.tau * ray.direction, lo, hi);

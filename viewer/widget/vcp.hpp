@@ -24,6 +24,14 @@ private:
     vcp_status status_;
 };
 
+/// Throws where `status` is not VCP_OK; `lastError`: vcp_context_last_error or vcp_view_last_error.
+template <class Handle>
+void check(vcp_status status, const Handle* handle, const char* (*lastError)(const Handle*)) {
+    // Whose turn it is may be writing the text just now.
+    if (status == VCP_BUSY) throw Error(status, "a call for this context has not ended yet");
+    if (status != VCP_OK) throw Error(status, lastError(handle));
+}
+
 /// A struct of vcp.h with its size set and the rest zero.
 template <class T>
 T sized() {
@@ -87,11 +95,7 @@ private:
     static void call(const F& f, T... values) noexcept {
         if (f) f(values...);
     }
-    void check(vcp_status status) const {
-        // Whose turn it is may be writing the text just now.
-        if (status == VCP_BUSY) throw Error(status, "a call for this context has not ended yet");
-        if (status != VCP_OK) throw Error(status, vcp_context_last_error(handle()));
-    }
+    void check(vcp_status status) const { widget::check(status, handle(), vcp_context_last_error); }
     template <class T>
     T got(vcp_status (*get)(vcp_context*, T*)) const {
         T value = sized<T>();
@@ -177,10 +181,7 @@ private:
         options.height = height;
         return options;
     }
-    void check(vcp_status status) const {
-        if (status == VCP_BUSY) throw Error(status, "a call for this context has not ended yet");
-        if (status != VCP_OK) throw Error(status, vcp_view_last_error(handle()));
-    }
+    void check(vcp_status status) const { widget::check(status, handle(), vcp_view_last_error); }
     template <class T>
     T got(vcp_status (*get)(vcp_view*, T*)) const {
         T value = sized<T>();

@@ -290,6 +290,15 @@ vcp_status changing(vcp_view* view, Call call) noexcept {
     });
 }
 
+vcp_status toCamera(vcp_view* view, const vcp_camera* camera, void (Viewer::*go)(const OrbitCamera&)) noexcept {
+    return changing(view, [&](vcp_view& v) -> Result<void> {
+        const auto wanted = cameraFrom(camera, v.viewer->camera());
+        if (!wanted) return wanted.error();
+        (v.viewer.get()->*go)(*wanted);
+        return {};
+    });
+}
+
 Result<glm::dvec2> cursorAt(vcp_view& view, double x, double y) {
     if (!std::isfinite(x) || !std::isfinite(y)) return wrong("the cursor is nowhere");
     view.cursor = {x, y};
@@ -308,12 +317,7 @@ Result<void> act(vcp_view& view, vcp_action action) {
 }
 
 void pressKey(vcp_view& view, uint32_t key, bool isPressed) {
-    if (view.viewer->isFlying()) {
-        const glm::dvec3 way = flyDirectionOf(key);
-        for (int axis = 0; axis < 3; ++axis)
-            if (way[axis] != 0 && (isPressed || view.fly[axis] == way[axis])) view.fly[axis] = isPressed ? way[axis] : 0;
-        if (way != glm::dvec3(0)) return;
-    }
+    if (view.viewer->isFlying() && holdFlyKey(view.fly, key, isPressed)) return;
     const auto action = actionOf(key);
     if (!isPressed || !action) return;
     view.viewer->act(*action);
@@ -432,23 +436,9 @@ vcp_status vcp_view_get_camera(vcp_view* view, vcp_camera* camera) {
     return inTurn(view, [&](vcp_view& v) { return give(camera, cameraOf(v.viewer->camera())); });
 }
 
-vcp_status vcp_view_set_camera(vcp_view* view, const vcp_camera* camera) {
-    return changing(view, [&](vcp_view& v) -> vcp::Result<void> {
-        const auto wanted = cameraFrom(camera, v.viewer->camera());
-        if (!wanted) return wanted.error();
-        v.viewer->setCamera(*wanted);
-        return {};
-    });
-}
+vcp_status vcp_view_set_camera(vcp_view* view, const vcp_camera* camera) { return toCamera(view, camera, &vcp::Viewer::setCamera); }
 
-vcp_status vcp_view_move_camera(vcp_view* view, const vcp_camera* camera) {
-    return changing(view, [&](vcp_view& v) -> vcp::Result<void> {
-        const auto wanted = cameraFrom(camera, v.viewer->camera());
-        if (!wanted) return wanted.error();
-        v.viewer->moveTo(*wanted);
-        return {};
-    });
-}
+vcp_status vcp_view_move_camera(vcp_view* view, const vcp_camera* camera) { return toCamera(view, camera, &vcp::Viewer::moveTo); }
 
 vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look) {
     return inTurn(view, [&](vcp_view& v) { return give(look, lookOf(*v.viewer)); });
