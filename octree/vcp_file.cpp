@@ -114,7 +114,10 @@ public:
         if (e.level != level) return brokenEntry(file_, index, "wrong level");
         VCP_TRY(extent(index, e.offset, e.storedBytes, e.pageBytes));
         if (e.colourStoredBytes == 0 && (e.colourBytes != 0 || (hasColour_ && e.leaves != 0))) return brokenEntry(file_, index, "colour is missing");
-        if (e.colourStoredBytes != 0) VCP_TRY(extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes));
+        if (e.colourStoredBytes != 0) {
+            if (e.colourOffset > end_ + kBlockBytes) return brokenEntry(file_, index, "its colour does not follow it");
+            VCP_TRY(extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes));
+        }
         if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError) || e.hardLeaves > e.leaves)
             return brokenEntry(file_, index, "certified error or counts out of range");
         if (level == 0 && e.morton != 0) return brokenEntry(file_, index, "the root is not at the origin");

@@ -103,7 +103,7 @@ struct RendererOptions {
     bool validation = false;        ///< validation layers, core and synchronization; see validationMessages
     PageAccess access = PageAccess::Auto;
     uint32_t loaderThreads = 2;
-    uint64_t ramBytes = 256ull << 20;     ///< of pages being read and not in the pool yet, never exceeded
+    uint64_t ramBytes = 256ull << 20;     ///< of pages on their way to the pool, and of stored ones kept to be read again; never exceeded
     LoadOrder order = LoadOrder::Feedback;  ///< of pages; others are for comparison
     uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
     DeviceFaults faults;
@@ -189,7 +189,7 @@ struct UpdateResult {
     uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
     bool relaxed = false;       ///< the budget is too small for the view's pixel error; errorPixels says what it has
-    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool since open() or setBudgets()
+    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
     uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
     uint64_t reloads = 0;       ///< pages loaded twice in one still view: always 0
     uint32_t deviceLosses = 0;  ///< since create(): each time all was made anew and pages are read again

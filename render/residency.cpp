@@ -60,7 +60,7 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
     }
 }
 
-/// Pages of the pool, coarse ones first, as many as fit into the memory for pages.
+/// Pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones in what is left.
 Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
     std::vector<CarriedPage> carried;
     uint64_t room = options_.loader.heldBytes;
@@ -70,6 +70,7 @@ Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
         const uint64_t bytes = uint64_t{entry.pageBytes} + (hasColour() ? entry.colourBytes : 0);
         if (!done || bytes > room) return;
         room -= bytes;
+        source_->keepWithin(room);
         carried.push_back({page, std::vector<std::byte>(bytes)});
         done = pool_->read(policy_->slotOf(page), 0, carried.back().bytes);
     });

@@ -19,11 +19,13 @@ uint64_t sizeOf(const LoadedPage& page) {
     return page.bytes ? page.bytes->geometryBytes().size() + page.bytes->colourBytes().size() : 0;
 }
 
-// Of this thread, from now on, so many steps of the system's niceness less urgent than what started it.
-void giveWay() {
-    constexpr int kSteps = 8;
+// Makes this thread, one of so many, less urgent than what started it: by steps of the system's niceness, of which each takes
+// a fifth of its share of the processor. All together have about the share that two threads have 8 steps down, a third of one
+// thread that draws.
+void giveWay(uint32_t threads) {
+    const int steps = 8 + static_cast<int>(std::lround(std::log(std::max(threads, 2u) / 2.0) / std::log(1.25)));
     const auto thread = static_cast<id_t>(::gettid());
-    ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + kSteps);
+    ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + steps);
 }
 
 double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
@@ -32,6 +34,7 @@ double steadySeconds() { return std::chrono::duration<double>(std::chrono::stead
 
 PageLoader::PageLoader(std::shared_ptr<const PageSource> source, const LoaderOptions& options)
     : source_(std::move(source)), options_(options), queue_(options.retry), working_(std::max(options.threads, 1u)) {
+    shareMemory();
     for (uint32_t i = 0, threads = working_; i < threads; ++i) threads_.emplace_back([this] { work(); });
 }
 
@@ -119,9 +122,15 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
         if (run.count > 0 && (!queue_.mayBegin(page, wish->priority * kRunUrgency, now) || !fits(more))) break;
         queue_.begin(page);
         stats_.heldBytes += more;
-        stats_.heldBytesMax = std::max(stats_.heldBytesMax, stats_.heldBytes);
     } while (++run.count < most);
+    shareMemory();
     return run;
+}
+
+/// The source keeps stored pages in what pages on their way leave.
+void PageLoader::shareMemory() {
+    const uint64_t kept = source_->keepWithin(options_.heldBytes - stats_.heldBytes);
+    stats_.heldBytesMax = std::max(stats_.heldBytesMax, stats_.heldBytes + kept);
 }
 
 void PageLoader::handOver(uint64_t page, Result<PageBytes> bytes) {
@@ -146,10 +155,11 @@ void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
             if (queue_.failed(page, pages[i].error().code, steadySeconds())) handOver(page, std::move(pages[i]));
         }
     }
+    shareMemory();
 }
 
 void PageLoader::work() {
-    giveWay();
+    giveWay(options_.threads);
     std::unique_lock lock(mutex_);
     while (!stop_) {
         const double now = steadySeconds();

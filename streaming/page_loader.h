@@ -10,8 +10,8 @@
 // No read begins while as many bytes are done as the next collect() would take: what a moving view wants changes before
 // more could be of use, and it would have been read in vain.
 //
-// Memory is reserved before a page is read and given back when it is collected: heldBytes() never exceeds the
-// limit. Nothing here waits but waitForPage() and the destructor, which interrupts reads in progress.
+// Memory is reserved before a page is read and given back when it is collected: it never exceeds the limit. What is left
+// of it, the source may keep stored pages in (PageSource::keepWithin). Nothing here waits but waitForPage() and the destructor, which interrupts reads in progress.
 #pragma once
 
 #include <chrono>
@@ -36,7 +36,7 @@ struct LoadedPage {
 struct LoaderOptions {
     bool withColour = true;
     uint32_t threads = 2;
-    uint64_t heldBytes = 64ull << 20;  ///< of pages being read and not collected yet
+    uint64_t heldBytes = 64ull << 20;  ///< of pages being read and not collected yet, and of those that the source keeps
     RetryPolicy retry;
 };
 
@@ -44,7 +44,8 @@ struct LoaderStats {
     uint64_t bytesRead = 0;  ///< decompressed, of all pages that were read without an error
     uint64_t pagesRead = 0;  ///< without an error
     uint64_t failures = 0;   ///< of single attempts
-    uint64_t heldBytes = 0, heldBytesMax = 0;
+    uint64_t heldBytes = 0;     ///< of pages being read and not collected yet
+    uint64_t heldBytesMax = 0;  ///< of these and what the source kept
 };
 
 /// All functions but the constructor and destructor may be called from any thread.
@@ -79,6 +80,7 @@ private:
     void work();
     [[nodiscard]] std::optional<Run> beginRun(double now);
     void finishRun(Run run, std::vector<Result<PageBytes>> pages);
+    void shareMemory();
     void handOver(uint64_t page, Result<PageBytes> bytes);
     [[nodiscard]] bool fits(uint64_t bytes) const { return bytes <= options_.heldBytes - stats_.heldBytes; }
 

@@ -20,10 +20,10 @@ Extent extentOf(const PageEntry& page, bool withColour) {
     return {page.offset, colour ? page.colourOffset + page.colourStoredBytes : page.offset + page.storedBytes};
 }
 
-/// A stretch of a file that has been read already.
+/// A stretch of a file that is in memory already.
 class Stretch final : public ByteReader {
 public:
-    Stretch(const ByteReader& file, uint64_t begin, std::vector<std::byte> bytes) : file_(file), begin_(begin), bytes_(std::move(bytes)) {}
+    Stretch(const ByteReader& file, uint64_t begin, std::span<const std::byte> bytes) : file_(file), begin_(begin), bytes_(bytes) {}
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
         if (offset < begin_ || bytes.size() > bytes_.size() || offset - begin_ > bytes_.size() - bytes.size()) return file_.read(offset, bytes);
         std::memcpy(bytes.data(), bytes_.data() + (offset - begin_), bytes.size());
@@ -35,7 +35,7 @@ public:
 private:
     const ByteReader& file_;
     uint64_t begin_;
-    std::vector<std::byte> bytes_;
+    std::span<const std::byte> bytes_;
 };
 
 }  // namespace
@@ -50,7 +50,6 @@ uint32_t PageSource::runFrom(uint64_t, uint32_t, bool) const { return 1; }
 
 Result<PageBytes> FilePageSource::read(uint64_t page, bool withColour) const {
     if (isBlock(page)) return std::move(readBlocks(page - kFirstBlockNumber, 1).front());
-    if (runBytes_ == 0) return readFrom(*reader_, page, withColour);
     return std::move(readRun(page, 1, withColour).front());
 }
 
@@ -77,13 +76,26 @@ std::vector<Result<PageBytes>> FilePageSource::readBlocks(uint64_t first, uint32
 
 std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t count, bool withColour) const {
     if (isBlock(first)) return readBlocks(first - kFirstBlockNumber, count);
-    if (runBytes_ == 0) return PageSource::readRun(first, count, withColour);
-    const uint64_t begin = dataset_->pages[first].offset, end = extentOf(dataset_->pages[first + count - 1], withColour).end;
+    std::vector<StoredPages::Bytes> kept;
+    for (uint64_t page = first; page < first + count; ++page) kept.push_back(kept_.find(page));
+    const auto extent = [&](uint32_t i) { return extentOf(dataset_->pages[first + i], withColour); };
+    // From the first page that is not kept to the last, in one read.
+    uint32_t from = 0, to = count;
+    while (from < to && kept[from]) ++from;
+    while (to > from && kept[to - 1]) --to;
+    const uint64_t begin = from < to ? extent(from).begin : 0, end = from < to ? extent(to - 1).end : 0;
     std::vector<std::byte> stored(end - begin);
-    if (const auto got = reader_->read(begin, stored); !got) return std::vector<Result<PageBytes>>(count, got.error());
-    const Stretch stretch(*reader_, begin, std::move(stored));
+    const Result<void> got = from < to ? reader_->read(begin, stored) : Result<void>();
     std::vector<Result<PageBytes>> pages;
-    for (uint64_t page = first; page < first + count; ++page) pages.push_back(readFrom(stretch, page, withColour));
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!kept[i] && !got) {
+            pages.push_back(got.error());
+            continue;
+        }
+        const auto bytes = kept[i] ? std::span(*kept[i]) : std::span<const std::byte>(stored).subspan(extent(i).begin - begin, extent(i).end - extent(i).begin);
+        pages.push_back(readFrom(Stretch(*reader_, extent(i).begin, bytes), first + i, withColour));
+        if (!kept[i] && pages.back()) kept_.keep(first + i, {bytes.begin(), bytes.end()});
+    }
     return pages;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "octree/vcp_file.h"
+#include "streaming/stored_pages.h"
 
 namespace vcp {
 
@@ -30,11 +31,14 @@ public:
 
     /// Memory that reading a page takes: its stored bytes, twice, and what it returns.
     [[nodiscard]] virtual uint64_t bytesToRead(uint64_t page, bool withColour) const = 0;
+    /// What pages take as they are stored may be kept in memory to be read again: at most `bytes` from now on, whatever is
+    /// being read. Returns how many are kept. For one PageLoader, which has the memory.
+    virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
 };
 
-/// Pages of a .vcp file behind any ByteReader (openFile for a local one).
+/// Pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none unless it may (keepWithin).
 class FilePageSource final : public PageSource {
 public:
     /// `runBytes`: pages that lie together are read together up to so many stored bytes. Worth it where a
@@ -46,6 +50,7 @@ public:
     std::vector<Result<PageBytes>> readRun(uint64_t first, uint32_t count, bool withColour) const override;
     [[nodiscard]] uint32_t runFrom(uint64_t first, uint32_t most, bool withColour) const override;
     [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override;
+    uint64_t keepWithin(uint64_t bytes) const override { return kept_.limitTo(bytes); }
     void interrupt() const override { reader_->interrupt(); }
 
 private:
@@ -55,6 +60,7 @@ private:
     std::shared_ptr<const ByteReader> reader_;
     std::shared_ptr<const Dataset> dataset_;
     uint64_t runBytes_;
+    mutable StoredPages kept_;
 };
 
 }  // namespace vcp

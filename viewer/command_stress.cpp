@@ -21,7 +21,7 @@ struct StressCommand {
     std::string file, out, faults;
     std::string path = "orbit";
     std::string size = "640x400";
-    std::string budget = "256M", ram = "64M";
+    std::string budget = "256M", ram = "256M";
     std::string order = "feedback";
     std::string device;
     uint64_t seed = 1;
@@ -110,7 +110,7 @@ Command addStress(CLI::App& vcp) {
         ->type_name("PATH")
         ->capture_default_str();
     app->add_option("--budget", command->budget, "Memory for subvolumes on the device")->type_name("BYTES")->capture_default_str()->check(checkBudget);
-    app->add_option("--ram", command->ram, "Memory for subvolumes on their way there")->type_name("BYTES")->capture_default_str()->check(checkBudget);
+    app->add_option("--ram", command->ram, "Memory for subvolumes on their way there, and for stored ones kept to be read again")->type_name("BYTES")->capture_default_str()->check(checkBudget);
     app->add_option("--faults", command->faults,
                     "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, bandwidth=2.5M (bytes a second)")
         ->type_name("A=X,B=Y")

@@ -140,7 +140,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("BYTES")
         ->capture_default_str()
         ->check(checkBudget);
-    app.add_option("--ram", settings.ram, "Memory for subvolumes on their way there, never exceeded")
+    app.add_option("--ram", settings.ram, "Memory for subvolumes on their way there, and for stored ones kept to be read again; never exceeded")
         ->type_name("BYTES")
         ->capture_default_str()
         ->check(checkBudget);

@@ -54,7 +54,7 @@ public:
 
     void check(const UpdateResult& update) {
         require(update.residentBytes <= budgetBytes_, "more bytes are resident than the budget allows");
-        require(update.heldBytesMax <= ramBytes_, "pages on their way take more memory than --ram allows");
+        require(update.heldBytesMax <= ramBytes_, "pages on their way and kept take more memory than --ram allows");
         require(update.settled == (update.pagesMissing == 0), "settled is not what it says");
         require(update.reloads == 0, "a page was loaded twice in a still view");
         for (const Error& problem : update.problems) {

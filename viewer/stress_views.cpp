@@ -58,7 +58,7 @@ private:
         auto update = views_[view]->update(requestOf(view, frame));
         if (!update) return update.error();
         require(update->residentBytes <= options_.budgetBytes, "several views: more bytes are resident than the budget allows");
-        require(update->heldBytesMax <= options_.ramBytes, "several views: pages on their way take more memory than --ram allows");
+        require(update->heldBytesMax <= options_.ramBytes, "several views: pages on their way and kept take more memory than --ram allows");
         require(update->reloads == 0, "several views: a page was loaded twice in still views");
         result_.residentBytesMax = std::max(result_.residentBytesMax, update->residentBytes);
         result_.loads = update->loads;

@@ -386,6 +386,7 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused("page size", [](F& f) { f.entry(1).pageBytes = 0xfffffff0; });
     expectRefused("page size", [](F& f) { f.entry(1).colourBytes = 0xfffffff0; });
     expectRefused("colour is missing", [](F& f) { f.entry(1).colourStoredBytes = 0; });
+    expectRefused("its colour does not follow it", [](F& f) { f.entry(1).colourOffset += 8192; });
     expectRefused("child pages do not match", [](F& f) { f.entry(1).level = 0; });
     expectRefused("wrong level", [](F& f) { f.entry(0).level = 1; });
     expectRefused("root is not at the origin", [](F& f) { f.entry(0).morton = 1; });

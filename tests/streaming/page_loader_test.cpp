@@ -55,6 +55,10 @@ public:
         changed_.notify_all();
     }
     void letGo() const { interrupt(); }
+    /// Keeps all it may.
+    uint64_t keepWithin(uint64_t bytes) const override { return kept = keeps ? bytes : 0; }
+    bool keeps = false;
+    mutable std::atomic<uint64_t> kept{0};
 
     mutable std::atomic<int> niceness{0};
     uint64_t failing = UINT64_MAX, stalling = UINT64_MAX;
@@ -110,6 +114,11 @@ TEST(PageLoader, ItsThreadsGiveWayToThoseThatDraw) {
     collectAll(loader, 1);
     const int own = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
     EXPECT_EQ(source->niceness, std::min(own + 8, 19));
+    // Eight of them together no more than two.
+    PageLoader many(source, options(false, 8, 1 << 20));
+    many.request({{3, 1}});
+    collectAll(many, 1);
+    EXPECT_EQ(source->niceness, std::min(own + 14, 19));
 }
 
 TEST(PageLoader, ReadsNoFurtherThanTheNextUpdateTakesIn) {
@@ -202,6 +211,22 @@ TEST(PageLoader, MemoryIsNeverExceeded) {
     EXPECT_EQ(collected, 64u);
     EXPECT_EQ(loader.stats().heldBytesMax, 4096u) << "all of it is used";
     EXPECT_EQ(loader.stats().heldBytes, 0u);
+}
+
+TEST(PageLoader, TheSourceKeepsPagesInWhatMemoryIsLeft) {
+    constexpr uint64_t kMemory = 4096 + 512;
+    const auto source = std::make_shared<FakeSource>(64);  // 1 KiB a page
+    source->keeps = true;
+    PageLoader loader(source, options(false, 3, kMemory));
+    EXPECT_EQ(source->kept, kMemory);
+    source->hold(true);
+    loader.request({{0, 1}, {1, 1}, {2, 1}});
+    source->waitUntilBegun(3);
+    EXPECT_EQ(source->kept, kMemory - 3 * 1024) << "pages on their way come first";
+    EXPECT_EQ(loader.stats().heldBytes, 3 * 1024u);
+    source->hold(false);
+    EXPECT_EQ(collectAll(loader, 3).size(), 3u);
+    EXPECT_EQ(loader.stats().heldBytesMax, kMemory);
 }
 
 TEST(PageLoader, APageLargerThanTheMemoryIsAnError) {

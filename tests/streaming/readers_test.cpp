@@ -231,7 +231,7 @@ TEST(PageSource, RunsGiveTheSamePagesInFewerReads) {
             ASSERT_EQ(read.size(), count);
             for (uint32_t i = 0; i < count; ++i) {
                 const auto alone = readPage(*reader, *dataset, page + i, true);
-                reader->reads -= 2;
+                reader->reads -= 2;  // geometry, colour
                 ASSERT_TRUE(read[i] && alone);
                 EXPECT_EQ(read[i]->geometry, alone->geometry);
                 EXPECT_EQ(read[i]->colour, alone->colour);
@@ -239,10 +239,67 @@ TEST(PageSource, RunsGiveTheSamePagesInFewerReads) {
             }
             page += count;
         }
-        EXPECT_EQ(reader->reads, runBytes == 0 ? 2 * runs : runs);
+        EXPECT_EQ(reader->reads, runs);
         EXPECT_EQ(runs == pages, runBytes == 0);
         EXPECT_EQ(runs == 1, runBytes == uint64_t{1} << 30);
     }
+}
+
+TEST(PageSource, WhatIsKeptIsNotReadAgain) {
+    const TestFolder folder("vcp_page_source_test");
+    test::writeSphereFile(folder / "scan.vcp", 3);
+    const auto reader = std::make_shared<CountingReader>(*openFile(folder / "scan.vcp"));
+    const auto dataset = std::make_shared<const Dataset>(*readDataset(*reader));
+    const FilePageSource source(reader, dataset, 1 << 20);
+    const auto readsOf = [&](uint64_t first, uint32_t count, bool withColour) {
+        reader->reads = 0;
+        const auto pages = source.readRun(first, count, withColour);
+        for (uint32_t i = 0; i < count; ++i) {
+            const uint64_t before = reader->reads;
+            const auto alone = readPage(*reader, *dataset, first + i, withColour);
+            reader->reads = before;
+            EXPECT_TRUE(pages[i] && alone && pages[i]->geometry == alone->geometry && pages[i]->colour == alone->colour) << first + i;
+        }
+        return reader->reads;
+    };
+    EXPECT_EQ(readsOf(2, 3, true), 1u);
+    EXPECT_EQ(readsOf(2, 3, true), 1u) << "none may be kept";
+    EXPECT_EQ(source.keepWithin(1 << 20), 0u);
+    EXPECT_EQ(readsOf(2, 3, true), 1u);
+    EXPECT_EQ(readsOf(2, 3, true), 0u);
+    EXPECT_EQ(readsOf(1, 5, true), 1u) << "1 and 5, and what lies between";
+    EXPECT_EQ(readsOf(1, 5, false), 0u);
+    EXPECT_GT(source.keepWithin(1 << 20), 0u);
+    EXPECT_EQ(source.keepWithin(0), 0u);
+    EXPECT_EQ(readsOf(4, 1, false), 1u);
+    source.keepWithin(1 << 20);
+    EXPECT_EQ(readsOf(4, 1, false), 1u);
+    EXPECT_EQ(readsOf(4, 1, true), 1u) << "colour was not kept";
+}
+
+TEST(StoredPages, TheLimitHoldsAndWhatWasUsedLongestAgoGoes) {
+    StoredPages pages;
+    const auto bytes = [](size_t count) { return std::vector<std::byte>(count, std::byte(7)); };
+    pages.keep(0, bytes(10));
+    EXPECT_EQ(pages.find(0), nullptr) << "none may be kept before there is a limit";
+    EXPECT_EQ(pages.limitTo(1 << 20), 0u);
+    pages.keep(1, bytes(1000));
+    const uint64_t each = pages.limitTo(1 << 20);
+    EXPECT_GE(each, 1000u);
+    EXPECT_LT(each, 1300u);
+    for (uint64_t page = 2; page <= 4; ++page) pages.keep(page, bytes(1000));
+    pages.keep(4, bytes(1000));
+    EXPECT_EQ(pages.limitTo(1 << 20), 4 * each);
+    ASSERT_NE(pages.find(1), nullptr);
+    EXPECT_EQ(pages.find(1)->size(), 1000u);
+    EXPECT_EQ(pages.limitTo(3 * each), 3 * each);
+    EXPECT_EQ(pages.find(2), nullptr) << "1 was used since";
+    pages.keep(5, bytes(1000));
+    EXPECT_EQ(pages.find(3), nullptr);
+    pages.keep(6, bytes(4000));
+    EXPECT_EQ(pages.find(6), nullptr) << "larger than the limit";
+    EXPECT_NE(pages.find(1), nullptr);
+    EXPECT_EQ(pages.limitTo(0), 0u);
 }
 
 TEST(PageSource, ADamagedPageIsAnErrorOfItsOwn) {
