@@ -10,6 +10,7 @@
 #include "builder/build.h"
 #include "builder/indexed_mesh.h"
 #include "builder/memory_plan.h"
+#include "viewer/bench_folder.h"
 #include "viewer/bench_rays.h"
 #include "viewer/bench_tracer.h"
 #include "viewer/child_process.h"
@@ -246,14 +247,9 @@ std::string scanSizeName(uint64_t triangles) {
 
 Result<BenchBuildReport> benchBuild(const BenchBuildOptions& options) {
     if (options.models.empty() && options.generated.empty()) return Error{ErrorCode::Usage, "no model to measure"};
-    const bool temporary = options.out.empty();
-    const fs::path folder = temporary ? fs::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : options.out;
-    std::error_code failed;
-    fs::create_directories(folder, failed);
-    if (failed) return Error{ErrorCode::Io, "the folder cannot be made: " + failed.message(), folder.string()};
-    auto report = measureAll(options, folder);
-    if (temporary) fs::remove_all(folder, failed);
-    return report;
+    const BenchFolder folder(options.out);
+    VCP_TRY(folder.make());
+    return measureAll(options, folder.path());
 }
 
 }  // namespace vcp

@@ -5,47 +5,17 @@
 #include <mutex>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "builder/build.h"
 #include "viewer/analytic_models.h"
 #include "viewer/bench_cameras.h"
+#include "viewer/bench_folder.h"
 #include "viewer/bench_methods.h"
 #include "viewer/peers/parallel_rows.h"
 
 namespace vcp {
 
 namespace {
-
-/// A folder for what is built: the caller's, or one that goes with this object.
-class BenchFolder {
-public:
-    explicit BenchFolder(const std::filesystem::path& wanted)
-        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid())
-                               : wanted),
-          temporary_(wanted.empty()) {}
-    ~BenchFolder() {
-        std::error_code ignored;
-        if (temporary_) std::filesystem::remove_all(path_, ignored);
-    }
-    BenchFolder(const BenchFolder&) = delete;
-    BenchFolder& operator=(const BenchFolder&) = delete;
-
-    Result<void> make() const {
-        std::error_code failed;
-        std::filesystem::create_directories(path_, failed);
-        if (failed)
-            return Error{.code = ErrorCode::Io,
-                         .message = "the folder cannot be made: " + failed.message(),
-                         .file = path_.string()};
-        return {};
-    }
-    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
-    bool temporary_;
-};
 
 /// The mesh of a model and its .vcp.
 struct ModelFiles {

@@ -1,4 +1,5 @@
-// vcp bench: run time against error, beside Embree measured in the same run.
+// vcp bench: run time against error, beside a peer measured in the same run.
+#include <algorithm>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -10,10 +11,13 @@
 #include "viewer/bench_meso.h"
 #include "viewer/bench_methods.h"
 #include "viewer/bench_rays.h"
+#include "viewer/bench_stream.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
 #include "viewer/paper_settings.h"
+#include "viewer/source_settings.h"
+#include "viewer/stress_path.h"
 
 namespace vcp {
 
@@ -52,6 +56,15 @@ struct RaysCommand : BenchCommand {
     int judgeEvery = 1;
     bool sweep = false, stability = false;
     PaperOptions paper;
+};
+
+struct StreamCommand {
+    BenchCommand bench;
+    std::vector<std::string> budgets = {"64M", "256M", "1G"}, paths = BenchStreamOptions().paths;
+    std::string size = "320x200", ram = "256M", device;
+    int frames = 240;
+    double errorPixels = StressOptions().errorPixels;
+    SourceSettings source;
 };
 
 struct MesoCommand {
@@ -166,6 +179,30 @@ Result<int> runRays(const RaysCommand& command) {
                    {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
 }
 
+Result<int> runStream(const StreamCommand& command) {
+    VCP_TRY(makeFolder(command.bench.out));
+    BenchStreamOptions options;
+    options.models = command.bench.models;
+    options.paths = command.paths;
+    options.budgets.clear();
+    for (const std::string& budget : command.budgets) options.budgets.push_back(parseBytes(budget).value());
+    options.access = command.source;
+    options.out = command.bench.out;
+    options.run.size = parseSize(command.size).value();
+    options.run.frames = command.frames;
+    options.run.errorPixels = command.errorPixels;
+    options.run.renderer.device = command.device;
+    options.run.renderer.ramBytes = parseBytes(command.ram).value();
+    const InterruptScope catching;
+    ProgressDisplay display(command.bench.report.progressStyle(), stderr);
+    options.run.progress = progressTo(display);
+    const auto rows = benchStream(options);
+    display.finish();
+    if (!rows) return rows.error();
+    VCP_TRY(publish(command.bench, "bench_stream", {benchStreamJson(*rows), benchStreamCsv(*rows), benchStreamMarkdown(*rows), benchStreamPlots(*rows)}));
+    return std::ranges::all_of(*rows, [](const StressReport& row) { return row.violations.empty(); }) ? 0 : 1;
+}
+
 Result<int> runMeso(const MesoCommand& command) {
     VCP_TRY(makeFolder(command.bench.out));
     BenchMesoOptions options = command.options;
@@ -205,11 +242,11 @@ RunCommand addBenchBuild(CLI::App& bench) {
     addBenchOptions(*app, *command, "Meshes");
     app->add_option("--generated", command->generated, "Also build scans of so many triangles, made by make_scan: 1M,10M,100M")
         ->type_name("N,N")
-        ->delimiter(',')
+        ->delimiter(',')->allow_extra_args(false)
         ->check(scanSizeProblem);
     app->add_option("--errors", command->errors, "Also build each mesh with these tolerances, in cells: 0.02,0.05,0.1")
         ->type_name("X,X")
-        ->delimiter(',')
+        ->delimiter(',')->allow_extra_args(false)
         ->check(CLI::Range(1e-6, 1e3));
     app->add_option("--memory", command->memory, "Cap on the memory that a build allocates: 512M, 4G, 50% [half of the machine's]")
         ->type_name("BYTES")
@@ -230,12 +267,12 @@ RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
     addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
-    app->add_option("--methods", command->methods, fmt::format("{} [all but paper-rules]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_option("--methods", command->methods, fmt::format("{} [all but paper-rules]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
     app->add_flag("--sweep", command->sweep,
                   "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the other octrees");
     app->add_flag("--stability", command->stability,
                   "Also what single precision costs, on the processor and on the device, with cells from 1e-6 to 1e6 and origins to 1e7 cells");
-    app->add_option("--cameras", command->cameras, "whole, half, close, cells [these four]; lattice and grazing, which look for holes")->type_name("A,B")->delimiter(',');
+    app->add_option("--cameras", command->cameras, "whole, half, close, cells [these four]; lattice and grazing, which look for holes")->type_name("A,B")->delimiter(',')->allow_extra_args(false);
     app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(
         CLI::Range(1, 1000));
     app->add_option("--size", command->size, "Rays across and down")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
@@ -251,13 +288,43 @@ RunCommand addBenchRays(CLI::App& bench) {
     return [command] { return runRays(*command); };
 }
 
+RunCommand addBenchStream(CLI::App& bench) {
+    auto command = std::make_shared<StreamCommand>();
+    CLI::App* app = bench.add_subcommand("stream", "Stream along camera paths under budgets, beside the same frames without loads");
+    app->add_option("MODEL", command->bench.models, ".vcp files, their http(s) addresses, or meshes [a sphere, a torus and a thin plate]")->type_name("");
+    app->add_option("--budgets", command->budgets, "Memory for subvolumes on the device")->type_name("N,N")->delimiter(',')->allow_extra_args(false)->capture_default_str()->check(budgetProblem);
+    app->add_option("--paths", command->paths, fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
+        ->type_name("A,B")
+        ->delimiter(',')->allow_extra_args(false)
+        ->capture_default_str();
+    app->add_option("--frames", command->frames, "Frames along a path")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1'000'000));
+    app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
+        return parseSize(text) ? std::string() : "must be like 320x200, not \"" + text + "\"";
+    });
+    app->add_option("--ram", command->ram, "Memory for subvolumes on their way to the device, and for stored ones kept to be read again")
+        ->type_name("BYTES")
+        ->capture_default_str()
+        ->check(budgetProblem);
+    app->add_option("--error-pixels", command->errorPixels, "Error that a picture may have, in pixels")
+        ->type_name("PIXELS")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 1000.0));
+    app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
+    app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
+    addSourceSettings(*app, command->source);
+    addProgressOption(*app, command->bench.report);
+    addJsonOption(*app, command->bench.report);
+    app->footer("Exit status 1 when an invariant of streaming breaks (vcp stress).");
+    return [command] { return runStream(*command); };
+}
+
 RunCommand addBenchMeso(CLI::App& bench) {
     auto command = std::make_shared<MesoCommand>();
     BenchMesoOptions& options = command->options;
     CLI::App* app = bench.add_subcommand("meso", "Time and judge the mesostructure marchers");
     app->add_option("ASSET", options.assets, "Procedural ones by name, or assets (.meso) [eleven procedural ones]")->type_name("");
-    app->add_option("--methods", options.methods, fmt::format("{} [all]", fmt::join(mesoMethodNames(), ", ")))->type_name("A,B")->delimiter(',');
-    app->add_option("--views", options.views, fmt::format("{} [all]", fmt::join(mesoViewNames(), ", ")))->type_name("A,B")->delimiter(',');
+    app->add_option("--methods", options.methods, fmt::format("{} [all]", fmt::join(mesoMethodNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
+    app->add_option("--views", options.views, fmt::format("{} [all]", fmt::join(mesoViewNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
     app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
     app->add_option("--rays", options.rays, "Rays a view")->type_name("N")->capture_default_str()->check(CLI::Range(1, 10'000'000));
     app->add_option("--repetitions", options.repetitions, "Runs whose median is reported")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1000));
@@ -272,11 +339,14 @@ RunCommand addBenchMeso(CLI::App& bench) {
 }  // namespace
 
 Command addBench(CLI::App& vcp) {
-    CLI::App* app = vcp.add_subcommand("bench", "Measure run time against error, beside Embree");
+    CLI::App* app = vcp.add_subcommand("bench", "Measure run time against error, beside a peer");
     app->require_subcommand(1);
-    const RunCommand build = addBenchBuild(*app), rays = addBenchRays(*app), meso = addBenchMeso(*app);
-    const CLI::App *buildApp = app->get_subcommand("build"), *mesoApp = app->get_subcommand("meso");
-    return {app, [=] { return buildApp->parsed() ? build() : mesoApp->parsed() ? meso() : rays(); }};
+    const std::vector<RunCommand> runs{addBenchBuild(*app), addBenchRays(*app), addBenchStream(*app), addBenchMeso(*app)};
+    return {app, [=] {
+                const auto all = app->get_subcommands([](CLI::App*) { return true; });
+                const auto at = std::ranges::find_if(all, [](const CLI::App* each) { return each->parsed(); });
+                return runs[static_cast<size_t>(at - all.begin())]();
+            }};
 }
 
 }  // namespace vcp

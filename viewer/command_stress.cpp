@@ -95,11 +95,6 @@ Result<int> run(const StressCommand& command) {
     return report->violations.empty() ? 0 : 1;
 }
 
-std::string checkBudget(const std::string& text) {
-    const auto bytes = parseBytes(text);
-    return bytes && *bytes >= 1 << 20 ? std::string() : "must be at least 1M, like 64M or 1G, not \"" + text + "\"";
-}
-
 }  // namespace
 
 Command addStress(CLI::App& vcp) {
@@ -109,8 +104,8 @@ Command addStress(CLI::App& vcp) {
     app->add_option("--path", command->path, fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("PATH")
         ->capture_default_str();
-    app->add_option("--budget", command->budget, "Memory for subvolumes on the device")->type_name("BYTES")->capture_default_str()->check(checkBudget);
-    app->add_option("--ram", command->ram, "Memory for subvolumes on their way there, and for stored ones kept to be read again")->type_name("BYTES")->capture_default_str()->check(checkBudget);
+    app->add_option("--budget", command->budget, "Memory for subvolumes on the device")->type_name("BYTES")->capture_default_str()->check(budgetProblem);
+    app->add_option("--ram", command->ram, "Memory for subvolumes on their way there, and for stored ones kept to be read again")->type_name("BYTES")->capture_default_str()->check(budgetProblem);
     app->add_option("--faults", command->faults,
                     "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, bandwidth=2.5M (bytes a second)")
         ->type_name("A=X,B=Y")

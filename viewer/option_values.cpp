@@ -96,6 +96,11 @@ std::optional<uint64_t> parseBytes(std::string_view text) {
     return static_cast<uint64_t>(number);
 }
 
+std::string budgetProblem(const std::string& text) {
+    const auto bytes = parseBytes(text);
+    return bytes && *bytes >= 1 << 20 ? std::string() : fmt::format("must be at least 1M, like 64M or 1G, not \"{}\"", text);
+}
+
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {
     if (!text.ends_with('%')) return parseBytes(text);
     double percent = 0;

@@ -23,6 +23,8 @@ std::optional<Length> parseLength(std::string_view text);
 /// "4096", "512K", "512M", "4G", "1T", also with "iB" or "B" behind; factors of 1024. Nothing when malformed,
 /// zero, or beyond 2^60.
 std::optional<uint64_t> parseBytes(std::string_view text);
+/// What is wrong with a budget of the pool or of memory, which is of 1 MiB at least; empty: nothing.
+std::string budgetProblem(const std::string& text);
 
 /// As parseBytes, or a part of `whole`: "50%".
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole);

@@ -41,12 +41,6 @@ std::string checkDirection(const std::string& text) {
     return parseDirection(text) ? std::string() : "must be like 1,0,0.5, not \"" + text + "\"";
 }
 
-std::string checkBudget(const std::string& text) {
-    constexpr uint64_t kLeast = 1 << 20;
-    const auto bytes = parseBytes(text);
-    return bytes && *bytes >= kLeast ? std::string() : "must be at least 1M, like 512M or 4G, not \"" + text + "\"";
-}
-
 }  // namespace
 
 RendererOptions RenderSettings::rendererOptions() const {
@@ -139,11 +133,11 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     app.add_option("--budget", settings.budget, "Memory for subvolumes on the device, never exceeded")
         ->type_name("BYTES")
         ->capture_default_str()
-        ->check(checkBudget);
+        ->check(budgetProblem);
     app.add_option("--ram", settings.ram, "Memory for subvolumes on their way there, and for stored ones kept to be read again; never exceeded")
         ->type_name("BYTES")
         ->capture_default_str()
-        ->check(checkBudget);
+        ->check(budgetProblem);
     addPaperMarchOptions(app, settings.march);
     addSourceSettings(app, settings.source);
     app.add_option("--device", settings.device, "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")

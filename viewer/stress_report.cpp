@@ -1,10 +1,12 @@
-// The report of vcp stress as JSON, Markdown and plots.
+// The reports of vcp stress and vcp bench stream as JSON, CSV, Markdown and plots.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "viewer/bench_stream.h"
+#include "viewer/csv_text.h"
 #include "viewer/option_values.h"
 #include "viewer/plot_svg.h"
-#include "viewer/stress.h"
 
 namespace vcp {
 
@@ -60,6 +62,69 @@ std::string row(const std::string& name, const Quantiles& q) {
     return fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, q.p50, q.p95, q.p99, q.max);
 }
 
+/// What one number or word says.
+Json summaryOf(const StressReport& r) {
+    return {{"name", r.name},
+            {"path", r.path},
+            {"faults", r.faults},
+            {"seed", r.seed},
+            {"frames", r.frames},
+            {"device", r.device},
+            {"first_picture_seconds", r.firstPictureSeconds},
+            {"detail_90_seconds", r.detail90Seconds},
+            {"settled_seconds", r.settledSeconds},
+            {"path_settled_seconds", r.pathSettledSeconds},
+            {"bytes_read", r.bytesRead},
+            {"bytes_needed", r.bytesNeeded},
+            {"reads", r.requests},
+            {"failed_reads", r.failures},
+            {"pages_given_up", r.pagesGivenUp},
+            {"budget_bytes", r.budgetBytes},
+            {"resident_bytes_max", r.residentBytesMax},
+            {"ram_bytes", r.ramBytes},
+            {"held_bytes_max", r.heldBytesMax},
+            {"loads", r.loads},
+            {"evictions", r.evictions},
+            {"relaxed", r.relaxed},
+            {"error_pixels", r.errorPixels},
+            {"frame_ms", toJson(r.frameMs)},
+            {"frame_ms_no_loads", toJson(r.frameMsNoLoads)},
+            {"violations", r.violations}};
+}
+
+/// One field a column: `frame_ms` becomes `frame_ms_p50` and so on.
+Json flatOf(const StressReport& report) {
+    const Json summary = summaryOf(report);
+    Json flat;
+    for (const auto& [name, value] : summary.items()) {
+        if (value.is_object())
+            for (const auto& [part, number] : value.items()) flat[fmt::format("{}_{}", name, part)] = number;
+        else flat[name] = value.is_array() ? Json(fmt::format("{}", fmt::join(report.violations, "; "))) : value;
+    }
+    return flat;
+}
+
+std::string timesOf(const Quantiles& q) { return fmt::format("{:.0f} / {:.0f} / {:.0f} / {:.0f}", q.p50, q.p95, q.p99, q.max); }
+
+std::string streamRow(const StressReport& r) {
+    return fmt::format("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {} | {} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {} |{}\n", r.name, r.path, formatBytes(r.budgetBytes),
+                       r.firstPictureSeconds, r.detail90Seconds, r.settledSeconds, timesOf(r.frameMs), timesOf(r.frameMsNoLoads),
+                       ratio(r.frameMs.p99, r.frameMsNoLoads.p99), 1e-6 * double(r.bytesRead), 1e-6 * double(r.bytesNeeded),
+                       ratio(double(r.bytesRead), double(r.bytesNeeded)), r.relaxed ? "yes" : "no",
+                       r.violations.empty() ? "" : fmt::format(" **broken: {}**", fmt::join(r.violations, "; ")));
+}
+
+/// A line for each model and path over the budgets.
+Plot overBudgets(const std::string& title, const std::string& yName, const std::vector<StressReport>& rows, double (*valueOf)(const StressReport&)) {
+    Plot plot{.title = title, .xName = "budget, MB", .yName = yName, .logX = true};
+    for (const StressReport& row : rows) {
+        const std::string name = fmt::format("{}, {}", row.name, row.path);
+        if (plot.series.empty() || plot.series.back().name != name) plot.series.push_back({name, {}});
+        plot.series.back().points.push_back({1e-6 * double(row.budgetBytes), valueOf(row)});
+    }
+    return plot;
+}
+
 template <class Value>
 PlotSeries series(const StressReport& report, const std::string& name, Value valueOf) {
     PlotSeries made{name, {}};
@@ -74,34 +139,9 @@ std::string stressJson(const StressReport& r) {
     for (const StressSample& sample : r.samples) samples.push_back(toJson(sample));
     Json orders = Json::array();
     for (const OrderCurve& curve : r.orders) orders.push_back(toJson(curve));
-    Json json = {{"name", r.name},
-                       {"path", r.path},
-                       {"faults", r.faults},
-                       {"seed", r.seed},
-                       {"frames", r.frames},
-                       {"device", r.device},
-                       {"first_picture_seconds", r.firstPictureSeconds},
-                       {"detail_90_seconds", r.detail90Seconds},
-                       {"settled_seconds", r.settledSeconds},
-                       {"path_settled_seconds", r.pathSettledSeconds},
-                       {"bytes_read", r.bytesRead},
-                       {"bytes_needed", r.bytesNeeded},
-                       {"reads", r.requests},
-                       {"failed_reads", r.failures},
-                       {"pages_given_up", r.pagesGivenUp},
-                       {"budget_bytes", r.budgetBytes},
-                       {"resident_bytes_max", r.residentBytesMax},
-                       {"ram_bytes", r.ramBytes},
-                       {"held_bytes_max", r.heldBytesMax},
-                       {"loads", r.loads},
-                       {"evictions", r.evictions},
-                       {"relaxed", r.relaxed},
-                       {"error_pixels", r.errorPixels},
-                       {"frame_ms", toJson(r.frameMs)},
-                       {"frame_ms_no_loads", toJson(r.frameMsNoLoads)},
-                       {"violations", r.violations},
-                       {"orders", orders},
-                       {"samples", samples}};
+    Json json = summaryOf(r);
+    json["orders"] = orders;
+    json["samples"] = samples;
     if (r.views) json["several_views"] = toJson(*r.views);
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -153,6 +193,36 @@ std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport&
     }
     plots.emplace_back("stress_orders", plotSvg(orders));
     return plots;
+}
+
+std::string benchStreamJson(const std::vector<StressReport>& rows) {
+    Json all = Json::array();
+    for (const StressReport& row : rows) all.push_back(summaryOf(row));
+    return Json{{"rows", all}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string benchStreamCsv(const std::vector<StressReport>& rows) {
+    Json all = Json::array();
+    for (const StressReport& row : rows) all.push_back(flatOf(row));
+    return csvOf(all);
+}
+
+std::string benchStreamMarkdown(const std::vector<StressReport>& rows) {
+    std::string text =
+        "| source | path | budget | first picture, s | 90 % detail, s | settled, s | frame p50 / p95 / p99 / max, ms | without loads | p99 ratio | read, MB | needed, MB | "
+        "ratio | relaxed |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+    for (const StressReport& row : rows) text += streamRow(row);
+    return text;
+}
+
+std::vector<std::pair<std::string, std::string>> benchStreamPlots(const std::vector<StressReport>& rows) {
+    Plot frames = overBudgets("Frame times, p99: with loads over without", "ratio", rows,
+                              [](const StressReport& r) { return ratio(r.frameMs.p99, r.frameMsNoLoads.p99); });
+    Plot bytes = overBudgets("Bytes read over bytes needed", "ratio", rows,
+                             [](const StressReport& r) { return ratio(double(r.bytesRead), double(r.bytesNeeded)); });
+    frames.levels = {{"goal", 1.25}};
+    bytes.levels = {{"goal", 1.3}};
+    return {{"bench_stream_frames", plotSvg(frames)}, {"bench_stream_bytes", plotSvg(bytes)}};
 }
 
 }  // namespace vcp

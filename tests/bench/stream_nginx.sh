@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
-# Streams a file from disk and from nginx on the loopback, and writes what it took as a Markdown table.
+# Streams a file from disk and from nginx on the loopback (vcp bench stream), and prints what it took as a Markdown table; all
+# forms of the report go to OUT_FOLDER.
 #
 # usage: tests/bench/stream_nginx.sh [--sources "disk http https 20mbit 50ms"] [--budgets "64M 256M 1G"] [--frames 24]
 #                                    [--size 320x200] [--path fly] FILE.vcp [OUT_FOLDER]
 #
-# What is in brackets is what it takes without; a run of one source and budget takes some 20 s on two cores.
+# What is in brackets is what it takes without; a run of one source and budget takes some 20 s on two cores, `vcp bench stream` all of them.
 # nginx runs with a configuration of its own, in a temporary folder, on free ports: plain, with TLS (a certificate made
-# here), at 20 Mbit/s (8 connections, each limited to an eighth), and behind a proxy that delays answers by 50 ms.
+# here), at 20 Mbit/s (8 connections, each limited to an eighth), and behind a proxy that delays answers by 50 ms. The server
+# and the proxy run at the lowest priority: elsewhere they have processors of their own.
 # Needs nginx (Debian: nginx-light), openssl and python3. The program is $VCP, or build/release/vcp.
 # Exit status 1 when a run fails or an invariant breaks.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 usage() {
-    sed -n '4,5p' "${BASH_SOURCE[0]}" >&2
+    sed -n '5,6p' "${BASH_SOURCE[0]}" >&2
     exit 2
 }
 sources="disk http https 20mbit 50ms"
@@ -84,8 +86,8 @@ http {
     server { listen 127.0.0.1:$limited; limit_rate 312500; }
 }
 CONF
-"$nginx" -p "$work" -e "$work/error.log" -c "$work/nginx.conf"
-coproc DELAY { exec python3 "$here/delay_proxy.py" "$plain" 50; }
+nice -n 19 "$nginx" -p "$work" -e "$work/error.log" -c "$work/nginx.conf"
+coproc DELAY { exec nice -n 19 python3 "$here/delay_proxy.py" "$plain" 50; }
 proxy=$DELAY_PID
 read -r _ delayed <&"${DELAY[0]}"
 
@@ -100,35 +102,14 @@ address() {
     esac
 }
 
-status=0
+models=() names=()
 for source in $sources; do
-    for budget in $budgets; do
-        # Cold: the file's pages leave the cache of the system.
-        dd if="$file" iflag=nocache count=0 2>/dev/null
-        more=()
-        [ "$source" != https ] || more=(--ca-file "$work/certificate.pem")
-        echo "$source, $budget" >&2
-        "$vcp" stress "$(address "$source")" --budget "$budget" --path "$path" --frames "$frames" --size "$size" ${more[@]+"${more[@]}"} --progress none --json \
-            >"$out/$source-$budget.json" || status=1
-    done
+    models+=("$(address "$source")")
+    names+=(-e "s|$(address "$source")|$source|g" -e "s#^| ${file##*/} |#| disk |#")
 done
-
-python3 - "$out" "$sources" "$budgets" <<'TABLE' | tee "$out/table.md"
-import json, os, sys
-
-out, sources, budgets = sys.argv[1], sys.argv[2].split(), sys.argv[3].split()
-print("| source | budget | first picture, s | 90 % detail, s | settled, s | frame p50 / p95 / p99 / max, ms | without loads | p99 ratio | read, MB | needed, MB | ratio | relaxed |")
-print("|---|---|---|---|---|---|---|---|---|---|---|---|")
-for source in sources:
-    for budget in budgets:
-        path = os.path.join(out, f"{source}-{budget}.json")
-        if os.path.getsize(path) == 0:
-            continue
-        r = json.load(open(path))
-        times = lambda q: " / ".join(f"{q[k]:.0f}" for k in ("p50", "p95", "p99", "max"))
-        print(f"| {source} | {budget} | {r['first_picture_seconds']:.2f} | {r['detail_90_seconds']:.2f} | {r['settled_seconds']:.2f} "
-              f"| {times(r['frame_ms'])} | {times(r['frame_ms_no_loads'])} | {r['frame_ms']['p99'] / r['frame_ms_no_loads']['p99']:.2f} "
-              f"| {r['bytes_read'] / 1e6:.1f} | {r['bytes_needed'] / 1e6:.1f} | {r['bytes_read'] / max(1, r['bytes_needed']):.2f} "
-              f"| {'yes' if r['relaxed'] else 'no'} |{' **broken: ' + '; '.join(r['violations']) + '**' if r['violations'] else ''}")
-TABLE
-exit $status
+# What nginx serves leaves the system's cache before the first run, the file itself before each from disk.
+dd if="$file" iflag=nocache count=0 2>/dev/null
+"$vcp" bench stream "${models[@]}" --budgets "${budgets// /,}" --paths "$path" --frames "$frames" --size "$size" --ca-file "$work/certificate.pem" --out "$out" >/dev/null || status=$?
+sed -i "${names[@]}" "$out"/bench_stream.*
+cat "$out/bench_stream.md"
+exit "${status:-0}"
