@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <glm/vec3.hpp>
 
@@ -89,7 +90,17 @@ struct ReliefOptions {
 };
 std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options);
 
-/// Maxima of the bilinear cells in a pyramid (Tevs et al. 2008), each texel cell solved in closed form.
+/// Maxima of a height map's bilinear cells, halved until one is left (Tevs et al. 2008).
+struct MaxPyramid {
+    struct Level {
+        glm::ivec2 size{0};
+        std::vector<uint16_t> most;  ///< x fastest
+    };
+    std::vector<Level> levels;  ///< level 0: an entry a texel, of the cell from it to the next
+};
+MaxPyramid buildMaxPyramid(const HeightMap& map);
+
+/// Skips by the pyramid; each texel cell is solved in closed form.
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map);
 
 /// Sphere tracing on a plain distance map: signed distances at the cells' centres, 16 bits each, trilinear between them
@@ -99,7 +110,16 @@ struct SphereOptions {
     float threshold = 0.05f;  ///< in cells
     int steps = 256;          ///< at most; then the ray is unresolved
 };
-Result<std::unique_ptr<Marcher>> sphereMarcher(const Shape& shape, const SphereOptions& options);
+struct SphereMap {
+    SphereOptions options;
+    TileGrid grid;
+    float cap = 0;        ///< tile units of 32767 steps
+    float threshold = 0;  ///< tile units
+    std::vector<int16_t> steps;
+};
+/// Errors: Usage (no cells, too many).
+Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options);
+std::unique_ptr<Marcher> sphereMarcher(SphereMap map);
 
 /// Double precision, no skipping, every cell solved: what the stored data itself say (truth of a method's own data).
 TruthHit traceField(const SampledField& field, const MarchRay& ray);

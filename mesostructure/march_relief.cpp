@@ -113,14 +113,7 @@ private:
 
 class Pyramid final : public Marcher {
 public:
-    explicit Pyramid(const HeightMap& map) : map_(map) {
-        Level base{map.size, std::vector<uint16_t>(map.texels.size())};
-        for (int y = 0; y < map.size.y; ++y)
-            for (int x = 0; x < map.size.x; ++x)
-                base.most[size_t(y) * size_t(map.size.x) + size_t(x)] = std::max({map.texel(x, y), map.texel(x + 1, y), map.texel(x, y + 1), map.texel(x + 1, y + 1)});
-        levels_.push_back(std::move(base));
-        while (levels_.back().size.x > 1 || levels_.back().size.y > 1) levels_.push_back(halved(levels_.back()));
-    }
+    explicit Pyramid(const HeightMap& map) : map_(map), levels_(buildMaxPyramid(map).levels) {}
 
     MarchResult march(const MarchRay& ray) const override {
         MarchResult result;
@@ -172,21 +165,7 @@ public:
     bool isConservative() const override { return true; }
 
 private:
-    struct Level {
-        ivec2 size;
-        std::vector<uint16_t> most;
-    };
-
-    static Level halved(const Level& fine) {
-        Level coarse{(fine.size + 1) / 2, {}};
-        coarse.most.resize(size_t(coarse.size.x) * size_t(coarse.size.y));
-        for (int y = 0; y < fine.size.y; ++y)
-            for (int x = 0; x < fine.size.x; ++x) {
-                uint16_t& most = coarse.most[size_t(y / 2) * size_t(coarse.size.x) + size_t(x / 2)];
-                most = std::max(most, fine.most[size_t(y) * size_t(fine.size.x) + size_t(x)]);
-            }
-        return coarse;
-    }
+    using Level = MaxPyramid::Level;
 
     bool solve(const GridWalk& walk, float end, bool& outside, MarchResult& result) const {
         ++result.fetches, ++result.surfaceTests;
@@ -211,7 +190,29 @@ private:
     std::vector<Level> levels_;  ///< level 0: of a texel's bilinear cell
 };
 
+MaxPyramid::Level halved(const MaxPyramid::Level& fine) {
+    MaxPyramid::Level coarse{(fine.size + 1) / 2, {}};
+    coarse.most.resize(size_t(coarse.size.x) * size_t(coarse.size.y));
+    for (int y = 0; y < fine.size.y; ++y)
+        for (int x = 0; x < fine.size.x; ++x) {
+            uint16_t& most = coarse.most[size_t(y / 2) * size_t(coarse.size.x) + size_t(x / 2)];
+            most = std::max(most, fine.most[size_t(y) * size_t(fine.size.x) + size_t(x)]);
+        }
+    return coarse;
+}
+
 }  // namespace
+
+MaxPyramid buildMaxPyramid(const HeightMap& map) {
+    MaxPyramid pyramid;
+    MaxPyramid::Level base{map.size, std::vector<uint16_t>(map.texels.size())};
+    for (int y = 0; y < map.size.y; ++y)
+        for (int x = 0; x < map.size.x; ++x)
+            base.most[size_t(y) * size_t(map.size.x) + size_t(x)] = std::max({map.texel(x, y), map.texel(x + 1, y), map.texel(x, y + 1), map.texel(x + 1, y + 1)});
+    pyramid.levels.push_back(std::move(base));
+    while (pyramid.levels.back().size.x > 1 || pyramid.levels.back().size.y > 1) pyramid.levels.push_back(halved(pyramid.levels.back()));
+    return pyramid;
+}
 
 std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options) { return std::make_unique<Relief>(map, options); }
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map) { return std::make_unique<Pyramid>(map); }

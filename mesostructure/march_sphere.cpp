@@ -15,72 +15,72 @@ using glm::ivec3, glm::vec3;
 
 class SphereTracing final : public Marcher {
 public:
-    SphereTracing(const Shape& shape, const SphereOptions& options) : options_(options), grid_(options.cells, shape.extent()), steps_(grid_.count()) {
-        cap_ = float(16 * std::max({grid_.cell.x, grid_.cell.y, grid_.cell.z}));
-        threshold_ = options.threshold * float(std::min({grid_.cell.x, grid_.cell.y, grid_.cell.z}));
-        for (size_t i = 0; i < steps_.size(); ++i) {
-            const glm::dvec3 centre = grid_.centre(grid_.at(i));
-            steps_[i] = int16_t(std::lround((shape.field(centre) > 0 ? 32767 : -32767) * shape.distance(centre, cap_) / double(cap_)));
-        }
-    }
+    explicit SphereTracing(SphereMap map) : map_(std::move(map)) {}
 
     MarchResult march(const MarchRay& ray) const override {
         MarchResult result;
-        const glm::dvec3 extent = grid_.extent();
+        const glm::dvec3 extent = map_.grid.extent();
         const vec3 o(inFirstTile(ray.origin, extent)), d(ray.direction);
         bool outside = false;
         for (float t = 0; t <= float(ray.tMax);) {
             const vec3 p = o + t * d;
             if (p.z < 0 ? d.z <= 0 : p.z > float(extent.z) && d.z >= 0) return result;
-            if (result.iterations++ == uint32_t(options_.steps)) {
+            if (result.iterations++ == uint32_t(map_.options.steps)) {
                 result.state = MarchState::Unresolved;
                 return result;
             }
             const float length = sample(p, result);
             // Inside and on the start's own surface, on by a part of a cell until the distance grows.
-            if (length >= threshold_) outside = true;
+            if (length >= map_.threshold) outside = true;
             else if (outside || t == 0) {
                 if (outside || p.z >= float(extent.z)) {
                     result.state = MarchState::Hit, result.t = t;
                     return result;
                 }
             }
-            t += std::max(length, outside ? 0 : float(grid_.cell.x) * 0.25f);
+            t += std::max(length, outside ? 0 : float(map_.grid.cell.x) * 0.25f);
         }
         return result;
     }
-    uint64_t bytes() const override { return steps_.size() * sizeof(int16_t); }
+    uint64_t bytes() const override { return map_.steps.size() * sizeof(int16_t); }
     bool isConservative() const override { return false; }
 
 private:
     float sample(vec3 p, MarchResult& result) const {
         ++result.fetches;
-        const vec3 at = p / vec3(grid_.cell) - 0.5f, first = glm::floor(at), w = at - first;
+        const vec3 at = p / vec3(map_.grid.cell) - 0.5f, first = glm::floor(at), w = at - first;
         float sum = 0;
         for (int corner = 0; corner < 8; ++corner) {
             const ivec3 bit(corner & 1, corner >> 1 & 1, corner >> 2);
             ivec3 cell = ivec3(first) + bit;
-            cell.z = std::clamp(cell.z, 0, grid_.cells.z - 1);
+            cell.z = std::clamp(cell.z, 0, map_.grid.cells.z - 1);
             const vec3 part = glm::mix(1.0f - w, w, vec3(bit));
-            sum += part.x * part.y * part.z * float(steps_[grid_.index(cell)]);
+            sum += part.x * part.y * part.z * float(map_.steps[map_.grid.index(cell)]);
         }
-        return sum * (cap_ / 32767);
+        return sum * (map_.cap / 32767);
     }
 
-    SphereOptions options_;
-    TileGrid grid_;
-    float cap_ = 0, threshold_ = 0;
-    std::vector<int16_t> steps_;
+    SphereMap map_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Marcher>> sphereMarcher(const Shape& shape, const SphereOptions& options) {
-    const TileGrid grid(options.cells, shape.extent());
+Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options) {
+    SphereMap map{options, TileGrid(options.cells, shape.extent()), 0, 0, {}};
+    const TileGrid& grid = map.grid;
     if (std::min({options.cells.x, options.cells.y, options.cells.z}) < 1 || grid.count() > kMaxGridCells)
         return Error{.code = ErrorCode::Usage, .message = fmt::format("a distance map of {} x {} x {} cells", options.cells.x, options.cells.y, options.cells.z)};
-    return std::unique_ptr<Marcher>(std::make_unique<SphereTracing>(shape, options));
+    map.cap = float(16 * std::max({grid.cell.x, grid.cell.y, grid.cell.z}));
+    map.threshold = options.threshold * float(std::min({grid.cell.x, grid.cell.y, grid.cell.z}));
+    map.steps.resize(grid.count());
+    for (size_t i = 0; i < map.steps.size(); ++i) {
+        const glm::dvec3 centre = grid.centre(grid.at(i));
+        map.steps[i] = int16_t(std::lround((shape.field(centre) > 0 ? 32767 : -32767) * shape.distance(centre, map.cap) / double(map.cap)));
+    }
+    return map;
 }
+
+std::unique_ptr<Marcher> sphereMarcher(SphereMap map) { return std::make_unique<SphereTracing>(std::move(map)); }
 
 TruthHit traceField(const SampledField& field, const MarchRay& ray) {
     const TileGrid& grid = field.grid;

@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "mesostructure/solids.h"
+#include "mesostructure/method.h"
+#include "render/meso_renderer.h"
+#include "viewer/meso_scene.h"
 
 namespace vcp {
 
@@ -21,13 +23,13 @@ using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-struct View {
+struct RayView {
     std::string_view name;
     double elevation;  ///< degrees below the horizon
     double part;       ///< of the tile that the rays enter
     bool isShadow = false;
 };
-constexpr std::array<View, 8> kViews = {{{"overhead", 89, 1},
+constexpr std::array<RayView, 8> kViews = {{{"overhead", 89, 1},
                                          {"45", 45, 1},
                                          {"15", 15, 1},
                                          {"5", 5, 1},
@@ -45,32 +47,18 @@ struct Subject {
 
 Result<std::unique_ptr<Subject>> subjectOf(const std::string& name) {
     auto subject = std::make_unique<Subject>();
-    Asset& asset = subject->asset;
-    const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
-    asset.name = name;
-    if (isIn(heightFieldNames())) {
-        auto map = makeHeightField(name, 256, 1);
-        if (!map) return map.error();
-        asset.heights = *std::move(map);
-    } else if (isIn(solidNames())) {
-        asset.solid = name, asset.seed = 1;
-    } else {
-        if (!name.ends_with(".meso"))
-            return Error{.code = ErrorCode::Usage, .message = fmt::format("\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
-        auto read = readAsset(name);
-        if (!read) return read.error();
-        asset = *std::move(read);
-    }
-    auto shape = shapeOf(asset);
+    auto asset = openMesoAsset(name);
+    if (!asset) return asset.error();
+    subject->asset = *std::move(asset);
+    auto shape = shapeOf(subject->asset);
     if (!shape) return shape.error();
     subject->shape = *std::move(shape);
-    asset.extent = subject->shape->extent();
-    subject->texel = asset.heights ? 1.0 / asset.heights->size.x : 1.0 / 128;
+    subject->texel = subject->asset.heights ? 1.0 / subject->asset.heights->size.x : 1.0 / 128;
     return subject;
 }
 
 /// Rays of a view, a jittered grid, the same for every method.
-std::vector<MarchRay> raysOf(const Subject& subject, const View& view, int count) {
+std::vector<MarchRay> raysOf(const Subject& subject, const RayView& view, int count) {
     std::mt19937 random(29);
     std::uniform_real_distribution<double> unit(0, 1);
     const glm::dvec3 extent = subject.shape->extent();
@@ -97,118 +85,39 @@ std::vector<MarchRay> raysOf(const Subject& subject, const View& view, int count
     return rays;
 }
 
-/// A marcher with what it reads.
-struct Method {
+/// A method that is measured.
+struct Measured {
     std::string name, knob;
     double preprocessSeconds = 0;
-    std::unique_ptr<Occupancy> occupancy;
-    std::unique_ptr<SampledField> field;
-    std::unique_ptr<DistanceMap> distances;
-    std::unique_ptr<CompressedMap> compressed;
-    std::unique_ptr<OctantBoxes> boxes;
-    std::unique_ptr<PatchSet> patches;
+    meso::Method method;
     std::unique_ptr<Marcher> marcher;
 };
 
-template <class T>
-Result<void> take(Result<T> made, std::unique_ptr<T>& to) {
-    if (!made) return made.error();
-    to = std::make_unique<T>(*std::move(made));
-    return {};
-}
-
 glm::ivec3 cellsOf(const Subject& subject, int n) {
     const glm::dvec3 extent = subject.shape->extent();
-    if (subject.asset.heights) return gridFor(subject.asset, {n, std::max(1, int(std::lround(n * extent.y))), std::clamp(int(std::ceil(extent.z * n)), 4, 256)});
     return {n, std::max(1, int(std::lround(n * extent.y))), std::max(1, int(std::ceil(extent.z * n)))};
 }
 
-using Build = std::function<Result<void>(const Subject&, Method&)>;
-
 struct Entry {
-    std::string name, knob;
+    std::string knob;
     bool isDefault = false;
-    bool forHeights = true, forSolids = true;
-    Build build;
+    MethodOptions options;
 };
-
-Build reliefOf(int steps, Refinement refinement, int refinements) {
-    return [=](const Subject& s, Method& m) -> Result<void> {
-        m.marcher = reliefMarcher(*s.asset.heights, {.steps = steps, .refinement = refinement, .refinements = refinements});
-        return {};
-    };
-}
-
-Build distancesOf(int cells, Cones cones, bool isCompressed, bool withPatches, CrossingRule rule) {
-    return [=](const Subject& s, Method& m) -> Result<void> {
-        VCP_TRY(take(occupy(*s.shape, cellsOf(s, cells)), m.occupancy));
-        VCP_TRY(take(buildDistanceMap(*m.occupancy, {.cones = cones, .cap = cones.areSigns() ? 0.25 : 0.125}), m.distances));
-        if (withPatches) VCP_TRY(take(buildPatches(*s.shape, *m.occupancy, rule), m.patches));
-        if (isCompressed) VCP_TRY(take(compressMap(*m.distances, std::array{4}), m.compressed));
-        Skipping skipping{.distances = m.distances.get()};
-        if (isCompressed) skipping = {.compressed = m.compressed.get()};
-        auto marcher = gridMarcher(skipping, {.patches = m.patches.get()});
-        if (!marcher) return marcher.error();
-        m.marcher = *std::move(marcher);
-        return {};
-    };
-}
-
-/// Octant boxes, or no skipping at all, with exact cells.
-Build exactOf(int cells, bool withBoxes) {
-    return [=](const Subject& s, Method& m) -> Result<void> {
-        const bool isHeights = s.asset.heights.has_value();
-        const glm::ivec3 grid = cellsOf(s, cells);
-        VCP_TRY(take(occupy(*s.shape, grid), m.occupancy));
-        if (!isHeights) {
-            VCP_TRY(take(sampleField(*s.shape, grid * 2), m.field));
-            occupyField(*m.field, *m.occupancy);
-        }
-        if (withBoxes) m.boxes = std::make_unique<OctantBoxes>(buildOctantBoxes(*m.occupancy));
-        Skipping skipping{.occupancy = m.occupancy.get()};
-        if (withBoxes) skipping = {.boxes = m.boxes.get()};
-        auto marcher = gridMarcher(skipping, {.heights = isHeights ? &*s.asset.heights : nullptr, .field = m.field.get()});
-        if (!marcher) return marcher.error();
-        m.marcher = *std::move(marcher);
-        return {};
-    };
-}
-
-Build sphereOf(int cells) {
-    return [=](const Subject& s, Method& m) -> Result<void> {
-        auto marcher = sphereMarcher(*s.shape, {.cells = cellsOf(s, cells)});
-        if (!marcher) return marcher.error();
-        m.marcher = *std::move(marcher);
-        return {};
-    };
-}
 
 std::vector<Entry> entries() {
     std::vector<Entry> all;
-    const std::pair<const char*, Refinement> refinements[] = {{"relief-binary", Refinement::Binary},
-                                                              {"relief-secant", Refinement::Secant},
-                                                              {"relief-secant-printed", Refinement::SecantAsPrinted},
-                                                              {"relief-illinois", Refinement::Illinois}};
-    for (const auto& [name, refinement] : refinements)
-        for (const int steps : {5, 10, 32, 64, 256}) all.push_back({name, fmt::format("steps {}", steps), steps == 32, true, false, reliefOf(steps, refinement, 10)});
-    all.push_back({"pyramid", "exact", true, true, false, [](const Subject& s, Method& m) -> Result<void> {
-                       m.marcher = pyramidMarcher(*s.asset.heights);
-                       return {};
-                   }});
-    for (const int cells : {32, 64, 128}) all.push_back({"sphere", fmt::format("grid {}", cells), cells == 64, true, true, sphereOf(cells)});
-    for (const int cells : {32, 64, 128})
-        all.push_back({"dm", fmt::format("grid {}", cells), cells == 64, true, true, distancesOf(cells, {1, 1}, false, false, CrossingRule::Direct)});
+    for (const char* name : {"relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois"})
+        for (const int steps : {5, 10, 32, 64, 256}) all.push_back({fmt::format("steps {}", steps), steps == 32, {.name = name, .steps = steps}});
+    all.push_back({"exact", true, {.name = "pyramid"}});
+    for (const char* name : {"sphere", "dm"})
+        for (const int cells : {32, 64, 128}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = name, .cells = cells}});
     for (const Cones cones : {Cones{2, 1}, Cones{4, 1}, Cones{8, 1}, Cones{4, 2}})
-        all.push_back({"ddm", fmt::format("{}x{} grid 64", cones.azimuth, cones.elevation), cones.azimuth == 4 && cones.elevation == 1, true, true,
-                       distancesOf(64, cones, false, false, CrossingRule::Direct)});
-    for (const int cells : {32, 128})
-        all.push_back({"ddm", fmt::format("4x1 grid {}", cells), false, true, true, distancesOf(cells, {4, 1}, false, false, CrossingRule::Direct)});
-    for (const int cells : {16, 32, 64, 128})
-        all.push_back({"ddm-quadric", fmt::format("4x1 grid {}", cells), cells == 64, true, true, distancesOf(cells, {4, 1}, true, true, CrossingRule::Direct)});
-    for (const int cells : {16, 32, 64})
-        all.push_back({"ddm-quadric-fitted", fmt::format("4x1 grid {}", cells), cells == 32, true, true, distancesOf(cells, {4, 1}, true, true, CrossingRule::Fitted)});
-    for (const int cells : {16, 32, 64}) all.push_back({"boxes", fmt::format("grid {}", cells), cells == 64, true, true, exactOf(cells, true)});
-    all.push_back({"cells", "grid 64", true, true, true, exactOf(64, false)});
+        all.push_back({fmt::format("{}x{} grid 64", cones.azimuth, cones.elevation), cones.azimuth == 4 && cones.elevation == 1, {.name = "ddm", .cells = 64, .cones = cones}});
+    for (const int cells : {32, 128}) all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
+    for (const int cells : {16, 32, 64}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
+    for (const int cells : {16, 32, 64}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
+    all.push_back({"grid 64", true, {.name = "cells", .cells = 64}});
     return all;
 }
 
@@ -266,13 +175,20 @@ void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
     row.iterationsP95 = quantile(iterations, 0.95);
 }
 
-BenchMesoRow measure(const Subject& subject, const Method& method, const View& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths, int repetitions) {
+Result<BenchMesoRow> measure(const Subject& subject, const Measured& method, const RayView& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths,
+                             int repetitions, MesoRenderer* renderer) {
     BenchMesoRow row;
     row.asset = subject.asset.name, row.view = view.name, row.method = method.name, row.knob = method.knob;
     row.rays = rays.size(), row.bytes = method.marcher->bytes(), row.preprocessSeconds = method.preprocessSeconds;
     std::vector<MarchResult> results(rays.size());
     std::vector<double> times;
-    for (int repetition = 0; repetition <= repetitions; ++repetition) {
+    if (renderer != nullptr) {
+        row.device = renderer->device().name;
+        auto marched = renderer->march(method.method, rays, repetitions);
+        if (!marched) return marched.error();
+        results = std::move(marched->results), times = std::move(marched->nsPerRay);
+    }
+    for (int repetition = 0; repetition <= repetitions && renderer == nullptr; ++repetition) {
         const auto start = Clock::now();
         for (size_t i = 0; i < rays.size(); ++i) results[i] = method.marcher->march(rays[i]);
         if (repetition > 0) times.push_back(secondsSince(start) * 1e9 / double(std::max<size_t>(1, rays.size())));
@@ -280,9 +196,9 @@ BenchMesoRow measure(const Subject& subject, const Method& method, const View& v
     row.nsPerRay = quantile(times, 0.5);
     row.shape = judge(results, truths, subject.texel);
     countWork(results, row);
-    if (method.field) {
+    if (method.method.field) {
         std::vector<TruthHit> own;
-        for (const MarchRay& ray : rays) own.push_back(traceField(*method.field, ray));
+        for (const MarchRay& ray : rays) own.push_back(traceField(*method.method.field, ray));
         row.solver = judge(results, own, subject.texel), row.hasSolver = true;
     }
     return row;
@@ -290,8 +206,8 @@ BenchMesoRow measure(const Subject& subject, const Method& method, const View& v
 
 /// Rays from random points of empty cells: the surface must not be nearer than the map says.
 Result<void> check(const Subject& subject, uint64_t rays, std::vector<MesoCheck>& checks) {
-    std::unique_ptr<Occupancy> occupancy;
-    VCP_TRY(take(occupy(*subject.shape, cellsOf(subject, 32)), occupancy));
+    const auto occupancy = occupy(*subject.shape, cellsOf(subject, 32));
+    if (!occupancy) return occupancy.error();
     const glm::dvec3 extent = subject.shape->extent();
     struct Case {
         std::string name;
@@ -302,8 +218,8 @@ Result<void> check(const Subject& subject, uint64_t rays, std::vector<MesoCheck>
                           {"8x1", {.cones = {8, 1}, .cap = 0.125}},
                           {"4x2 paper", {.cones = {4, 2}, .rule = DistanceRule::Paper}}};
     for (const Case& c : cases) {
-        std::unique_ptr<DistanceMap> map;
-        VCP_TRY(take(buildDistanceMap(*occupancy, c.options, subject.shape.get()), map));
+        const auto map = buildDistanceMap(*occupancy, c.options, subject.shape.get());
+        if (!map) return map.error();
         MesoCheck result{subject.asset.name, c.name};
         std::mt19937 random(31);
         std::uniform_real_distribution<double> unit(0, 1);
@@ -324,6 +240,27 @@ Result<void> check(const Subject& subject, uint64_t rays, std::vector<MesoCheck>
     return {};
 }
 
+/// Table 3: texels of the plain map over those of lookup and atlas, at the paper's resolution.
+Result<void> compareCompression(std::vector<MesoPublished>& published) {
+    struct Row {
+        const char* asset;
+        int block;
+        double ratio;
+    };
+    for (const Row& row : {Row{"beads", 2, 4}, Row{"kitten", 4, 12.8}, Row{"ball", 8, 256}}) {
+        const auto subject = subjectOf(row.asset);
+        if (!subject) return subject.error();
+        const auto occupancy = occupy(*(*subject)->shape, cellsOf(**subject, 256));
+        if (!occupancy) return occupancy.error();
+        const auto map = buildDistanceMap(*occupancy, {.cones = {1, 1}});
+        if (!map) return map.error();
+        const auto compressed = compressMap(*map, std::array{row.block});
+        if (!compressed) return compressed.error();
+        published.push_back({fmt::format("Table 3: texels, blocks of {}", row.block), row.asset, row.ratio, row.ratio, compressed->texelRatio(), 0});
+    }
+    return {};
+}
+
 template <class Names>
 Result<void> knows(const char* what, const std::vector<std::string>& asked, const Names& known) {
     for (const std::string& name : asked)
@@ -338,13 +275,13 @@ bool isAsked(const std::vector<std::string>& asked, std::string_view name) { ret
 std::vector<std::string> mesoMethodNames() {
     std::vector<std::string> names;
     for (const Entry& entry : entries())
-        if (names.empty() || names.back() != entry.name) names.push_back(entry.name);
+        if (names.empty() || names.back() != entry.options.name) names.push_back(entry.options.name);
     return names;
 }
 
 std::vector<std::string> mesoViewNames() {
     std::vector<std::string> names;
-    for (const View& view : kViews) names.emplace_back(view.name);
+    for (const RayView& view : kViews) names.emplace_back(view.name);
     return names;
 }
 
@@ -353,14 +290,20 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     VCP_TRY(knows("view", options.views, mesoViewNames()));
     std::vector<std::string> assets = options.assets;
     if (assets.empty()) assets = {"fbm", "hemispheres", "bricks", "maze", "needle", "beads", "chain", "weave", "ball", "scales", "kitten"};
+    std::unique_ptr<MesoRenderer> renderer;
+    if (options.device) {
+        auto made = MesoRenderer::create({.device = *options.device});
+        if (!made) return made.error();
+        renderer = *std::move(made);
+    }
     BenchMesoReport report;
     for (size_t a = 0; a < assets.size(); ++a) {
         const auto subject = subjectOf(assets[a]);
         if (!subject) return subject.error();
-        std::vector<const View*> views;
+        std::vector<const RayView*> views;
         std::vector<std::vector<MarchRay>> rays;
         std::vector<std::vector<TruthHit>> truths;
-        for (const View& view : kViews) {
+        for (const RayView& view : kViews) {
             if (!isAsked(options.views, view.name)) continue;
             views.push_back(&view);
             rays.push_back(raysOf(**subject, view, options.rays));
@@ -368,16 +311,30 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
             for (const MarchRay& ray : rays.back()) truths.back().push_back((*subject)->shape->trace(ray.origin, ray.direction, ray.tMax));
         }
         for (const Entry& entry : entries()) {
-            if (!isAsked(options.methods, entry.name) || !(options.sweep || entry.isDefault) || !((*subject)->asset.heights ? entry.forHeights : entry.forSolids)) continue;
-            if (options.progress && !options.progress(assets[a] + ": " + entry.name, double(a) / double(assets.size()))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
-            Method method;
-            method.name = entry.name, method.knob = entry.knob;
+            if (!isAsked(options.methods, entry.options.name) || !(options.sweep || entry.isDefault) || !methodFits(entry.options.name, (*subject)->asset)) continue;
+            if (options.progress && !options.progress(assets[a] + ": " + entry.options.name, double(a) / double(assets.size())))
+                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            Measured method;
+            method.name = entry.options.name, method.knob = entry.knob;
             const auto start = Clock::now();
-            VCP_TRY(entry.build(**subject, method));
+            auto made = buildMethod((*subject)->asset, *(*subject)->shape, entry.options);
+            if (!made) return made.error();
+            method.method = *std::move(made);
+            auto marcher = method.method.marcher();
+            if (!marcher) return marcher.error();
+            method.marcher = *std::move(marcher);
             method.preprocessSeconds = secondsSince(start);
-            for (size_t v = 0; v < views.size(); ++v) report.rows.push_back(measure(**subject, method, *views[v], rays[v], truths[v], options.repetitions));
+            for (size_t v = 0; v < views.size(); ++v) {
+                auto row = measure(**subject, method, *views[v], rays[v], truths[v], options.repetitions, renderer.get());
+                if (!row) return row.error();
+                report.rows.push_back(*std::move(row));
+            }
         }
         if (options.checkRays > 0) VCP_TRY(check(**subject, options.checkRays, report.checks));
+    }
+    if (options.published) {
+        report.published = publishedOf(report.rows);
+        VCP_TRY(compareCompression(report.published));
     }
     return report;
 }

@@ -1,14 +1,15 @@
-// vcp bench meso: run time and work against error of the mesostructure marchers, on the CPU, all with the same rays
-// (docs/mesostructure.md).
+// vcp bench meso: run time and work against error of the mesostructure marchers, on the CPU or on a device, all with the
+// same rays (docs/mesostructure.md).
 //
 // Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes and
 // the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the solving
-// alone costs. Rays go one by one in one thread; times are the median of the repetitions after a warm-up.
+// alone costs. On the CPU rays go one by one in one thread, on a device all at once; times are the median of the repetitions after a warm-up.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,9 +24,11 @@ struct BenchMesoOptions {
     std::vector<std::string> assets;
     std::vector<std::string> methods;  ///< empty: all that fit the asset
     std::vector<std::string> views;    ///< empty: all
+    std::optional<std::string> device; ///< march there, as RendererOptions::device; absent: on the CPU
     bool sweep = false;                ///< each method at several values of its knob
     int rays = 2000;                   ///< a view
     int repetitions = 3;
+    bool published = false;            ///< beside the paper's tables; its Table 3 is made anew
     uint64_t checkRays = 0;            ///< rays of the conservative test an asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -47,7 +50,7 @@ struct MesoJudged {
 };
 
 struct BenchMesoRow {
-    std::string asset, view, method, knob;
+    std::string asset, view, method, knob, device = "cpu";
     uint64_t rays = 0;
     double nsPerRay = 0;
     MesoJudged shape;           ///< against the shape
@@ -67,9 +70,19 @@ struct MesoCheck {
     double worstTexels = 0;
 };
 
+/// A ratio that the paper prints (Mehra and Kumar, Tables 1 to 3), over its models from least to most, and ours: the mean over the
+/// views of an asset. Its Figure 7 has no numbers; the rows' iterationBins are its bins.
+struct MesoPublished {
+    std::string what, asset;
+    double least = 0, most = 0;
+    double ours = 0;         ///< of times; Table 3: of texels
+    double oursFetches = 0;  ///< of fetches; Table 3: 0
+};
+
 struct BenchMesoReport {
     std::vector<BenchMesoRow> rows;
     std::vector<MesoCheck> checks;
+    std::vector<MesoPublished> published;
 };
 
 std::vector<std::string> mesoMethodNames();
@@ -77,6 +90,9 @@ std::vector<std::string> mesoViewNames();
 
 /// Errors: Usage (no such asset, method or view), those of the builders, Cancelled.
 Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options);
+
+/// Tables 1 and 2, of the rows that there are: time and fetches of each method over those of its table's first.
+std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);
 
 std::string benchMesoJson(const BenchMesoReport& report);
 std::string benchMesoCsv(const BenchMesoReport& report);

@@ -19,6 +19,7 @@ Json toJson(const BenchMesoRow& row) {
                  {"view", row.view},
                  {"method", row.method},
                  {"knob", row.knob},
+                 {"device", row.device},
                  {"rays", row.rays},
                  {"ns_per_ray", row.nsPerRay},
                  {"fetches_mean", row.fetchesMean},
@@ -69,13 +70,52 @@ std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string tit
     return plotSvg(plot);
 }
 
+/// Mean time and fetches of a method on an asset, over the views; count 0 where it was not measured.
+struct Cost {
+    double time = 0, fetches = 0, count = 0;
+};
+
+Cost costOf(const std::vector<BenchMesoRow>& rows, const std::string& asset, std::string_view method, std::string_view knob) {
+    Cost cost;
+    for (const BenchMesoRow& row : rows)
+        if (row.asset == asset && row.method == method && row.knob == knob) cost.time += row.nsPerRay, cost.fetches += row.fetchesMean, ++cost.count;
+    return cost;
+}
+
 }  // namespace
+
+std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
+    struct Ratio {
+        const char *what, *method, *knob, *baseMethod, *baseKnob;
+        double least, most;
+    };
+    constexpr Ratio kRatios[] = {{"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
+                                 {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
+                                 {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
+                                 {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
+                                 {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
+                                 {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary", "steps 32", 0.34, 2.10}};
+    std::vector<std::string> assets;
+    for (const BenchMesoRow& row : rows)
+        if (std::ranges::find(assets, row.asset) == assets.end()) assets.push_back(row.asset);
+    std::vector<MesoPublished> published;
+    for (const Ratio& ratio : kRatios)
+        for (const std::string& asset : assets) {
+            const Cost of = costOf(rows, asset, ratio.method, ratio.knob), base = costOf(rows, asset, ratio.baseMethod, ratio.baseKnob);
+            if (of.count == 0 || base.count == 0) continue;
+            published.push_back({ratio.what, asset, ratio.least, ratio.most, of.time / base.time, of.fetches / base.fetches});
+        }
+    return published;
+}
 
 std::string benchMesoJson(const BenchMesoReport& report) {
     Json checks = Json::array();
     for (const MesoCheck& check : report.checks)
         checks.push_back({{"asset", check.asset}, {"map", check.map}, {"rays", check.rays}, {"oversteps", check.oversteps}, {"worst_texels", check.worstTexels}});
-    return Json{{"rows", rowsOf(report)}, {"checks", checks}}.dump();
+    Json published = Json::array();
+    for (const MesoPublished& row : report.published)
+        published.push_back({{"what", row.what}, {"asset", row.asset}, {"published_least", row.least}, {"published_most", row.most}, {"ours", row.ours}, {"ours_fetches", row.oursFetches}});
+    return Json{{"rows", rowsOf(report)}, {"checks", checks}, {"published", published}}.dump();
 }
 
 std::string benchMesoCsv(const BenchMesoReport& report) { return csvOf(rowsOf(report)); }
@@ -91,6 +131,12 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
                             percent(MesoClass::Unresolved));
         text += fmt::format("| {:.4f} | {:.4f} | {:.4f} | {} | {:.2f} | {:.2f} |\n", row.shape.p50, row.shape.p95, row.shape.p99,
                             row.hasSolver ? fmt::format("{:.3f}", 100 * row.solver.wrong()) : std::string(), double(row.bytes) * 1e-6, row.preprocessSeconds);
+    }
+    if (!report.published.empty()) {
+        text += "\n| published | asset | ratio there | ours | ours, fetches |\n|---|---|---|---|---|\n";
+        for (const MesoPublished& row : report.published)
+            text += fmt::format("| {} | {} | {:.3g} to {:.3g} | {:.3g} | {} |\n", row.what, row.asset, row.least, row.most, row.ours,
+                                row.oursFetches > 0 ? fmt::format("{:.3g}", row.oursFetches) : std::string());
     }
     if (report.checks.empty()) return text;
     text += "\n| asset | map | rays | oversteps | worst, texels |\n|---|---|---|---|---|\n";

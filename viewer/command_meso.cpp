@@ -8,7 +8,7 @@
 
 #include "mesostructure/asset_file.h"
 #include "mesostructure/solids.h"
-#include "viewer/commands.h"
+#include "viewer/command_meso_render.h"
 #include "viewer/height_image.h"
 #include "viewer/option_values.h"
 #include "viewer/tile_mesh.h"
@@ -221,12 +221,13 @@ RunCommand addMesoBuild(CLI::App& meso) {
 Command addMeso(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("meso", "Mesostructure assets");
     app->require_subcommand(1);
-    const RunCommand build = addMesoBuild(*app);
+    const RunCommand build = addMesoBuild(*app), render = addMesoRender(*app);
+    const CLI::App* renderApp = app->get_subcommand("render");
     auto info = std::make_shared<InfoMeso>();
     CLI::App* infoApp = app->add_subcommand("info", "Say what is in an asset");
     infoApp->add_option("FILE", info->file, "An asset made by `vcp meso build`")->type_name("")->required();
     addJsonOption(*infoApp, info->report);
-    return {app, [=] { return infoApp->parsed() ? runInfo(*info) : build(); }};
+    return {app, [=] { return infoApp->parsed() ? runInfo(*info) : renderApp->parsed() ? render() : build(); }};
 }
 
 }  // namespace vcp

@@ -159,7 +159,7 @@ TEST(March, AwkwardRays) {
 TEST(March, CapsAreUnresolved) {
     const HeightMap map = *makeHeightField("needle", 16, 1);
     const auto shape = test::heights(map);
-    const auto few = *sphereMarcher(*shape, {.cells = {16, 16, 4}, .steps = 2});
+    const auto few = sphereMarcher(*buildSphereMap(*shape, {.cells = {16, 16, 4}, .steps = 2}));
     EXPECT_EQ(few->march({{0.1, 0.1, map.range}, glm::normalize(glm::dvec3(1, 0.1, -0.05))}).state, MarchState::Unresolved);
     // Between the needles for ever: more cells than iterations.
     const Occupancy occupancy = test::occupied(*shape, {16, 16, 4});

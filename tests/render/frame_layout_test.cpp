@@ -11,6 +11,8 @@
 #include "render/feedback_spirv.h"
 #include "render/frame.h"
 #include "render/light_spirv.h"
+#include "render/meso_arrays.h"
+#include "render/meso_surface_spirv.h"
 #include "render/paper_trace_spirv.h"
 #include "render/shade_spirv.h"
 #include "render/trace_spirv.h"
@@ -45,6 +47,17 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
               (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX), OFFSET(directionY),
                                      OFFSET(originLattice), OFFSET(lattice), OFFSET(picture), OFFSET(mode), OFFSET(lightDirection),
                                      OFFSET(upDirection), OFFSET(clay), OFFSET(cap), OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(sections)}));
+}
+
+TEST(FrameLayout, Mesostructure) {
+    const Offsets offsets = offsetsIn(kMesoSurfaceSpirv);
+    ASSERT_TRUE(offsets.contains("MesoRecord") && offsets.contains("MesoView"));
+    using frame::MesoRecord, frame::MesoView;
+    const auto words = [](std::initializer_list<size_t> all) { return std::vector<uint32_t>(all.begin(), all.end()); };
+    EXPECT_EQ(offsets.at("MesoRecord"), words({offsetof(MesoRecord, extent), offsetof(MesoRecord, cell), offsetof(MesoRecord, cells), offsetof(MesoRecord, fine), offsetof(MesoRecord, ratio),
+                                               offsetof(MesoRecord, cones), offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale), offsetof(MesoRecord, levels)}));
+    EXPECT_EQ(offsets.at("MesoView"), words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward), offsetof(MesoView, forwardX),
+                                             offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up)}));
 }
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }

@@ -137,5 +137,67 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
     EXPECT_EQ(run("bench meso nothing").status, 2);
 }
 
+TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
+    std::ofstream(path("mapped.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    const Ran ran = run("meso render hemispheres --method pyramid --surface " + path("mapped.obj") + " --tiles 2 --size 64x48 --shadows --validation --json -o " + path("a.png"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json told = Json::parse(ran.out);
+    EXPECT_GT(told["hit_pixels"], 64 * 48 / 8);
+    EXPECT_EQ(told["unresolved"], 0);
+    EXPECT_EQ(told["warnings"].size(), 0u);
+    EXPECT_TRUE(std::filesystem::exists(path("a.png")));
+    // Two assets, and coordinates along a line.
+    std::ofstream(path("line.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 2/2\nf 1/1 2/1 3/1\n";
+    const Ran smeared = run("meso render fbm maze --method pyramid --tiles 2 --tiles 1 --heat --surface " + path("line.obj") + " --size 32x32 --json -o " + path("b.png"));
+    ASSERT_EQ(smeared.status, 0) << smeared.err;
+    EXPECT_NE(smeared.out.find("smeared"), std::string::npos) << smeared.out;
+}
+
+TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
+    std::ofstream(path("bare.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
+    std::ofstream(path("wild.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/1 9/1\n";
+    std::ofstream(path("nan.obj")) << "v 0 0 0\nv 1 nan 0\n";
+    std::ofstream(path("bare.stl")) << "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\nendsolid a\n";
+    const struct {
+        std::string arguments;
+        int status;
+        std::string says;
+    } cases[] = {{"fbm --surface " + path("bare.obj"), 1, "line 4: has no texture coordinates"},
+                 {"fbm --surface " + path("wild.obj"), 1, "names no vertex"},
+                 {"fbm --surface " + path("nan.obj"), 1, "three numbers"},
+                 {"fbm --surface " + path("bare.stl"), 1, "has no texture coordinates"},
+                 {"fbm --surface " + path("none.obj"), 1, "none.obj"},
+                 {"fbm --surface plate", 2, "teapot"},
+                 {"fbm --method magic", 2, "pyramid"},
+                 {"beads --method pyramid", 2, "height fields"},
+                 {"nothing", 2, "nothing"},
+                 {"fbm --view 30", 2, "--view"},
+                 {"fbm maze --tiles 1 --tiles 2 --tiles 3", 2, "--tiles"},
+                 {"fbm --size 0x7", 2, "--size"}};
+    for (const auto& c : cases) {
+        const Ran ran = run("meso render " + c.arguments + " -o " + path("x.png"));
+        EXPECT_EQ(ran.status, c.status) << c.arguments << ": " << ran.err;
+        EXPECT_NE(ran.err.find(c.says), std::string::npos) << c.arguments << ": " << ran.err;
+        EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+        EXPECT_FALSE(std::filesystem::exists(path("x.png"))) << c.arguments;
+    }
+}
+
+TEST_F(MesoCommands, BenchOnADeviceFindsWhatTheProcessorFinds) {
+    const std::string arguments = "bench meso beads --methods boxes,dm --views 45 --rays 400 --repetitions 1 --progress none --json";
+    const Ran here = run(arguments), there = run(arguments + " --device");
+    ASSERT_EQ(here.status, 0) << here.err;
+    ASSERT_EQ(there.status, 0) << there.err;
+    const Json a = Json::parse(here.out)["rows"], b = Json::parse(there.out)["rows"];
+    ASSERT_EQ(a.size(), b.size());
+    for (size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(a[i]["device"], "cpu");
+        EXPECT_NE(b[i]["device"], "cpu");
+        EXPECT_GT(b[i]["ns_per_ray"], 0);
+        EXPECT_NEAR(a[i]["hit"].get<double>(), b[i]["hit"].get<double>(), 0.01);
+        EXPECT_NEAR(a[i]["fetches_mean"].get<double>(), b[i]["fetches_mean"].get<double>(), 0.02 * a[i]["fetches_mean"].get<double>());
+    }
+}
+
 }  // namespace
 }  // namespace vcp

@@ -1,0 +1,38 @@
+// Base surfaces that mesostructure is laid on: triangles with a texture map in tile units. The shapes are made here; mesh
+// files come from viewer/base_mesh.h.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "octree/result.h"
+
+namespace vcp::meso {
+
+struct BaseSurface {
+    std::vector<glm::dvec3> positions;                ///< world
+    std::vector<std::array<uint32_t, 3>> triangles;   ///< counter-clockwise from outside; corners at one place share the number
+    std::vector<std::array<glm::dvec2, 3>> uvs;       ///< of the triangles' corners, tile units
+};
+
+/// "quad", "box", "cylinder", "sphere", "torus", "teapot". All but the teapot, which is in its traditional units, fit
+/// [-1, 1]^3 or are a little larger; z is up.
+std::span<const std::string_view> baseSurfaceNames();
+
+/// `tiles`: tile edges along the edge of the quad, of a side of the box, of a sixth of the sphere, of the cylinder's height
+/// and diameter, once round the torus' tube, and a quarter round the teapot. Errors: Usage (no such name, tiles not above 0).
+Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles);
+
+/// Gives equal positions one number.
+void joinPositions(BaseSurface& surface);
+
+/// World units of a tile's edge, on average over the area; 0 where the map has no area.
+double tileEdge(const BaseSurface& surface);
+
+}  // namespace vcp::meso

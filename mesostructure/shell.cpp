@@ -1,0 +1,200 @@
+#include "mesostructure/shell.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+namespace vcp::meso {
+
+namespace {
+
+using glm::dvec2, glm::dvec3;
+
+constexpr size_t kMostPieces = size_t{1} << 24;  // numbers of pieces are stored as floats
+constexpr double kLongest = 3;                   // of a direction at an edge, in heights
+
+struct Piece {
+    std::array<dvec3, 4> corners, tile;
+    bool hasBase = false;
+    [[nodiscard]] dvec3 low() const { return glm::min(glm::min(corners[0], corners[1]), glm::min(corners[2], corners[3])); }
+    [[nodiscard]] dvec3 high() const { return glm::max(glm::max(corners[0], corners[1]), glm::max(corners[2], corners[3])); }
+};
+
+dvec3 faceNormal(const BaseSurface& surface, size_t triangle) {
+    const auto& t = surface.triangles[triangle];
+    const dvec3 a = surface.positions[t[0]], n = glm::cross(surface.positions[t[1]] - a, surface.positions[t[2]] - a);
+    const double length = glm::length(n);
+    return length > 0 ? n / length : dvec3(0);
+}
+
+std::vector<dvec3> directionsOf(const BaseSurface& surface) {
+    std::vector<dvec3> sums(surface.positions.size(), dvec3(0));
+    std::vector<double> least(surface.positions.size(), 1);
+    const auto each = [&](const auto& use) {
+        for (size_t i = 0; i < surface.triangles.size(); ++i) {
+            const dvec3 normal = faceNormal(surface, i);
+            if (normal != dvec3(0)) use(surface.triangles[i], normal);
+        }
+    };
+    each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
+        for (int k = 0; k < 3; ++k) {
+            const dvec3 p = surface.positions[t[k]], a = glm::normalize(surface.positions[t[(k + 1) % 3]] - p), b = glm::normalize(surface.positions[t[(k + 2) % 3]] - p);
+            sums[t[k]] += normal * std::acos(std::clamp(glm::dot(a, b), -1.0, 1.0));
+        }
+    });
+    for (dvec3& sum : sums)
+        if (const double length = glm::length(sum); length > 0) sum /= length;
+    each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
+        for (const uint32_t corner : t) least[corner] = std::min(least[corner], glm::dot(sums[corner], normal));
+    });
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] /= std::max(least[i], 1 / kLongest);
+    return sums;
+}
+
+class PieceMaker {
+public:
+    PieceMaker(const BaseSurface& surface, double height, double tileHeight, Shell& shell) : surface_(surface), directions_(directionsOf(surface)), height_(height), tileHeight_(tileHeight), shell_(shell) {}
+
+    std::vector<Piece> all() {
+        std::vector<Piece> pieces;
+        for (size_t i = 0; i < surface_.triangles.size(); ++i) addPrism(i, pieces);
+        return pieces;
+    }
+
+private:
+    void addPrism(size_t triangle, std::vector<Piece>& pieces) {
+        if (faceNormal(surface_, triangle) == dvec3(0)) {
+            ++shell_.withoutArea;
+            return;
+        }
+        const auto& t = surface_.triangles[triangle];
+        const auto& map = surface_.uvs[triangle];
+        const dvec2 a = map[1] - map[0], b = map[2] - map[0];
+        const double area = a.x * b.y - a.y * b.x;
+        shell_.withoutMap += std::abs(area) <= 1e-12 * (glm::dot(a, a) + glm::dot(b, b));
+        shell_.mirrored += area < 0;
+        std::array<int, 3> order = {0, 1, 2};
+        std::ranges::sort(order, {}, [&](int k) { return t[k]; });
+        const bool isOdd = (order[1] - order[0] + 3) % 3 != 1;
+        std::array<dvec3, 6> world, tile;  // base, then top, by number
+        for (int k = 0; k < 3; ++k) {
+            world[k] = surface_.positions[t[order[k]]] - shell_.origin;
+            world[k + 3] = world[k] + height_ * directions_[t[order[k]]];
+            tile[k] = dvec3(map[order[k]], 0), tile[k + 3] = dvec3(map[order[k]], tileHeight_);
+        }
+        constexpr int kCorners[3][4] = {{0, 1, 2, 5}, {0, 1, 4, 5}, {0, 3, 4, 5}};
+        for (int piece = 0; piece < 3; ++piece) {
+            Piece made;
+            for (int k = 0; k < 4; ++k) made.corners[k] = world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
+            made.hasBase = piece == 0;
+            const dvec3 x = made.corners[1] - made.corners[0], y = made.corners[2] - made.corners[0], z = made.corners[3] - made.corners[0];
+            const double volume = glm::dot(glm::cross(x, y), z) * (isOdd ? -1 : 1) * (piece == 1 ? -1 : 1);
+            const double scale = glm::length(x) * glm::length(y) * glm::length(z);
+            shell_.inverted += volume < 0;
+            if (std::abs(volume) > 1e-12 * scale) pieces.push_back(made);
+        }
+    }
+
+    const BaseSurface& surface_;
+    std::vector<dvec3> directions_;
+    double height_, tileHeight_;
+    Shell& shell_;
+};
+
+/// Halves at the median of the middles, along the longest axis.
+class TreeMaker {
+public:
+    TreeMaker(const std::vector<Piece>& pieces, std::vector<uint32_t>& order) : pieces_(pieces), order_(order) {}
+
+    std::vector<glm::vec4> nodes() {
+        texels_.resize(Shell::kNodeTexels);
+        make(0, 0, order_.size());
+        return std::move(texels_);
+    }
+
+private:
+    void make(size_t node, size_t first, size_t last) {
+        dvec3 low(std::numeric_limits<double>::infinity()), high = -low, lowMiddle = low, highMiddle = high;
+        for (size_t i = first; i < last; ++i) {
+            const Piece& piece = pieces_[order_[i]];
+            low = glm::min(low, piece.low()), high = glm::max(high, piece.high());
+            lowMiddle = glm::min(lowMiddle, middle(piece)), highMiddle = glm::max(highMiddle, middle(piece));
+        }
+        // Wider than single precision rounds.
+        const dvec3 slack = 1e-6 * (glm::abs(low) + glm::abs(high)) + 1e-5 * (high - low);
+        low -= slack, high += slack;
+        const bool isLeaf = last - first <= Shell::kMostInLeaf;
+        const size_t children = texels_.size() / Shell::kNodeTexels;
+        texels_[2 * node] = glm::vec4(low, float(isLeaf ? first : children));
+        texels_[2 * node + 1] = glm::vec4(high, float(isLeaf ? last - first : 0));
+        if (isLeaf) return;
+        texels_.resize(texels_.size() + 2 * Shell::kNodeTexels);
+        const dvec3 size = highMiddle - lowMiddle;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const auto half = order_.begin() + std::ptrdiff_t((first + last) / 2);
+        std::nth_element(order_.begin() + std::ptrdiff_t(first), half, order_.begin() + std::ptrdiff_t(last),
+                         [&](uint32_t a, uint32_t b) { return middle(pieces_[a])[axis] < middle(pieces_[b])[axis]; });
+        make(children, first, (first + last) / 2);
+        make(children + 1, (first + last) / 2, last);
+    }
+    static dvec3 middle(const Piece& piece) { return piece.low() + piece.high(); }
+
+    const std::vector<Piece>& pieces_;
+    std::vector<uint32_t>& order_;
+    std::vector<glm::vec4> texels_;
+};
+
+void append(const Piece& piece, dvec3 extent, std::vector<glm::vec4>& texels) {
+    const auto edges = [](const std::array<dvec3, 4>& c) { return glm::dmat3(c[1] - c[0], c[2] - c[0], c[3] - c[0]); };
+    const glm::dmat3 weights = glm::inverse(edges(piece.corners)), map = edges(piece.tile) * weights;
+    dvec3 q0 = piece.tile[0];
+    for (int axis = 0; axis < 2; ++axis) q0[axis] -= extent[axis] * std::floor(q0[axis] / extent[axis]);
+    // Rows of a matrix that is stored by columns.
+    const glm::dmat3 r = glm::transpose(weights), t = glm::transpose(map);
+    texels.push_back(glm::vec4(piece.corners[0], piece.hasBase ? 1 : 0));
+    for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(r[row], q0[row]));
+    for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(t[row], 0));
+}
+
+bool isFinite(const BaseSurface& surface) {
+    const auto good = [](double x) { return std::isfinite(x); };
+    for (const dvec3 p : surface.positions)
+        if (!good(p.x) || !good(p.y) || !good(p.z)) return false;
+    for (const auto& map : surface.uvs)
+        for (const dvec2 uv : map)
+            if (!good(uv.x) || !good(uv.y)) return false;
+    return true;
+}
+
+}  // namespace
+
+Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent) {
+    const auto fail = [](ErrorCode code, const char* message) { return Error{.code = code, .message = message}; };
+    if (!(height > 0) || !std::isfinite(height) || !(extent.z > 0)) return fail(ErrorCode::Usage, "a shell's height must be above 0");
+    if (surface.uvs.size() != surface.triangles.size()) return fail(ErrorCode::Usage, "a base surface needs texture coordinates for each triangle");
+    if (3 * surface.triangles.size() > kMostPieces) return fail(ErrorCode::Limit, "a base surface has at most 5 592 405 triangles");
+    if (!isFinite(surface)) return fail(ErrorCode::InvalidInput, "positions and texture coordinates must be finite");
+    Shell shell;
+    dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const auto& triangle : surface.triangles)
+        for (const uint32_t corner : triangle) low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
+    if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
+    const std::vector<Piece> pieces = PieceMaker(surface, height, extent.z, shell).all();
+    if (pieces.empty()) return fail(ErrorCode::InvalidInput, "no triangle has an area");
+    std::vector<uint32_t> order(pieces.size());
+    std::iota(order.begin(), order.end(), 0u);
+    shell.texels = TreeMaker(pieces, order).nodes();
+    shell.nodes = uint32_t(shell.texels.size() / Shell::kNodeTexels);
+    shell.pieces = uint32_t(pieces.size());
+    shell.low = shell.origin + dvec3(shell.texels[0]), shell.high = shell.origin + dvec3(shell.texels[1]);
+    for (const uint32_t i : order) append(pieces[i], extent, shell.texels);
+    return shell;
+}
+
+}  // namespace vcp::meso

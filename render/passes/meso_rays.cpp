@@ -1,0 +1,72 @@
+#include "render/passes/meso_rays.h"
+
+#include <bit>
+
+#include "mesostructure/grid_walk.h"
+#include "render/meso_rays_spirv.h"
+#include "render/passes/readback.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr uint32_t kResultWords = 8, kGroup = 64;
+
+}  // namespace
+
+Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const meso::MarchRay> rays) {
+    const glm::dvec3 extent(arrays.record.extent);
+    std::vector<glm::vec4> texels;
+    for (const meso::MarchRay& ray : rays) {
+        texels.push_back(glm::vec4(meso::inFirstTile(ray.origin, extent), std::min(ray.tMax, 1e6)));
+        texels.push_back(glm::vec4(ray.direction, float(ray.origin.z) >= arrays.record.extent.z ? 1 : 0));
+    }
+    count_ = uint32_t(rays.size());
+    auto words = resources_.words(arrays.words);
+    if (!words) return words.error();
+    words_ = std::move(*words);
+    auto input = resources_.vectors(texels);
+    if (!input) return input.error();
+    rays_ = std::move(*input);
+    auto results = resources_.storage(uint64_t{kResultWords} * 4 * count_);
+    if (!results) return results.error();
+    results_ = std::move(*results);
+    auto none = resources_.storage(16);
+    if (!none) return none.error();
+    none_ = std::move(*none);
+    auto constants = device_.createBuffer(sizeof values_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    if (!constants) return constants.error();
+    constants_ = std::move(*constants);
+    values_.record = arrays.record;
+    values_.view.picture.x = count_;
+    auto set = resources_.makeSet({&constants_, &words_, &rays_, &results_, &none_, &none_});
+    if (!set) return set.error();
+    set_ = *set;
+    auto pipeline = resources_.pipeline(kMesoRaysSpirv, {arrays.constants.begin(), arrays.constants.end()});
+    if (!pipeline) return pipeline.error();
+    pipeline_ = *pipeline;
+    return {};
+}
+
+void MesoRaysPass::record(VkCommandBuffer commands) const {
+    vkCmdUpdateBuffer(commands, constants_.handle(), 0, sizeof values_, &values_);
+    barrierTransferToAll(commands);
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &set_, 0, nullptr);
+    vkCmdDispatch(commands, (count_ + kGroup - 1) / kGroup, 1, 1);
+    barrierComputeToReadback(commands);
+}
+
+Result<std::vector<meso::MarchResult>> MesoRaysPass::read() {
+    const auto words = readWords(device_, results_, 0, uint64_t{kResultWords} * count_);
+    if (!words) return words.error();
+    std::vector<meso::MarchResult> results(count_);
+    for (uint32_t i = 0; i < count_; ++i) {
+        const uint32_t* w = words->data() + size_t{kResultWords} * i;
+        const auto real = [&](int k) { return std::bit_cast<float>(w[k]); };
+        results[i] = {static_cast<meso::MarchState>(w[0]), double(real(1)), {real(2), real(3), real(4)}, w[5], w[6], w[7]};
+    }
+    return results;
+}
+
+}  // namespace vcp

@@ -1,0 +1,145 @@
+#include "render/passes/meso_resources.h"
+
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "render/vulkan/check.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+constexpr VkDescriptorType kBindings[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage};
+constexpr uint32_t kBindingCount = std::size(kBindings);
+
+}  // namespace
+
+Result<std::unique_ptr<MesoResources>> MesoResources::create(Device& device) {
+    std::unique_ptr<MesoResources> made(new MesoResources(device));
+    VCP_TRY(made->createLayout());
+    return made;
+}
+
+Result<void> MesoResources::createLayout() {
+    std::vector<VkDescriptorSetLayoutBinding> bindings;
+    for (uint32_t i = 0; i < kBindingCount; ++i) bindings.push_back({i, kBindings[i], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+    VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
+    set.bindingCount = kBindingCount;
+    set.pBindings = bindings.data();
+    VCP_VK(vkCreateDescriptorSetLayout, device_.handle(), &set, nullptr, &setLayout_);
+    VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+    layout.setLayoutCount = 1;
+    layout.pSetLayouts = &setLayout_;
+    VCP_VK(vkCreatePipelineLayout, device_.handle(), &layout, nullptr, &layout_);
+    return {};
+}
+
+MesoResources::~MesoResources() {
+    for (VkDescriptorPool pool : pools_) vkDestroyDescriptorPool(device_.handle(), pool, nullptr);
+    vkDestroyPipelineLayout(device_.handle(), layout_, nullptr);
+    vkDestroyDescriptorSetLayout(device_.handle(), setLayout_, nullptr);
+}
+
+Result<Buffer> MesoResources::upload(std::span<const std::byte> bytes) {
+    auto buffer = device_.createBuffer(bytes.size(), VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    if (!buffer) return buffer;
+    if (std::byte* mapped = buffer->mapped()) {
+        std::memcpy(mapped, bytes.data(), bytes.size());
+        return buffer;
+    }
+    auto staging = device_.createBuffer(bytes.size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
+    if (!staging) return staging;
+    std::memcpy(staging->mapped(), bytes.data(), bytes.size());
+    VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, bytes.size()};
+        vkCmdCopyBuffer(commands, staging->handle(), buffer->handle(), 1, &region);
+    }));
+    return buffer;
+}
+
+Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
+    if (words.size() > device_.limits().maxTexelBufferElements)
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("a mesostructure of {} words; this device reads {} at most", words.size(), device_.limits().maxTexelBufferElements)};
+    MesoTexels made;
+    auto buffer = upload(std::as_bytes(words));
+    if (!buffer) return buffer.error();
+    made.buffer = std::move(*buffer);
+    auto view = device_.createTexelView(made.buffer, VK_FORMAT_R32_UINT, words.size_bytes());
+    if (!view) return view.error();
+    made.view = std::move(*view);
+    auto quads = device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, words.size_bytes());
+    if (!quads) return quads.error();
+    made.quads = std::move(*quads);
+    return made;
+}
+
+Result<MesoTexels> MesoResources::vectors(std::span<const glm::vec4> texels) {
+    if (texels.size() > device_.limits().maxTexelBufferElements)
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} texels of rays or of a shell; this device reads {} at most", texels.size(), device_.limits().maxTexelBufferElements)};
+    MesoTexels made;
+    auto buffer = upload(std::as_bytes(texels));
+    if (!buffer) return buffer.error();
+    made.buffer = std::move(*buffer);
+    auto view = device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_SFLOAT, texels.size_bytes());
+    if (!view) return view.error();
+    made.view = std::move(*view);
+    return made;
+}
+
+Result<Buffer> MesoResources::storage(uint64_t bytes) const {
+    if (bytes > device_.limits().maxStorageBufferRange)
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} bytes of hits; this device has {} at most: a smaller picture, or fewer rays", bytes, device_.limits().maxStorageBufferRange)};
+    return device_.createBuffer(bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+}
+
+Result<VkDescriptorSet> MesoResources::makeSet(const Bound& bound) {
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 3}, {kStorage, 3}};
+    VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+    pool.maxSets = 1;
+    pool.poolSizeCount = std::size(sizes);
+    pool.pPoolSizes = sizes;
+    VkDescriptorPool made = VK_NULL_HANDLE;
+    VCP_VK(vkCreateDescriptorPool, device_.handle(), &pool, nullptr, &made);
+    pools_.push_back(made);
+    VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+    allocation.descriptorPool = made;
+    allocation.descriptorSetCount = 1;
+    allocation.pSetLayouts = &setLayout_;
+    VkDescriptorSet set = VK_NULL_HANDLE;
+    VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &set);
+
+    const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE, bound.words->view.handle(), bound.words->quads.handle(), bound.input->view.handle()};
+    const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr, nullptr, nullptr, bound.hits, bound.picture, bound.counters};
+    VkDescriptorBufferInfo infos[kBindingCount] = {};
+    VkWriteDescriptorSet writes[kBindingCount];
+    for (uint32_t i = 0; i < kBindingCount; ++i) {
+        if (buffers[i] != nullptr) infos[i] = {buffers[i]->handle(), 0, VK_WHOLE_SIZE};
+        writes[i] = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
+        writes[i].dstSet = set;
+        writes[i].dstBinding = i;
+        writes[i].descriptorCount = 1;
+        writes[i].descriptorType = kBindings[i];
+        writes[i].pBufferInfo = &infos[i];
+        writes[i].pTexelBufferView = &views[i];
+    }
+    vkUpdateDescriptorSets(device_.handle(), kBindingCount, writes, 0, nullptr);
+    return set;
+}
+
+void MesoResources::clearSets() {
+    for (VkDescriptorPool pool : pools_) vkDestroyDescriptorPool(device_.handle(), pool, nullptr);
+    pools_.clear();
+}
+
+Result<VkPipeline> MesoResources::pipeline(std::span<const uint32_t> spirv, const std::vector<uint32_t>& constants) {
+    const auto key = std::pair(spirv.data(), constants);
+    if (const auto found = pipelines_.find(key); found != pipelines_.end()) return found->second.handle();
+    auto made = ComputePipeline::create(device_, layout_, spirv, constants);
+    if (!made) return made.error();
+    return pipelines_.emplace(key, std::move(*made)).first->second.handle();
+}
+
+}  // namespace vcp

@@ -1,0 +1,73 @@
+// What the mesostructure passes share: one descriptor set layout, its pipelines, and asset buffers (shaders/meso_bindings.glsl).
+//
+// binding   what                          written by              read by
+//  0        MesoRecord, MesoView          copies                  all
+//  1, 2     words of the asset, as words  CPU (upload)            rays, surface
+//           and as fours
+//  3        rays, or the shell            CPU (upload)            rays, surface
+//  4        results, or hits              rays, surface           surface, shade, readback
+//  5        picture                       copies, shade           readback
+//  6        counters                      surface                 readback
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/meso_arrays.h"
+#include "render/vulkan/compute_pipeline.h"
+#include "render/vulkan/device.h"
+
+namespace vcp {
+
+struct MesoConstants {
+    frame::MesoRecord record;
+    frame::MesoView view;
+};
+
+/// A buffer that shaders read as texels of one or two formats.
+struct MesoTexels {
+    Buffer buffer;
+    TexelView view, quads;  ///< quads: of words alone
+};
+
+class MesoResources {
+public:
+    static Result<std::unique_ptr<MesoResources>> create(Device& device);
+    ~MesoResources();
+    MesoResources(const MesoResources&) = delete;
+    MesoResources& operator=(const MesoResources&) = delete;
+
+    /// Errors: Device (no memory); Limit (more texels than the device reads).
+    Result<MesoTexels> words(std::span<const uint32_t> words);
+    Result<MesoTexels> vectors(std::span<const glm::vec4> texels);
+    Result<Buffer> storage(uint64_t bytes) const;
+
+    struct Bound {
+        const Buffer* constants;
+        const MesoTexels *words, *input;
+        const Buffer *hits, *picture, *counters;
+    };
+    /// A set of its own for each that asks, until clearSets(). Errors: Device.
+    Result<VkDescriptorSet> makeSet(const Bound& bound);
+    void clearSets();
+
+    /// The pipeline of a shader and its constants, made on first use. Errors: Device.
+    Result<VkPipeline> pipeline(std::span<const uint32_t> spirv, const std::vector<uint32_t>& constants);
+    [[nodiscard]] uint32_t pipelinesMade() const { return uint32_t(pipelines_.size()); }
+    [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
+
+private:
+    explicit MesoResources(Device& device) : device_(device) {}
+    Result<void> createLayout();
+    Result<Buffer> upload(std::span<const std::byte> bytes);
+
+    Device& device_;
+    VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
+    VkPipelineLayout layout_ = VK_NULL_HANDLE;
+    std::vector<VkDescriptorPool> pools_;  // one a set
+    std::map<std::pair<const uint32_t*, std::vector<uint32_t>>, ComputePipeline> pipelines_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,156 @@
+#include "render/passes/meso_surface.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <map>
+
+#include <glm/geometric.hpp>
+
+#include "render/meso_shade_spirv.h"
+#include "render/meso_surface_spirv.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+
+glm::vec4 toVec4(glm::dvec3 v, double w = 0) { return {glm::vec3(v), float(w)}; }
+
+}  // namespace
+
+double shadowLift(const MesoArrays& arrays, double tileEdge) {
+    const frame::MesoRecord& r = arrays.record;
+    const bool isExact = arrays.constants[0] == frame::kMesoPyramid || arrays.constants[2] == frame::kMesoHeights || arrays.constants[2] == frame::kMesoField;
+    if (r.fine.x > 0 && (isExact || arrays.constants[0] == frame::kMesoRelief)) return (isExact ? 0.25 : 1.5) * tileEdge / r.fine.x;
+    return 0.5 * tileEdge * double(r.cell.x);
+}
+
+Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
+    surfaces_.clear();
+    resources_.clearSets();
+    std::map<const MesoArrays*, std::shared_ptr<MesoTexels>> uploaded;
+    std::vector<Placed> placed;
+    for (const MesoSurface& surface : surfaces) {
+        Placed made;
+        made.arrays = surface.arrays;
+        auto& words = uploaded[surface.arrays.get()];
+        if (!words) {
+            auto texels = resources_.words(surface.arrays->words);
+            if (!texels) return texels.error();
+            words = std::make_shared<MesoTexels>(std::move(*texels));
+        }
+        made.words = words;
+        auto shell = resources_.vectors(surface.shell.texels);
+        if (!shell) return shell.error();
+        made.shell = std::move(*shell);
+        auto constants = device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local);
+        if (!constants) return constants.error();
+        made.constants = std::move(*constants);
+        made.origin = surface.shell.origin;
+        made.view.picture = {0, 0, surface.shell.nodes, surface.withBase ? 1 : 0};
+        made.view.light.w = float(surface.lift);
+        made.view.colour = glm::vec4(surface.colour, 0);
+        placed.push_back(std::move(made));
+    }
+    surfaces_ = std::move(placed);
+    return {};
+}
+
+uint64_t MesoSurfacePass::assetBytes() const {
+    std::map<const MesoTexels*, uint64_t> bytes;
+    uint64_t sum = 0;
+    for (const Placed& surface : surfaces_) bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
+    for (const auto& [texels, count] : bytes) sum += count;
+    return sum;
+}
+
+Result<void> MesoSurfacePass::prepare(PictureSize size, bool shadows) {
+    if (isEmpty()) return {};
+    const auto make = [&](Buffer& buffer, uint64_t bytes) -> Result<void> {
+        auto made = resources_.storage(bytes);
+        if (!made) return made.error();
+        buffer = std::move(*made);
+        return {};
+    };
+    if (!(size == size_) || surfaces_.front().set == VK_NULL_HANDLE) {
+        VCP_TRY(make(hits_, size.pixels() * frame::kMesoPlanes * 4));
+        VCP_TRY(make(picture_, size.pixels() * 4));
+        VCP_TRY(make(counters_, 16));
+        resources_.clearSets();
+        size_ = size;
+        for (Placed& surface : surfaces_) {
+            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &hits_, &picture_, &counters_});
+            if (!set) return set.error();
+            surface.set = *set;
+        }
+    }
+    for (Placed& surface : surfaces_) {
+        std::vector<uint32_t> constants(surface.arrays->constants.begin(), surface.arrays->constants.end());
+        constants.push_back(0);
+        auto cast = resources_.pipeline(kMesoSurfaceSpirv, constants);
+        if (!cast) return cast.error();
+        surface.cast = *cast;
+        if (!shadows) continue;
+        constants.back() = 1;
+        auto shadow = resources_.pipeline(kMesoSurfaceSpirv, constants);
+        if (!shadow) return shadow.error();
+        surface.shadow = *shadow;
+    }
+    auto shade = resources_.pipeline(kMesoShadeSpirv, {});
+    if (!shade) return shade.error();
+    shade_ = *shade;
+    return {};
+}
+
+MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, const MesoLook& look) const {
+    MesoConstants c{surface.arrays->record, surface.view};
+    const CameraBasis basis = cameraBasis(look.camera, size_.width, size_.height);
+    const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / size_.width), stepY = basis.up * (-2 * basis.halfHeight / size_.height);
+    const glm::dvec3 corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth, eye = look.camera.eye - surface.origin;
+    if (look.camera.projection == Projection::Orthographic) {
+        c.view.eye = toVec4(eye + corner), c.view.eyeX = toVec4(stepX), c.view.eyeY = toVec4(stepY);
+        c.view.forward = toVec4(basis.forward);
+    } else {
+        c.view.eye = toVec4(eye);
+        c.view.forward = toVec4(basis.forward + corner), c.view.forwardX = toVec4(stepX), c.view.forwardY = toVec4(stepY);
+    }
+    c.view.picture.x = size_.width, c.view.picture.y = size_.height;
+    c.view.light = toVec4(glm::normalize(look.light), surface.view.light.w);
+    c.view.up = toVec4(glm::normalize(look.up), look.heat ? 1 : 0);
+    return c;
+}
+
+void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, VkDescriptorSet set) const {
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &set, 0, nullptr);
+    vkCmdDispatch(commands, (size_.width + 7) / 8, (size_.height + 7) / 8, 1);
+    barrierComputeToCompute(commands);
+}
+
+void MesoSurfacePass::record(VkCommandBuffer commands, const MesoLook& look, const Buffer* depths) {
+    if (isEmpty()) return;
+    const uint64_t plane = size_.pixels() * 4;
+    if (depths != nullptr) {
+        const VkBufferCopy region{0, 0, plane};
+        vkCmdCopyBuffer(commands, depths->handle(), hits_.handle(), 1, &region);
+    } else {
+        // The shader's kNoHit.
+        vkCmdFillBuffer(commands, hits_.handle(), 0, plane, std::bit_cast<uint32_t>(1e30f));
+    }
+    vkCmdFillBuffer(commands, hits_.handle(), plane, 3 * plane, 0);
+    vkCmdFillBuffer(commands, counters_.handle(), 0, VK_WHOLE_SIZE, 0);
+    for (const Placed& surface : surfaces_) {
+        const MesoConstants constants = constantsOf(surface, look);
+        vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
+    }
+    barrierTransferToAll(commands);
+    for (const Placed& surface : surfaces_) dispatch(commands, surface.cast, surface.set);
+    if (look.shadows && !look.heat)
+        for (const Placed& surface : surfaces_) dispatch(commands, surface.shadow, surface.set);
+    dispatch(commands, shade_, surfaces_.front().set);
+    barrierComputeToReadback(commands);
+}
+
+}  // namespace vcp

@@ -1,0 +1,79 @@
+// Pictures of mesostructure on surfaces (shaders/meso_surface.comp, meso_shade.comp): for each surface a dispatch that finds
+// first hits in its shell and keeps the nearest of all, then one that casts shadow rays, then one that shades. Depths and
+// normals are those of the other passes' hits, but in world units, so surfaces compose with whatever else has depths.
+//
+// Reads the shells and assets; writes hits, picture, counters. Barriers are recorded here; ends with
+// barrierComputeToReadback. Without surfaces nothing is made: no pipeline, no buffer but the picture's.
+#pragma once
+
+#include <optional>
+
+#include "mesostructure/shell.h"
+#include "render/camera.h"
+#include "render/passes/frame_resources.h"
+#include "render/passes/meso_resources.h"
+
+namespace vcp {
+
+/// One asset on one base.
+struct MesoSurface {
+    std::shared_ptr<const MesoArrays> arrays;  ///< surfaces may share them
+    meso::Shell shell;
+    glm::vec3 colour{0.8f};   ///< encoded, as the screen has it
+    bool withBase = true;     ///< the base is drawn where rays come through to it
+    double lift = 0;          ///< world units by which shadow rays start above a hit
+};
+
+/// A good lift: some texels or a part of a cell. `tileEdge` in world units.
+double shadowLift(const MesoArrays& arrays, double tileEdge);
+
+struct MesoLook {
+    Camera camera;
+    glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light
+    glm::dvec3 up{0, 0, 1};            ///< of the sky
+    bool shadows = false;
+    bool heat = false;                 ///< iterations of each pixel's ray, blue to red: 0 to 100
+};
+
+class MesoSurfacePass {
+public:
+    MesoSurfacePass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
+
+    /// Replaces the surfaces; waits for nothing: no frame may be in flight. Errors: Device, Limit.
+    Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
+    /// Makes buffers and pipelines where there are surfaces. Errors: Device, Limit.
+    Result<void> prepare(PictureSize size, bool shadows);
+    /// Precondition: prepare(); the picture is as it shall be where there is no mesostructure. `depths`: a float a pixel,
+    /// world units along the unit ray, of what is there already; null: nothing is.
+    void record(VkCommandBuffer commands, const MesoLook& look, const Buffer* depths);
+
+    [[nodiscard]] bool isEmpty() const { return surfaces_.empty(); }
+    [[nodiscard]] const Buffer& picture() const { return picture_; }
+    [[nodiscard]] const Buffer& hits() const { return hits_; }
+    [[nodiscard]] const Buffer& counters() const { return counters_; }
+    /// Of assets and shells.
+    [[nodiscard]] uint64_t assetBytes() const;
+
+private:
+    struct Placed {
+        std::shared_ptr<const MesoArrays> arrays;
+        std::shared_ptr<MesoTexels> words;
+        MesoTexels shell;
+        Buffer constants;
+        glm::dvec3 origin;
+        frame::MesoView view{};  ///< what does not depend on the camera
+        VkDescriptorSet set = VK_NULL_HANDLE;
+        VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE;
+    };
+    MesoConstants constantsOf(const Placed& surface, const MesoLook& look) const;
+    void dispatch(VkCommandBuffer commands, VkPipeline pipeline, VkDescriptorSet set) const;
+
+    Device& device_;
+    MesoResources& resources_;
+    std::vector<Placed> surfaces_;
+    PictureSize size_;
+    Buffer hits_, picture_, counters_;
+    VkPipeline shade_ = VK_NULL_HANDLE;
+};
+
+}  // namespace vcp

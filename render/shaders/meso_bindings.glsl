@@ -1,0 +1,23 @@
+// The descriptor set of the mesostructure passes (render/passes/meso_bindings.h).
+#include "render/shared/meso_layout.h"
+
+layout(constant_id = 0) const uint kWalk = 0u;
+layout(constant_id = 1) const uint kSkip = 0u;
+layout(constant_id = 2) const uint kSurface = 0u;
+layout(constant_id = 3) const uint kRefinement = 0u;
+
+layout(set = 0, binding = 0, std140) uniform MesoBlock {
+    MesoRecord meso;
+    MesoView view;
+};
+layout(set = 0, binding = 1) uniform utextureBuffer wordTexels;
+layout(set = 0, binding = 2) uniform utextureBuffer quadTexels;
+layout(set = 0, binding = 3) uniform textureBuffer inputTexels;  // rays, or the shell
+layout(set = 0, binding = 4, std430) buffer HitBlock { uint hits[]; };
+layout(set = 0, binding = 5, std430) buffer PictureBlock { uint picturePixels[]; };
+layout(set = 0, binding = 6, std430) buffer CounterBlock { uint counters[]; };  // unresolved rays
+
+uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }
+uint fetchByte(uint array, uint i) { return bitfieldExtract(fetchWord(array + (i >> 2)), int(i & 3u) * 8, 8); }
+uint fetchShort(uint array, uint i) { return bitfieldExtract(fetchWord(array + (i >> 1)), int(i & 1u) * 16, 16); }
+uvec4 fetchQuad(uint i) { return texelFetch(quadTexels, int(i)); }

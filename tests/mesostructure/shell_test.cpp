@@ -1,0 +1,138 @@
+// Base surfaces and the shells over them.
+#include "mesostructure/shell.h"
+
+#include <random>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+namespace vcp::meso {
+namespace {
+
+constexpr glm::dvec3 kTile{1, 1, 0.25};
+
+BaseSurface base(std::string_view name, double tiles = 2) {
+    auto made = makeBaseSurface(name, tiles);
+    EXPECT_TRUE(made.ok()) << made.error().line();
+    return *std::move(made);
+}
+
+Shell shellOf(const BaseSurface& surface, double height) {
+    auto made = buildShell(surface, height, kTile);
+    EXPECT_TRUE(made.ok()) << made.error().line();
+    return *std::move(made);
+}
+
+/// One tetrahedron as the shaders read it.
+struct Piece {
+    glm::vec3 v0, r[3], q0, t[3];
+    Piece(const Shell& shell, uint32_t i) {
+        const glm::vec4* at = shell.texels.data() + Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{i};
+        v0 = glm::vec3(at[0]);
+        for (int k = 0; k < 3; ++k) r[k] = glm::vec3(at[1 + k]), q0[k] = at[1 + k].w, t[k] = glm::vec3(at[4 + k]);
+    }
+    /// Least weight of a corner: above 0 inside.
+    [[nodiscard]] float least(glm::vec3 p) const {
+        const glm::vec3 w(glm::dot(r[0], p - v0), glm::dot(r[1], p - v0), glm::dot(r[2], p - v0));
+        return std::min({w.x, w.y, w.z, 1 - w.x - w.y - w.z});
+    }
+    [[nodiscard]] glm::vec3 tile(glm::vec3 p) const { return q0 + glm::vec3(glm::dot(t[0], p - v0), glm::dot(t[1], p - v0), glm::dot(t[2], p - v0)); }
+};
+
+TEST(Shell, BasesFaceOutwardsAndHaveSoundShells) {
+    for (const auto name : baseSurfaceNames()) {
+        const BaseSurface surface = base(name);
+        const double edge = tileEdge(surface);
+        EXPECT_GT(edge, 0.2) << name;
+        const Shell shell = shellOf(surface, 0.05);
+        EXPECT_EQ(shell.inverted, 0u) << name;
+        EXPECT_EQ(shell.withoutMap, 0u) << name;
+        // Only the teapot, at its poles, and the cylinder's caps come to a point.
+        EXPECT_EQ(shell.withoutArea > 0, name == "teapot" || name == "cylinder") << name;
+        // Outside is up, and outwards from the middle.
+        glm::dvec3 low(1e9), high(-1e9);
+        for (const glm::dvec3 p : surface.positions) low = glm::min(low, p), high = glm::max(high, p);
+        EXPECT_NEAR(shell.high.z, high.z + 0.05, 0.01) << name;
+        if (name != "quad") EXPECT_LT(shell.low.x, low.x - 0.03) << name;
+        EXPECT_EQ(shell.texels.size(), Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{shell.pieces}) << name;
+    }
+}
+
+TEST(Shell, PiecesFillTheShellOnce) {
+    // A closed surface: the shell between the boxes of edge 2 and 2.4, without gap and overlap.
+    const Shell shell = shellOf(base("box"), 0.2);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> unit(-1.25f, 1.25f);
+    for (int i = 0; i < 3000; ++i) {
+        const glm::vec3 p(unit(random), unit(random), unit(random));
+        const float far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+        int inside = 0;
+        bool onWall = std::abs(far - 1) < 1e-3f || std::abs(far - 1.2f) < 1e-3f;
+        for (uint32_t k = 0; k < shell.pieces && !onWall; ++k) {
+            const float least = Piece(shell, k).least(p);
+            onWall = std::abs(least) < 1e-5f;
+            inside += least > 0;
+        }
+        if (!onWall) EXPECT_EQ(inside, far > 1 && far < 1.2f ? 1 : 0) << "point " << i;
+    }
+}
+
+TEST(Shell, MapsToTheTile) {
+    // Flat: tile space is world space, scaled.
+    const Shell shell = shellOf(base("quad", 4), 0.125);
+    for (uint32_t k = 0; k < shell.pieces; ++k) {
+        const Piece piece(shell, k);
+        const glm::vec3 p(0.3f, -0.2f, 0.05f), expected((p.x + 1) * 2, (p.y + 1) * 2, 0.1f), found = piece.tile(p);
+        EXPECT_NEAR(found.x - expected.x, std::round(found.x - expected.x), 1e-5);
+        EXPECT_NEAR(found.y - expected.y, std::round(found.y - expected.y), 1e-5);
+        EXPECT_NEAR(found.z, expected.z, 1e-5);
+    }
+}
+
+BaseSurface twoTriangles() {
+    return {.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+            .triangles = {{0, 1, 2}, {0, 2, 3}},
+            .uvs = {{glm::dvec2(0, 0), {1, 0}, {1, 1}}, {glm::dvec2(0, 0), {1, 1}, {0, 1}}}};
+}
+
+TEST(Shell, CountsWhatMapsAndSurfacesHave) {
+    BaseSurface mirrored = twoTriangles();
+    for (auto& map : mirrored.uvs)
+        for (glm::dvec2& uv : map) uv.x = -uv.x;
+    EXPECT_EQ(shellOf(mirrored, 0.1).mirrored, 2u);
+    EXPECT_EQ(shellOf(mirrored, 0.1).inverted, 0u);
+
+    BaseSurface flat = twoTriangles();
+    flat.uvs[1] = {glm::dvec2(0, 0), {1, 1}, {2, 2}};
+    EXPECT_EQ(shellOf(flat, 0.1).withoutMap, 1u);
+
+    BaseSurface sliver = twoTriangles();
+    sliver.triangles.push_back({0, 1, 1}), sliver.uvs.push_back(sliver.uvs[0]);
+    EXPECT_EQ(shellOf(sliver, 0.1).withoutArea, 1u);
+
+    // A gutter, narrower than the shell is high.
+    BaseSurface gutter = {.positions = {{-1, 0, 1}, {-1, 4, 1}, {-0.1, 0, 0}, {-0.1, 4, 0}, {0.1, 0, 0}, {0.1, 4, 0}, {1, 0, 1}, {1, 4, 1}}, .triangles = {}, .uvs = {}};
+    for (uint32_t i = 0; i < 6; i += 2)
+        for (const std::array<uint32_t, 3> t : {std::array<uint32_t, 3>{i, i + 2, i + 3}, {i, i + 3, i + 1}})
+            gutter.triangles.push_back(t), gutter.uvs.push_back({glm::dvec2(t[0], 0), {t[1], 1}, {t[2], 2}});
+    EXPECT_EQ(shellOf(gutter, 0.05).inverted, 0u);
+    EXPECT_GT(shellOf(gutter, 1.0).inverted, 0u);
+}
+
+TEST(Shell, RefusesWhatIsNoBase) {
+    EXPECT_EQ(makeBaseSurface("plate", 1).error().code, ErrorCode::Usage);
+    EXPECT_EQ(makeBaseSurface("quad", 0).error().code, ErrorCode::Usage);
+    EXPECT_EQ(buildShell(twoTriangles(), 0, kTile).error().code, ErrorCode::Usage);
+    BaseSurface unmapped = twoTriangles();
+    unmapped.uvs.clear();
+    EXPECT_EQ(buildShell(unmapped, 0.1, kTile).error().code, ErrorCode::Usage);
+    BaseSurface infinite = twoTriangles();
+    infinite.uvs[0][1].x = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(buildShell(infinite, 0.1, kTile).error().code, ErrorCode::InvalidInput);
+    BaseSurface point = twoTriangles();
+    for (glm::dvec3& p : point.positions) p = {1, 2, 3};
+    EXPECT_EQ(buildShell(point, 0.1, kTile).error().code, ErrorCode::InvalidInput);
+}
+
+}  // namespace
+}  // namespace vcp::meso

@@ -1,0 +1,15 @@
+// Base surfaces for mesostructure from mesh files.
+#pragma once
+
+#include <filesystem>
+
+#include "mesostructure/base_surface.h"
+
+namespace vcp {
+
+/// Reads a mesh with texture coordinates: OBJ (v, vt and f; with or without materials), and the other formats where they
+/// have coordinates and a material. `tiles`: tile edges that one unit of the coordinates takes. The file may be hostile. Errors: those of openMesh; InvalidInput
+/// (a face without texture coordinates, numbers out of range); Limit (above 5 million triangles).
+Result<meso::BaseSurface> readBaseMesh(const std::filesystem::path& path, double tiles);
+
+}  // namespace vcp

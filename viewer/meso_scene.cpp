@@ -1,0 +1,95 @@
+#include "viewer/meso_scene.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+
+#include "mesostructure/solids.h"
+#include "viewer/base_mesh.h"
+
+namespace vcp {
+
+using namespace meso;
+
+namespace {
+
+constexpr int kTexels = 256;
+
+Result<std::shared_ptr<const MesoArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    const auto method = buildMethod(asset, **shape, options);
+    if (!method) return method.error();
+    auto arrays = packMesoArrays(*method);
+    if (!arrays) return arrays.error();
+    return std::make_shared<const MesoArrays>(*std::move(arrays));
+}
+
+Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
+    const auto names = baseSurfaceNames();
+    if (std::ranges::find(names, d.base) != names.end() || d.base.find('.') == std::string::npos) return makeBaseSurface(d.base, d.tiles);
+    return readBaseMesh(d.base, d.tiles);
+}
+
+void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::string>& warnings) {
+    const auto say = [&](uint64_t count, const char* what) {
+        if (count > 0) warnings.push_back(fmt::format("{}: {} {}", d.base, count, what));
+    };
+    say(shell.withoutArea, "triangles without area are left out");
+    say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
+    say(shell.inverted, "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
+}
+
+}  // namespace
+
+Result<Asset> openMesoAsset(const std::string& name) {
+    Asset asset;
+    const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
+    asset.name = name;
+    if (isIn(heightFieldNames())) {
+        auto map = makeHeightField(name, kTexels, 1);
+        if (!map) return map.error();
+        asset.heights = *std::move(map);
+    } else if (isIn(solidNames())) {
+        asset.solid = name, asset.seed = 1;
+    } else {
+        if (!name.ends_with(".meso"))
+            return Error{.code = ErrorCode::Usage, .message = fmt::format("\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
+        return readAsset(name);
+    }
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    asset.extent = (*shape)->extent();
+    return asset;
+}
+
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
+    MesoScene scene;
+    scene.bounds.low = glm::dvec3(std::numeric_limits<double>::infinity()), scene.bounds.high = -scene.bounds.low;
+    for (const MesoSurfaceDescription& d : descriptions) {
+        const auto asset = openMesoAsset(d.asset);
+        if (!asset) return asset.error();
+        auto arrays = arraysOf(*asset, d.method);
+        if (!arrays) return arrays.error();
+        const auto base = baseOf(d);
+        if (!base) return base.error();
+        const double edge = tileEdge(*base);
+        auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
+        if (!shell) {
+            Error error = shell.error();
+            if (d.base.find('.') != std::string::npos) error.file = d.base;
+            return error;
+        }
+        warn(d, *shell, scene.warnings);
+        scene.bounds.low = glm::min(scene.bounds.low, shell->low), scene.bounds.high = glm::max(scene.bounds.high, shell->high);
+        MesoSurface surface;
+        surface.lift = shadowLift(**arrays, edge);
+        surface.arrays = *std::move(arrays), surface.shell = *std::move(shell), surface.colour = d.colour, surface.withBase = d.withBase;
+        scene.surfaces.push_back(std::move(surface));
+    }
+    return scene;
+}
+
+}  // namespace vcp

@@ -1,0 +1,37 @@
+// Mesostructure surfaces from what a person says of them: asset, method, base. What scenes and `vcp meso render` hand to the
+// renderer (render/meso_renderer.h).
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mesostructure/method.h"
+#include "render/meso_renderer.h"
+#include "viewer/orbit_camera.h"
+
+namespace vcp {
+
+/// A procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those of readAsset.
+Result<meso::Asset> openMesoAsset(const std::string& name);
+
+struct MesoSurfaceDescription {
+    std::string asset;           ///< as openMesoAsset
+    meso::MethodOptions method;
+    std::string base = "quad";   ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
+    double tiles = 4;            ///< along the base (makeBaseSurface, readBaseMesh)
+    double heightScale = 1;      ///< of the slab; 1: as high as the asset is to its tile's edge
+    glm::vec3 colour{0.8f};      ///< encoded
+    bool withBase = true;
+};
+
+struct MesoScene {
+    std::vector<MesoSurface> surfaces;
+    Box bounds;
+    std::vector<std::string> warnings;  ///< what shells and maps have that a picture may show
+};
+
+/// Errors: those of the assets, methods, bases and shells, with the file where there is one.
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions);
+
+}  // namespace vcp
