@@ -143,12 +143,12 @@ void addTube(BaseSurface& to, std::span<const BicubicPatch> patches, double tile
                 to, 8, 8,
                 [&](double u, double v) {
                     std::array<dvec3, 4> row;
-                    for (int i = 0; i < 4; ++i) row[i] = bezier(patch[i], half > 0 ? 1 - u : u);
+                    for (int i = 0; i < 4; ++i) row[i] = bezier(patch[i], half > 0 ? u : 1 - u);
                     dvec3 p = bezier(row, v);
                     p.y *= half;
                     return p;
                 },
-                [&](double u, double v) { return tiles * 0.5 * dvec2(half > 0 ? 1 - u : 1 + u, 2 * (first + v)); });
+                [&](double u, double v) { return tiles * 0.5 * dvec2(half > 0 ? u : 1 + u, 2 * (first + v)); });
         first += 1;
     }
 }

@@ -67,8 +67,11 @@ struct StreamCommand {
     SourceSettings source;
 };
 
+constexpr const char* kBestDevice = "best";
+
 struct MesoCommand {
     BenchMesoOptions options;
+    std::string device;  ///< empty: the CPU
     BenchCommand bench;
 };
 
@@ -206,6 +209,7 @@ Result<int> runStream(const StreamCommand& command) {
 Result<int> runMeso(const MesoCommand& command) {
     VCP_TRY(makeFolder(command.bench.out));
     BenchMesoOptions options = command.options;
+    if (!command.device.empty()) options.device = command.device == kBestDevice ? "" : command.device;
     const InterruptScope catching;
     ProgressDisplay display(command.bench.report.progressStyle(), stderr);
     options.progress = progressTo(display);
@@ -327,7 +331,10 @@ RunCommand addBenchMeso(CLI::App& bench) {
     app->add_option("--views", options.views, fmt::format("{} [all]", fmt::join(mesoViewNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
     app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
     app->add_flag("--published", options.published, "Beside the ratios of the paper's tables (with --sweep, for those of times)");
-    app->add_option("--device", options.device, "March on a Vulkan device: an index or a part of a name, or without one the best [on the CPU]")->type_name("DEVICE")->expected(0, 1)->default_str("");
+    app->add_option("--device", command->device, "March on a Vulkan device: an index or a part of a name, or without one the best [on the CPU]")
+        ->type_name("DEVICE")
+        ->expected(0, 1)
+        ->default_str(kBestDevice);
     app->add_option("--rays", options.rays, "Rays a view")->type_name("N")->capture_default_str()->check(CLI::Range(1, 10'000'000));
     app->add_option("--repetitions", options.repetitions, "Runs whose median is reported")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1000));
     app->add_option("--check-rays", options.checkRays, "Rays of the test that no distance passes the surface; 0: not made")->type_name("N")->capture_default_str()->check(

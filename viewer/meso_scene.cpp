@@ -71,10 +71,10 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     for (const MesoSurfaceDescription& d : descriptions) {
         const auto asset = openMesoAsset(d.asset);
         if (!asset) return asset.error();
-        auto arrays = arraysOf(*asset, d.method);
-        if (!arrays) return arrays.error();
         const auto base = baseOf(d);
         if (!base) return base.error();
+        auto arrays = arraysOf(*asset, d.method);
+        if (!arrays) return arrays.error();
         const double edge = tileEdge(*base);
         auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
         if (!shell) {

@@ -75,14 +75,15 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
         const auto normals = *renderer_->readNormals();
         // Distance maps alone show whole cells.
         const bool isCells = method == "dm" || method == "ddm";
-        const double cell = 0.5 / 8;
+        // A hundredth of the slab for relief mapping; what a sampled distance may be too long for sphere tracing.
+        const double tolerance = isCells ? 0.13 : method.starts_with("relief") ? 0.006 : method == "sphere" ? 0.07 : 2e-3;
         for (uint32_t y = 0; y < kEdge; ++y)
             for (uint32_t x = 0; x < kEdge; ++x) {
                 const glm::dvec2 p = placeOf(x, y);
                 const float depth = depths[y * kEdge + x];
                 ASSERT_EQ(std::isfinite(depth), std::abs(p.x) < 1 && std::abs(p.y) < 1) << x << ", " << y;
                 if (!std::isfinite(depth)) continue;
-                ASSERT_NEAR(depth, 5 - 0.5 * 0.6, isCells ? 2.1 * cell : method == "sphere" ? 0.01 : 2e-4) << x << ", " << y;
+                ASSERT_NEAR(depth, 5 - 0.5 * 0.6, tolerance) << x << ", " << y;
                 ASSERT_GT(normals[y * kEdge + x].z, 0.99f) << x << ", " << y;
             }
     }
@@ -102,7 +103,7 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
                 const float depth = depths[y * kEdge + x];
                 const double r = glm::length(p);
                 // The sphere is of flat pieces: up to 0.003 within.
-                if (r > radius) EXPECT_FALSE(std::isfinite(depth)) << x << ", " << y;
+                if (r > radius + 0.002) EXPECT_FALSE(std::isfinite(depth)) << x << ", " << y;
                 if (r > radius - 0.01) continue;
                 ASSERT_TRUE(std::isfinite(depth)) << x << ", " << y;
                 const glm::dvec3 hit(p, 5 - double(depth));
@@ -159,7 +160,8 @@ TEST_F(MesoSurfaces, ShadowsFallBehindWhatStands) {
         request.look.shadows = shadows;
         draw({surfaceOf(asset, "boxes", "quad", 0.3)}, request);
         uint64_t sum = 0;
-        for (const uint8_t byte : renderer_->readPicture()->rgba) sum += byte;
+        const Picture picture = *renderer_->readPicture();
+        for (const uint8_t byte : picture.rgba) sum += byte;
         return sum;
     };
     const Asset maze = heightAsset("maze", *makeHeightField("maze", 64, 1));
