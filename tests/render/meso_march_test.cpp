@@ -52,7 +52,8 @@ protected:
         EXPECT_LE(states, rays.size() / 200);
         EXPECT_LE(places, few);
         EXPECT_LE(normals, few);
-        EXPECT_LE(counts, few);
+        // The maze is flat above and below: what a pyramid may skip there hangs on the last bit.
+        EXPECT_LE(counts, rays.size() / 20);
         EXPECT_NEAR(fetches, expectedFetches, 0.01 * expectedFetches);
     }
 
