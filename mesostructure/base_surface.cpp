@@ -61,13 +61,13 @@ BaseSurface cube(int cells, bool isSphere, double tiles) {
 
 BaseSurface cylinder(double tiles) {
     BaseSurface made;
-    constexpr int kAround = 96;
+    constexpr int kAround = 96, kUp = 24;
     const auto ring = [](double u, double r, double z) { return dvec3(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u), z); };
     addSheet(
-        made, kAround, 1, [&](double u, double v) { return ring(u, 1, 2 * v - 1); }, [&](double u, double v) { return tiles * dvec2(3 * u, v); });
+        made, kAround, kUp, [&](double u, double v) { return ring(u, 1, 2 * v - 1); }, [&](double u, double v) { return tiles * dvec2(3 * u, v); });
     for (const double end : {1.0, -1.0})
         addSheet(
-            made, kAround, 4, [&](double u, double v) { return ring(u * end, 1 - v, end); },
+            made, kAround, kUp / 2, [&](double u, double v) { return ring(u * end, 1 - v, end); },
             [&](double u, double v) { return tiles * 0.5 * (1 - v) * dvec2(std::cos(2 * kPi * u), std::sin(2 * kPi * u)); });
     return made;
 }
@@ -163,7 +163,7 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
     if (name == "quad")
         addSheet(
             made, 1, 1, [](double u, double v) { return dvec3(2 * u - 1, 2 * v - 1, 0); }, [&](double u, double v) { return tiles * dvec2(u, v); });
-    else if (name == "box") made = cube(4, false, tiles);
+    else if (name == "box") made = cube(16, false, tiles);
     else if (name == "sphere") made = cube(20, true, tiles);
     else if (name == "cylinder") made = cylinder(tiles);
     else if (name == "torus") made = torus(tiles);

@@ -138,7 +138,8 @@ public:
             ++result.fetches;
             const Level& maxima = levels_[size_t(level)];
             const float most = float(maxima.most[size_t(home.y >> level) * size_t(maxima.size.x) + size_t(home.x >> level)]) * (1.0f / 65535);
-            const float lowest = std::min(walk.at(walk.t).z, walk.at(end).z);
+            // Where the ray leaves by the slab's bottom it is at 0, however that rounds: ground at 0 is a tie there.
+            const float atEnd = axisOut == 2 && end == exit ? float(walk.sign.z > 0) : walk.at(end).z, lowest = std::min(walk.at(walk.t).z, atEnd);
             const bool isAbove = lowest > most && (outside || level > 0 || walk.t > 0);
             if (!isAbove && level > 0) {
                 --level;

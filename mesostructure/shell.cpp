@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 
 #include <glm/common.hpp>
@@ -21,7 +22,7 @@ constexpr double kLongest = 3;                   // of a direction at an edge, i
 
 struct Piece {
     std::array<dvec3, 4> corners, tile;
-    bool hasBase = false;
+    uint32_t bits = 0;  ///< as Shell::texels has them
     [[nodiscard]] dvec3 low() const { return glm::min(glm::min(corners[0], corners[1]), glm::min(corners[2], corners[3])); }
     [[nodiscard]] dvec3 high() const { return glm::max(glm::max(corners[0], corners[1]), glm::max(corners[2], corners[3])); }
 };
@@ -57,9 +58,49 @@ std::vector<dvec3> directionsOf(const BaseSurface& surface) {
     return sums;
 }
 
+/// Which edges of which triangles have a neighbour that goes on with the same map, whole tiles apart.
+class Joins {
+public:
+    Joins(const BaseSurface& surface, dvec2 tile) : tile_(tile) {
+        for (size_t i = 0; i < surface.triangles.size(); ++i)
+            for (int k = 0; k < 3; ++k) {
+                const Edge edge = edgeOf(surface, i, k);
+                uses_[edge.corners].push_back(edge.map);
+            }
+    }
+    /// The edge from corner k to the next.
+    [[nodiscard]] bool isJoined(const BaseSurface& surface, size_t triangle, int k) const {
+        const Edge edge = edgeOf(surface, triangle, k);
+        const auto& uses = uses_.at(edge.corners);
+        return std::ranges::count_if(uses, [&](const Map& map) { return isWhole(map[0] - edge.map[0], map[1] - edge.map[1]); }) > 1;
+    }
+
+private:
+    using Map = std::array<dvec2, 2>;
+    struct Edge {
+        std::pair<uint32_t, uint32_t> corners;
+        Map map;
+    };
+    static Edge edgeOf(const BaseSurface& surface, size_t triangle, int k) {
+        const auto& t = surface.triangles[triangle];
+        const auto& map = surface.uvs[triangle];
+        const int next = (k + 1) % 3;
+        return t[k] < t[next] ? Edge{{t[k], t[next]}, {map[k], map[next]}} : Edge{{t[next], t[k]}, {map[next], map[k]}};
+    }
+    /// A part of a millionth of a tile is not seen.
+    bool isWhole(dvec2 a, dvec2 b) const {
+        const dvec2 tiles = a / tile_, off = glm::abs(tiles - glm::round(tiles)), turned = glm::abs(a - b) / tile_;
+        return std::max({off.x, off.y, turned.x, turned.y}) < 1e-6;
+    }
+
+    dvec2 tile_;
+    std::map<std::pair<uint32_t, uint32_t>, std::vector<Map>> uses_;
+};
+
 class PieceMaker {
 public:
-    PieceMaker(const BaseSurface& surface, double height, double tileHeight, Shell& shell) : surface_(surface), directions_(directionsOf(surface)), height_(height), tileHeight_(tileHeight), shell_(shell) {}
+    PieceMaker(const BaseSurface& surface, double height, dvec3 extent, Shell& shell)
+        : surface_(surface), directions_(directionsOf(surface)), joins_(surface, extent), height_(height), tileHeight_(extent.z), shell_(shell) {}
 
     std::vector<Piece> all() {
         std::vector<Piece> pieces;
@@ -88,11 +129,16 @@ private:
             world[k + 3] = world[k] + height_ * directions_[t[order[k]]];
             tile[k] = dvec3(map[order[k]], 0), tile[k + 3] = dvec3(map[order[k]], tileHeight_);
         }
-        constexpr int kCorners[3][4] = {{0, 1, 2, 5}, {0, 1, 4, 5}, {0, 3, 4, 5}};
+        // Of the sides, by the column that they are opposite to.
+        std::array<bool, 3> isCut{};
+        for (int k = 0; k < 3; ++k) {
+            const int from = order[(k + 1) % 3], to = order[(k + 2) % 3];
+            isCut[k] = !joins_.isJoined(surface_, triangle, (from + 1) % 3 == to ? from : to);
+        }
         for (int piece = 0; piece < 3; ++piece) {
             Piece made;
             for (int k = 0; k < 4; ++k) made.corners[k] = world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
-            made.hasBase = piece == 0;
+            made.bits = bitsOf(kCorners[piece], isCut);
             const dvec3 x = made.corners[1] - made.corners[0], y = made.corners[2] - made.corners[0], z = made.corners[3] - made.corners[0];
             const double volume = glm::dot(glm::cross(x, y), z) * (isOdd ? -1 : 1) * (piece == 1 ? -1 : 1);
             const double scale = glm::length(x) * glm::length(y) * glm::length(z);
@@ -101,8 +147,25 @@ private:
         }
     }
 
+    /// Of the prism's corners: base, then top; column i is corners i and i + 3.
+    static constexpr int kCorners[3][4] = {{0, 1, 2, 5}, {0, 1, 4, 5}, {0, 3, 4, 5}};
+
+    static uint32_t bitsOf(const int (&corners)[4], const std::array<bool, 3>& isCut) {
+        uint32_t bits = corners[2] < 3 ? Shell::kBase : 0;
+        for (int face = 0; face < 4; ++face) {
+            uint32_t columns = 0;
+            for (int k = 0; k < 4; ++k)
+                if (k != face) columns |= 1u << corners[k] % 3;
+            // A side has two columns, the base, the top and faces within have three.
+            for (int opposite = 0; opposite < 3; ++opposite)
+                if (columns == (7u & ~(1u << opposite)) && isCut[opposite]) bits |= 1u << face;
+        }
+        return bits;
+    }
+
     const BaseSurface& surface_;
     std::vector<dvec3> directions_;
+    Joins joins_;
     double height_, tileHeight_;
     Shell& shell_;
 };
@@ -157,7 +220,7 @@ void append(const Piece& piece, dvec3 extent, std::vector<glm::vec4>& texels) {
     for (int axis = 0; axis < 2; ++axis) q0[axis] -= extent[axis] * std::floor(q0[axis] / extent[axis]);
     // Rows of a matrix that is stored by columns.
     const glm::dmat3 r = glm::transpose(weights), t = glm::transpose(map);
-    texels.push_back(glm::vec4(piece.corners[0], piece.hasBase ? 1 : 0));
+    texels.push_back(glm::vec4(piece.corners[0], float(piece.bits)));
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(r[row], q0[row]));
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(t[row], 0));
 }
@@ -185,7 +248,7 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
     for (const auto& triangle : surface.triangles)
         for (const uint32_t corner : triangle) low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
     if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
-    const std::vector<Piece> pieces = PieceMaker(surface, height, extent.z, shell).all();
+    const std::vector<Piece> pieces = PieceMaker(surface, height, extent, shell).all();
     if (pieces.empty()) return fail(ErrorCode::InvalidInput, "no triangle has an area");
     std::vector<uint32_t> order(pieces.size());
     std::iota(order.begin(), order.end(), 0u);

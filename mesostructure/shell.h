@@ -31,9 +31,11 @@ struct Shell {
 
     /// `nodes` nodes, then `pieces` tetrahedra, as shaders read them:
     ///   node    (low, first child or first piece) (high, pieces; 0: two children, one after the other)
-    ///   piece   (v0, 1 where the face opposite the last corner is the base)
+    ///   piece   (v0, bits: 1 << i where the face opposite corner i is cut, kBase where the one opposite the last is the base)
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
     ///           3 x (row of T, 0)                   tile space is q0 + T (p - v0); q0 is in the first tile
+    /// Cut is what is on a border of the base, or where the map goes on elsewhere: solid shows its cut there.
+    static constexpr uint32_t kBase = 16;
     std::vector<glm::vec4> texels;
 };
 

@@ -112,7 +112,7 @@ Result<std::unique_ptr<MesoRenderer>> MesoRenderer::create(const MesoRendererOpt
     auto instance = Instance::create(options.validation, {});
     if (!instance) return instance.error();
     state->instance = std::move(*instance);
-    auto device = Device::create(*state->instance, options.device, VK_NULL_HANDLE);
+    auto device = Device::create(*state->instance, options.device, VK_NULL_HANDLE, false);
     if (!device) return device.error();
     state->device = std::move(*device);
     auto resources = MesoResources::create(*state->device);

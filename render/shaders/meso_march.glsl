@@ -114,6 +114,21 @@ void fieldAt(ivec3 cell, out vec4 v0, out vec4 v1) {
     }
 }
 
+// Of the methods that have samples and look at cells with surface only.
+bool isSolidAt(vec3 p) {
+    if (kSurface != kMesoHeights && kSurface != kMesoField) return false;
+    vec3 at = p / meso.extent.xyz * vec3(meso.fine.xyz), w = fract(at);
+    if (kSurface == kMesoHeights) {
+        vec4 h = heightsAt(int(floor(at.x)), int(floor(at.y)));
+        return p.z <= mix(mix(h.x, h.y, w.x), mix(h.z, h.w, w.x), w.y) * meso.scale.x;
+    }
+    int z = min(int(at.z), meso.fine.z - 1);
+    vec4 v0, v1;
+    fieldAt(ivec3(floor(at.xy), z), v0, v1);
+    vec4 v = mix(v0, v1, at.z - float(z));
+    return mix(mix(v.x, v.y, w.x), mix(v.z, v.w, w.x), w.y) <= 0.0;
+}
+
 CellHit solveHeights(Walk w, ivec3 at, vec3 o, vec3 d, float from, float to, bool outside, inout MesoResult result) {
     result.fetches++;
     ivec2 texel = w.cell.xy * meso.ratio.xy + at.xy;
@@ -341,7 +356,8 @@ void marchPyramid(MesoRay ray, inout MesoResult result) {
         uvec4 maxima = meso.levels[level];
         ivec2 entry = home >> level;
         float most = float(fetchShort(maxima.x, uint(entry.y) * maxima.y + uint(entry.x))) * (1.0 / 65535.0);
-        float lowest = min(walkAt(w, w.t).z, walkAt(w, end).z);
+        // Where the ray leaves by the slab's bottom it is at 0, however that rounds: ground at 0 is a tie there.
+        float atEnd = axisOut == 2 && end == exit ? float(w.sign.z > 0) : walkAt(w, end).z, lowest = min(walkAt(w, w.t).z, atEnd);
         bool isAbove = lowest > most && (outside || level > 0 || w.t > 0.0);
         if (!isAbove && level > 0) {
             level--;

@@ -15,6 +15,7 @@ const float kNoHit = 1e30;
 // Pieces are met a little wider than they are, in weights of their corners, so that no rounding opens a gap between two; what is
 // met twice is the same surface. Ten times what single precision loses over a picture.
 const float kPieceSlack = 2e-5;
+const uint kBaseFace = 16u;  // Shell::kBase
 
 struct ShellHit {
     float t;        // along the ray; kNoHit
@@ -55,20 +56,23 @@ void castPiece(uint piece, vec3 o, vec3 d, float start, inout ShellHit best) {
     a.x = 1.0 - a.y - a.z - a.w;
     b.x = -b.y - b.z - b.w;
     a += kPieceSlack;
-    float enter = 0.0, leave = best.t - start;
-    bool fromBase = false, toBase = false;
+    // From the eye on: the piece may reach out of the box whose wall `o` is on.
+    float enter = -start, leave = best.t - start;
+    uint bits = uint(corner.w);
+    int entered = -1;
+    bool toBase = false;
     for (int i = 0; i < 4; i++) {
         float time = -a[i] / b[i];
-        bool isBase = i == 3 && corner.w > 0.0;
-        if (b[i] > 0.0) {
-            fromBase = isBase && time > enter;
-            enter = max(enter, time);
-        } else if (b[i] < 0.0) {
-            toBase = isBase && time < leave;
-            leave = min(leave, time);
-        } else if (a[i] < 0.0) return;
+        if (b[i] > 0.0 && time > enter) {
+            entered = i;
+            enter = time;
+        } else if (b[i] < 0.0 && time < leave) {
+            toBase = i == 3 && (bits & kBaseFace) != 0u;
+            leave = time;
+        } else if (b[i] == 0.0 && a[i] < 0.0) return;
     }
     if (!(enter <= leave)) return;
+    bool fromBase = entered == 3 && (bits & kBaseFace) != 0u, fromCut = entered >= 0 && (bits & (1u << uint(entered))) != 0u;
     // The weight of the corner above, whose row of R this is, grows away from the base.
     if (fromBase && view.picture.w != 0u) {
         best.t = start + enter;
@@ -86,7 +90,13 @@ void castPiece(uint piece, vec3 o, vec3 d, float start, inout ShellHit best) {
         ray.tMax = (leave - enter) * scale;
         ray.atTop = false;
         // A ray that comes from another piece was outside there, or had its hit there.
-        ray.isOutside = enter > 0.0;
+        ray.isOutside = entered >= 0;
+        vec3 cut = entered == 0 ? r0.xyz + r1.xyz + r2.xyz : entered == 1 ? -r0.xyz : entered == 2 ? -r1.xyz : -r2.xyz;
+        if (fromCut && isSolidAt(ray.o)) {
+            best.t = start + enter;
+            best.normal = cut;
+            return;
+        }
         MesoResult found = marchMeso(ray);
         best.iterations += found.iterations;
         best.unresolved = best.unresolved || found.state == kMesoUnresolved;
@@ -94,7 +104,10 @@ void castPiece(uint piece, vec3 o, vec3 d, float start, inout ShellHit best) {
         if (found.state == kMesoHit && t < best.t) {
             best.t = t;
             vec3 n = found.normal != vec3(0.0) ? found.normal : fallbackNormal(ray.o + found.t * ray.d, ray.d);
+            // On a ridge, where rounding may choose the side that is turned away.
+            if (ray.d.z < 0.0 && dot(n, ray.d) > 0.1 * length(n)) n = vec3(0.0, 0.0, 1.0);
             best.normal = t0 * n.x + t1 * n.y + t2 * n.z;
+            if (fromCut && found.t == 0.0) best.normal = cut;
             return;
         }
     }

@@ -1,7 +1,8 @@
 // The marchers on the GPU, ray by ray against the reference on the CPU.
-#include <algorithm>
 #include <cmath>
+#include <string>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "render/meso_renderer.h"
@@ -24,7 +25,9 @@ protected:
         for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
     }
 
-    /// Single precision on both sides, in another order here and there: a ray may round to another cell, and then counts by a few.
+    /// Each ray as the reference marches it, counts and all, or as it marches one that differs by what single precision
+    /// rounds: shader and reference round in another order, and where a ray passes a wall, a corner or a bound by less than that, either
+    /// way is right.
     void expectSame(const Asset& asset, const Shape& shape, const MethodOptions& options, std::span<const MarchRay> rays) {
         SCOPED_TRACE(asset.name + " " + options.name);
         const auto method = buildMethod(asset, shape, options);
@@ -34,27 +37,38 @@ protected:
         const auto marched = renderer_->march(*method, rays, 0);
         ASSERT_TRUE(marched) << marched.error().line();
         ASSERT_EQ(marched->results.size(), rays.size());
-        size_t states = 0, places = 0, counts = 0, hits = 0, normals = 0;
-        double fetches = 0, expectedFetches = 0;
+        size_t hits = 0;
         for (size_t i = 0; i < rays.size(); ++i) {
-            const MarchResult expected = (*marcher)->march(rays[i]), &found = marched->results[i];
-            states += expected.state != found.state;
-            const auto apart = [](uint32_t a, uint32_t b) { return std::abs(double(a) - double(b)) > 2; };
-            counts += apart(expected.fetches, found.fetches) || apart(expected.iterations, found.iterations) || apart(expected.surfaceTests, found.surfaceTests);
-            fetches += found.fetches, expectedFetches += expected.fetches;
-            if (expected.state != MarchState::Hit || found.state != MarchState::Hit) continue;
-            ++hits;
-            places += std::abs(found.t - expected.t) > 1e-4;
-            normals += glm::dot(found.normal, expected.normal) < 0.999f * glm::dot(expected.normal, expected.normal);
+            const MarchResult& found = marched->results[i];
+            const MarchResult expected = (*marcher)->march(rays[i]);
+            hits += expected.state == MarchState::Hit;
+            if (isSame(expected, found) || isOfARayNearby(**marcher, rays[i], shape.extent(), found, i)) continue;
+            ADD_FAILURE() << "ray " << i << ": " << textOf(found) << "; the reference " << textOf(expected);
         }
-        const auto few = rays.size() / 50;
         EXPECT_GT(hits, rays.size() / 3);
-        EXPECT_LE(states, rays.size() / 200);
-        EXPECT_LE(places, few);
-        EXPECT_LE(normals, few);
-        // The maze is flat above and below: what a pyramid may skip there hangs on the last bit.
-        EXPECT_LE(counts, rays.size() / 20);
-        EXPECT_NEAR(fetches, expectedFetches, 0.01 * expectedFetches);
+    }
+
+    static bool isSame(const MarchResult& a, const MarchResult& b) {
+        if (a.state != b.state || a.fetches != b.fetches || a.iterations != b.iterations || a.surfaceTests != b.surfaceTests) return false;
+        return a.state != MarchState::Hit || (std::abs(a.t - b.t) <= 1e-4 && glm::dot(a.normal, b.normal) >= 0.999f * glm::dot(a.normal, a.normal));
+    }
+
+    static bool isOfARayNearby(const Marcher& marcher, const MarchRay& ray, glm::dvec3 extent, const MarchResult& found, size_t seed) {
+        std::mt19937 random{uint32_t(seed)};
+        // A few units of the last place of a coordinate in the tile, and of the direction.
+        std::uniform_real_distribution<double> place(-1e-6, 1e-6), turn(-3e-7, 3e-7);
+        for (int i = 0; i < 400; ++i) {
+            MarchRay nearby = ray;
+            for (int axis = 0; axis < 3; ++axis) nearby.origin[axis] += place(random), nearby.direction[axis] += turn(random);
+            // What starts on the slab's top does so exactly.
+            if (ray.origin.z >= extent.z) nearby.origin.z = ray.origin.z;
+            if (isSame(marcher.march(nearby), found)) return true;
+        }
+        return false;
+    }
+
+    static std::string textOf(const MarchResult& r) {
+        return fmt::format("state {}, t {}, normal {} {} {}, {} fetches, {} iterations, {} tests", int(r.state), r.t, r.normal.x, r.normal.y, r.normal.z, r.fetches, r.iterations, r.surfaceTests);
     }
 
     static std::vector<MarchRay> raysInto(glm::dvec3 extent) {
