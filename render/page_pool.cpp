@@ -15,8 +15,8 @@ namespace vcp {
 
 namespace {
 
-// Of the staging buffer, where there is one; more where a page is larger.
-constexpr uint64_t kStagingBytes = 4ull << 20;
+// Of the staging buffer, where there is one: what an update brings, in one submission; more where a page is larger.
+constexpr uint64_t kStagingBytes = 16ull << 20;
 
 }  // namespace
 
@@ -52,10 +52,11 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
     return pool;
 }
 
-PagePool::~PagePool() = default;
+PagePool::~PagePool() { static_cast<void>(device_.waitForCopies()); }
 
 Result<void> PagePool::reserveStaging(uint64_t bytes) {
     if (staging_.bytes() >= bytes) return {};
+    VCP_TRY(device_.waitForCopies());
     auto staging = device_.createBuffer(std::bit_ceil(bytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Upload);
     if (!staging) return staging.error();
     staging_ = std::move(*staging);
@@ -81,6 +82,7 @@ Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::by
         VCP_TRY(flush());
         VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));
     }
+    if (stagedBytes_ == 0) VCP_TRY(device_.waitForCopies());
     std::memcpy(staging_.mapped() + stagedBytes_, bytes.data(), bytes.size());
     waiting_.push_back({chunk, {stagedBytes_, to, bytes.size()}});
     stagedBytes_ += bytes.size();
@@ -91,7 +93,7 @@ Result<void> PagePool::flush() {
     if (waiting_.empty()) return {};
     stagedBytes_ = 0;
     const std::vector<StagedCopy> copies = std::exchange(waiting_, {});
-    return device_.submitAndWait([&](VkCommandBuffer commands) {
+    return device_.submitCopies([&](VkCommandBuffer commands) {
         for (const StagedCopy& copy : copies) vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
     });
 }

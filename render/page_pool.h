@@ -1,6 +1,6 @@
 // Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that
 // shaders see as texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into
-// their slots; elsewhere through a staging buffer, many with one submission. A slot is written only while no frame that
+// their slots; elsewhere through a staging buffer, many with one submission, on the queue for copies where there is one. A slot is written only while no frame that
 // could read it is in flight: the renderer waits for each frame. Who is in which slot is not known here
 // (streaming/residency_policy.h).
 #pragma once
@@ -23,7 +23,7 @@ public:
     /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: they fit into the slot and are multiples
     /// of 16. Errors: Device.
     Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes);
-    /// What was written is there for all that is submitted later. Errors: Device.
+    /// What was written is there for all that is submitted later; nothing waits for it here. Errors: Device.
     Result<void> flush();
     /// Reads from byte `at` of a slot; as write(). Errors: Device.
     Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes);

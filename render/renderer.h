@@ -80,6 +80,7 @@ struct HostDevice {
 /// What goes wrong, or is lacking, on purpose: for tests.
 struct DeviceFaults {
     bool separateMemory = false;        ///< the CPU does not see the device's memory, as on a discrete GPU
+    bool separateCopies = false;        ///< copies are submitted beside other work, as to a queue of their own
     uint64_t memoryBytes = UINT64_MAX;  ///< more the device has not
     uint64_t lostAtSubmission = 0;      ///< the device is lost at this submission of work, once; 0: never
 };

@@ -123,21 +123,33 @@ bool Device::shows(VkSurfaceKHR surface) const {
     return hasSwapchain_ && vkGetPhysicalDeviceSurfaceSupportKHR(physical_, family_, surface, &shows) == VK_SUCCESS && shows == VK_TRUE;
 }
 
+/// One that does nothing but copy, beside the processors: a discrete GPU's.
+void Device::chooseCopyFamily() {
+    const auto families = queueFamilies();
+    for (uint32_t i = 0; i < families.size() && !copyFamily_; ++i)
+        if ((families[i].queueFlags & (VK_QUEUE_TRANSFER_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT)) == VK_QUEUE_TRANSFER_BIT) copyFamily_ = i;
+    if (faults_.separateCopies && !copyFamily_) copyFamily_ = family_;
+}
+
 Result<void> Device::createDevice() {
     const float priority = 1;
-    VkDeviceQueueCreateInfo queue{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
-    queue.queueFamilyIndex = family_;
-    queue.queueCount = 1;
-    queue.pQueuePriorities = &priority;
+    chooseCopyFamily();
+    std::vector<VkDeviceQueueCreateInfo> queues(copyFamily_.value_or(family_) != family_ ? 2 : 1, {VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO});
+    for (VkDeviceQueueCreateInfo& queue : queues) {
+        queue.queueFamilyIndex = &queue == &queues[0] ? family_ : *copyFamily_;
+        queue.queueCount = 1;
+        queue.pQueuePriorities = &priority;
+    }
 
     const char* swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
     VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
-    info.queueCreateInfoCount = 1;
-    info.pQueueCreateInfos = &queue;
+    info.queueCreateInfoCount = static_cast<uint32_t>(queues.size());
+    info.pQueueCreateInfos = queues.data();
     info.enabledExtensionCount = hasSwapchain_ ? 1 : 0;
     info.ppEnabledExtensionNames = &swapchain;
     VCP_VK(vkCreateDevice, physical_, &info, nullptr, &device_);
     vkGetDeviceQueue(device_, family_, 0, &queue_);
+    if (copyFamily_) vkGetDeviceQueue(device_, *copyFamily_, 0, &copyQueue_);
     return {};
 }
 
@@ -155,11 +167,32 @@ Result<void> Device::createObjects() {
     VCP_VK(vkCreateFence, device_, &fence, nullptr, &fence_);
     const VkPipelineCacheCreateInfo cache{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
     VCP_VK(vkCreatePipelineCache, device_, &cache, nullptr, &pipelineCache_);
+    return copyQueue_ != VK_NULL_HANDLE ? createCopyObjects() : Result<void>();
+}
+
+Result<void> Device::createCopyObjects() {
+    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    pool.queueFamilyIndex = *copyFamily_;
+    VCP_VK(vkCreateCommandPool, device_, &pool, nullptr, &copyPool_);
+    VkCommandBufferAllocateInfo commands{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    commands.commandPool = copyPool_;
+    commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    commands.commandBufferCount = 1;
+    VCP_VK(vkAllocateCommandBuffers, device_, &commands, &copyCommands_);
+    const VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    VCP_VK(vkCreateFence, device_, &fence, nullptr, &copyFence_);
+    const VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
+    VCP_VK(vkCreateSemaphore, device_, &semaphore, nullptr, &copiesDone_);
     return {};
 }
 
 Device::~Device() {
     if (device_ == VK_NULL_HANDLE) return;
+    static_cast<void>(waitForCopies());
+    vkDestroySemaphore(device_, copiesDone_, nullptr);
+    vkDestroyFence(device_, copyFence_, nullptr);
+    vkDestroyCommandPool(device_, copyPool_, nullptr);
     vkDestroyPipelineCache(device_, pipelineCache_, nullptr);
     vkDestroyFence(device_, fence_, nullptr);
     vkDestroyCommandPool(device_, commandPool_, nullptr);
@@ -195,6 +228,13 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
     info.size = made.bytes_;
     info.usage = usage;
+    // Both queues see it: between them, bytes need no change of owner.
+    const std::array families{family_, copyFamily_.value_or(family_)};
+    if (families[0] != families[1]) {
+        info.sharingMode = VK_SHARING_MODE_CONCURRENT;
+        info.queueFamilyIndexCount = static_cast<uint32_t>(families.size());
+        info.pQueueFamilyIndices = families.data();
+    }
     VCP_VK(vkCreateBuffer, device_, &info, nullptr, &made.buffer_);
     VkMemoryRequirements needs;
     vkGetBufferMemoryRequirements(device_, made.buffer_, &needs);
@@ -241,20 +281,65 @@ Result<VkCommandBuffer> Device::beginCommands() {
 
 Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
     VCP_VK(vkEndCommandBuffer, commands_);
-    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_TRANSFER_BIT;
+    std::vector<VkSemaphore> waits;
+    std::vector<VkPipelineStageFlags> stages;
+    const auto waitFirst = [&](VkSemaphore semaphore, VkPipelineStageFlags stage) {
+        waits.push_back(semaphore);
+        stages.push_back(stage);
+    };
+    if (wait != VK_NULL_HANDLE) waitFirst(wait, VK_PIPELINE_STAGE_TRANSFER_BIT);
+    if (copiesAwaited_) waitFirst(copiesDone_, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT);
     VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-    submit.waitSemaphoreCount = wait != VK_NULL_HANDLE ? 1 : 0;
-    submit.pWaitSemaphores = &wait;
-    submit.pWaitDstStageMask = &stage;
+    submit.waitSemaphoreCount = static_cast<uint32_t>(waits.size());
+    submit.pWaitSemaphores = waits.data();
+    submit.pWaitDstStageMask = stages.data();
     submit.commandBufferCount = 1;
     submit.pCommandBuffers = &commands_;
     submit.signalSemaphoreCount = signal != VK_NULL_HANDLE ? 1 : 0;
     submit.pSignalSemaphores = &signal;
-    VkResult done = ++submissions_ == faults_.lostAtSubmission ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue_, 1, &submit, fence_);
-    if (done == VK_SUCCESS) done = vkWaitForFences(device_, 1, &fence_, VK_TRUE, UINT64_MAX);
+    VCP_TRY(submitTo(queue_, submit, fence_));
+    copiesAwaited_ = false;
+    return waitFor(fence_);
+}
+
+Result<void> Device::submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence fence) {
+    const VkResult done = ++submissions_ == faults_.lostAtSubmission ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue, 1, &submit, fence);
     lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
-    if (done != VK_SUCCESS) return vulkanError("vkQueueSubmit", done);
-    VCP_VK(vkResetFences, device_, 1, &fence_);
+    return done == VK_SUCCESS ? Result<void>() : vulkanError("vkQueueSubmit", done);
+}
+
+Result<void> Device::waitFor(VkFence fence) {
+    const VkResult done = vkWaitForFences(device_, 1, &fence, VK_TRUE, UINT64_MAX);
+    lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
+    if (done != VK_SUCCESS) return vulkanError("vkWaitForFences", done);
+    VCP_VK(vkResetFences, device_, 1, &fence);
+    return {};
+}
+
+Result<void> Device::waitForCopies() { return std::exchange(copiesRun_, false) ? waitFor(copyFence_) : Result<void>(); }
+
+Result<void> Device::beginCopies() {
+    VCP_TRY(waitForCopies());
+    VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    VCP_VK(vkBeginCommandBuffer, copyCommands_, &begin);
+    return {};
+}
+
+Result<void> Device::endCopies() {
+    VCP_VK(vkEndCommandBuffer, copyCommands_);
+    // Of copies before, for which nothing has waited yet, these inherit the signal.
+    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_TRANSFER_BIT;
+    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
+    submit.waitSemaphoreCount = copiesAwaited_ ? 1 : 0;
+    submit.pWaitSemaphores = &copiesDone_;
+    submit.pWaitDstStageMask = &stage;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &copyCommands_;
+    submit.signalSemaphoreCount = 1;
+    submit.pSignalSemaphores = &copiesDone_;
+    VCP_TRY(submitTo(copyQueue_, submit, copyFence_));
+    copiesRun_ = copiesAwaited_ = true;
     return {};
 }
 

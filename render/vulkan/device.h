@@ -1,9 +1,10 @@
-// A logical device with one queue, its buffers, compute pipelines and commands.
+// A logical device with one queue, and one of its own for copies where it has such; its buffers and commands.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -114,6 +115,17 @@ public:
     /// With semaphores: waits for `wait` before transfers, signals `signal`.
     Result<void> endCommandsAndWait(VkSemaphore wait = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
 
+    /// Copies between buffers, done before anything that is submitted after them. On a queue of their own they run beside what
+    /// the CPU does next, and waitForCopies() waits for them; elsewhere they are done on return.
+    template <class Record>
+    Result<void> submitCopies(Record record) {
+        if (copyQueue_ == VK_NULL_HANDLE) return submitAndWait(record);
+        VCP_TRY(beginCopies());
+        record(copyCommands_);
+        return endCopies();
+    }
+    Result<void> waitForCopies();
+
 private:
     Device() = default;
     Result<void> allocate(Buffer& buffer, VkBufferUsageFlags usage, MemoryUse use) const;
@@ -123,6 +135,12 @@ private:
     Result<void> chooseQueue(VkSurfaceKHR surface, bool forWindows);
     Result<void> createDevice();
     Result<void> createObjects();
+    void chooseCopyFamily();
+    Result<void> createCopyObjects();
+    Result<void> beginCopies();
+    Result<void> endCopies();
+    Result<void> submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence fence);
+    Result<void> waitFor(VkFence fence);
 
     VkPhysicalDevice physical_ = VK_NULL_HANDLE;
     VkDevice device_ = VK_NULL_HANDLE;
@@ -132,6 +150,13 @@ private:
     VkFence fence_ = VK_NULL_HANDLE;
     VkPipelineCache pipelineCache_ = VK_NULL_HANDLE;
     uint32_t family_ = 0;
+    VkQueue copyQueue_ = VK_NULL_HANDLE;  // null: copies go to queue_
+    VkCommandPool copyPool_ = VK_NULL_HANDLE;
+    VkCommandBuffer copyCommands_ = VK_NULL_HANDLE;
+    VkFence copyFence_ = VK_NULL_HANDLE;          // of the copies that run
+    VkSemaphore copiesDone_ = VK_NULL_HANDLE;     // signalled by copies, waited for by what is submitted next
+    bool copiesRun_ = false, copiesAwaited_ = false;  // since when nobody has waited: the fence, the semaphore
+    std::optional<uint32_t> copyFamily_;
     double timestampNanoseconds_ = 0;
     DeviceInfo info_;
     VkPhysicalDeviceLimits limits_{};

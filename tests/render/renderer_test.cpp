@@ -441,10 +441,15 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
     start(options);
     show(scene);
     const Picture expected = drawAllTheWay(*renderer_, request);
-    // With separate memory, updates submit work too.
-    for (const auto& [separate, lostAt] : {std::pair(false, 2), std::pair(true, 2), std::pair(true, 5)}) {
+    // With separate memory, updates submit work too; their copies on their own wait for nothing.
+    struct Loss {
+        bool separateMemory, separateCopies;
+        int at;
+    };
+    for (const auto& [separateMemory, separateCopies, lostAt] : {Loss{false, false, 2}, {true, false, 2}, {true, false, 5}, {true, true, 3}, {true, true, 4}}) {
         SCOPED_TRACE(lostAt);
-        options.faults.separateMemory = separate;
+        options.faults.separateMemory = separateMemory;
+        options.faults.separateCopies = separateCopies;
         options.faults.lostAtSubmission = static_cast<uint64_t>(lostAt);
         start(options);
         show(scene);
@@ -465,21 +470,23 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
 TEST_F(RendererTest, PagesGoThroughStagingWhereTheMemoryIsSeparate) {
     const Scene scene = test::sphereScene(4);
     for (const uint64_t budget : {uint64_t{1} << 20, uint64_t{64} << 20}) {
-        std::vector<Picture> pictures[2];
-        for (const bool separate : {false, true}) {
+        std::vector<Picture> pictures[3];
+        for (const int way : {0, 1, 2}) {
             RendererOptions options;
             options.budgetBytes = budget;
-            options.faults.separateMemory = separate;
+            options.faults.separateMemory = way > 0;
+            options.faults.separateCopies = way > 1;
             start(options);
             show(scene);
             for (int view = 0; view < 4; ++view) {
                 FrameRequest request = requestOf(cameras(scene)[static_cast<size_t>(view)].camera, 64, 48);
                 request.errorPixels = 0.001;
-                pictures[separate ? 1 : 0].push_back(drawAllTheWay(*renderer_, request));
+                pictures[way].push_back(drawAllTheWay(*renderer_, request));
             }
             for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
         }
         EXPECT_EQ(pictures[0], pictures[1]);
+        EXPECT_EQ(pictures[0], pictures[2]);
     }
 }
 
