@@ -21,11 +21,18 @@ constexpr uint64_t kCheapMoves = 2;
 // Motion is continued for no more steps than this.
 constexpr double kMostAhead = 20;
 
+/// The page that chunks leave room for: of so many bytes at least, so that what fits does not depend on which pages are
+/// known so far; where chunks are small, the largest known.
+uint64_t largestPlanned(uint64_t largestKnown, uint64_t unitsPerChunk) {
+    constexpr uint64_t kLeastBytes = 4 << 20;
+    return std::max(largestKnown, std::min(kLeastBytes / kPoolUnitBytes, unitsPerChunk / 64));
+}
+
 /// What first fit may leave unused: in every chunk less than the largest page needs. One chunk can be
 /// gathered whole.
-uint64_t unusableUnits(PoolShape pool, uint64_t largestPage) {
+uint64_t unusableUnits(PoolShape pool, uint64_t largestKnown) {
     const uint64_t chunks = (pool.units + pool.unitsPerChunk - 1) / pool.unitsPerChunk;
-    return chunks > 1 ? chunks * (largestPage - 1) : 0;
+    return chunks > 1 ? chunks * (largestPlanned(largestKnown, pool.unitsPerChunk) - 1) : 0;
 }
 
 /// Where a view that went from `before` to `view` in so many seconds will be.
@@ -63,6 +70,7 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
     }
     uint64_t useful = std::max<uint64_t>(all, 1);
     if (all > chunk && chunk > largest) {
+        largest = largestPlanned(largest, chunk);
         const uint64_t chunks = (all + chunk - largest) / (chunk - largest + 1);
         useful = all + chunks * (largest - 1);
     }
