@@ -133,6 +133,7 @@ void ResidencyPolicy::setPool(PoolShape pool) {
 void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber number) {
     ++round_;
     seconds_ = seconds;
+    evictable_.reset();
     learnBlocks();
     const auto known = motions_.find(number);
     Motion next{view, seconds, std::nullopt, known == motions_.end() || known->second.view != view};
@@ -176,18 +177,19 @@ bool ResidencyPolicy::mayEvict(uint64_t page, const Resident& resident, Rank for
 }
 
 bool ResidencyPolicy::evictOne(Rank forRank) {
-    // Least wanted first, then wanted longest ago; deeper levels come later in the directory.
-    const auto isBetter = [&](const auto& a, const auto& b) {
-        if (rankOf(a.first) != rankOf(b.first)) return rankOf(a.first) < rankOf(b.first);
-        if (a.second.lastWanted != b.second.lastWanted) return a.second.lastWanted < b.second.lastWanted;
-        return a.first > b.first;
-    };
-    auto best = slots_.end();
-    for (auto at = slots_.begin(); at != slots_.end(); ++at)
-        if (mayEvict(at->first, at->second, forRank) && (best == slots_.end() || isBetter(*at, *best))) best = at;
-    if (best == slots_.end()) return false;
-    evict(best->first);
-    return true;
+    if (!evictable_) {
+        evictable_.emplace();
+        for (const auto& [page, resident] : slots_)
+            if (mayEvict(page, resident, Rank::Wanted)) evictable_->push({rankOf(page), resident.lastWanted, page});
+    }
+    while (!evictable_->empty() && evictable_->top().rank < forRank) {
+        const uint64_t page = evictable_->top().page;
+        evictable_->pop();
+        if (!isResident(page)) continue;
+        evict(page);
+        return true;
+    }
+    return false;
 }
 
 void ResidencyPolicy::evict(uint64_t page) {
@@ -200,7 +202,7 @@ void ResidencyPolicy::evict(uint64_t page) {
     ++counts_.evictions;
 }
 
-/// Moves pages down until `units` free ones are on end, as few units as possible. False: no chunk has so many, or it takes
+/// Moves pages down until `units` free ones are on end: few units, or as few as possible. False: no chunk has so many, or it takes
 /// more than `most` units.
 bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves) {
     struct Window {
@@ -224,6 +226,7 @@ bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove
             const uint64_t cost = gaps[last].end() - gaps[first].firstUnit - free;
             if (free >= units && cost < best.cost) best = {gaps[first].firstUnit, gaps[last].end(), cost};
         }
+        if (best.cost <= kCheapMoves * units) break;
     }
     if (best.cost == UINT64_MAX || best.cost > most) return false;
     uint64_t to = best.begin;
@@ -264,7 +267,8 @@ Placement ResidencyPolicy::place(uint64_t page) {
         ++counts_.refused;
         return placement;
     }
-    slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, seconds_});
+    const Resident& placed = slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, seconds_}).first->second;
+    if (evictable_ && mayEvict(page, placed, Rank::Wanted)) evictable_->push({rank, placed.lastWanted, page});
     pageAt_.emplace(placement.slot->firstUnit, page);
     resident_[page] = 1;
     ++version_;

@@ -30,6 +30,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <queue>
+#include <tuple>
 #include <vector>
 
 #include "octree/vcp_file.h"
@@ -139,6 +141,13 @@ private:
         uint64_t lastWanted = 0;  // round
         double loaded = 0;        // seconds
     };
+    struct Evictable {
+        Rank rank;
+        uint64_t lastWanted, page;
+
+        /// Goes later: first the least wanted, then what was wanted longest ago; deeper levels come later in the directory.
+        bool operator<(const Evictable& other) const { return std::tuple(other.rank, other.lastWanted, page) < std::tuple(rank, lastWanted, other.page); }
+    };
     struct Motion {
         SelectionView view;
         double seconds = 0;                  // of the last look
@@ -167,6 +176,7 @@ private:
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
     std::map<uint64_t, uint64_t> pageAt_;  // by the slot's first unit
+    std::optional<std::priority_queue<Evictable>> evictable_;  // of this round, once one had to go; some may have gone
     std::vector<uint8_t> resident_;
     std::vector<uint8_t> states_;       // PageState
     std::vector<uint8_t> blocksSeen_;   // of the directory; empty: all
