@@ -163,9 +163,9 @@ void ResidencyPolicy::choose() {
     }
     choice_ = choosePages(*dataset_, views_, planned_, pageUnits_, states_);
     std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
-    ahead_.clear();
-    if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, states_).wanted;
-    for (const WantedPage& wanted : ahead_) ranks_[wanted.page] = Rank::Ahead;
+    ahead_ = {};
+    if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, states_);
+    for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Ahead;
     for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
     stale_ = false;
     ++version_;
@@ -302,17 +302,18 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     // Wishes in order of urgency, as long as there is room for them.
     uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
     bool full = false;
-    wishForBlocks(outcome.wishes);
+    std::set<uint64_t> blocks;
+    wishForBlocks(choice_.awaited, kBlockUrgency, blocks, outcome.wishes);
     for (const WantedPage& wanted : priorities_.ordered(std::move(missing), views_)) {
         full = full || reserved + pageUnits_[wanted.page] > room;
         if (full) continue;
         reserved += pageUnits_[wanted.page];
         outcome.wishes.push_back({wanted.page, wanted.priority});
     }
-    if (ahead_.empty() || full) return outcome;
+    if (full || (ahead_.wanted.empty() && ahead_.awaited.empty())) return outcome;
     room = unitsWithin(Rank::Ahead);
     double urgency = 1e6;
-    for (const WantedPage& wanted : ahead_) {
+    for (const WantedPage& wanted : ahead_.wanted) {
         if (isResident(wanted.page) || rankOf(wanted.page) != Rank::Ahead) continue;
         reserved += pageUnits_[wanted.page];
         if (reserved > room) break;
@@ -320,19 +321,19 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
         urgency = std::min(urgency, wanted.priority);
         outcome.wishes.push_back({wanted.page, urgency * kAheadUrgency});
     }
+    wishForBlocks(ahead_.awaited, urgency * kAheadUrgency, blocks, outcome.wishes);
     return outcome;
 }
 
-/// Those that hold children of the pages that wait for them.
-void ResidencyPolicy::wishForBlocks(std::vector<PageRequest>& wishes) const {
+/// Those that hold children of the pages that wait for them, but `blocks`, which have been wished for.
+void ResidencyPolicy::wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks, std::vector<PageRequest>& wishes) const {
     uint64_t last = UINT64_MAX;
-    std::set<uint64_t> blocks;
-    for (const uint64_t page : choice_.awaited) {
+    for (const uint64_t page : awaited) {
         for (const uint64_t child : childrenOf(dataset_->pages[page])) {
             const uint64_t block = child / kEntriesPerBlock;
             if (block == last || blocksSeen_[block] != 0 || !blocks.insert(block).second) continue;
             last = block;
-            wishes.push_back({numberOfBlock(block), kBlockUrgency});
+            wishes.push_back({numberOfBlock(block), urgency});
         }
     }
 }
@@ -356,7 +357,7 @@ bool ResidencyPolicy::giveUp(uint64_t page) {
 uint64_t ResidencyPolicy::bytesHeld() const {
     constexpr uint64_t kNode = 4 * sizeof(void*);  // of a map, beside its value
     const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-    uint64_t bytes = bytesOf(pageUnits_) + bytesOf(resident_) + bytesOf(states_) + bytesOf(blocksSeen_) + bytesOf(loadedIn_) + bytesOf(views_) + bytesOf(ahead_) + bytesOf(ranks_);
+    uint64_t bytes = bytesOf(pageUnits_) + bytesOf(resident_) + bytesOf(states_) + bytesOf(blocksSeen_) + bytesOf(loadedIn_) + bytesOf(views_) + bytesOf(ahead_.wanted) + bytesOf(ahead_.refined) + bytesOf(ranks_);
     bytes += bytesOf(choice_.wanted) + bytesOf(choice_.refined) + priorities_.bytesHeld() + allocator_.bytesHeld();
     bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);

@@ -31,6 +31,7 @@
 #include <memory>
 #include <optional>
 #include <queue>
+#include <set>
 #include <tuple>
 #include <vector>
 
@@ -164,7 +165,7 @@ private:
     void learnBlocks();
     void choose();
     [[nodiscard]] std::span<uint8_t> statesOf(uint64_t number);
-    void wishForBlocks(std::vector<PageRequest>& wishes) const;
+    void wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks, std::vector<PageRequest>& wishes) const;
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
     std::shared_ptr<const Dataset> dataset_;
@@ -186,7 +187,7 @@ private:
     std::map<ViewNumber, Motion> motions_;
     std::vector<SelectionView> views_;  // of motions_
     PageChoice choice_;
-    std::vector<WantedPage> ahead_;
+    PageChoice ahead_;  // of where views will be, while they move
     std::vector<Rank> ranks_;
     bool moving_ = false, stale_ = true, emptied_ = false;
     double seconds_ = 0;

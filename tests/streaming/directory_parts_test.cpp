@@ -132,6 +132,29 @@ TEST(DirectoryParts, SettlesOnTheSamePagesInAPoolOfSeveralChunks) {
     EXPECT_GT(relaxed, 3);
 }
 
+TEST(DirectoryParts, AMovingViewAsksForBlocksOfWhatComesLater) {
+    const Scan scan = scanOf(1);
+    std::mt19937_64 random(5);
+    int now = 0, ahead = 0;
+    for (int i = 0; i < 10; ++i) {
+        const auto start = scan.start();
+        ResidencyPolicy policy(start, start->hasColour(), poolShapeFor(*start, start->hasColour(), uint64_t{1} << 30, uint64_t{1} << 40));
+        SelectionView view = test::randomView(random, 0.5);
+        const auto blocksWished = [&](double seconds, bool urgent) {
+            policy.look(view, seconds);
+            const auto wishes = policy.finish().wishes;
+            return std::count_if(wishes.begin(), wishes.end(), [&](const PageRequest& wish) { return isBlock(wish.page) && (wish.priority > 1e6) == urgent; });
+        };
+        blocksWished(0, true);
+        now += static_cast<int>(blocksWished(0.1, true));
+        EXPECT_EQ(blocksWished(0.2, false), 0) << "a still view looks at nothing ahead";
+        view.eye *= 0.9;
+        ahead += static_cast<int>(blocksWished(0.3, false));
+    }
+    EXPECT_GT(now, 0);
+    EXPECT_GT(ahead, 0);
+}
+
 TEST(DirectoryParts, ABrokenBlockIsReportedOnceAndDrawnFromItsParents) {
     const Scan scan = scanOf(1);
     const auto start = scan.start();
