@@ -104,7 +104,8 @@ uint32_t hitPlanes(const FrameRequest& request, bool colour) {
     return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || isFalseColour(request.shading.mode) ? 1 : 0);
 }
 
-frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels) {
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels,
+                                    const Similarity& placement) {
     frame::FrameConstants c{};
     const FileHeader header = dataset != nullptr ? dataset->header : FileHeader{.cell = 1, .levels = 1, .log2Cells = 5};
     const CameraBasis basis = basisOf(request);
@@ -135,6 +136,9 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.cap = encoded(s.cap);
     c.extra.x = hitPlanes(request, colour) - 1;
     c.march.x = request.march.epsilon;
+    c.march.y = static_cast<float>(header.cell * placement.scale);
+    const glm::dquat& q = placement.rotation;
+    c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     setSections(c, request, header);
     setLight(c, request, header, basis, errorPixels);
     return c;

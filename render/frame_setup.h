@@ -7,9 +7,11 @@
 
 namespace vcp {
 
+/// `request` as seen from the dataset (requestIn); what shows the world's axes or units is told by `placement`.
 /// `dataset` may be null: a picture of the background. `stripes`: see stripedIndex in tiles.glsl.
 /// `colour`: whether hits have colours. `errorPixels`: of what is drawn (UpdateResult).
-frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels);
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels,
+                                    const Similarity& placement = {});
 
 /// Whether rays of light are traced: where shading asks for them and shows light.
 bool hasLight(const Shading& shading);

@@ -21,6 +21,7 @@
 // another draws next, which that one's update() then says. One thread at a time may call any of them.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -37,6 +38,7 @@
 #include "octree/vcp_file.h"
 #include "render/camera.h"
 #include "render/picture.h"
+#include "render/similarity.h"
 #include "streaming/load_order.h"
 #include "streaming/page_source.h"
 
@@ -226,11 +228,36 @@ struct ImageTarget {
     VkSemaphore signal = VK_NULL_HANDLE;  ///< where given: signalled when the image is written
 };
 
+/// A dataset and where it lies in the world.
+struct PlacedDataset {
+    std::shared_ptr<const Dataset> dataset;
+    std::shared_ptr<const PageSource> source;  ///< of this one alone
+    Similarity placement;
+};
+
+/// A page in the pool, for a picture of what is there.
+struct PageBox {
+    glm::dvec3 corner;                 ///< world
+    std::array<glm::dvec3, 3> edges;   ///< from the corner, world
+    uint32_t level = 0;                ///< 0: the coarsest
+    bool isDrawn = false;              ///< in the cut of this view
+};
+
+/// What the rays of the last frame that missed pages met, 24 x 16 over the picture, row by row from the upper left.
+struct FeedbackPicture {
+    static constexpr uint32_t kWidth = 24, kHeight = 16;
+    /// Of the page that was hit, its certified error in pixels there; below 0: nothing was hit. Above the request's
+    /// errorPixels the ray asked for finer pages.
+    std::array<float, size_t{kWidth} * kHeight> errorPixels;
+};
+
 /// What one pixel shows.
 struct PixelHit {
     double depth;         ///< distance from the ray's origin, world units
     glm::dvec3 position;  ///< world space
     glm::vec3 normal;     ///< unit, towards the viewer
+    size_t dataset = 0;   ///< number of the dataset, in the order of open()
+    bool onCap = false;   ///< on what a section plane cut open
 };
 
 class Renderer {
@@ -251,6 +278,9 @@ public:
 
     /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
+    /// Shows several, each drawn by itself and the nearest surface seen; shadows and occlusion are within each. Budgets are
+    /// shared out (budgetShares). Errors: those of open of one; then none is shown.
+    Result<void> open(std::vector<PlacedDataset> datasets);
     /// Stops the loader and forgets all pages.
     void close();
 
@@ -291,6 +321,12 @@ public:
     /// Copies the last picture into the host's image, scaled to it, sRGB-encoded; what was in the image is lost. Waits for
     /// the GPU. Errors: Usage, where nothing was drawn yet or the queue has no graphics; Device.
     Result<void> copyPicture(const ImageTarget& target);
+    /// All pages in the pool; takes time for each.
+    [[nodiscard]] std::vector<PageBox> residentPages() const;
+    /// Whether frames keep what their feedback pass met for feedbackPicture(), from now on. Off, it costs nothing.
+    void keepFeedback(bool keep);
+    /// Nothing, where no frame missed pages since keepFeedback(true).
+    [[nodiscard]] const std::optional<FeedbackPicture>& feedbackPicture() const;
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.

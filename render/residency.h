@@ -66,6 +66,10 @@ public:
     [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
     [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
+    template <class Visit>
+    void forEachResident(Visit&& visit) const {
+        policy_->forEachResident(visit);
+    }
     /// Of the pages in the pool.
     [[nodiscard]] uint64_t colourBytes() const;
 

@@ -49,6 +49,7 @@ struct RayFeedback {
     struct Hit {
         uint64_t page = 0;
         glm::ivec3 place{0};
+        uint32_t ray = 0;  ///< of the 24 x 16, row by row
     };
     /// A page of the cut that rays went into, and the sum of 1 / (a + eps) over them, in any unit.
     struct Passed {

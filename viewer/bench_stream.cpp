@@ -74,9 +74,6 @@ private:
     }
 
     Result<std::string> datasetOf(const std::string& model) const {
-        auto isDataset = isOneDataset({model});
-        if (!isDataset) return isDataset.error();
-        if (*isDataset) return model;
         auto file = datasetFor({model}, {}, [&](const BuildProgress&) { return progress(fmt::format("{}: building", model), 0); });
         if (!file) return file.error();
         return file->string();

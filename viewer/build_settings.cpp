@@ -10,6 +10,7 @@
 #include "streaming/http_reader.h"
 #include "viewer/interrupt.h"
 #include "viewer/mesh_cache.h"
+#include "viewer/scene_file.h"
 #include "viewer/option_values.h"
 
 namespace vcp {
@@ -88,34 +89,26 @@ BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) c
 
 ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.triangles, .tempBytes = at.tempBytes}; }
 
-Result<bool> isOneDataset(const std::vector<std::string>& inputs) {
+Result<InputKind> kindOf(const std::vector<std::string>& inputs) {
     const auto isDataset = [](const std::string& input) { return isHttpUrl(input) || looksLikeDataset(input); };
-    const bool any = std::any_of(inputs.begin(), inputs.end(), isDataset);
-    if (any && inputs.size() > 1) return Error{ErrorCode::Usage, "several inputs must all be meshes; one .vcp at a time"};
-    return any;
+    const auto datasets = static_cast<size_t>(std::count_if(inputs.begin(), inputs.end(), isDataset));
+    const auto scenes = static_cast<size_t>(std::count_if(inputs.begin(), inputs.end(), isSceneName));
+    if (scenes > 0 && inputs.size() > 1) return Error{ErrorCode::Usage, "a scene file (.json) is opened alone"};
+    if (scenes > 0) return InputKind::Scene;
+    if (datasets > 0 && datasets < inputs.size())
+        return Error{ErrorCode::Usage, "several inputs must all be meshes or all .vcp files; a scene file (.json) takes both"};
+    return datasets > 0 ? InputKind::Datasets : InputKind::Meshes;
 }
 
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          const std::function<bool(const BuildProgress&)>& progress) {
-    const auto isBuilt = isOneDataset(inputs);
-    if (!isBuilt) return isBuilt.error();
-    if (*isBuilt) return std::filesystem::path(inputs.front());
+    if (inputs.size() == 1 && (isHttpUrl(inputs.front()) || looksLikeDataset(inputs.front()))) return std::filesystem::path(inputs.front());
 
     auto folder = defaultCacheFolder();
     if (!folder) return folder;
     BuildOptions options = settings.optionsFor(inputs);
     options.progress = progress;
     return MeshCache(*folder).dataset(std::move(options), buildOctree);
-}
-
-Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
-                                         ProgressStyle progress) {
-    ProgressDisplay display(progress, stderr);
-    const InterruptScope catching;
-    return datasetFor(inputs, settings, [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction, detailsOf(at));
-        return !interrupted();
-    });
 }
 
 }  // namespace vcp

@@ -31,16 +31,14 @@ void addBuildSettings(CLI::App& app, BuildSettings& settings);
 /// What a display is told of a build.
 ProgressDetails detailsOf(const BuildProgress& at);
 
-/// True for one .vcp or address, false for meshes. Errors: Usage (a .vcp among several inputs).
-Result<bool> isOneDataset(const std::vector<std::string>& inputs);
+/// One scene file (.json), .vcp files and addresses, or meshes.
+enum class InputKind { Scene, Datasets, Meshes };
+/// Errors: Usage (kinds are mixed; several scenes).
+Result<InputKind> kindOf(const std::vector<std::string>& inputs);
 
 /// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache. `progress` as in
-/// BuildOptions. Any thread. Errors: those of isOneDataset and MeshCache.
+/// BuildOptions. Any thread. Errors: those of MeshCache. Precondition: one .vcp or address, or meshes.
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          const std::function<bool(const BuildProgress&)>& progress);
-
-/// The same with progress on stderr, cancelled by Ctrl-C.
-Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
-                                         ProgressStyle progress);
 
 }  // namespace vcp

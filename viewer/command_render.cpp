@@ -13,6 +13,7 @@
 #include "viewer/commands.h"
 #include "viewer/image_files.h"
 #include "viewer/interrupt.h"
+#include "viewer/opened_scene.h"
 #include "viewer/option_values.h"
 #include "viewer/png_rows.h"
 #include "viewer/render_settings.h"
@@ -241,12 +242,11 @@ Result<void> makeTiled(Renderer& renderer, FrameRequest request, const std::vect
 
 Result<int> run(const RenderCommand& command) {
     const glm::ivec2 size = parseSize(command.size).value();
-    const auto path = datasetFor(command.inputs, command.build, command.report.progressStyle());
-    if (!path) return path.error();
-    const auto open = openDataset(path->string(), command.render.source);
+    const auto open = openScene(command.inputs, command.build, command.render.source, command.report.progressStyle());
     if (!open) return open.error();
-    VCP_TRY(command.render.checkFor(*open->dataset));
-    const auto camera = command.render.cameraFor(open->bounds(), size);
+    if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
+    const SceneFile& scene = open->file;
+    const auto camera = command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(open->bounds(), size);
     if (!camera) return camera.error();
     const auto cameras = camerasOf(command, *camera, open->bounds());
     if (!cameras) return cameras.error();
@@ -254,7 +254,7 @@ Result<int> run(const RenderCommand& command) {
     options.loaderThreads = open->loaderThreads();
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->open(open->dataset, open->source));
+    VCP_TRY((*renderer)->open(open->placed()));
 
     FrameRequest request;
     request.camera = camera->current();
@@ -265,6 +265,14 @@ Result<int> run(const RenderCommand& command) {
     request.shading.transparent = command.transparent;
     request.sections = command.render.sectionPlanes(open->bounds());
     request.sectionCaps = command.render.caps;
+    if (request.sections.empty()) {
+        request.sections = scene.sections;
+        request.sectionCaps = scene.sectionCaps;
+    }
+    if (scene.light) {
+        request.shading.lightFollowsCamera = scene.light->followsCamera;
+        request.shading.lightDirection = scene.light->direction;
+    }
     request.march = command.render.march;
     const InterruptScope catching;
     if (command.isTiled(request)) {
@@ -293,8 +301,8 @@ std::string checkPlane(const std::string& text) {
 
 Command addRender(CLI::App& vcp) {
     auto command = std::make_shared<RenderCommand>();
-    CLI::App* app = vcp.add_subcommand("render", "Render a .vcp file or meshes into a picture, without a window");
-    app->add_option("IN", command->inputs, "A .vcp file or its http(s) address, or meshes, which are built into the cache first")
+    CLI::App* app = vcp.add_subcommand("render", "Render .vcp files, a scene or meshes into a picture, without a window");
+    app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
         ->type_name("")
         ->required();
     app->add_option("-o,--output", command->output, "The PNG file to write")->type_name("OUT.png")->required();

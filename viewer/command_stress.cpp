@@ -8,6 +8,7 @@
 
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
+#include "viewer/motion_bench.h"
 #include "viewer/option_values.h"
 #include "viewer/render_settings.h"
 #include "viewer/stress.h"
@@ -28,6 +29,7 @@ struct StressCommand {
     int frames = 120;
     int views = 1;
     double errorPixels = 0.5;
+    double motionSeconds = 0;  // 0: not given
     SourceSettings source;
     ReportOptions report;
 };
@@ -74,12 +76,26 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
     return options;
 }
 
+Result<int> runMotion(const StressCommand& command, const OpenDataset& open, const RendererOptions& renderer) {
+    MotionOptions options;
+    options.viewer.renderer = renderer;
+    options.viewer.errorPixels = command.errorPixels;
+    options.size = parseSize(command.size).value();
+    options.seconds = command.motionSeconds;
+    options.cancel = interrupted;
+    const auto report = measureMotion({{open.dataset, open.source, {}}}, open.bounds(), options);
+    if (!report) return report.error();
+    VCP_TRY(printLine(command.report.json ? motionJson(*report) : motionText(*report)));
+    return 0;
+}
+
 Result<int> run(const StressCommand& command) {
     const InterruptScope catching;
     const auto start = std::chrono::steady_clock::now();
     const auto open = openDataset(command.file, command.source);
     if (!open) return open.error();
     StressOptions options = optionsFor(command, *open);
+    if (command.motionSeconds > 0) return runMotion(command, *open, options.renderer);
     options.openSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = [&](const std::string& what, double fraction) {
@@ -129,6 +145,10 @@ Command addStress(CLI::App& vcp) {
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
+    app->add_option("--motion", command->motionSeconds,
+                    "Instead: turn once about the dataset in so many seconds, as the window draws it (smaller while it is slow), and count frames by size")
+        ->type_name("SECONDS")
+        ->check(CLI::Range(0.1, 3600.0));
     app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
     app->add_option("--out", command->out, "Folder for the report as JSON and Markdown, and for its plots")->type_name("DIR");
     addSourceSettings(*app, command->source);

@@ -46,13 +46,21 @@ Json toJson(const WindowReport& report) {
 
 /// What can be said before a window is opened: a mesh that is not there, a .vcp that is none.
 Result<void> checkInputs(const ViewCommand& command) {
-    if (const auto isBuilt = isOneDataset(command.inputs); !isBuilt) return isBuilt.error();
-    for (const std::string& input : command.inputs) {
+    std::vector<std::string> inputs = command.inputs;
+    const auto kind = kindOf(inputs);
+    if (!kind) return kind.error();
+    if (*kind == InputKind::Scene) {
+        const auto scene = readScene(inputs.front());
+        if (!scene) return scene.error();
+        inputs.clear();
+        for (const SceneDataset& each : scene->datasets) inputs.push_back(each.file);
+    }
+    for (const std::string& input : inputs) {
         if (isHttpUrl(input)) continue;
         if (looksLikeDataset(input)) {
             const auto open = openDataset(input, command.render.source);
             if (!open) return open.error();
-            VCP_TRY(command.render.checkFor(*open->dataset));
+            if (inputs.size() == 1) VCP_TRY(command.render.checkFor(*open->dataset));
         } else if (std::error_code failed; !std::filesystem::exists(input, failed)) {
             return Error{ErrorCode::Io, "cannot be opened: there is no such file", input};
         }
@@ -100,8 +108,8 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
 
 Command addView(CLI::App& vcp) {
     auto command = std::make_shared<ViewCommand>();
-    CLI::App* app = vcp.add_subcommand("view", "Open a window, on a .vcp file or on meshes");
-    app->add_option("IN", command->inputs, "A .vcp file or its http(s) address, or meshes, which are built into the cache first")
+    CLI::App* app = vcp.add_subcommand("view", "Open a window, on .vcp files, a scene or meshes");
+    app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
         ->type_name("");
     app->add_option("--size", command->size, "Width and height of the window [1280x800, then as it was left]")
         ->type_name("WxH")

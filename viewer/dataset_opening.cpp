@@ -32,18 +32,16 @@ DatasetOpening::Progress DatasetOpening::progress() const {
     return progress_;
 }
 
-Result<OpenDataset> DatasetOpening::take() { return *std::exchange(opened_, std::nullopt); }
+Result<OpenedScene> DatasetOpening::take() { return *std::exchange(opened_, std::nullopt); }
 
-Result<OpenDataset> DatasetOpening::open() {
+Result<OpenedScene> DatasetOpening::open() {
     ProgressDisplay display(style_, stderr);
-    const auto path = datasetFor(inputs_, build_, [&](const BuildProgress& at) {
+    return openScene(inputs_, build_, source_, [&](const BuildProgress& at) {
         display.update(at.stage, at.fraction, detailsOf(at));
         const std::lock_guard lock(mutex_);
         progress_ = {at.stage, at.fraction, at.triangles};
         return !cancelled_ && !interrupted();
     });
-    if (!path) return path.error();
-    return openDataset(path->string(), source_);
 }
 
 }  // namespace vcp

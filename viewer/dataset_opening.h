@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "viewer/build_settings.h"
+#include "viewer/opened_scene.h"
 #include "viewer/source_settings.h"
 
 namespace vcp {
@@ -25,7 +26,7 @@ public:
         uint64_t triangles = 0;
     };
 
-    /// `inputs`: as datasetFor and openDataset take them. `style`: told on stderr as well.
+    /// `inputs`: as openScene takes them. `style`: told on stderr as well.
     DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style);
     ~DatasetOpening();
     DatasetOpening(const DatasetOpening&) = delete;
@@ -35,11 +36,11 @@ public:
     [[nodiscard]] Progress progress() const;
     void cancel() { cancelled_ = true; }
     [[nodiscard]] bool isDone() const { return done_; }
-    /// Once, when it is done. Errors: those of datasetFor and openDataset; Cancelled.
-    Result<OpenDataset> take();
+    /// Once, when it is done. Errors: those of openScene; Cancelled.
+    Result<OpenedScene> take();
 
 private:
-    Result<OpenDataset> open();
+    Result<OpenedScene> open();
 
     std::vector<std::string> inputs_;
     BuildSettings build_;
@@ -48,7 +49,7 @@ private:
     std::atomic<bool> cancelled_ = false, done_ = false;
     mutable std::mutex mutex_;
     Progress progress_;                         // guarded by mutex_
-    std::optional<Result<OpenDataset>> opened_;  // of the thread until done_
+    std::optional<Result<OpenedScene>> opened_;  // of the thread until done_
     std::thread thread_;
 };
 

@@ -97,4 +97,23 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
     return nearest;
 }
 
+Result<std::optional<RayHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections) {
+    std::optional<RayHit> nearest;
+    for (Part& part : parts_) {
+        const Similarity& placement = part.placement;
+        const Ray local{placement.fromWorld(ray.origin), placement.turnedFromWorld(ray.direction)};
+        std::vector<SectionPlane> planes;
+        for (const SectionPlane& plane : sections) planes.push_back(planeIn(placement, plane));
+        auto hit = part.pick.cast(local, planes);
+        if (!hit) return hit;
+        if (!*hit || (nearest && nearest->t <= (*hit)->t * placement.scale)) continue;
+        nearest = *std::move(hit);
+        nearest->t *= placement.scale;
+        nearest->certifiedError *= placement.scale;
+        nearest->position = placement.toWorld(nearest->position);
+        nearest->normal = placement.rotation * nearest->normal;
+    }
+    return nearest;
+}
+
 }  // namespace vcp

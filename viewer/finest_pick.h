@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "octree/reference_caster.h"
 #include "octree/result.h"
@@ -23,6 +25,22 @@ public:
 private:
     std::shared_ptr<const ByteReader> reader_;
     PageCache pages_;
+};
+
+/// The same over several datasets, each where it is placed; the nearest hit, in the world.
+class ScenePick {
+public:
+    void add(std::shared_ptr<const ByteReader> reader, const Dataset& dataset, const Similarity& placement) {
+        parts_.push_back({FinestPick(std::move(reader), dataset), placement});
+    }
+    Result<std::optional<RayHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {});
+
+private:
+    struct Part {
+        FinestPick pick;
+        Similarity placement;
+    };
+    std::vector<Part> parts_;
 };
 
 }  // namespace vcp

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <imgui.h>
 
@@ -22,11 +23,16 @@ constexpr ImGuiColorEditFlags kColour = ImGuiColorEditFlags_NoInputs | ImGuiColo
 
 constexpr float kPanelWidth = 250, kMargin = 8;
 constexpr float kScaleBarLargest = 160;
+constexpr size_t kMostBoxes = 2000;
+constexpr double kUrgentDoublings = 5;  // of the tolerated error, until a ray that asks is red
 constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160), kMeasured = IM_COL32(255, 210, 60, 255);
 constexpr ImU32 kHandle = IM_COL32(90, 190, 255, 255), kGripped = IM_COL32(255, 210, 60, 255);
 constexpr uint32_t kOcclusionRays = 8;
 
 constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "cells", "fetches", "level", "error"};
+
+constexpr const char* kPictureSizeNames[] = {"as shown", "3840 x 2160", "7680 x 4320", "16384 x 9216", "16384 x 16384"};
+constexpr glm::ivec2 kPictureSizes[] = {{0, 0}, {3840, 2160}, {7680, 4320}, {16384, 9216}, {16384, 16384}};
 
 ImVec2 vec(glm::vec2 v) { return {v.x, v.y}; }
 
@@ -41,6 +47,24 @@ void wrapped(const std::string& line) {
 void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
     list.AddText(vec(at + 1.0f), kShade, line.data(), line.data() + line.size());
     list.AddText(vec(at), kInk, line.data(), line.data() + line.size());
+}
+
+/// Blue through green to red, as the false colours (shaders/shade.comp).
+ImU32 heatColour(float x, int alpha) {
+    const glm::vec3 c = 255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
+    return IM_COL32(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z), alpha);
+}
+
+/// A line of the world, as far as it is before the eye.
+void drawSegment(ImDrawList& list, const Viewer& viewer, glm::dvec3 from, glm::dvec3 to, ImU32 colour, float width) {
+    const OrbitCamera& camera = viewer.camera();
+    const double near = 1e-3 * camera.focusDistance;
+    double a = camera.depthOf(from), b = camera.depthOf(to);
+    if (a < near && b < near) return;
+    if (a < near) from += (to - from) * ((near - a) / (b - a));
+    if (b < near) to = from + (to - from) * ((a - near) / (a - b));
+    const auto p = camera.pixelOf(from, viewer.size()), q = camera.pixelOf(to, viewer.size());
+    if (p && q) list.AddLine(vec(glm::vec2(*p)), vec(glm::vec2(*q)), colour, width);
 }
 
 /// Screens show colours encoded; the shading takes them linear.
@@ -71,9 +95,11 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     scale_ = scale;
     statusHeight_ = ImGui::GetFrameHeight();
     if (session_->viewer().dataset()) {
+        if (session_->showsPages) drawPages();
         drawScaleBar();
         drawMeasured();
         drawSectionHandles();
+        if (session_->showsFeedback()) drawFeedback();
         if (session_->user().panel) layOutPanel();
     } else if (!session_->opening()) {
         layOutStart();
@@ -81,6 +107,7 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     layOutStatus();
     layOutMessages();
     if (session_->opening()) layOutOpening();
+    else if (const auto fraction = session_->savingFraction()) layOutSaving(*fraction);
     if (showsHelp) layOutHelp();
 }
 
@@ -96,13 +123,15 @@ void Interface::layOutStatus() {
     std::string line;
     if (viewer.isFlying()) line += fmt::format("flying, speed {:.2g} | ", viewer.flySpeed());
     if (session_->isMeasuring) line += session_->isPicking() ? "measuring ... | " : "measuring: click | ";
-    text(line + statusLine(viewer.status()));
+    const std::string hint = "F1 keys  Tab panel";
+    const float room = size_.x - ImGui::CalcTextSize(hint.c_str()).x - 5 * kMargin * scale_;
+    const auto most = static_cast<size_t>(std::max(0.0f, room / ImGui::CalcTextSize("0").x));
+    text(line + statusLine(viewer.status(), most - std::min(most, line.size())));
     ImGui::End();
-    // A narrow window cuts the line off, not how to get on.
     ImGui::SetNextWindowPos({size_.x, size_.y - statusHeight_}, ImGuiCond_Always, {1, 0});
     ImGui::SetNextWindowBgAlpha(1);
     ImGui::Begin("hint", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
-    text("F1 keys  Tab panel");
+    text(hint);
     ImGui::End();
     ImGui::PopStyleVar(3);
 }
@@ -135,13 +164,14 @@ void Interface::layOutPanel() {
     if (ImGui::CollapsingHeader("Look", ImGuiTreeNodeFlags_DefaultOpen)) layOutLooks();
     if (ImGui::CollapsingHeader("Measure", ImGuiTreeNodeFlags_DefaultOpen)) layOutMeasuring();
     if (ImGui::CollapsingHeader("Streaming", ImGuiTreeNodeFlags_DefaultOpen)) layOutLimits();
+    if (ImGui::CollapsingHeader("Picture")) layOutPicture();
     if (ImGui::CollapsingHeader("Recent files")) layOutFiles();
     ImGui::PopItemWidth();
     ImGui::End();
 }
 
 void Interface::actionButton(const char* label, ViewerAction action) {
-    if (ImGui::Button(label)) session_->viewer().act(action);
+    if (ImGui::Button(label)) session_->act(action);
 }
 
 void Interface::layOutViews() {
@@ -184,10 +214,13 @@ void Interface::layOutLooks() {
     Shading shading = viewer.shading();
     int mode = static_cast<int>(shading.mode);
     if (ImGui::Combo("shading", &mode, kModes, static_cast<int>(std::size(kModes)))) shading.mode = static_cast<ShadingMode>(mode);
+    // On files that are drawn without, the switch does nothing.
+    ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
     ImGui::Checkbox("shadows", &shading.shadows);
     ImGui::SameLine();
     bool occlusion = shading.occlusionRays > 0;
     if (ImGui::Checkbox("occlusion", &occlusion)) shading.occlusionRays = occlusion ? kOcclusionRays : 0;
+    ImGui::EndDisabled();
     colourEdit("above", shading.backgroundTop);
     ImGui::SameLine();
     colourEdit("below", shading.backgroundBottom);
@@ -195,9 +228,9 @@ void Interface::layOutLooks() {
     text("background");
     if (shading != viewer.shading()) viewer.setShading(shading);
     bool follows = shading.lightFollowsCamera;
-    if (ImGui::Checkbox("light follows the camera", &follows)) viewer.act(ViewerAction::ToggleLight);
+    if (ImGui::Checkbox("light follows the camera", &follows)) session_->act(ViewerAction::ToggleLight);
     bool section = !viewer.sections().empty();
-    if (ImGui::Checkbox("section", &section)) viewer.act(ViewerAction::ToggleSection);
+    if (ImGui::Checkbox("section", &section)) session_->act(ViewerAction::ToggleSection);
 }
 
 void Interface::layOutLimits() {
@@ -219,6 +252,10 @@ void Interface::layOutLimits() {
     text(fmt::format("{} subvolumes drawn, {} resident", update.pagesInCut, update.pagesResident));
     text(update.settled ? "settled" : fmt::format("loading, {} missing", update.pagesMissing));
     text(fmt::format("{} read", formatBytes(update.bytesRead)));
+    ImGui::Checkbox("subvolumes", &session_->showsPages);
+    ImGui::SameLine();
+    bool feedback = session_->showsFeedback();
+    if (ImGui::Checkbox("what rays ask for", &feedback)) session_->showFeedback(feedback);
 }
 
 void Interface::layOutMeasuring() {
@@ -231,6 +268,24 @@ void Interface::layOutMeasuring() {
     if (ImGui::Button("CSV, JSON")) session_->exportMeasurement();
     ImGui::SameLine();
     if (ImGui::Button("Clear")) measured.clear();
+}
+
+void Interface::layOutPicture() {
+    ImGui::Combo("size", &pictureSize_, kPictureSizeNames, static_cast<int>(std::size(kPictureSizeNames)));
+    const glm::ivec2 size = pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_];
+    ImGui::BeginDisabled(session_->savingFraction().has_value());
+    if (ImGui::Button("Save picture")) session_->savePicture(size);
+    ImGui::EndDisabled();
+}
+
+void Interface::layOutSaving(double fraction) {
+    ImGui::SetNextWindowPos({0.5f * size_.x, size_.y - statusHeight_ - 2 * kMargin * scale_}, ImGuiCond_Always, {0.5f, 1});
+    ImGui::SetNextWindowSize({std::min(300 * scale_, size_.x), 0});
+    ImGui::Begin("saving", nullptr, kBare);
+    const std::string percent = fmt::format("{:.0f} %", 100 * fraction);
+    ImGui::ProgressBar(static_cast<float>(fraction), ImVec2(-1, 0), percent.c_str());
+    if (ImGui::Button("Cancel (Esc)")) session_->cancelSaving();
+    ImGui::End();
 }
 
 void Interface::layOutFiles() {
@@ -335,6 +390,51 @@ void Interface::drawSectionHandles() const {
         list.AddLine(vec(foot), vec(neck), colour, 3 * scale_);
         list.AddTriangleFilled(vec(tip), vec(neck + 6 * scale_ * across), vec(neck - 6 * scale_ * across), colour);
     }
+}
+
+void Interface::drawPages() const {
+    ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    Viewer& viewer = session_->viewer();
+    const std::vector<PageBox> pages = viewer.renderer().residentPages();
+    const float finest = static_cast<float>(std::max(1u, viewer.status().levels - 1));
+    size_t drawn = 0;
+    for (const PageBox& page : pages) {
+        if (!page.isDrawn || ++drawn > kMostBoxes) continue;
+        const ImU32 colour = heatColour(static_cast<float>(page.level) / finest, 150);
+        for (int axis = 0; axis < 3; ++axis)
+            for (int side = 0; side < 4; ++side) {
+                const glm::dvec3 from = page.corner + page.edges[size_t(axis + 1) % 3] * double(side & 1) + page.edges[size_t(axis + 2) % 3] * double(side >> 1);
+                drawSegment(list, viewer, from, from + page.edges[size_t(axis)], colour, scale_);
+            }
+    }
+    const std::string said = fmt::format("{} of {} subvolumes in memory are drawn{}", std::count_if(pages.begin(), pages.end(), [](const PageBox& p) { return p.isDrawn; }),
+                                         pages.size(), drawn > kMostBoxes ? fmt::format("; the first {} as boxes", kMostBoxes) : "");
+    textAt(list, {2 * kMargin * scale_, size_.y - statusHeight_ - 52 * scale_}, said);
+}
+
+void Interface::drawFeedback() const {
+    ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    Viewer& viewer = session_->viewer();
+    const auto& kept = viewer.renderer().feedbackPicture();
+    const float cell = 8 * scale_;
+    const glm::vec2 size(FeedbackPicture::kWidth * cell, FeedbackPicture::kHeight * cell);
+    const glm::vec2 corner(2 * kMargin * scale_, 5 * kMargin * scale_);
+    list.AddRectFilled(vec(corner - 4 * scale_), vec(corner + size + glm::vec2(4 * scale_, 22 * scale_)), kShade);
+    size_t asking = 0;
+    const double tolerated = viewer.errorPixels();
+    for (uint32_t i = 0; kept && i < kept->errorPixels.size(); ++i) {
+        const double error = kept->errorPixels[i];
+        if (error < 0) continue;
+        const bool asks = error > tolerated;
+        asking += asks ? 1 : 0;
+        const glm::vec2 at = corner + cell * glm::vec2(i % FeedbackPicture::kWidth, i / FeedbackPicture::kWidth);
+        // Green where the page is fine enough, yellow to red where a finer one is asked for.
+        const auto urgency = static_cast<float>(asks ? std::min(std::log2(error / tolerated) / kUrgentDoublings, 1.0) : 0);
+        const ImU32 colour = asks ? IM_COL32(255, static_cast<int>(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
+        list.AddRectFilled(vec(at), vec(at + cell - scale_), colour);
+    }
+    const std::string said = kept ? fmt::format("{} of {} rays asked", asking, kept->errorPixels.size()) : "nothing is missing";
+    textAt(list, corner + glm::vec2(0, size.y + 3 * scale_), said);
 }
 
 void Interface::copyCamera() {

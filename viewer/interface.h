@@ -42,12 +42,16 @@ private:
     void layOutLimits();
     void layOutMeasuring();
     void layOutFiles();
+    void layOutPicture();
+    void layOutSaving(double fraction);
     void layOutHelp();
     void layOutStart();
     void layOutOpening();
     void drawScaleBar() const;
     void drawMeasured() const;
     void drawSectionHandles() const;
+    void drawPages() const;
+    void drawFeedback() const;
     void actionButton(const char* label, ViewerAction action);
 
     ViewSession* session_;
@@ -55,6 +59,7 @@ private:
     glm::vec2 size_{0};
     float scale_ = 1;
     float statusHeight_ = 0;
+    int pictureSize_ = 0;  // of kPictureSizes
 };
 
 }  // namespace vcp

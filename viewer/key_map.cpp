@@ -30,6 +30,8 @@ constexpr KeyHelp kKeyMap[] = {
     {"S", "shadows"},
     {"O", "ambient occlusion"},
     {"X", "section through the middle; its arrow and shift + wheel move it, its ring turns it"},
+    {"B", "the subvolumes that are drawn, as boxes coloured by level"},
+    {"I", "inset: which rays asked for finer subvolumes"},
     {"D", "measure: click points; Enter ends a line, Backspace takes a point back"},
     {"Ctrl+E", "write what is measured: measurement-1.csv, .json"},
     {"Tab", "the panel"},

@@ -54,6 +54,16 @@ glm::dquat facing(glm::dvec3 forward, glm::dvec3 up) {
     return glm::normalize(glm::quat_cast(glm::dmat3(right, glm::cross(back, right), back)));
 }
 
+Box placedBox(const Box& box, const Similarity& placement) {
+    Box placed{placement.toWorld(box.low), placement.toWorld(box.low)};
+    for (int corner = 1; corner < 8; ++corner) {
+        const glm::dvec3 at((corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y, (corner & 4) != 0 ? box.high.z : box.low.z);
+        placed.low = glm::min(placed.low, placement.toWorld(at));
+        placed.high = glm::max(placed.high, placement.toWorld(at));
+    }
+    return placed;
+}
+
 double Box::diagonal() const { return glm::length(high - low); }
 
 double OrbitCamera::viewHeight() const { return 2 * focusDistance * std::tan(0.5 * fovY); }

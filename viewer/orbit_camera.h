@@ -23,6 +23,7 @@
 
 #include "octree/result.h"
 #include "render/camera.h"
+#include "render/similarity.h"
 
 namespace vcp {
 
@@ -34,6 +35,9 @@ struct Box {
     [[nodiscard]] glm::dvec3 centre() const { return 0.5 * (low + high); }
     [[nodiscard]] double diagonal() const;
 };
+
+/// Of a box that is placed: the box about its corners.
+Box placedBox(const Box& box, const Similarity& placement);
 
 enum class UpAxis { Y, Z };
 

@@ -38,9 +38,44 @@ struct TiledPictureStats {
     UpdateResult update;         ///< of the last tile
 };
 
-/// Draws `request`, whose width and height may be up to 2^20 here, and hands each band to `take`. Errors: those of
-/// Renderer; those of `take`; the first page that cannot be read; Cancelled.
+/// A picture in the making, tile by tile. What it is given stays until it is done.
+class TiledPicture {
+public:
+    using Take = std::function<Result<void>(const PictureBand&)>;
+
+    /// `request`: its width and height may be up to 2^20 here. `options.progress` is not asked. `take` gets each band.
+    TiledPicture(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
+        : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
+
+    /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. True when the last
+    /// band was taken. Errors: those of Renderer; those of `take`; the first page that cannot be read.
+    Result<bool> step();
+    /// Whether the last step() missed pages.
+    [[nodiscard]] bool isWaiting() const { return isWaiting_; }
+    [[nodiscard]] double fraction() const;
+    [[nodiscard]] const TiledPictureStats& stats() const { return stats_; }
+
+private:
+    struct Rect {
+        uint32_t x, y, width, height;
+    };
+    [[nodiscard]] Rect inner() const;
+    [[nodiscard]] Rect outer() const;
+    Result<void> draw(const FrameRequest& request);
+    Result<void> copyTile(const Rect& outer, const Rect& inner);
+
+    Renderer* renderer_;
+    FrameRequest whole_;
+    TiledPictureOptions options_;
+    Take take_;
+    uint32_t x_ = 0, y_ = 0;  // of the next tile
+    PictureBand band_;
+    bool isWaiting_ = false;
+    TiledPictureStats stats_;
+};
+
+/// Draws `request` as TiledPicture does and hands each band to `take`. Errors: also Cancelled.
 Result<TiledPictureStats> drawTiled(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options,
-                                    const std::function<Result<void>(const PictureBand&)>& take);
+                                    const TiledPicture::Take& take);
 
 }  // namespace vcp

@@ -20,6 +20,7 @@ constexpr double kPickPollSeconds = 0.01;
 
 constexpr uint32_t kRemoteLoaderThreads = 8;
 constexpr int kMostExports = 10000;
+constexpr uint32_t kSavedTile = 512;  // small: the window goes on between tiles
 
 bool writeText(const std::filesystem::path& path, const std::string& text) {
     std::ofstream file(path, std::ios::binary);
@@ -73,7 +74,7 @@ void ViewSession::takeOpened() {
         say(shown.error().line());
 }
 
-Result<void> ViewSession::show(const OpenDataset& open, const std::vector<std::string>& inputs) {
+Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::string>& inputs) {
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
     camera.up = user_.up;
@@ -86,13 +87,25 @@ Result<void> ViewSession::show(const OpenDataset& open, const std::vector<std::s
         else
             say(asked.error().line());
         viewer_->setSections(options_.render.sectionPlanes(open.bounds()));
+        if (options_.render.camera == "fit" && open.file.camera) camera = *open.file.camera;
     } else {
         viewer_->setSections({});
+        if (open.file.camera) camera = *open.file.camera;
     }
+    if (viewer_->sections().empty()) viewer_->setSections(open.file.sections);
+    if (!open.file.sections.empty()) viewer_->setSectionCaps(open.file.sectionCaps);
+    if (open.file.light) {
+        Shading shading = viewer_->shading();
+        shading.lightFollowsCamera = open.file.light->followsCamera;
+        shading.lightDirection = open.file.light->direction;
+        viewer_->setShading(shading);
+    }
+    cancelSaving();
     if (pick_.valid()) pick_.wait(), pick_ = {};
     measurement_.clear();
-    finest_ = std::make_shared<FinestPick>(open.reader, *open.dataset);
-    VCP_TRY(viewer_->open(open.dataset, open.source, camera, nameOf(inputs)));
+    finest_ = std::make_shared<ScenePick>();
+    for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
+    VCP_TRY(viewer_->open(open.placed(), camera, nameOf(inputs)));
     shown_ = rememberedName(inputs.front());
     for (const std::string& input : inputs) user_.remember(input);
     return {};
@@ -101,11 +114,23 @@ Result<void> ViewSession::show(const OpenDataset& open, const std::vector<std::s
 Result<NextStep> ViewSession::update(double now) {
     takeOpened();
     takePicked();
+    goOnSaving();
     auto next = viewer_->update(now);
     if (!next) return next;
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
+    if (saving_) next->waitSeconds = saving_->picture->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
     if (pick_.valid()) next->waitSeconds = std::min(next->waitSeconds, kPickPollSeconds);
     return next;
+}
+
+void ViewSession::act(ViewerAction action) {
+    viewer_->act(action);
+    if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
+}
+
+void ViewSession::showFeedback(bool show) {
+    showsFeedback_ = show;
+    viewer_->renderer().keepFeedback(show);
 }
 
 std::string ViewSession::problem() const { return problem_.empty() ? viewer_->status().problem : problem_; }
@@ -141,6 +166,11 @@ void ViewSession::pasteCamera(const std::string& json) {
 
 void ViewSession::measureAt(glm::dvec2 pixel) {
     if (!finest_ || pick_.valid()) return;
+    // A cap is the section plane itself: its points are exact.
+    if (const auto cap = viewer_->capAt(pixel)) {
+        measurement_.add({*cap, 0, viewer_->status().levels - 1});
+        return;
+    }
     const CameraRay through = viewer_->camera().rayThrough(pixel, viewer_->size());
     const Ray ray{through.origin, through.direction};
     pick_ = std::async(std::launch::async, [finest = finest_, ray, sections = viewer_->sections()] { return finest->cast(ray, sections); });
@@ -165,6 +195,43 @@ void ViewSession::exportMeasurement() {
             return say(fs::absolute(name + ".csv", failed).string() + ": cannot be written");
         return note(fmt::format("written: {}.csv and .json in {}", name, fs::current_path(failed).string()));
     }
+}
+
+void ViewSession::savePicture(glm::ivec2 size) {
+    if (saving_ || !viewer_->dataset()) return;
+    namespace fs = std::filesystem;
+    int number = 1;
+    std::error_code failed;
+    while (number < kMostExports && fs::exists(fmt::format("picture-{}.png", number), failed)) ++number;
+    Saving saving{.path = fmt::format("picture-{}.png", number), .view = {}, .png = {}, .picture = {}};
+    auto view = viewer_->renderer().addView();
+    if (!view) return say(view.error().line());
+    auto png = PngRows::create(saving.path, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
+    if (!png) return say(png.error().line());
+    saving.view = *std::move(view);
+    saving.png = *std::move(png);
+    saving.picture = std::make_unique<TiledPicture>(*saving.view, viewer_->pictureOf(size), TiledPictureOptions{.tile = kSavedTile, .progress = {}},
+                                                    [rows = saving.png.get()](const PictureBand& band) { return rows->add(band.picture.rgba); });
+    saving_ = std::move(saving);
+}
+
+std::optional<double> ViewSession::savingFraction() const { return saving_ ? std::optional(saving_->picture->fraction()) : std::nullopt; }
+
+void ViewSession::cancelSaving() {
+    if (saving_) note(saving_->path + ": cancelled, nothing is written");
+    saving_.reset();
+}
+
+void ViewSession::goOnSaving() {
+    if (!saving_) return;
+    auto done = saving_->picture->step();
+    if (done && !*done) return;
+    if (done)
+        if (const auto finished = saving_->png->finish(); !finished) done = finished.error();
+    std::error_code failed;
+    if (done) note(fmt::format("written: {} in {}", saving_->path, std::filesystem::current_path(failed).string()));
+    else say(done.error().line());
+    saving_.reset();
 }
 
 void ViewSession::collectSettings() {

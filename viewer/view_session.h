@@ -14,7 +14,9 @@
 #include "viewer/dataset_opening.h"
 #include "viewer/finest_pick.h"
 #include "viewer/measurement.h"
+#include "viewer/png_rows.h"
 #include "viewer/render_settings.h"
+#include "viewer/tiled_picture.h"
 #include "viewer/user_settings.h"
 #include "viewer/viewer.h"
 
@@ -46,6 +48,9 @@ public:
     /// Viewer::update, and takes in what was opened or picked meanwhile.
     Result<NextStep> update(double now);
 
+    /// Viewer::act, and says so where that shows nothing.
+    void act(ViewerAction action);
+
     /// What went wrong last, in one line; empty: nothing.
     [[nodiscard]] std::string problem() const;
     void say(std::string problem) { problem_ = std::move(problem); }
@@ -62,12 +67,23 @@ public:
     void pasteCamera(const std::string& json);
 
     bool isMeasuring = false;
+    /// Overlays of streaming; nothing is asked of the renderer for them while they are off.
+    bool showsPages = false;
+    [[nodiscard]] bool showsFeedback() const { return showsFeedback_; }
+    void showFeedback(bool show);
     [[nodiscard]] Measurement& measurement() { return measurement_; }
     [[nodiscard]] bool isPicking() const { return pick_.valid(); }
     /// Picks on the finest level and adds the point; later, where it has to be read first.
     void measureAt(glm::dvec2 pixel);
     /// measurement-1.csv and .json in the working folder, or the next free number; says so.
     void exportMeasurement();
+
+    /// picture-1.png in the working folder, or the next free number: what is shown, of any size up to 16384 each way, tile
+    /// by tile between frames of the window.
+    void savePicture(glm::ivec2 size);
+    /// 0 to 1; nothing where no picture is being saved.
+    [[nodiscard]] std::optional<double> savingFraction() const;
+    void cancelSaving();
 
     /// Looks that are remembered, from the viewer into user().
     void collectSettings();
@@ -77,19 +93,27 @@ private:
 
     ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
     void takeOpened();
-    Result<void> show(const OpenDataset& open, const std::vector<std::string>& inputs);
+    Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
+    void goOnSaving();
 
     SessionOptions options_;
     UserSettings user_;
     std::unique_ptr<Viewer> viewer_;
     std::unique_ptr<DatasetOpening> opening_;
     std::string shown_;  // rememberedName of what is shown; empty: nothing
-    bool wasShown_ = false;
+    bool wasShown_ = false, showsFeedback_ = false;
     std::string problem_, note_;
     Measurement measurement_;
-    std::shared_ptr<FinestPick> finest_;
+    std::shared_ptr<ScenePick> finest_;
     std::future<Picked> pick_;
+    struct Saving {
+        std::string path;
+        std::unique_ptr<Renderer> view;
+        std::unique_ptr<PngRows> png;
+        std::unique_ptr<TiledPicture> picture;
+    };
+    std::optional<Saving> saving_;
 };
 
 }  // namespace vcp

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "viewer/option_values.h"
@@ -38,6 +39,14 @@ ShadingMode next(ShadingMode mode) {
     return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(static_cast<int>(mode) + 1);
 }
 
+/// A long name loses its middle.
+std::string shortened(const std::string& name, size_t most) {
+    constexpr size_t kLeast = 8;
+    if (name.size() <= std::max(most, kLeast)) return name;
+    const size_t half = (std::max(most, kLeast) - 2) / 2;
+    return name.substr(0, half) + ".." + name.substr(name.size() - half);
+}
+
 /// Starts and ends slowly.
 double eased(double part) { return part * part * (3 - 2 * part); }
 
@@ -48,19 +57,25 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 
 }  // namespace
 
-std::string statusLine(const ViewerStatus& status) {
-    if (status.levels == 0) return status.device + (status.software ? " (software)" : "");
-    std::string line = fmt::format("{} | {} triangles | {}", status.name, formatCount(status.triangles), status.update.settled ? "settled" : "loading");
-    // What matters most comes first: a narrow window cuts the line off.
+std::string statusLine(const ViewerStatus& status, size_t most) {
+    const std::string device = status.device + (status.software ? " (software)" : "");
+    if (status.levels == 0) return device.substr(0, most);
+    // What matters most comes first: a narrow window has no room for the rest.
+    std::vector<std::string> parts{shortened(status.name, most / 3), status.update.settled ? "settled" : "loading"};
+    if (!status.without.empty()) parts.push_back(status.without);
     if (status.update.drawable) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
         const std::string levels = coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
-        line += fmt::format(" | {} (finest {})", levels, status.levels - 1);
-        if (coarsest + 1 < status.levels) line += fmt::format(" | error {:.2g} px", status.update.errorPixels);
+        parts.push_back(fmt::format("{} (finest {})", levels, status.levels - 1));
+        if (coarsest + 1 < status.levels) parts.push_back(fmt::format("error {:.2g} px", status.update.errorPixels));
     }
-    if (status.reduction > 1) line += fmt::format(" | 1/{} size", status.reduction);
-    line += fmt::format(" | {:.0f} ms | {}{}", status.frame.msFrame, status.device, status.software ? " (software)" : "");
-    if (status.update.drawable) line += fmt::format(" | {} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes));
+    if (status.reduction > 1) parts.push_back(fmt::format("1/{} size", status.reduction));
+    parts.push_back(fmt::format("{:.0f} ms", status.frame.msFrame));
+    parts.push_back(formatCount(status.triangles) + " triangles");
+    if (status.update.drawable) parts.push_back(fmt::format("{} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes)));
+    parts.push_back(device);
+    std::string line = parts.front();
+    for (size_t i = 1; i < parts.size() && line.size() + 3 + parts[i].size() <= most; ++i) line += " | " + parts[i];
     return line;
 }
 
@@ -83,16 +98,31 @@ Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
 
 Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source,
                           const OrbitCamera& camera, std::string name) {
-    VCP_TRY(renderer_->open(dataset, std::move(source)));
-    show(std::move(dataset), camera, std::move(name));
+    std::vector<PlacedDataset> one;
+    one.push_back({std::move(dataset), std::move(source), {}});
+    return open(std::move(one), camera, std::move(name));
+}
+
+Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const OrbitCamera& camera, std::string name) {
+    if (datasets.empty()) return Error{.code = ErrorCode::Usage, .message = "there is nothing to open"};
+    VCP_TRY(renderer_->open(datasets));
+    show(datasets, camera, std::move(name));
     return {};
 }
 
-void Viewer::show(std::shared_ptr<const Dataset> dataset, const OrbitCamera& camera, std::string name) {
-    dataset_ = std::move(dataset);
-    const FileHeader& header = dataset_->header;
-    bounds_ = {{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
-               {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}};
+void Viewer::show(const std::vector<PlacedDataset>& datasets, const OrbitCamera& camera, std::string name) {
+    dataset_ = datasets.front().dataset;
+    isPaper_ = true;
+    status_.triangles = status_.levels = 0;
+    for (const PlacedDataset& each : datasets) {
+        const FileHeader& header = each.dataset->header;
+        const Box box = placedBox({{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
+                                   {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}}, each.placement);
+        bounds_ = &each == datasets.data() ? box : Box{glm::min(bounds_.low, box.low), glm::max(bounds_.high, box.high)};
+        isPaper_ = isPaper_ && header.method == Method::Paper;
+        status_.triangles += header.triangles;
+        status_.levels = std::max(status_.levels, header.levels);
+    }
     camera_ = home_ = seen_ = camera;
     drawn_.reset();
     drag_ = Drag::None;
@@ -101,8 +131,6 @@ void Viewer::show(std::shared_ptr<const Dataset> dataset, const OrbitCamera& cam
     sectionAnchors_.clear();
     flySpeed_ = 1;
     status_.name = std::move(name);
-    status_.triangles = header.triangles;
-    status_.levels = header.levels;
     status_.update = {};
     status_.problem.clear();
 }
@@ -115,14 +143,31 @@ Result<void> Viewer::setBudget(uint64_t bytes) {
 
 void Viewer::resize(glm::ivec2 size) { size_ = glm::clamp(size, glm::ivec2(0), glm::ivec2(16384)); }
 
-std::optional<glm::dvec3> Viewer::pointAt(glm::dvec2 pixel) {
+std::optional<PixelHit> Viewer::hitAt(glm::dvec2 pixel) {
     if (!drawn_ || !hasSize()) return std::nullopt;
     // The last picture may be smaller than the window it is shown in.
     const glm::dvec2 at = pixel * glm::dvec2(drawn_->width, drawn_->height) / glm::dvec2(size_);
     if (at.x < 0 || at.y < 0 || at.x >= drawn_->width || at.y >= drawn_->height) return std::nullopt;
     const auto hit = renderer_->pick(static_cast<uint32_t>(at.x), static_cast<uint32_t>(at.y));
-    if (!hit || !*hit) return std::nullopt;
-    return (*hit)->position;
+    return hit ? *hit : std::nullopt;
+}
+
+std::optional<glm::dvec3> Viewer::pointAt(glm::dvec2 pixel) {
+    const auto hit = hitAt(pixel);
+    return hit ? std::optional(hit->position) : std::nullopt;
+}
+
+std::optional<glm::dvec3> Viewer::capAt(glm::dvec2 pixel) {
+    const auto hit = hitAt(pixel);
+    if (!hit || !hit->onCap) return std::nullopt;
+    // The ray enters what is kept through the last of the planes that it crosses towards it.
+    const CameraRay ray = camera_.rayThrough(pixel, size_);
+    double enter = 0;
+    for (const SectionPlane& plane : sections_) {
+        const double along = glm::dot(plane.normal, ray.direction);
+        if (along > 0) enter = std::max(enter, (plane.offset - glm::dot(plane.normal, ray.origin)) / along);
+    }
+    return ray.origin + ray.direction * enter;
 }
 
 glm::dvec3 Viewer::pointOfInterest(glm::dvec2 pixel) {
@@ -302,6 +347,14 @@ void Viewer::moveSections(double steps) {
     for (SectionPlane& plane : sections_) plane.offset += by * glm::length(plane.normal);
 }
 
+std::string Viewer::whyWithout(ViewerAction action) const {
+    if (!isPaper_ || !dataset_) return {};
+    if (action == ViewerAction::ToggleShadows) return "files of the method paper are drawn without shadows";
+    if (action == ViewerAction::ToggleOcclusion) return "files of the method paper are drawn without ambient occlusion";
+    if (action == ViewerAction::ToggleSection && !sections_.empty()) return "sections of files of the method paper have no caps";
+    return {};
+}
+
 void Viewer::act(ViewerAction action) {
     if (!dataset_ || !hasSize()) return;
     switch (action) {
@@ -356,6 +409,14 @@ FrameRequest Viewer::requestWith(int reduction) const {
     return request;
 }
 
+FrameRequest Viewer::pictureOf(glm::ivec2 size) const {
+    FrameRequest request = requestWith(1);
+    request.shading = shading_;
+    request.width = static_cast<uint32_t>(size.x);
+    request.height = static_cast<uint32_t>(size.y);
+    return request;
+}
+
 bool Viewer::refinementIsDue(double now) const {
     if (!pagesChanged_) return false;
     if (status_.update.settled || !drawn_) return true;
@@ -396,6 +457,8 @@ Result<void> Viewer::draw() {
     if (!stats) return stats.error();
     status_.frame = *stats;
     status_.reduction = requestReduction_;
+    const bool wantsLight = request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
+    status_.without = isPaper_ && dataset_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
     // The first frame also compiles; it says nothing about the next. Nor does a moving one trace occlusion.
     if (framesDrawn_ > 0)
         fullFrameMs_ = requestReduction_ * requestReduction_ * (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));

@@ -89,11 +89,12 @@ struct ViewerStatus {
     std::string device;
     bool software = false;
     uint64_t budgetBytes = 0;
+    std::string without;   ///< what is asked for and not drawn, in a few words; empty: nothing
     std::string problem;   ///< the last thing that went wrong, in one line; empty when nothing has
 };
 
-/// The status in one line.
-std::string statusLine(const ViewerStatus& status);
+/// The status in one line of at most so many characters: what matters less is left out.
+std::string statusLine(const ViewerStatus& status, size_t most = std::numeric_limits<size_t>::max());
 
 class Viewer {
 public:
@@ -107,8 +108,11 @@ public:
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source,
                       const OrbitCamera& camera, std::string name);
 
-    /// The same, where a view that shares the device has opened the dataset already.
-    void show(std::shared_ptr<const Dataset> dataset, const OrbitCamera& camera, std::string name);
+    /// Shows several datasets where they are placed. Errors: those of Renderer::open.
+    Result<void> open(std::vector<PlacedDataset> datasets, const OrbitCamera& camera, std::string name);
+
+    /// The same, where a view that shares the device has opened the datasets already; their sources are not looked at.
+    void show(const std::vector<PlacedDataset>& datasets, const OrbitCamera& camera, std::string name);
 
     /// Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);
@@ -140,14 +144,22 @@ public:
     /// Draws what the last update chose.
     Result<void> draw();
 
-    /// World position of what the last picture shows at a pixel.
+    /// What the last picture shows at a pixel.
+    std::optional<PixelHit> hitAt(glm::dvec2 pixel);
+    /// Its world position.
     std::optional<glm::dvec3> pointAt(glm::dvec2 pixel);
+
+    /// Where the last picture shows a section's cap under the cursor: the point of the plane itself. Nothing elsewhere.
+    std::optional<glm::dvec3> capAt(glm::dvec2 pixel);
 
     [[nodiscard]] const OrbitCamera& camera() const { return camera_; }
     /// At once.
     void setCamera(const OrbitCamera& camera) { camera_ = camera; move_.reset(); }
     [[nodiscard]] const Box& bounds() const { return bounds_; }
+    /// The first one; null without any.
     [[nodiscard]] const std::shared_ptr<const Dataset>& dataset() const { return dataset_; }
+    /// Why an action shows nothing on what is open; empty where it shows something.
+    [[nodiscard]] std::string whyWithout(ViewerAction action) const;
     [[nodiscard]] glm::ivec2 size() const { return size_; }
 
     /// How things look, for panels to show and to change.
@@ -155,6 +167,7 @@ public:
     void setShading(const Shading& shading) { shading_ = shading; }
     [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
     void setSections(std::vector<SectionPlane> planes);
+    void setSectionCaps(bool caps) { sectionCaps_ = caps; }
     /// Section planes can be gripped from now on; for a host that draws the handles. `scale`: as of sectionHandle(); 0: no
     /// longer.
     void showSectionHandles(double scale) { handleScale_ = scale; }
@@ -169,6 +182,8 @@ public:
     [[nodiscard]] const ViewerStatus& status() const { return status_; }
     void dismissProblem() { status_.problem.clear(); }
     [[nodiscard]] uint64_t framesDrawn() const { return framesDrawn_; }
+    /// What the window shows, at full quality and of another size, for pictures.
+    [[nodiscard]] FrameRequest pictureOf(glm::ivec2 size) const;
     /// For present() and the pictures.
     [[nodiscard]] Renderer& renderer() { return *renderer_; }
 
@@ -201,6 +216,7 @@ private:
     ViewerOptions options_;
     std::unique_ptr<Renderer> renderer_;
     std::shared_ptr<const Dataset> dataset_;
+    bool isPaper_ = false;  // all datasets are of that method
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;

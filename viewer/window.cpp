@@ -255,7 +255,6 @@ private:
     }
 
     void plainKey(int key) {
-        Viewer& viewer = session_->viewer();
         switch (key) {
             case GLFW_KEY_ESCAPE: escape(); break;
             case GLFW_KEY_F1: interface_.showsHelp = !interface_.showsHelp; break;
@@ -263,23 +262,26 @@ private:
             case GLFW_KEY_D: session_->isMeasuring = !session_->isMeasuring; break;
             case GLFW_KEY_ENTER: session_->measurement().finishLine(); break;
             case GLFW_KEY_BACKSPACE: session_->measurement().takeBack(); break;
-            case GLFW_KEY_HOME: viewer.act(ViewerAction::Reset); break;
+            case GLFW_KEY_HOME: session_->act(ViewerAction::Reset); break;
             case GLFW_KEY_G: toggleFly(); break;
+            case GLFW_KEY_B: session_->showsPages = !session_->showsPages; break;
+            case GLFW_KEY_I: session_->showFeedback(!session_->showsFeedback()); break;
             default:
                 // GLFW names keys by the capitals on them.
-                if (const auto action = actionOf(static_cast<uint32_t>(key))) viewer.act(*action);
+                if (const auto action = actionOf(static_cast<uint32_t>(key))) session_->act(*action);
         }
     }
 
     void toggleFly() {
         letGo();
-        session_->viewer().act(ViewerAction::ToggleFly);
+        session_->act(ViewerAction::ToggleFly);
     }
 
     void escape() {
         if (session_->viewer().cancelSectionDrag()) return;
         if (interface_.showsHelp) interface_.showsHelp = false;
         else if (session_->opening()) session_->opening()->cancel();
+        else if (session_->savingFraction()) session_->cancelSaving();
         else if (session_->viewer().isFlying()) toggleFly();
         else if (session_->isMeasuring) session_->isMeasuring = false;
         else glfwSetWindowShouldClose(window_, GLFW_TRUE);

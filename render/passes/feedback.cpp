@@ -70,7 +70,7 @@ RayFeedback FeedbackPass::read() const {
     for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
         const uint32_t* w = &words[uint64_t{ray} * frame::kFeedbackRayWords];
         if (w[3] == 0 || w[3] > pages_.size()) continue;
-        feedback.hits.push_back({pages_[w[3] - 1], glm::ivec3(w[0], w[1], w[2])});
+        feedback.hits.push_back({pages_[w[3] - 1], glm::ivec3(w[0], w[1], w[2]), ray});
     }
     for (size_t record = 0; record < pages_.size(); ++record)
         if (words[kRayWords + record] != 0) feedback.passed.push_back({pages_[record], double(words[kRayWords + record]) / double(frame::kNearnessOne)});

@@ -30,6 +30,8 @@ constexpr Binding kBindings[] = {
     {kStorage, 1},
     {kStorage, 1},
     {kStorage, 1},
+    {kStorage, 1},
+    {kStorage, 1},
 };
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
@@ -164,6 +166,15 @@ void FrameResources::setFeedback(const Buffer* feedback) {
     setStale_ = true;
 }
 
+void FrameResources::setTarget(const Buffer* picture, const Buffer* depths) {
+    const VkBuffer handles[2] = {picture != nullptr ? picture->handle() : VK_NULL_HANDLE, depths != nullptr ? depths->handle() : VK_NULL_HANDLE};
+    if (handles[0] == targetHandles_[0] && handles[1] == targetHandles_[1]) return;
+    targetPicture_ = picture;
+    targetDepths_ = depths;
+    std::copy(handles, handles + 2, targetHandles_);
+    setStale_ = true;
+}
+
 void FrameResources::writeSet() {
     VkDescriptorBufferInfo buffers[kBindingCount][frame::kMaxPoolChunks] = {};
     VkBufferView views[kBindingCount][frame::kMaxPoolChunks] = {};
@@ -192,6 +203,8 @@ void FrameResources::writeSet() {
     useBuffer(13, 0, picture_);
     useBuffer(14, 0, counters_);
     useBuffer(15, 0, feedback_ != nullptr ? *feedback_ : none_.buffer);
+    useBuffer(16, 0, targetPicture_ != nullptr ? *targetPicture_ : none_.buffer);
+    useBuffer(17, 0, targetDepths_ != nullptr ? *targetDepths_ : none_.buffer);
 
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {

@@ -11,6 +11,8 @@
 // 13        picture                        begin, shade      readback, present
 // 14        counters                       trace             readback
 // 15        feedback (passes/feedback.h)   feedback          readback
+// 16, 17    picture and depths of all      compose           readback, present
+//           datasets (passes/compose.h)
 #pragma once
 
 #include <initializer_list>
@@ -85,6 +87,9 @@ public:
     /// Null, or as long as frames with the feedback pass are drawn.
     void setFeedback(const Buffer* feedback);
 
+    /// Null, or what the pictures of several datasets are composed into.
+    void setTarget(const Buffer* picture, const Buffer* depths);
+
     /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
 
@@ -122,6 +127,9 @@ private:
     const PagePool* colours_ = nullptr;
     const Buffer* feedback_ = nullptr;
     VkBuffer feedbackHandle_ = VK_NULL_HANDLE;  // as of the last call
+    const Buffer* targetPicture_ = nullptr;
+    const Buffer* targetDepths_ = nullptr;
+    VkBuffer targetHandles_[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};  // as of the last call
     bool setStale_ = true;
     uint32_t pipelinesMade_ = 0;
 };

@@ -38,6 +38,12 @@ float skyAbout(uvec2 pixel, float depth, uint plane) {
     return sum / max(count, 1.0);
 }
 
+// From the dataset's own axes.
+vec3 worldNormal(vec3 n) {
+    vec4 q = frame.rotation;
+    return n + 2.0 * cross(q.xyz, cross(q.xyz, n) + q.w * n);
+}
+
 void main() {
     uvec2 pixel;
     uint tile;
@@ -63,7 +69,7 @@ void main() {
         sunSeen = unpackUnorm4x8(fetchHit(frame.extra.x * plane + at)).x;
         if (frame.extra.z > 0u) skySeen = skyAbout(pixel, depth, plane);
     }
-    vec3 colour = frame.mode.w == kShadeNormals ? n * 0.5 + 0.5
+    vec3 colour = frame.mode.w == kShadeNormals ? worldNormal(n) * 0.5 + 0.5
                 : frame.mode.w == kShadeUnlit   ? albedo
                                                 : albedo * encodedLight(n, sunSeen, skySeen);
     picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));

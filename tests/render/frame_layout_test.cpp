@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "render/beam_spirv.h"
+#include "render/compose_spirv.h"
 #include "render/feedback_spirv.h"
 #include "render/frame.h"
 #include "render/light_spirv.h"
@@ -46,7 +47,7 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
     EXPECT_EQ(offsets.at("FrameConstants"),
               (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX), OFFSET(directionY),
                                      OFFSET(originLattice), OFFSET(lattice), OFFSET(picture), OFFSET(mode), OFFSET(lightDirection),
-                                     OFFSET(upDirection), OFFSET(clay), OFFSET(cap), OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(sections)}));
+                                     OFFSET(upDirection), OFFSET(clay), OFFSET(cap), OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(rotation), OFFSET(sections)}));
 }
 
 TEST(FrameLayout, Mesostructure) {
@@ -62,6 +63,7 @@ TEST(FrameLayout, Mesostructure) {
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }
 TEST(FrameLayout, Beam) { expectSameLayout(kBeamSpirv); }
+TEST(FrameLayout, Compose) { expectSameLayout(kComposeSpirv); }
 TEST(FrameLayout, PaperTrace) { expectSameLayout(kPaperTraceSpirv); }
 TEST(FrameLayout, Feedback) { expectSameLayout(kFeedbackSpirv); }
 TEST(FrameLayout, Shade) { expectSameLayout(kShadeSpirv); }

@@ -374,7 +374,39 @@ TEST_F(CommandLine, PicturesInTilesAndSequences) {
 
 TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {
     expectFailure(run({"view", dataset().string()}), 1, "vcp render");
-    expectFailure(run({"view", dataset().string(), dataset().string()}), 2, "one .vcp at a time");
+    expectFailure(run({"view", dataset().string(), ball().string()}), 2, "a scene file");
+    const fs::path scene = *folder_ / "wrong_scene.json";
+    write(scene, "{\n\"datasets\": [{\"file\": \"none.vcp\", \"scale\": 0}]}");
+    expectFailure(run({"view", scene.string()}), 1, scene.string() + ": line 2: \"scale\"");
+    expectFailure(run({"view", scene.string(), scene.string()}), 2, "opened alone");
+}
+
+TEST_F(CommandLine, ScenesOfSeveralDatasets) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const auto render = [&](const std::string& png, std::vector<std::string> arguments) {
+        std::vector<std::string> all{"render", "-o", (*folder_ / png).string(), "--size", "96x64", "--json"};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        const Ran ran = run(all);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return Json::parse(ran.out, nullptr, false);
+    };
+    render("one.png", {dataset().string()});
+    render("twice.png", {dataset().string(), dataset().string()});
+    EXPECT_EQ(readPng(*folder_ / "one.png").value(), readPng(*folder_ / "twice.png").value()) << "two in one place look like one";
+    const fs::path scene = *folder_ / "scene.json";
+    // A small one before the large one, a mesh, and one beside; the camera is the scene's.
+    write(scene, Json{{"datasets", {{{"file", dataset().filename().string()}}, {{"file", ball().string()}, {"scale", 0.25}, {"translate", {0, 0, 1.5}}},
+                                    {{"file", dataset().string()}, {"translate", {-3, 0, 0}}, {"rotate", {{"axis", {0, 0, 1}}, {"degrees", 90}}}}}},
+                      {"camera", {{"position", {-1, 0, 8}}, {"target", {-1, 0, 0}}}}}.dump());
+    const Json whole = render("scene.png", {scene.string(), "--depth", (*folder_ / "scene.pfm").string()});
+    EXPECT_EQ(whole["settled"], true);
+    EXPECT_EQ(whole["camera"]["position"], (Json{-1.0, 0.0, 8.0}));
+    render("tiles.png", {scene.string(), "--tile", "40"});
+    const Picture picture = readPng(*folder_ / "scene.png").value(), tiles = readPng(*folder_ / "tiles.png").value();
+    size_t other = 0;
+    for (size_t i = 0; i < picture.rgba.size(); ++i) other += std::abs(picture.rgba[i] - tiles.rgba[i]) > 3 ? 1 : 0;
+    EXPECT_LT(other, picture.rgba.size() / 200);
+    expectFailure(run({"render", scene.string(), dataset().string(), "-o", "x.png"}), 2, "opened alone");
 }
 
 TEST_F(CommandLine, UnwritableOutputs) {

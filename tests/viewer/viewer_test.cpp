@@ -532,6 +532,70 @@ TEST_F(ViewerTest, StatusLineSaysWhatMatters) {
     EXPECT_EQ(line.find('\n'), std::string::npos);
 }
 
+TEST_F(ViewerTest, StatusLineKeepsToItsRoom) {
+    ViewerStatus status;
+    status.name = "a_rather_long_name_of_a_scan_from_a_museum.ply";
+    status.triangles = 100'000'000;
+    status.levels = 9;
+    status.update.drawable = true;
+    status.update.finestLevel = 8;
+    status.reduction = 2;
+    status.device = "a graphics card with a long name (driver 1.2.3, 256 bits)";
+    for (const size_t most : {40u, 80u, 107u, 200u}) EXPECT_LE(statusLine(status, most).size(), most);
+    EXPECT_NE(statusLine(status, 60).find("loading"), std::string::npos) << statusLine(status, 60);
+    EXPECT_NE(statusLine(status).find(status.name), std::string::npos);
+    EXPECT_NE(statusLine(status).find(status.device), std::string::npos);
+    status.without = "no shadows";
+    EXPECT_NE(statusLine(status, 60).find("no shadows"), std::string::npos);
+}
+
+// Caps are the plane itself, to the last digits.
+TEST_F(ViewerTest, CapsArePickedOnThePlane) {
+    openViewer();
+    viewer_->setSections({{{0, 0, -1}, -0.25}});
+    viewer_->setSectionCaps(true);
+    settle();
+    const auto cap = viewer_->capAt(glm::dvec2(kSize) / 2.0);
+    ASSERT_TRUE(cap);
+    EXPECT_NEAR(cap->z, 0.25, 1e-12);
+    EXPECT_LT(glm::distance(pixelOf(*cap), glm::dvec2(kSize) / 2.0), 1e-6);
+    EXPECT_FALSE(viewer_->capAt({2, 2}));
+    viewer_->setSections({});
+    settle();
+    EXPECT_FALSE(viewer_->capAt(glm::dvec2(kSize) / 2.0));
+}
+
+TEST_F(ViewerTest, TwoDatasetsAreOneScene) {
+    openViewer();
+    const auto dataset = viewer_->dataset();
+    const uint64_t triangles = viewer_->status().triangles;
+    auto reader = openFile(*folder_ / "ball.vcp").value();
+    const auto source = [&] { return std::make_shared<FilePageSource>(reader, dataset); };
+    const Similarity beside{glm::angleAxis(1.0, glm::dvec3(0, 0, 1)), 0.5, {3, 0, 0}};
+    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, viewer_->camera(), "two balls"));
+    EXPECT_EQ(viewer_->status().triangles, 2 * triangles);
+    EXPECT_GT(viewer_->bounds().high.x, 3.4);
+    viewer_->act(ViewerAction::Fit);
+    settle();
+    const auto second = viewer_->pointAt(pixelOf({3, 0, 0}));
+    ASSERT_TRUE(second);
+    EXPECT_NEAR(glm::distance(*second, glm::dvec3(3, 0, 0)), 0.5, 0.06);
+    // What is in memory, and what rays met: kept when it is asked for.
+    const auto pages = viewer_->renderer().residentPages();
+    EXPECT_EQ(pages.size(), viewer_->status().update.pagesResident);
+    const auto drawn = std::count_if(pages.begin(), pages.end(), [](const PageBox& page) { return page.isDrawn; });
+    EXPECT_EQ(static_cast<uint32_t>(drawn), viewer_->status().update.pagesInCut);
+    for (const PageBox& page : pages) EXPECT_NEAR(glm::length(page.edges[0]), glm::length(page.edges[2]), 1e-9);
+    EXPECT_FALSE(viewer_->renderer().feedbackPicture());
+    viewer_->renderer().keepFeedback(true);
+    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, viewer_->camera(), "two balls"));
+    settle();
+    const auto& heard = viewer_->renderer().feedbackPicture();
+    ASSERT_TRUE(heard) << "no frame missed pages";
+    EXPECT_GT(std::count_if(heard->errorPixels.begin(), heard->errorPixels.end(), [](float error) { return error > 0; }), 10);
+    EXPECT_LT(heard->errorPixels[0], 0) << "nothing is in the corner";
+}
+
 TEST_F(ViewerTest, CallsBeforeADatasetDoNothing) {
     auto viewer = Viewer::create({});
     ASSERT_TRUE(viewer) << viewer.error().line();

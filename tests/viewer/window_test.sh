@@ -1,8 +1,8 @@
 #!/bin/bash
-# The real window under Xvfb, driven by xdotool as a person would. Usage: window_test.sh VCP FOLDER.
+# The real window under Xvfb, driven by xdotool as a person would. Usage: window_test.sh VCP FOLDER [DROP_FILE.so].
 # Ends with 77 (skipped) where Xvfb or xdotool is missing.
 set -euo pipefail
-vcp=$1 folder=$2
+vcp=$1 folder=$2 drop=${3:-}
 for tool in Xvfb xdotool import convert; do
     command -v $tool >/dev/null || { echo "skipped: no $tool"; exit 77; }
 done
@@ -159,6 +159,16 @@ waits_for "no picture of the size it was left with" is_resized
 xdotool mousemove --window $window 250 150 click --repeat 9 --delay 20 4
 differs resized unplugged
 ends 0
+
+# A file is dropped into an empty window. Without a dataset the size is the one it was left with.
+if [ -n "$drop" ]; then
+    export VCP_TEST_DROP=$folder/dropped
+    LD_PRELOAD=$drop starts vcp --size 640x480
+    echo "$folder/ball.ply" >dropped.part
+    mv dropped.part dropped
+    waits_for "what was dropped is not shown" is_first dropped_picture
+    ends 0
+fi
 
 # What cannot be opened is said in the window, which stays.
 head -c 3000 ball.ply >broken.ply

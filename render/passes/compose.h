@@ -1,0 +1,39 @@
+// Pictures of several datasets into one, dataset after dataset (shaders/compose.comp): the nearest surface is seen.
+// Reads constants, tile list, hits and picture of the dataset's resources; writes the target: the picture of the first
+// dataset's resources, and depths of its own. Before: the shade pass. After: barrierComputeToReadback, recorded here.
+#pragma once
+
+#include "render/passes/frame_resources.h"
+
+namespace vcp {
+
+/// What is composed into: one a view, as large as its picture.
+class ComposeTarget {
+public:
+    /// Makes the depths fit. Errors: Device.
+    Result<void> resize(Device& device, PictureSize size);
+    /// For the first dataset of a frame: nothing is hit yet. Between begin() and the passes' first barrier.
+    void clear(VkCommandBuffer commands) const;
+    [[nodiscard]] const Buffer& depths() const { return depths_; }
+    /// Pixels that something is hit in. Precondition: the frame is done. Errors: Device.
+    [[nodiscard]] Result<uint32_t> hitPixels(Device& device) const;
+
+private:
+    PictureSize size_;
+    Buffer depths_;  // a word a pixel, and the count of pixels that are hit
+};
+
+class ComposePass {
+public:
+    ComposePass();
+    /// `resources`: of the dataset, with the target set. Makes the pipeline on first use. Errors: Device.
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants);
+    /// Precondition: prepare().
+    void record(VkCommandBuffer commands, const FrameResources& resources) const;
+    void clear() { pipelines_.clear(); }
+
+private:
+    PipelineVariants pipelines_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,28 @@
+// One dataset's picture into that of all: the nearest surface is seen. Reads tile list, hits and the dataset's picture;
+// writes the target's picture and depths, world units, and counts the pixels that something is hit in.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "render/shaders/bindings.glsl"
+#include "render/shaders/tiles.glsl"
+#include "render/shaders/hit_records.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(set = 0, binding = 13, std430) readonly buffer OwnPictureBlock { uint ownPixels[]; };
+layout(set = 0, binding = 16, std430) buffer TargetPictureBlock { uint targetPixels[]; };
+layout(set = 0, binding = 17, std430) buffer TargetDepthBlock { uint targetDepths[]; };  // float bits; behind them the count
+
+void main() {
+    uvec2 pixel;
+    uint tile;
+    if (!listedPixel(tile, pixel)) return;
+    uint at = pixel.y * frame.picture.x + pixel.x;
+    float depth = fetchPixelHit(at).depth;
+    if (depth >= kNoHit) return;
+    float distance = depth * frame.march.y;
+    float before = uintBitsToFloat(targetDepths[at]);
+    if (distance >= before) return;
+    if (before >= kNoHit) atomicAdd(targetDepths[frame.picture.x * frame.picture.y], 1u);
+    targetDepths[at] = floatBitsToUint(distance);
+    targetPixels[at] = ownPixels[at];
+}

@@ -1,0 +1,44 @@
+// Frames in motion: a Viewer driven as a window drives it, while the camera turns once about the dataset and comes as
+// near as a third of the distance; by the wall clock, without a window and without showing the pictures.
+//
+// What is measured follows the machine: each frame is of the time that has passed, so a slow one sees fewer. All that the
+// first view wants is read before, and what comes into view is read meanwhile.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "viewer/viewer.h"
+
+namespace vcp {
+
+struct MotionOptions {
+    ViewerOptions viewer;
+    glm::ivec2 size{1280, 720};
+    double seconds = 10;
+    std::function<bool()> cancel;  ///< true ends it; may be empty
+};
+
+struct MotionReport {
+    double seconds = 0;               ///< that the motion took
+    std::vector<double> frameMs;      ///< from one frame to the next, in order
+    std::map<int, uint64_t> byReduction;  ///< frames drawn at 1, 1/2, ... of width and height
+    double stillMs = 0;               ///< a frame at full size before
+    double fullSizeAfterMs = 0;       ///< from the end of the motion until a frame at full size was drawn
+    std::string device;
+    glm::ivec2 size{0};
+
+    [[nodiscard]] double framesPerSecond() const { return seconds > 0 ? static_cast<double>(frameMs.size()) / seconds : 0; }
+    /// The smallest time that `part` of the frames took at most; 0 without frames.
+    [[nodiscard]] double quantileMs(double part) const;
+};
+
+/// Errors: those of Viewer; Cancelled.
+Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds, const MotionOptions& options);
+
+std::string motionJson(const MotionReport& report);
+std::string motionText(const MotionReport& report);
+
+}  // namespace vcp

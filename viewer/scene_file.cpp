@@ -1,0 +1,310 @@
+#include "viewer/scene_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include "streaming/http_reader.h"
+
+namespace vcp {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::streamsize kLargestFile = 1 << 20;
+constexpr size_t kMostDatasets = 256;
+constexpr int kDeepest = 16;
+
+/// The line of each value of a JSON text, by its JSON pointer; of a member the line of its key.
+class LinesOf {
+public:
+    /// Precondition: the text is valid JSON.
+    explicit LinesOf(std::string_view text) : text_(text) { value("", 0); }
+
+    [[nodiscard]] size_t operator()(const std::string& pointer) const {
+        const auto found = lines_.find(pointer);
+        return found == lines_.end() ? 1 : found->second;
+    }
+
+private:
+    void skipSpace() {
+        for (; at_ < text_.size() && std::string_view(" \t\r\n").find(text_[at_]) != std::string_view::npos; ++at_)
+            if (text_[at_] == '\n') ++line_;
+    }
+
+    std::string string() {
+        const size_t begin = at_++;
+        while (at_ < text_.size() && text_[at_] != '"') at_ += text_[at_] == '\\' ? 2 : 1;
+        ++at_;
+        const Json decoded = Json::parse(text_.substr(begin, at_ - begin), nullptr, false);
+        return decoded.is_string() ? decoded.get<std::string>() : std::string();
+    }
+
+    void value(const std::string& pointer, int depth) {
+        skipSpace();
+        lines_.emplace(pointer, line_);
+        if (at_ >= text_.size() || depth > kDeepest) return;
+        if (text_[at_] == '"') {
+            string();
+        } else if (text_[at_] == '{' || text_[at_] == '[') {
+            members(pointer, depth);
+        } else {
+            while (at_ < text_.size() && std::string_view(",]} \t\r\n").find(text_[at_]) == std::string_view::npos) ++at_;
+        }
+    }
+
+    void members(const std::string& pointer, int depth) {
+        const bool isObject = text_[at_++] == '{';
+        for (size_t i = 0;; ++i) {
+            skipSpace();
+            if (at_ >= text_.size()) return;
+            if (text_[at_] == '}' || text_[at_] == ']') {
+                ++at_;
+                return;
+            }
+            if (text_[at_] == ',') {
+                ++at_;
+                skipSpace();
+            }
+            std::string key = std::to_string(i);
+            if (isObject) {
+                const size_t line = line_;
+                key = string();
+                lines_.emplace(pointer + "/" + key, line);
+                skipSpace();
+                ++at_;
+            }
+            value(pointer + "/" + key, depth + 1);
+        }
+    }
+
+    std::string_view text_;
+    size_t at_ = 0, line_ = 1;
+    std::map<std::string, size_t> lines_;
+};
+
+bool isDeeperThan(const Json& json, int depth) {
+    if (!json.is_structured()) return false;
+    if (depth == 0) return true;
+    return std::any_of(json.begin(), json.end(), [&](const Json& each) { return isDeeperThan(each, depth - 1); });
+}
+
+/// Takes a scene apart and remembers the first thing that is wrong.
+class SceneReader {
+public:
+    SceneReader(const LinesOf& lines, const std::string& name, std::filesystem::path folder) : lines_(lines), name_(name), folder_(std::move(folder)) {}
+
+    SceneFile scene(const Json& json) {
+        SceneFile scene;
+        if (!json.is_object()) return wrong("", "a scene must be a JSON object"), scene;
+        onlyKeys(json, "", {"datasets", "lights", "camera", "sections", "caps", "mesostructure"});
+        if (json.contains("mesostructure")) wrong("/mesostructure", "surfaces with mesostructure are not supported in scenes yet");
+        if (!json.contains("datasets")) wrong("", "\"datasets\" is missing");
+        const Json& datasets = json.value("datasets", Json::array());
+        if (!datasets.is_array() || datasets.empty() || datasets.size() > kMostDatasets) wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostDatasets));
+        for (size_t i = 0; i < datasets.size() && !error_; ++i) scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
+        if (json.contains("lights")) scene.light = light(json["lights"]);
+        if (json.contains("camera")) scene.camera = camera(json["camera"]);
+        if (json.contains("sections")) scene.sections = sections(json["sections"]);
+        if (json.contains("caps")) scene.sectionCaps = flag(json["caps"], "/caps");
+        return scene;
+    }
+
+    [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+private:
+    void wrong(const std::string& at, const std::string& what) {
+        if (error_) return;
+        const std::string key = at.substr(at.rfind('/') + 1);
+        const bool isKey = !key.empty() && !std::all_of(key.begin(), key.end(), [](char c) { return c >= '0' && c <= '9'; });
+        error_ = Error{ErrorCode::InvalidInput, isKey ? fmt::format("\"{}\" {}", key, what) : what, name_, fmt::format("line {}", lines_(at))};
+    }
+
+    void onlyKeys(const Json& object, const std::string& at, std::initializer_list<std::string_view> keys) {
+        for (const auto& [key, value] : object.items())
+            if (std::find(keys.begin(), keys.end(), key) == keys.end()) wrong(at + "/" + key, fmt::format("is no key here; there are {}", fmt::join(keys, ", ")));
+    }
+
+    double number(const Json& value, const std::string& at) {
+        if (!value.is_number() || !std::isfinite(value.get<double>())) return wrong(at, "must be a number"), 0;
+        return value.get<double>();
+    }
+
+    bool flag(const Json& value, const std::string& at) {
+        if (!value.is_boolean()) return wrong(at, "must be true or false"), false;
+        return value.get<bool>();
+    }
+
+    glm::dvec3 triple(const Json& value, const std::string& at) {
+        glm::dvec3 v(0);
+        if (!value.is_array() || value.size() != 3) return wrong(at, "must be three numbers"), v;
+        for (int i = 0; i < 3; ++i) {
+            if (!value[size_t(i)].is_number()) return wrong(at, "must be three numbers"), v;
+            v[i] = number(value[size_t(i)], at);
+        }
+        return v;
+    }
+
+    glm::dvec3 direction(const Json& object, const char* key, const std::string& at) {
+        if (!object.contains(key)) return wrong(at, fmt::format("\"{}\" is missing", key)), glm::dvec3(1, 0, 0);
+        const std::string there = at + "/" + key;
+        const glm::dvec3 v = triple(object[key], there);
+        if (!(glm::length(v) > 0) || !std::isfinite(glm::length(v))) return wrong(there, "must not be zero"), glm::dvec3(1, 0, 0);
+        return v;
+    }
+
+    bool isObject(const Json& value, const std::string& at) {
+        if (!value.is_object()) wrong(at, "must be an object");
+        return value.is_object();
+    }
+
+    SceneDataset dataset(const Json& json, const std::string& at) {
+        SceneDataset made;
+        if (!isObject(json, at)) return made;
+        onlyKeys(json, at, {"file", "transform", "translate", "rotate", "scale"});
+        if (!json.contains("file")) wrong(at, "\"file\" is missing");
+        else if (!json["file"].is_string() || json["file"].get<std::string>().empty()) wrong(at + "/file", "must be a file's name");
+        else made.file = fileNamed(json["file"].get<std::string>());
+        if (json.contains("transform")) {
+            for (const char* other : {"translate", "rotate", "scale"})
+                if (json.contains(other)) wrong(at + "/" + other, "does not go with \"transform\"");
+            made.placement = matrix(json["transform"], at + "/transform");
+            return made;
+        }
+        if (json.contains("translate")) made.placement.translation = triple(json["translate"], at + "/translate");
+        if (json.contains("rotate")) made.placement.rotation = rotation(json["rotate"], at + "/rotate");
+        if (json.contains("scale")) made.placement.scale = scale(json["scale"], at + "/scale");
+        return made;
+    }
+
+    [[nodiscard]] std::string fileNamed(const std::string& file) const {
+        return isHttpUrl(file) || std::filesystem::path(file).is_absolute() ? file : (folder_ / file).lexically_normal().string();
+    }
+
+    double scale(const Json& value, const std::string& at) {
+        if (value.is_array()) return wrong(at, "must be one number: other scales along other axes are not supported"), 1;
+        const double s = number(value, at);
+        if (!(s > 0)) return wrong(at, "must be above 0"), 1;
+        return s;
+    }
+
+    glm::dquat rotation(const Json& json, const std::string& at) {
+        if (!isObject(json, at)) return {1, 0, 0, 0};
+        onlyKeys(json, at, {"axis", "degrees"});
+        if (!json.contains("degrees")) wrong(at, "needs \"degrees\"");
+        const glm::dvec3 axis = direction(json, "axis", at);
+        const double degrees = json.contains("degrees") ? number(json["degrees"], at + "/degrees") : 0;
+        return glm::angleAxis(std::remainder(degrees, 360) * std::numbers::pi / 180, glm::normalize(axis));
+    }
+
+    Similarity matrix(const Json& json, const std::string& at) {
+        std::array<double, 16> rows{};
+        bool good = json.is_array() && json.size() == 4;
+        for (size_t i = 0; good && i < 16; ++i) {
+            good = json[i / 4].is_array() && json[i / 4].size() == 4 && json[i / 4][i % 4].is_number();
+            if (good) rows[i] = json[i / 4][i % 4].get<double>();
+        }
+        if (!good) return wrong(at, "must be four rows of four numbers"), Similarity{};
+        const auto placement = similarityFromMatrix(rows);
+        if (!placement) return wrong(at, placement.error().message), Similarity{};
+        return *placement;
+    }
+
+    std::optional<SceneLight> light(const Json& json) {
+        if (!json.is_array() || json.size() > 1) return wrong("/lights", "must be a list of at most one light; more are not supported"), std::nullopt;
+        if (json.empty() || !isObject(json[0], "/lights/0")) return std::nullopt;
+        onlyKeys(json[0], "/lights/0", {"direction", "follows_camera"});
+        SceneLight made;
+        made.direction = glm::vec3(glm::normalize(direction(json[0], "direction", "/lights/0")));
+        made.followsCamera = json[0].contains("follows_camera") && flag(json[0]["follows_camera"], "/lights/0/follows_camera");
+        return made;
+    }
+
+    std::optional<OrbitCamera> camera(const Json& json) {
+        if (!isObject(json, "/camera")) return std::nullopt;
+        const auto made = cameraFromJson(json.dump(), name_);
+        if (made) return *made;
+        // The field is named by the error: "\"target\"".
+        std::string field = made.error().element;
+        std::erase(field, '"');
+        wrong(json.contains(field) ? "/camera/" + field : "/camera", json.contains(field) ? made.error().message : fmt::format("\"{}\" {}", field, made.error().message));
+        return std::nullopt;
+    }
+
+    std::vector<SectionPlane> sections(const Json& json) {
+        std::vector<SectionPlane> planes;
+        if (!json.is_array() || json.size() > kMostSections) return wrong("/sections", fmt::format("must be a list of at most {} planes", kMostSections)), planes;
+        for (size_t i = 0; i < json.size() && !error_; ++i) {
+            const std::string at = fmt::format("/sections/{}", i);
+            if (!isObject(json[i], at)) return planes;
+            onlyKeys(json[i], at, {"normal", "offset"});
+            if (!json[i].contains("offset")) wrong(at, "\"offset\" is missing");
+            planes.push_back({direction(json[i], "normal", at), json[i].contains("offset") ? number(json[i]["offset"], at + "/offset") : 0});
+        }
+        return planes;
+    }
+
+    const LinesOf& lines_;
+    const std::string& name_;
+    std::filesystem::path folder_;
+    std::optional<Error> error_;
+};
+
+/// Where a text stops being JSON, numbers that no double holds among it.
+class FirstMistake : public nlohmann::detail::json_sax_acceptor<Json> {
+public:
+    bool parse_error(size_t byte, const std::string&, const Json::exception& e) {
+        at = byte > 0 ? byte - 1 : 0;
+        isNumber = dynamic_cast<const Json::out_of_range*>(&e) != nullptr;
+        return false;
+    }
+    size_t at = 0;
+    bool isNumber = false;
+};
+
+/// Nothing: it is JSON.
+std::optional<Error> notJson(std::string_view text, const std::string& name) {
+    FirstMistake mistake;
+    if (Json::sax_parse(text, &mistake)) return std::nullopt;
+    const size_t at = std::min(mistake.at, text.size());
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    const char* what = mistake.isNumber ? "a number is out of range" : "the JSON breaks off or goes wrong here";
+    return Error{ErrorCode::InvalidInput, what, name, fmt::format("line {}", line), at};
+}
+
+}  // namespace
+
+bool isSceneName(const std::string& name) { return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json"; }
+
+Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+    if (auto error = notJson(text, name)) return *std::move(error);
+    const Json json = Json::parse(text);
+    if (isDeeperThan(json, kDeepest)) return Error{ErrorCode::InvalidInput, "not a scene: nested too deeply", name};
+    const LinesOf lines(text);
+    SceneReader reader(lines, name, folder);
+    SceneFile scene = reader.scene(json);
+    if (reader.error()) return *reader.error();
+    return scene;
+}
+
+Result<SceneFile> readScene(const std::filesystem::path& path) {
+    std::error_code failed;
+    std::ifstream file(path, std::ios::binary);
+    if (!file || std::filesystem::is_directory(path, failed)) return Error{ErrorCode::Io, "cannot be opened", path.string()};
+    std::string text(static_cast<size_t>(kLargestFile) + 1, '\0');
+    file.read(text.data(), kLargestFile + 1);
+    if (file.bad()) return Error{ErrorCode::Io, "cannot be read", path.string()};
+    if (file.gcount() > kLargestFile) return Error{ErrorCode::Limit, "too large for a scene file", path.string()};
+    text.resize(static_cast<size_t>(file.gcount()));
+    return sceneFromJson(text, path.string(), path.parent_path());
+}
+
+}  // namespace vcp

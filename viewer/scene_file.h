@@ -1,0 +1,46 @@
+// Scene files: several datasets with their places, light, camera and section planes, in JSON. docs/scenes.md has the
+// schema and an example.
+//
+// Unknown keys are errors, so that a misspelt one is not passed over. Errors name the file, the line and the key.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "octree/result.h"
+#include "render/renderer.h"
+#include "viewer/orbit_camera.h"
+
+namespace vcp {
+
+struct SceneDataset {
+    std::string file;  ///< a .vcp or its address, or a mesh
+    Similarity placement;
+};
+
+struct SceneLight {
+    bool followsCamera = true;
+    glm::vec3 direction{0};  ///< as Shading::lightDirection
+};
+
+struct SceneFile {
+    std::vector<SceneDataset> datasets;  ///< at least one
+    std::optional<SceneLight> light;
+    std::optional<OrbitCamera> camera;
+    std::vector<SectionPlane> sections;  ///< at most kMostSections
+    bool sectionCaps = false;
+};
+
+/// Whether a name stands for a scene file: it ends in .json.
+bool isSceneName(const std::string& name);
+
+/// Relative files are taken from `folder`. `name` stands for the file in errors. May be hostile. Errors: InvalidInput.
+Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+
+/// sceneFromJson of a file of at most 1 MiB. Errors: also Io, Limit.
+Result<SceneFile> readScene(const std::filesystem::path& path);
+
+}  // namespace vcp
