@@ -44,8 +44,10 @@ void wrapped(const std::string& line) {
     ImGui::PopTextWrapPos();
 }
 
+/// On a dark ground: what is behind may be as light as the text.
 void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
-    list.AddText(vec(at + 1.0f), kShade, line.data(), line.data() + line.size());
+    const ImVec2 size = ImGui::CalcTextSize(line.data(), line.data() + line.size());
+    list.AddRectFilled({at.x - 3, at.y - 1}, {at.x + size.x + 3, at.y + size.y + 1}, kShade, 3);
     list.AddText(vec(at), kInk, line.data(), line.data() + line.size());
 }
 
@@ -272,9 +274,8 @@ void Interface::layOutMeasuring() {
 
 void Interface::layOutPicture() {
     ImGui::Combo("size", &pictureSize_, kPictureSizeNames, static_cast<int>(std::size(kPictureSizeNames)));
-    const glm::ivec2 size = pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_];
     ImGui::BeginDisabled(session_->savingFraction().has_value());
-    if (ImGui::Button("Save picture")) session_->savePicture(size);
+    if (ImGui::Button("Save picture")) savePicture();
     ImGui::EndDisabled();
 }
 
@@ -447,6 +448,10 @@ void Interface::pasteCamera() { session_->pasteCamera(host_.pasteText()); }
 void Interface::copyMeasurement() {
     host_.copyText(measurementText(session_->measurement()));
     session_->note("measurement copied");
+}
+
+void Interface::savePicture() {
+    session_->savePicture(pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_]);
 }
 
 }  // namespace vcp

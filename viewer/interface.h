@@ -32,6 +32,8 @@ public:
     void copyCamera();
     void pasteCamera();
     void copyMeasurement();
+    /// Of the size chosen in the panel.
+    void savePicture();
 
 private:
     void layOutStatus();

@@ -34,6 +34,7 @@ constexpr KeyHelp kKeyMap[] = {
     {"I", "inset: which rays asked for finer subvolumes"},
     {"D", "measure: click points; Enter ends a line, Backspace takes a point back"},
     {"Ctrl+E", "write what is measured: measurement-1.csv, .json"},
+    {"Ctrl+S", "save the picture: picture-1.png, of the size chosen in the panel"},
     {"Tab", "the panel"},
     {"F1", "this list"},
     {"Esc", "ends what is going on, else the program"},

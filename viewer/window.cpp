@@ -251,6 +251,7 @@ private:
         if (key == GLFW_KEY_C) interface_.copyCamera();
         if (key == GLFW_KEY_V) interface_.pasteCamera();
         if (key == GLFW_KEY_E) session_->exportMeasurement();
+        if (key == GLFW_KEY_S) interface_.savePicture();
         if (key == GLFW_KEY_Q) glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }
 
