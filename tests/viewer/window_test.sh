@@ -122,9 +122,10 @@ is_saved() { [ -s picture-1.png ]; }
 waits_for "no picture is saved" is_saved
 [ "$(convert front.png -crop 640x400+0+0 +repage shown.png; convert picture-1.png -crop 640x400+0+0 +repage saved.png
     compare -metric AE -fuzz 2% shown.png saved.png null: 2>&1 || true)" -lt 100 ] || fail "what is saved is not what was shown"
+differs front noted
 key x
 # The section's handle is in the middle of the window; Esc puts the plane back, and the window stays.
-waits_for "no section" is_other front section
+waits_for "no section" is_other noted section
 xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 320 190
 waits_for "the section does not move" is_other section moved
 key Escape
