@@ -42,7 +42,7 @@ struct MarchResult {
     glm::vec3 normal{0};            ///< unit, of a hit where the method knows it
     uint32_t iterations = 0;        ///< steps, refinements included
     uint32_t fetches = 0;
-    uint32_t surfaceTests = 0;      ///< cells, texels or patches that were solved
+    uint32_t surfaceTests = 0;      ///< cells, texels or patches that were solved; of relief mapping the refinements
 };
 
 class Marcher {

@@ -73,7 +73,7 @@ private:
         for (int i = 0; i < options_.refinements; ++i) {
             const float chord = low + (high - low) * (fLow / (fLow - fHigh));
             t = options_.refinement == Refinement::Binary || !(chord >= low && chord <= high) ? 0.5f * (low + high) : chord;
-            ++result.iterations;
+            ++result.iterations, ++result.surfaceTests;
             const float f = line.f(t, result);
             if (std::abs(f) < options_.tolerance || f == 0) break;
             // Illinois (Dowell and Jarratt 1971): an end that is kept twice counts half.
@@ -96,7 +96,7 @@ private:
         for (int i = 0; i < options_.refinements; ++i) {
             const float lineSlope = (upperH - lowerH) / (upperD - lowerD), at = (upperH - lineSlope * upperD - depth0) / (slope - lineSlope);
             if (!std::isfinite(at)) break;
-            ++result.iterations;
+            ++result.iterations, ++result.surfaceTests;
             const float f = line.f(at, result), depth = depth0 + slope * at, surface = depth + f;
             best = surface;
             if (surface < depth) upperH = surface, upperD = at;

@@ -256,7 +256,7 @@ Result<void> compareCompression(std::vector<MesoPublished>& published) {
         if (!map) return map.error();
         const auto compressed = compressMap(*map, std::array{row.block});
         if (!compressed) return compressed.error();
-        published.push_back({fmt::format("Table 3: texels, blocks of {}", row.block), row.asset, row.ratio, row.ratio, compressed->texelRatio(), 0});
+        published.push_back({fmt::format("Table 3: texels, blocks of {}", row.block), row.asset, "texels", row.ratio, row.ratio, compressed->texelRatio(), 0});
     }
     return {};
 }

@@ -1,15 +1,19 @@
-// vcp meso render: a picture of mesostructure on a surface.
+// vcp meso render: pictures of mesostructure on surfaces, one a method, side by side.
 #include "viewer/command_meso_render.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <numbers>
+#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <glm/common.hpp>
 
 #include "viewer/image_files.h"
+#include "viewer/meso_backdrop.h"
 #include "viewer/meso_scene.h"
 #include "viewer/option_values.h"
 #include "viewer/render_settings.h"
@@ -21,10 +25,10 @@ namespace {
 constexpr double kFov = 0.6;
 
 struct RenderMeso {
-    std::vector<std::string> assets, colours;
-    std::vector<double> tiles, heights;
+    std::vector<std::string> assets, surfaces, colours, places, methods{"boxes"};
+    std::vector<double> tiles, heights, scales;
     MesoSurfaceDescription description;
-    std::string out, size = "960x640", view = "30,35", camera, light = "0.5,-0.4,0.75", device, depth, cones = "4x1";
+    std::string out, size = "960x640", view = "30,35", camera, light, up = "z", scan, device, depth, cones = "4x1";
     bool shadows = false, heat = false, noBase = false, validation = false;
     int frames = 0;
     ReportOptions report;
@@ -56,27 +60,45 @@ Result<T> valueOf(const std::vector<T>& values, size_t i, size_t count, T otherw
     return values[i];
 }
 
-Result<std::vector<MesoSurfaceDescription>> descriptionsOf(const RenderMeso& c) {
+Result<glm::dvec3> threeOf(const std::string& text, const char* option, const char* example) {
+    const std::vector<double> numbers = numbersOf(text);
+    if (numbers.size() != 3) return wrong(fmt::format("{} must be like {}, not \"{}\"", option, example, text));
+    return glm::dvec3(numbers[0], numbers[1], numbers[2]);
+}
+
+UpAxis upOf(const RenderMeso& c) { return c.up == "y" ? UpAxis::Y : UpAxis::Z; }
+
+Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
     constexpr const char* kColours[] = {"0.78,0.76,0.72", "0.95,0.74,0.22", "0.55,0.68,0.8", "0.72,0.45,0.36"};
+    MesoSurfaceDescription d = c.description;
+    const size_t count = c.assets.size();
+    const auto surface = valueOf(c.surfaces, i, count, std::string("quad"), "--surface");
+    if (!surface) return surface.error();
+    const auto tiles = valueOf(c.tiles, i, count, 4.0, "--tiles"), height = valueOf(c.heights, i, count, 1.0, "--height"), scale = valueOf(c.scales, i, count, 1.0, "--scale");
+    for (const auto* value : {&tiles, &height, &scale})
+        if (!*value) return value->error();
+    if (!(*scale > 0)) return wrong("--scale must be above 0");
+    const auto place = valueOf(c.places, i, count, std::string("0,0,0"), "--at"), colour = valueOf(c.colours, i, count, std::string(kColours[i % std::size(kColours)]), "--colour");
+    for (const auto* value : {&place, &colour})
+        if (!*value) return value->error();
+    const auto at = threeOf(*place, "--at", "0,0.5,0"), rgb = threeOf(*colour, "--colour", "0.8,0.7,0.6");
+    for (const auto* value : {&at, &rgb})
+        if (!*value) return value->error();
+    const std::vector<double> cones = numbersOf(std::string(c.cones).replace(std::min(c.cones.find('x'), c.cones.size()), 1, ","));
+    if (cones.size() != 2) return wrong("--cones must be like 4x2, not \"" + c.cones + "\"");
+    d.asset = c.assets[i], d.base = *surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale, d.place = *at, d.colour = glm::vec3(*rgb), d.up = upOf(c);
+    d.method.cones = {int(cones[0]), int(cones[1])};
+    return d;
+}
+
+Result<std::vector<MesoSurfaceDescription>> descriptionsOf(const RenderMeso& c) {
     std::vector<MesoSurfaceDescription> all;
     for (size_t i = 0; i < c.assets.size(); ++i) {
-        MesoSurfaceDescription d = c.description;
-        d.asset = c.assets[i];
-        const auto tiles = valueOf(c.tiles, i, c.assets.size(), 4.0, "--tiles");
-        if (!tiles) return tiles.error();
-        const auto height = valueOf(c.heights, i, c.assets.size(), 1.0, "--height");
-        if (!height) return height.error();
-        const auto colour = valueOf(c.colours, i, c.assets.size(), std::string(kColours[i % std::size(kColours)]), "--colour");
-        if (!colour) return colour.error();
-        const std::vector<double> rgb = numbersOf(*colour);
-        if (rgb.size() != 3) return wrong("--colour must be like 0.8,0.7,0.6, not \"" + *colour + "\"");
-        d.tiles = *tiles, d.heightScale = *height, d.colour = {float(rgb[0]), float(rgb[1]), float(rgb[2])};
-        const std::vector<double> cones = numbersOf(std::string(c.cones).replace(std::min(c.cones.find('x'), c.cones.size()), 1, ","));
-        if (cones.size() != 2) return wrong("--cones must be like 4x2, not \"" + c.cones + "\"");
-        d.method.cones = {int(cones[0]), int(cones[1])};
-        // A base is drawn once.
-        d.withBase = !c.noBase && i == 0;
-        all.push_back(std::move(d));
+        auto d = descriptionOf(c, i);
+        if (!d) return d.error();
+        // A base is drawn once: with the first asset on it, and not beside a quad where that has sunk a little.
+        d->withBase = !c.noBase && std::ranges::none_of(all, [&](const MesoSurfaceDescription& other) { return other.base == d->base && (other.place == d->place || d->base == "quad"); });
+        all.push_back(*std::move(d));
     }
     return all;
 }
@@ -84,7 +106,7 @@ Result<std::vector<MesoSurfaceDescription>> descriptionsOf(const RenderMeso& c) 
 Result<Camera> cameraOf(const RenderMeso& c, const Box& bounds, glm::ivec2 size) {
     if (!c.camera.empty()) {
         RenderSettings settings;
-        settings.camera = c.camera, settings.up = "z";
+        settings.camera = c.camera, settings.up = c.up;
         const auto camera = settings.cameraFor(bounds, size);
         if (!camera) return camera.error();
         return camera->current();
@@ -93,63 +115,136 @@ Result<Camera> cameraOf(const RenderMeso& c, const Box& bounds, glm::ivec2 size)
     if (view.size() < 2 || view.size() > 3 || std::abs(view[1]) >= 90 || (view.size() == 3 && !(view[2] > 0)))
         return wrong("--view must be an azimuth and an elevation below 90 degrees, like 30,35, or with a magnification, like 30,35,2; not \"" + c.view + "\"");
     const double turn = view[0] * std::numbers::pi / 180, rise = view[1] * std::numbers::pi / 180;
-    const glm::dvec3 forward(-std::cos(rise) * std::cos(turn), -std::cos(rise) * std::sin(turn), -std::sin(rise));
-    Camera camera = fitCamera(bounds.low, bounds.high, forward, {0, 0, 1}, kFov, double(size.x) / size.y);
+    const glm::dvec3 forward = turnedUp({-std::cos(rise) * std::cos(turn), -std::cos(rise) * std::sin(turn), -std::sin(rise)}, upOf(c));
+    Camera camera = fitCamera(bounds.low, bounds.high, forward, turnedUp({0, 0, 1}, upOf(c)), kFov, double(size.x) / size.y);
     if (view.size() == 3) camera.verticalFov = 2 * std::atan(std::tan(kFov / 2) / view[2]);
     return camera;
 }
 
-Result<int> runRender(const RenderMeso& command) {
-    const auto size = parseSize(command.size);
-    if (!size) return wrong("--size must be like 960x640, not \"" + command.size + "\"");
-    const auto descriptions = descriptionsOf(command);
-    if (!descriptions) return descriptions.error();
-    const auto scene = makeMesoScene(*descriptions);
-    if (!scene) return scene.error();
-    const auto camera = cameraOf(command, scene->bounds, *size);
-    if (!camera) return camera.error();
-    const auto light = parseDirection(command.light);
-    if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
-    auto renderer = MesoRenderer::create({.device = command.device, .validation = command.validation});
-    if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->setSurfaces(scene->surfaces));
-    MesoRequest request;
-    request.look.camera = *camera, request.look.light = *light, request.look.shadows = command.shadows, request.look.heat = command.heat;
-    request.width = uint32_t(size->x), request.height = uint32_t(size->y);
+/// One method's picture.
+struct Panel {
+    Picture picture;
+    Json json;
+    std::string line;
+};
+
+Picture besideEachOther(const std::vector<Panel>& panels) {
+    if (panels.size() == 1) return panels.front().picture;
+    const uint32_t width = panels.front().picture.width, height = panels.front().picture.height;
+    Picture all{uint32_t(width * panels.size()), height, {}};
+    all.rgba.reserve(size_t{4} * all.width * height);
+    for (uint32_t y = 0; y < height; ++y)
+        for (const Panel& panel : panels) {
+            const auto row = panel.picture.rgba.begin() + std::ptrdiff_t(size_t{4} * y * width);
+            all.rgba.insert(all.rgba.end(), row, row + std::ptrdiff_t(size_t{4} * width));
+        }
+    return all;
+}
+
+Result<MesoFrameStats> drawFrames(MesoRenderer& renderer, const MesoRequest& request, int frames) {
     MesoFrameStats stats;
     std::vector<double> times;
-    for (int i = 0; i <= command.frames; ++i) {
-        const auto drawn = (*renderer)->render(request);
+    for (int i = 0; i <= frames; ++i) {
+        const auto drawn = renderer.render(request);
         if (!drawn) return drawn.error();
         stats = *drawn;
         if (i > 0) times.push_back(stats.msFrame);
     }
     std::ranges::sort(times);
     if (!times.empty()) stats.msFrame = times[times.size() / 2];
-    const auto picture = (*renderer)->readPicture();
+    return stats;
+}
+
+Result<Panel> drawPanel(MesoRenderer& renderer, const MesoRequest& request, const RenderMeso& command, const std::string& method) {
+    const auto stats = drawFrames(renderer, request, command.frames);
+    if (!stats) return stats.error();
+    auto picture = renderer.readPicture();
     if (!picture) return picture.error();
-    VCP_TRY(writePng(*picture, command.out));
-    const auto depth = (*renderer)->readDepth();
+    const auto depth = renderer.readDepth();
     if (!depth) return depth.error();
     if (!command.depth.empty()) VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth));
-    const auto iterations = (*renderer)->readIterations();
+    const auto iterations = renderer.readIterations();
     if (!iterations) return iterations.error();
+    const std::vector<std::string> problems = renderer.validationMessages();
+    if (!problems.empty()) return Error{.code = ErrorCode::Device, .message = problems.front()};
     uint64_t covered = 0;
     double sum = 0;
     for (const float d : *depth) covered += std::isfinite(d);
     for (const uint32_t n : *iterations) sum += n;
-    const std::vector<std::string> problems = (*renderer)->validationMessages();
-    if (!problems.empty()) return Error{.code = ErrorCode::Device, .message = problems.front()};
+    const double mean = sum / double(depth->size());
+    return Panel{*std::move(picture),
+                 {{"method", method}, {"ms_per_frame", stats->msFrame}, {"hit_pixels", covered}, {"iterations_mean", mean}, {"unresolved", stats->unresolved}, {"asset_bytes", stats->assetBytes}},
+                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame, mean, stats->unresolved, formatBytes(stats->assetBytes))};
+}
+
+Result<MesoRequest> requestOf(const RenderMeso& command, const Box& bounds) {
+    const auto size = parseSize(command.size);
+    if (!size) return wrong("--size must be like 960x640, not \"" + command.size + "\"");
+    const auto camera = cameraOf(command, bounds, *size);
+    if (!camera) return camera.error();
+    const auto light = command.light.empty() ? turnedUp({0.5, -0.4, 0.75}, upOf(command)) : parseDirection(command.light);
+    if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
+    MesoRequest request;
+    request.look.camera = *camera, request.look.light = *light, request.look.up = turnedUp({0, 0, 1}, upOf(command));
+    request.look.shadows = command.shadows, request.look.heat = command.heat;
+    request.width = uint32_t(size->x), request.height = uint32_t(size->y);
+    return request;
+}
+
+Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels, const std::vector<std::string>& warnings, const DeviceInfo& device) {
     if (command.report.json) {
-        VCP_TRY(printJson({{"file", command.out}, {"method", command.description.method.name}, {"surface", command.description.base}, {"device", (*renderer)->device().name},
-                           {"ms_per_frame", stats.msFrame}, {"hit_pixels", covered}, {"iterations_mean", sum / double(depth->size())}, {"unresolved", stats.unresolved},
-                           {"asset_bytes", stats.assetBytes}, {"warnings", scene->warnings}}));
+        Json json = {{"file", command.out}, {"device", device.name}, {"warnings", warnings}, {"panels", Json::array()}};
+        for (const Panel& panel : panels) json["panels"].push_back(panel.json);
+        VCP_TRY(printJson(json));
         return 0;
     }
-    for (const std::string& warning : scene->warnings) VCP_TRY(printLine("warning: " + warning));
-    VCP_TRY(printLine(fmt::format("{}: {} on {}, {:.1f} ms on {}, {:.1f} iterations a pixel, {} unresolved, {}", command.out, command.description.method.name,
-                                  command.description.base, stats.msFrame, (*renderer)->device().name, sum / double(depth->size()), stats.unresolved, formatBytes(stats.assetBytes))));
+    for (const std::string& warning : warnings) VCP_TRY(printLine("warning: " + warning));
+    VCP_TRY(printLine(fmt::format("{} on {}", command.out, device.name)));
+    for (const Panel& panel : panels) VCP_TRY(printLine("  " + panel.line));
     return 0;
+}
+
+Result<int> runRender(const RenderMeso& command) {
+    if (command.methods.size() > 1 && !command.depth.empty()) return wrong("--depth is of one method");
+    auto descriptions = descriptionsOf(command);
+    if (!descriptions) return descriptions.error();
+    std::unique_ptr<MesoRenderer> renderer;
+    std::optional<MesoBackdrop> backdrop;
+    std::optional<MesoBehind> behind;
+    std::vector<std::string> warnings;
+    std::vector<Panel> panels;
+    for (const std::string& method : command.methods) {
+        for (MesoSurfaceDescription& d : *descriptions) d.method.name = method;
+        const auto scene = makeMesoScene(*descriptions);
+        if (!scene) return scene.error();
+        if (!renderer) {
+            warnings = scene->warnings;
+            auto made = MesoRenderer::create({.device = command.device, .validation = command.validation});
+            if (!made) return made.error();
+            renderer = *std::move(made);
+            if (!command.scan.empty()) {
+                auto opened = MesoBackdrop::open(command.scan, command.device);
+                if (!opened) return opened.error();
+                backdrop = *std::move(opened);
+            }
+        }
+        Box bounds = scene->bounds;
+        if (backdrop) bounds = {glm::min(bounds.low, backdrop->bounds().low), glm::max(bounds.high, backdrop->bounds().high)};
+        auto request = requestOf(command, bounds);
+        if (!request) return request.error();
+        if (backdrop && !behind) {
+            auto drawn = backdrop->draw(*request);
+            if (!drawn) return drawn.error();
+            behind = *std::move(drawn);
+        }
+        if (behind) request->behind = &*behind;
+        VCP_TRY(renderer->setSurfaces(scene->surfaces));
+        auto panel = drawPanel(*renderer, *request, command, method);
+        if (!panel) return panel.error();
+        panels.push_back(*std::move(panel));
+    }
+    VCP_TRY(writePng(besideEachOther(panels), command.out));
+    return report(command, panels, warnings, renderer->device());
 }
 
 }  // namespace
@@ -157,11 +252,20 @@ Result<int> runRender(const RenderMeso& command) {
 RunCommand addMesoRender(CLI::App& meso) {
     auto command = std::make_shared<RenderMeso>();
     MesoSurfaceDescription& d = command->description;
-    CLI::App* app = meso.add_subcommand("render", "A picture of assets on a surface");
-    app->add_option("ASSET", command->assets, "Procedural ones by name, or assets (.meso); several lie on the same surface")->type_name("")->required();
+    CLI::App* app = meso.add_subcommand("render", "A picture of assets on surfaces");
+    app->add_option("ASSET", command->assets, "Procedural ones by name, or assets (.meso)")->type_name("")->required();
     app->add_option("-o,--output", command->out, "The PNG to write")->type_name("FILE")->required();
-    app->add_option("--surface", d.base, fmt::format("{}, or a mesh with texture coordinates", fmt::join(meso::baseSurfaceNames(), ", ")))->type_name("BASE")->capture_default_str();
-    app->add_option("--method", d.method.name, fmt::format("{}", fmt::join(meso::methodNames(), ", ")))->type_name("NAME")->capture_default_str();
+    app->add_option("--surface", command->surfaces, fmt::format("{}, or a mesh with texture coordinates; for all assets, or each [quad]", fmt::join(meso::baseSurfaceNames(), ", ")))
+        ->type_name("BASE")
+        ->allow_extra_args(false);
+    app->add_option("--at", command->places, "Where the surface's origin is, world units; for all assets, or each [0,0,0]")->type_name("X,Y,Z")->allow_extra_args(false);
+    app->add_option("--scale", command->scales, "Times the surface's own size; for all assets, or each [1]")->type_name("X")->allow_extra_args(false);
+    app->add_option("--scan", command->scan, "An octree (.vcp) in the same picture, or a mesh, which is built into the cache first")->type_name("FILE");
+    app->add_option("--up", command->up, "Which way is up, for surfaces and view")->capture_default_str()->check(CLI::IsMember({"y", "z"}));
+    app->add_option("--method", command->methods, fmt::format("{}; several are drawn side by side [boxes]", fmt::join(meso::methodNames(), ", ")))
+        ->type_name("A,B")
+        ->delimiter(',')
+        ->allow_extra_args(false);
     app->add_option("--grid", d.method.cells, "Cells along x of the method's grid [the asset's, or 64]")->type_name("N")->check(CLI::Range(1, meso::kMaxGridEdge));
     app->add_option("--cones", command->cones, "Of ddm methods: azimuths x elevations")->type_name("MxN")->capture_default_str();
     app->add_option("--steps", d.method.steps, "Of relief methods, from the slab's top to its bottom")->type_name("N")->capture_default_str()->check(CLI::Range(1, 4096));
@@ -171,7 +275,7 @@ RunCommand addMesoRender(CLI::App& meso) {
     app->add_option("--size", command->size, "Pixels")->type_name("WxH")->capture_default_str();
     app->add_option("--view", command->view, "Azimuth and elevation of the eye in degrees, magnification")->type_name("A,E,M")->capture_default_str();
     app->add_option("--camera", command->camera, "fit, front, ..., isometric, or a camera file, in place of --view")->type_name("CAMERA");
-    app->add_option("--light", command->light, "Towards the light, in world space")->type_name("X,Y,Z")->capture_default_str();
+    app->add_option("--light", command->light, "Towards the light, in world space [0.5,-0.4,0.75 where z is up]")->type_name("X,Y,Z");
     app->add_option("--depth", command->depth, "Distances along the rays, as `vcp render --depth`")->type_name("FILE");
     app->add_option("--frames", command->frames, "Draw so many more frames and report their median")->type_name("N")->check(CLI::Range(0, 10000));
     app->add_option("--device", command->device, "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")->type_name("DEVICE");

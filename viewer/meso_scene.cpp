@@ -27,10 +27,16 @@ Result<std::shared_ptr<const MesoArrays>> arraysOf(const Asset& asset, const Met
     return std::make_shared<const MesoArrays>(*std::move(arrays));
 }
 
-Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
+bool isFile(const MesoSurfaceDescription& d) {
     const auto names = baseSurfaceNames();
-    if (std::ranges::find(names, d.base) != names.end() || d.base.find('.') == std::string::npos) return makeBaseSurface(d.base, d.tiles);
-    return readBaseMesh(d.base, d.tiles);
+    return std::ranges::find(names, d.base) == names.end() && d.base.find('.') != std::string::npos;
+}
+
+Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
+    auto base = isFile(d) ? readBaseMesh(d.base, d.tiles) : makeBaseSurface(d.base, d.tiles);
+    if (!base) return base;
+    for (glm::dvec3& p : base->positions) p = d.place + d.scale * (isFile(d) ? p : turnedUp(p, d.up));
+    return base;
 }
 
 void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::string>& warnings) {
@@ -79,7 +85,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
         if (!shell) {
             Error error = shell.error();
-            if (d.base.find('.') != std::string::npos) error.file = d.base;
+            if (isFile(d)) error.file = d.base;
             return error;
         }
         warn(d, *shell, scene.warnings);

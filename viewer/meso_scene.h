@@ -21,9 +21,15 @@ struct MesoSurfaceDescription {
     std::string base = "quad";   ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
     double tiles = 4;            ///< along the base (makeBaseSurface, readBaseMesh)
     double heightScale = 1;      ///< of the slab; 1: as high as the asset is to its tile's edge
+    glm::dvec3 place{0};         ///< the base's origin, world
+    double scale = 1;            ///< of the base, mesh files too
+    UpAxis up = UpAxis::Z;       ///< which way the base's z points; mesh files stay as they are
     glm::vec3 colour{0.8f};      ///< encoded
     bool withBase = true;
 };
+
+/// A direction or place in a world where z is up, in one where y may be.
+inline glm::dvec3 turnedUp(glm::dvec3 p, UpAxis up) { return up == UpAxis::Z ? p : glm::dvec3(p.x, p.z, -p.y); }
 
 struct MesoScene {
     std::vector<MesoSurface> surfaces;

@@ -250,6 +250,7 @@ float refineRelief(vec3 o, vec3 d, float low, float fLow, float high, float fHig
         float chord = low + (high - low) * (fLow / (fLow - fHigh));
         t = kRefinement == kMesoBinary || !(chord >= low && chord <= high) ? 0.5 * (low + high) : chord;
         result.iterations++;
+        result.tests++;
         float f = reliefF(o, d, t, result);
         if (abs(f) < meso.scale.z || f == 0.0) break;
         if (f > 0.0) {
@@ -277,6 +278,7 @@ float refineAsPrinted(vec3 o, vec3 d, float low, float fLow, float high, float f
         float lineSlope = (upperH - lowerH) / (upperD - lowerD), at = (upperH - lineSlope * upperD - depth0) / (slope - lineSlope);
         if (!isFinite(at)) break;
         result.iterations++;
+        result.tests++;
         float f = reliefF(o, d, at, result), depth = depth0 + slope * at, surface = depth + f;
         best = surface;
         if (surface < depth) {

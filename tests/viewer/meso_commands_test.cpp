@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <png.h>
 
+#include "render/picture.h"
 #include "vcp_program.h"
 
 namespace vcp {
@@ -142,8 +143,9 @@ TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
     const Ran ran = run("meso render hemispheres --method pyramid --surface " + path("mapped.obj") + " --tiles 2 --size 64x48 --shadows --validation --json -o " + path("a.png"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json told = Json::parse(ran.out);
-    EXPECT_GT(told["hit_pixels"], 64 * 48 / 8);
-    EXPECT_EQ(told["unresolved"], 0);
+    ASSERT_EQ(told["panels"].size(), 1u);
+    EXPECT_GT(told["panels"][0]["hit_pixels"], 64 * 48 / 8);
+    EXPECT_EQ(told["panels"][0]["unresolved"], 0);
     EXPECT_EQ(told["warnings"].size(), 0u);
     EXPECT_TRUE(std::filesystem::exists(path("a.png")));
     // Two assets, and coordinates along a line.
@@ -151,6 +153,33 @@ TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
     const Ran smeared = run("meso render fbm maze --method pyramid --tiles 2 --tiles 1 --heat --surface " + path("line.obj") + " --size 32x32 --json -o " + path("b.png"));
     ASSERT_EQ(smeared.status, 0) << smeared.err;
     EXPECT_NE(smeared.out.find("smeared"), std::string::npos) << smeared.out;
+}
+
+TEST_F(MesoCommands, RendersMethodsSideBySide) {
+    const Ran ran = run("meso render maze ball --method boxes,dm,cells --tiles 1 --at 0,0,0 --at 0.1,0.2,-0.05 --scale 1 --scale 0.5 --heat --size 40x32 --json -o " + path("a.png"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json panels = Json::parse(ran.out)["panels"];
+    ASSERT_EQ(panels.size(), 3u);
+    EXPECT_EQ(panels[1]["method"], "dm");
+    EXPECT_LT(panels[0]["iterations_mean"], panels[2]["iterations_mean"]);
+    const auto picture = readPng(path("a.png"));
+    ASSERT_TRUE(picture) << picture.error().line();
+    EXPECT_EQ(picture->width, 120u);
+    EXPECT_EQ(picture->height, 32u);
+}
+
+TEST_F(MesoCommands, RendersWithAScanInTheSamePicture) {
+    // A box from 0 to 0.4 over a quad, y up.
+    std::ofstream(path("box.obj")) << "v 0 0 0\nv .4 0 0\nv .4 .4 0\nv 0 .4 0\nv 0 0 .4\nv .4 0 .4\nv .4 .4 .4\nv 0 .4 .4\n"
+                                      "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    ASSERT_EQ(run("build " + path("box.obj") + " -o " + path("box.vcp")).status, 0);
+    const std::string arguments = "meso render edge --method pyramid --up y --tiles 1 --scale 0.5 --camera front --size 64x64 --validation --json -o " + path("a.png");
+    const Ran alone = run(arguments), both = run(arguments + " --scan " + path("box.vcp"));
+    ASSERT_EQ(alone.status, 0) << alone.err;
+    ASSERT_EQ(both.status, 0) << both.err;
+    // From the front the quad is a line, the box a square of two fifths of its width, and nearer.
+    EXPECT_GT(Json::parse(both.out)["panels"][0]["hit_pixels"], Json::parse(alone.out)["panels"][0]["hit_pixels"].get<int>() + 64 * 64 / 16);
+    EXPECT_EQ(run(arguments + " --scan " + path("none.vcp")).status, 1);
 }
 
 TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
@@ -172,6 +201,9 @@ TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
                  {"beads --method pyramid", 2, "height fields"},
                  {"nothing", 2, "nothing"},
                  {"fbm --view 30", 2, "--view"},
+                 {"fbm --at 1,2", 2, "--at"},
+                 {"fbm --scale 0", 2, "--scale"},
+                 {"fbm --method pyramid,boxes --depth " + path("d.pfm"), 2, "--depth"},
                  {"fbm maze --tiles 1 --tiles 2 --tiles 3", 2, "--tiles"},
                  {"fbm --size 0x7", 2, "--size"}};
     for (const auto& c : cases) {
