@@ -44,63 +44,73 @@ vec3 fallbackNormal(vec3 p, vec3 d) {
     return off.x == least ? vec3(-sign(d.x), 0.0, 0.0) : off.y == least ? vec3(0.0, -sign(d.y), 0.0) : vec3(0.0, 0.0, -sign(d.z));
 }
 
-// `o` is on the ray at `start`.
-void castPiece(uint piece, vec3 o, vec3 d, float start, inout ShellHit best) {
+// Where a ray passes a piece; times count from `o`, which is on the ray at `start`.
+struct Passage {
+    int at;          // texel of the piece
+    float enter, leave;
+    int entered;     // the corner opposite to the face that it comes in by; -1: it starts within
+    bool toBase;
+};
+
+bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, out Passage passage) {
     int at = int(2u * view.picture.z + 7u * piece);
     vec4 corner = texelFetch(inputTexels, at);
-    vec4 r0 = texelFetch(inputTexels, at + 1), r1 = texelFetch(inputTexels, at + 2), r2 = texelFetch(inputTexels, at + 3);
+    vec3 r0 = texelFetch(inputTexels, at + 1).xyz, r1 = texelFetch(inputTexels, at + 2).xyz, r2 = texelFetch(inputTexels, at + 3).xyz;
     vec3 p = o - corner.xyz;
     vec4 a, b;
-    a.yzw = vec3(dot(r0.xyz, p), dot(r1.xyz, p), dot(r2.xyz, p));
-    b.yzw = vec3(dot(r0.xyz, d), dot(r1.xyz, d), dot(r2.xyz, d));
+    a.yzw = vec3(dot(r0, p), dot(r1, p), dot(r2, p));
+    b.yzw = vec3(dot(r0, d), dot(r1, d), dot(r2, d));
     a.x = 1.0 - a.y - a.z - a.w;
     b.x = -b.y - b.z - b.w;
     a += kPieceSlack;
     // From the eye on: the piece may reach out of the box whose wall `o` is on.
-    float enter = -start, leave = best.t - start;
-    uint bits = uint(corner.w);
-    int entered = -1;
-    bool toBase = false;
+    passage = Passage(at, -start, tMax - start, -1, false);
     for (int i = 0; i < 4; i++) {
         float time = -a[i] / b[i];
-        if (b[i] > 0.0 && time > enter) {
-            entered = i;
-            enter = time;
-        } else if (b[i] < 0.0 && time < leave) {
-            toBase = i == 3 && (bits & kBaseFace) != 0u;
-            leave = time;
-        } else if (b[i] == 0.0 && a[i] < 0.0) return;
+        if (b[i] > 0.0 && time > passage.enter) {
+            passage.entered = i;
+            passage.enter = time;
+        } else if (b[i] < 0.0 && time < passage.leave) {
+            passage.toBase = i == 3 && (uint(corner.w) & kBaseFace) != 0u;
+            passage.leave = time;
+        } else if (b[i] == 0.0 && a[i] < 0.0) return false;
     }
-    if (!(enter <= leave)) return;
-    bool fromBase = entered == 3 && (bits & kBaseFace) != 0u, fromCut = entered >= 0 && (bits & (1u << uint(entered))) != 0u;
-    // The weight of the corner above, whose row of R this is, grows away from the base.
-    if (fromBase && view.picture.w != 0u) {
-        best.t = start + enter;
+    return passage.enter <= passage.leave;
+}
+
+void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best) {
+    int at = passage.at, entered = passage.entered;
+    vec4 corner = texelFetch(inputTexels, at), r0 = texelFetch(inputTexels, at + 1), r1 = texelFetch(inputTexels, at + 2), r2 = texelFetch(inputTexels, at + 3);
+    uint bits = uint(corner.w);
+    // The weight of the corner above, whose row of R r2 is, grows away from the base.
+    if (entered == 3 && (bits & kBaseFace) != 0u && view.picture.w != 0u) {
+        best.t = start + passage.enter;
         best.normal = -r2.xyz;
         return;
     }
+    bool fromCut = entered >= 0 && (bits & (1u << uint(entered))) != 0u;
     vec3 t0 = texelFetch(inputTexels, at + 4).xyz, t1 = texelFetch(inputTexels, at + 5).xyz, t2 = texelFetch(inputTexels, at + 6).xyz;
-    vec3 q = p + enter * d, direction = vec3(dot(t0, d), dot(t1, d), dot(t2, d));
+    vec3 q = o - corner.xyz + passage.enter * d, direction = vec3(dot(t0, d), dot(t1, d), dot(t2, d));
     float scale = length(direction);
     if (scale > 1e-12) {
         MesoRay ray;
         ray.o = vec3(r0.w + dot(t0, q), r1.w + dot(t1, q), clamp(r2.w + dot(t2, q), 0.0, meso.extent.z));
         ray.o.xy -= meso.extent.xy * floor(ray.o.xy / meso.extent.xy);
         ray.d = direction / scale;
-        ray.tMax = (leave - enter) * scale;
+        ray.tMax = (passage.leave - passage.enter) * scale;
         ray.atTop = false;
         // A ray that comes from another piece was outside there, or had its hit there.
         ray.isOutside = entered >= 0;
         vec3 cut = entered == 0 ? r0.xyz + r1.xyz + r2.xyz : entered == 1 ? -r0.xyz : entered == 2 ? -r1.xyz : -r2.xyz;
         if (fromCut && isSolidAt(ray.o)) {
-            best.t = start + enter;
+            best.t = start + passage.enter;
             best.normal = cut;
             return;
         }
         MesoResult found = marchMeso(ray);
         best.iterations += found.iterations;
         best.unresolved = best.unresolved || found.state == kMesoUnresolved;
-        float t = start + enter + found.t / scale;
+        float t = start + passage.enter + found.t / scale;
         if (found.state == kMesoHit && t < best.t) {
             best.t = t;
             vec3 n = found.normal != vec3(0.0) ? found.normal : fallbackNormal(ray.o + found.t * ray.d, ray.d);
@@ -111,8 +121,8 @@ void castPiece(uint piece, vec3 o, vec3 d, float start, inout ShellHit best) {
             return;
         }
     }
-    if (toBase && view.picture.w != 0u) {
-        best.t = start + leave;
+    if (passage.toBase && view.picture.w != 0u) {
+        best.t = start + passage.leave;
         best.normal = r2.xyz;
     }
 }
@@ -134,29 +144,39 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     // From the shell's box on, where numbers are small.
     vec3 o = eye + start * d;
     uint stack[32];
-    int depth = 0;
-    uint node = 0u;
+    stack[0] = 0u;
+    int depth = 1;
+    uint piece = 0u, left = 0u;
+    // All rays of a group look for their next piece, then all march: a piece is long work, and done for one ray at a time otherwise.
     while (true) {
-        if (boxEntry(node, o, inverse, best.t - start, low, high) < kNoHit) {
-            if (high.w > 0.0) {
-                for (uint i = 0u; i < uint(high.w); i++) castPiece(uint(low.w) + i, o, d, start, best);
-                if (kShadow != 0u && best.t < tMax) return best;
-            } else {
-                uint child = uint(low.w);
-                vec4 l0, h0, l1, h1;
-                float e0 = boxEntry(child, o, inverse, best.t - start, l0, h0), e1 = boxEntry(child + 1u, o, inverse, best.t - start, l1, h1);
-                bool swapped = e1 < e0;
-                if (max(e0, e1) < kNoHit) stack[depth++] = swapped ? child : child + 1u;
-                if (min(e0, e1) < kNoHit) {
-                    node = swapped ? child + 1u : child;
-                    continue;
-                }
+        Passage passage;
+        bool passes = false;
+        while (!passes && (left > 0u || depth > 0)) {
+            if (left > 0u) {
+                passes = passesPiece(piece, o, d, start, best.t, passage);
+                piece++;
+                left--;
+                continue;
             }
+            uint node = stack[--depth];
+            if (boxEntry(node, o, inverse, best.t - start, low, high) >= kNoHit) continue;
+            if (high.w > 0.0) {
+                piece = uint(low.w);
+                left = uint(high.w);
+                continue;
+            }
+            uint child = uint(low.w);
+            vec4 l, h;
+            float e0 = boxEntry(child, o, inverse, best.t - start, l, h), e1 = boxEntry(child + 1u, o, inverse, best.t - start, l, h);
+            // The nearer one on top.
+            uint swapped = e1 < e0 ? 1u : 0u;
+            if (max(e0, e1) < kNoHit) stack[depth++] = child + 1u - swapped;
+            if (min(e0, e1) < kNoHit) stack[depth++] = child + swapped;
         }
-        if (depth == 0) break;
-        node = stack[--depth];
+        if (!passes) return best;
+        castPiece(passage, o, d, start, best);
+        if (kShadow != 0u && best.t < tMax) return best;
     }
-    return best;
 }
 
 void main() {
