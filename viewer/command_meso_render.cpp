@@ -260,7 +260,7 @@ RunCommand addMesoRender(CLI::App& meso) {
         ->allow_extra_args(false);
     app->add_option("--at", command->places, "Where the surface's origin is, world units; for all assets, or each [0,0,0]")->type_name("X,Y,Z")->allow_extra_args(false);
     app->add_option("--scale", command->scales, "Times the surface's own size; for all assets, or each [1]")->type_name("X")->allow_extra_args(false);
-    app->add_option("--scan", command->scan, "An octree (.vcp) in the same picture, or a mesh, which is built into the cache first")->type_name("FILE");
+    app->add_option("--scan", command->scan, "In the same picture: an octree (.vcp), a mesh, which is built into the cache first, or a scene of several (.json)")->type_name("FILE");
     app->add_option("--up", command->up, "Which way is up, for surfaces and view")->capture_default_str()->check(CLI::IsMember({"y", "z"}));
     app->add_option("--method", command->methods, fmt::format("{}; several are drawn side by side [boxes]", fmt::join(meso::methodNames(), ", ")))
         ->type_name("A,B")

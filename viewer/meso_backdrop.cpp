@@ -4,7 +4,6 @@
 #include <glm/exponential.hpp>
 #include <glm/vector_relational.hpp>
 
-#include "viewer/build_settings.h"
 #include "viewer/interrupt.h"
 
 namespace vcp {
@@ -17,15 +16,13 @@ glm::vec3 linearOf(glm::vec3 encoded) { return glm::mix(glm::pow((encoded + 0.05
 }  // namespace
 
 Result<MesoBackdrop> MesoBackdrop::open(const std::string& input, const std::string& device) {
-    const auto path = datasetFor({input}, BuildSettings{}, ProgressStyle::None);
-    if (!path) return path.error();
-    auto open = openDataset(path->string(), {});
+    auto open = openScene({input}, BuildSettings{}, SourceSettings{}, ProgressStyle::None);
     if (!open) return open.error();
     RendererOptions options;
     options.device = device, options.loaderThreads = open->loaderThreads();
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->open(open->dataset, open->source));
+    VCP_TRY((*renderer)->open(open->placed()));
     MesoBackdrop made;
     made.open_ = *std::move(open), made.renderer_ = *std::move(renderer);
     return made;

@@ -1,5 +1,5 @@
-// What mesostructure is drawn over: an octree in the same picture, seen by the same camera in the same light. The nearer
-// of the two wins at each pixel (MesoBehind); mesostructure casts no shadow on the octree, nor the octree on it.
+// What mesostructure is drawn over: octrees in the same picture, seen by the same camera in the same light. The nearer
+// of the two wins at each pixel (MesoBehind); mesostructure casts no shadow on octrees, nor they on it.
 #pragma once
 
 #include <memory>
@@ -7,13 +7,14 @@
 
 #include "render/meso_renderer.h"
 #include "render/renderer.h"
-#include "viewer/open_dataset.h"
+#include "viewer/opened_scene.h"
 
 namespace vcp {
 
 class MesoBackdrop {
 public:
-    /// A .vcp file, or a mesh, which is built into the cache first. Errors: those of datasetFor, openDataset and Renderer.
+    /// What `vcp render` takes: a .vcp file, a mesh, or a scene of several, of which only the datasets count. Errors: those of
+    /// openScene and Renderer.
     static Result<MesoBackdrop> open(const std::string& input, const std::string& device);
 
     [[nodiscard]] Box bounds() const { return open_.bounds(); }
@@ -21,7 +22,7 @@ public:
     Result<MesoBehind> draw(const MesoRequest& request);
 
 private:
-    OpenDataset open_;
+    OpenedScene open_;
     std::unique_ptr<Renderer> renderer_;
 };
 
