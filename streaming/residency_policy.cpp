@@ -24,8 +24,8 @@ constexpr double kMostAhead = 20;
 /// The page that chunks leave room for: of so many bytes at least, so that what fits does not depend on which pages are
 /// known so far; where chunks are small, the largest known.
 uint64_t largestPlanned(uint64_t largestKnown, uint64_t unitsPerChunk) {
-    constexpr uint64_t kLeastBytes = 4 << 20;
-    return std::max(largestKnown, std::min(kLeastBytes / kPoolUnitBytes, unitsPerChunk / 64));
+    constexpr uint64_t kLeastBytes = 32 << 20;
+    return std::max(largestKnown, std::min(kLeastBytes / kPoolUnitBytes, unitsPerChunk / 32));
 }
 
 /// What first fit may leave unused: in every chunk less than the largest page needs. One chunk can be

@@ -117,7 +117,7 @@ TEST(DirectoryParts, SettlesOnTheSamePagesAndReadsNoMoreBlocksThanItNeeds) {
 }
 
 TEST(DirectoryParts, SettlesOnTheSamePagesInAPoolOfSeveralChunks) {
-    constexpr uint64_t kChunk = 4 << 20;  // room for a page of 64 KiB is left in each
+    constexpr uint64_t kChunk = 4 << 20;  // room for a page of 128 KiB is left in each
     int relaxed = 0;
     for (uint64_t seed = 0; seed < 20; ++seed) {
         SCOPED_TRACE(seed);
