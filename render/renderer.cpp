@@ -74,12 +74,9 @@ private:
     VkQueryPool pool_ = VK_NULL_HANDLE;
 };
 
-/// Of all pages; of a directory that is known in part: more than any budget, as only large ones come in parts.
+/// The largest pool that it can make use of, as far as is known.
 uint64_t bytesOf(const Dataset& dataset, bool withColour) {
-    if (dataset.pages.blocksKnown() < dataset.pages.blocks()) return kMoreThanAnyBudget;
-    uint64_t units = 0;
-    for (const PageEntry& page : dataset.pages) units += pageUnits(page, withColour && dataset.hasColour());
-    return units * kPoolUnitBytes;
+    return poolShapeFor(dataset, withColour && dataset.hasColour(), kMoreThanAnyBudget, kMoreThanAnyBudget).units * kPoolUnitBytes;
 }
 
 /// Of another dataset in the same picture.
@@ -233,6 +230,8 @@ struct Renderer::State {
     void release();
     /// As many layers as there are datasets.
     Result<void> makeLayers();
+    /// Whether each dataset has its layer: not, where the device gave out half-way.
+    [[nodiscard]] bool isComplete() const;
     /// Shaders of all views see no pool; see the residency's, or the dataset is closed where it has none.
     void hidePool();
     Result<void> showPool();
@@ -334,6 +333,11 @@ Result<void> Renderer::State::makeLayers() {
     return {};
 }
 
+bool Renderer::State::isComplete() const {
+    const bool isBound = std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) { return datasets.empty() || layer.residency != nullptr; });
+    return isBound && layers.size() == std::max<size_t>(datasets.size(), 1);
+}
+
 Result<void> Renderer::State::attachToDevice() {
     const auto window = createSurface();
     if (!window) return window.error();
@@ -426,9 +430,14 @@ bool Renderer::State::recover(bool mayRebuild) {
     if (device->isLost()) return mayRebuild && rebuild().ok();
     if (!device->takeOutOfMemory() || datasets.empty()) return false;
     hidePool();
-    bool halved = true;
-    for (const Shared::Placed& placed : datasets)
-        halved = halved && placed.residency->setBudgets(*device, access, placed.residency->pages().bytes() / 2, options.ramBytes / datasets.size()).ok();
+    // One whose coarsest page has all of its pool already stays as it is.
+    bool halved = false;
+    for (const Shared::Placed& placed : datasets) {
+        if (!placed.residency->hasPool()) continue;
+        const auto done = placed.residency->setBudgets(*device, access, placed.residency->pages().bytes() / 2, options.ramBytes / datasets.size());
+        if (!done && done.error().code != ErrorCode::Limit) return false;
+        halved = halved || done.ok();
+    }
     return showPool().ok() && halved;
 }
 
@@ -450,7 +459,9 @@ Result<void> Renderer::open(std::vector<PlacedDataset> datasets) {
     ResidencyOptions options;
     options.order = o.order;
     options.loader.withColour = o.colour;
-    options.loader.threads = o.loaderThreads;
+    const auto loaders = static_cast<uint32_t>(std::max<size_t>(datasets.size(), 1));
+    options.loader.threads = std::max(o.loaderThreads / loaders, 1u);
+    options.loader.allThreads = loaders * options.loader.threads;
     options.uploadBytes = o.uploadBytes / std::max<size_t>(datasets.size(), 1);
     options.loader.heldBytes = o.ramBytes / std::max<size_t>(datasets.size(), 1);
     std::vector<uint64_t> bytes;
@@ -458,6 +469,13 @@ Result<void> Renderer::open(std::vector<PlacedDataset> datasets) {
     const std::vector<uint64_t> shares = budgetShares(o.budgetBytes, bytes);
     for (size_t i = 0; i < datasets.size(); ++i) {
         options.budgetBytes = shares[i];
+        const uint64_t needed = datasets[i].source->bytesToRead(0, o.colour && datasets[i].dataset->hasColour());
+        if (datasets.size() > 1 && needed > options.loader.heldBytes) {
+            close();
+            return Error{.code = ErrorCode::Limit,
+                         .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to read the coarsest page of one takes {}: allow more (--ram)",
+                                                datasets.size(), o.ramBytes, needed)};
+        }
         auto residency = Residency::create(*state_->device, state_->access, options, std::move(datasets[i].dataset), std::move(datasets[i].source));
         if (!residency) {
             close();
@@ -465,15 +483,22 @@ Result<void> Renderer::open(std::vector<PlacedDataset> datasets) {
         }
         state_->datasets.push_back({std::move(*residency), datasets[i].placement});
     }
-    return state_->showPool();
+    const auto shown = state_->showPool();
+    if (!shown) close();
+    return shown;
 }
 
 Result<void> Renderer::State::setShares(uint64_t budgetBytes, uint64_t ramBytes) {
     std::vector<uint64_t> bytes;
     for (const Shared::Placed& placed : datasets) bytes.push_back(bytesOf(placed.residency->dataset(), placed.residency->hasColour()));
     const std::vector<uint64_t> shares = budgetShares(budgetBytes, bytes);
-    for (size_t i = 0; i < datasets.size(); ++i)
-        VCP_TRY(datasets[i].residency->setBudgets(*device, access, shares[i], ramBytes / datasets.size()));
+    // What shrinks goes first, so that all together are never more than they may be.
+    for (const bool shrinks : {true, false})
+        for (size_t i = 0; i < datasets.size(); ++i) {
+            Residency& residency = *datasets[i].residency;
+            if ((residency.hasPool() && residency.pages().bytes() > shares[i]) != shrinks) continue;
+            VCP_TRY(residency.setBudgets(*device, access, shares[i], ramBytes / datasets.size()));
+        }
     return {};
 }
 
@@ -517,7 +542,7 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
 }
 
 Result<UpdateResult> Renderer::State::updateAll(const FrameRequest& request) {
-    if (datasets.empty()) return kGone;
+    if (datasets.empty() || !isComplete()) return kGone;
     std::optional<UpdateResult> all;
     for (Layer& layer : layers) {
         auto one = layer.residency->update(selectionView(requestIn(layer.placement, request)), number);
@@ -549,12 +574,14 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
 
 void Renderer::waitForPage(std::chrono::milliseconds timeout) {
     std::vector<Shared::Placed>& datasets = state_->datasets;
-    // One after the other, so that none is waited for while another has pages.
+    if (datasets.size() == 1) return static_cast<void>(datasets.front().residency->waitForPage(timeout));
+    // One after the other, until one has pages.
     constexpr std::chrono::milliseconds kTurn(5);
     const auto until = std::chrono::steady_clock::now() + timeout;
-    for (size_t i = 0; i < datasets.size() && datasets.size() > 1; ++i)
-        if (std::chrono::steady_clock::now() < until) datasets[i].residency->waitForPage(std::min(timeout, kTurn));
-    if (datasets.size() == 1) datasets.front().residency->waitForPage(timeout);
+    for (const Shared::Placed& placed : datasets) {
+        if (std::chrono::steady_clock::now() >= until) return;
+        if (placed.residency->waitForPage(std::min(timeout, kTurn))) return;
+    }
 }
 
 PassConstants Renderer::State::constantsFor(const Layer& layer, const FrameRequest& request) const {
@@ -650,7 +677,7 @@ Result<FrameStats> Renderer::render(const FrameRequest& request) {
 
 Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
     drawn.reset();
-    if (!device) return kGone;
+    if (!device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
     if (std::any_of(layers.begin(), layers.end(), [](const Layer& layer) { return layer.listens(); })) feedbackPicture.reset();
     std::optional<FrameStats> all;
@@ -756,6 +783,7 @@ Result<Picture> Renderer::readPicture() {
 }
 
 Result<std::vector<float>> Renderer::readDepth() {
+    if (!state_->drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
     auto depth = state_->depthOf(state_->layers.front());
     for (size_t i = 1; depth && i < state_->layers.size(); ++i) {
         const auto other = state_->depthOf(state_->layers[i]);

@@ -246,7 +246,7 @@ struct PageBox {
 /// What the rays of the last frame that missed pages met, 24 x 16 over the picture, row by row from the upper left.
 struct FeedbackPicture {
     static constexpr uint32_t kWidth = 24, kHeight = 16;
-    /// Of the page that was hit, its certified error in pixels there; below 0: nothing was hit. Above the request's
+    /// Of the page that was hit, its certified error in pixels there, of several datasets' the largest; below 0: nothing was hit. Above the request's
     /// errorPixels the ray asked for finer pages.
     std::array<float, size_t{kWidth} * kHeight> errorPixels;
 };

@@ -87,8 +87,8 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
     options_.loader.heldBytes = ramBytes;
     startLoader();  // what the old one held is gone
     for (const uint64_t page : std::exchange(tooLarge_, {})) policy_->restore(page);
-    if (shape.units * kPoolUnitBytes == pool_->bytes()) return {};
-    auto carried = carryOut();
+    if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
+    auto carried = pool_ ? carryOut() : std::vector<CarriedPage>();
     if (!carried) return carried.error();
     VCP_TRY(rebuild(device, access));
     for (CarriedPage& page : *carried) {

@@ -54,7 +54,7 @@ public:
     void hear(const RayFeedback& feedback, const SelectionView& view) { policy_->hear(feedback, view); }
 
     /// Waits until the loader has something, or the time is over.
-    void waitForPage(std::chrono::milliseconds timeout) { loader_->waitForPage(timeout); }
+    bool waitForPage(std::chrono::milliseconds timeout) { return loader_->waitForPage(timeout); }
 
     [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
     /// What the view can draw now, in directory order.

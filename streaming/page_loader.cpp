@@ -159,7 +159,7 @@ void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
 }
 
 void PageLoader::work() {
-    giveWay(options_.threads);
+    giveWay(std::max(options_.threads, options_.allThreads));
     std::unique_lock lock(mutex_);
     while (!stop_) {
         const double now = steadySeconds();

@@ -36,6 +36,7 @@ struct LoadedPage {
 struct LoaderOptions {
     bool withColour = true;
     uint32_t threads = 2;
+    uint32_t allThreads = 0;           ///< with those of other loaders of the same picture; 0: there are none
     uint64_t heldBytes = 64ull << 20;  ///< of pages being read and not collected yet, and of those that the source keeps
     RetryPolicy retry;
 };

@@ -267,7 +267,7 @@ Result<int> run(const RenderCommand& command) {
     request.sectionCaps = command.render.caps;
     if (request.sections.empty()) {
         request.sections = scene.sections;
-        request.sectionCaps = scene.sectionCaps;
+        request.sectionCaps = command.render.caps || scene.sectionCaps;
     }
     if (scene.light) {
         request.shading.lightFollowsCamera = scene.light->followsCamera;

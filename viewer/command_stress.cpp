@@ -145,12 +145,12 @@ Command addStress(CLI::App& vcp) {
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
-    app->add_option("--motion", command->motionSeconds,
+    CLI::Option* motion = app->add_option("--motion", command->motionSeconds,
                     "Instead: turn once about the dataset in so many seconds, as the window draws it (smaller while it is slow), and count frames by size")
         ->type_name("SECONDS")
         ->check(CLI::Range(0.1, 3600.0));
     app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
-    app->add_option("--out", command->out, "Folder for the report as JSON and Markdown, and for its plots")->type_name("DIR");
+    app->add_option("--out", command->out, "Folder for the report as JSON and Markdown, and for its plots")->type_name("DIR")->excludes(motion);
     addSourceSettings(*app, command->source);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);

@@ -81,7 +81,7 @@ void clip(Ray& ray, const SectionPlane& plane) {
 
 Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionPlane> sections) {
     for (const SectionPlane& plane : sections) clip(ray, plane);
-    if (pages_.bytes() > kMostBytes) pages_ = PageCache(reader_, pages_.dataset());
+    if (bytesKept() > kMostBytes) forget();
     std::optional<RayHit> nearest;
     if (ray.tMin > ray.tMax) return nearest;
     const auto pages = finestPagesOn(*reader_, pages_.dataset(), ray);
@@ -100,8 +100,15 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
 Result<std::optional<RayHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections) {
     std::optional<RayHit> nearest;
     for (Part& part : parts_) {
+        // Of all together no more than one alone may keep, beside those that are cast into now.
+        uint64_t kept = 0;
+        for (const Part& each : parts_) kept += each.pick.bytesKept();
+        if (kept > kMostBytes)
+            for (Part& each : parts_) each.pick.forget();
         const Similarity& placement = part.placement;
-        const Ray local{placement.fromWorld(ray.origin), placement.turnedFromWorld(ray.direction)};
+        Ray local{placement.fromWorld(ray.origin), placement.turnedFromWorld(ray.direction)};
+        local.tMin = ray.tMin / placement.scale;
+        local.tMax = (nearest ? std::min(nearest->t, ray.tMax) : ray.tMax) / placement.scale;
         std::vector<SectionPlane> planes;
         for (const SectionPlane& plane : sections) planes.push_back(planeIn(placement, plane));
         auto hit = part.pick.cast(local, planes);

@@ -21,6 +21,8 @@ public:
     /// The first hit on what the section planes keep; nothing where the ray hits nothing. Reads from the file or
     /// server, so it may take long. One thread at a time. Errors: those of readPage.
     Result<std::optional<RayHit>> cast(Ray ray, std::span<const SectionPlane> sections = {});
+    [[nodiscard]] uint64_t bytesKept() const { return pages_.bytes(); }
+    void forget() { pages_ = PageCache(reader_, pages_.dataset()); }
 
 private:
     std::shared_ptr<const ByteReader> reader_;

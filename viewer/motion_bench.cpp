@@ -100,23 +100,24 @@ Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Bo
     }
     // At rest from here on: until the frame at full size is there.
     const double stopped = seconds();
-    for (bool isFull = false; !isFull; isFull = (*viewer)->status().reduction == 1) {
+    while (!report.fullSizeAfterMs && seconds() - stopped <= kLongestRest) {
         const auto drew = motion.turn();
         if (!drew) return drew.error();
-        if (seconds() - stopped > kLongestRest) break;
+        if ((*viewer)->status().reduction == 1) report.fullSizeAfterMs = 1e3 * (seconds() - stopped);
     }
-    report.fullSizeAfterMs = 1e3 * (seconds() - stopped);
     return report;
 }
 
 std::string motionJson(const MotionReport& report) {
     nlohmann::ordered_json sizes = nlohmann::ordered_json::object();
     for (const auto& [reduction, frames] : report.byReduction) sizes[reduction == 1 ? "1" : fmt::format("1/{}", reduction)] = frames;
+    nlohmann::ordered_json after;  // null: never
+    if (report.fullSizeAfterMs) after = *report.fullSizeAfterMs;
     const nlohmann::ordered_json json = {{"width", report.size.x}, {"height", report.size.y}, {"device", report.device},
                                          {"seconds", report.seconds}, {"frames", report.frameMs.size()},
                                          {"frames_per_second", report.framesPerSecond()}, {"median_ms", report.quantileMs(0.5)},
                                          {"ms_95", report.quantileMs(0.95)}, {"worst_ms", report.quantileMs(1)},
-                                         {"still_ms", report.stillMs}, {"full_size_after_ms", report.fullSizeAfterMs}, {"frames_by_size", sizes}};
+                                         {"still_ms", report.stillMs}, {"full_size_after_ms", after}, {"frames_by_size", sizes}};
     return json.dump(2);
 }
 
@@ -124,9 +125,10 @@ std::string motionText(const MotionReport& report) {
     std::string sizes;
     for (const auto& [reduction, frames] : report.byReduction)
         sizes += fmt::format("{}{} at {}", sizes.empty() ? "" : ", ", frames, reduction == 1 ? std::string("full size") : fmt::format("1/{}", reduction));
-    return fmt::format("{} x {} on {}: {} frames in {:.1f} s, {:.1f} a second\n  median {:.1f} ms, 95 % {:.1f} ms, worst {:.1f} ms; at rest {:.1f} ms, at full size {:.0f} ms after the motion\n  {}",
+    return fmt::format("{} x {} on {}: {} frames in {:.1f} s, {:.1f} a second\n  median {:.1f} ms, 95 % {:.1f} ms, worst {:.1f} ms; at rest {:.1f} ms, {}\n  {}",
                        report.size.x, report.size.y, report.device, report.frameMs.size(), report.seconds, report.framesPerSecond(),
-                       report.quantileMs(0.5), report.quantileMs(0.95), report.quantileMs(1), report.stillMs, report.fullSizeAfterMs, sizes);
+                       report.quantileMs(0.5), report.quantileMs(0.95), report.quantileMs(1), report.stillMs,
+                       report.fullSizeAfterMs ? fmt::format("at full size {:.0f} ms after the motion", *report.fullSizeAfterMs) : "never at full size again", sizes);
 }
 
 }  // namespace vcp

@@ -7,6 +7,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct MotionReport {
     std::vector<double> frameMs;      ///< from one frame to the next, in order
     std::map<int, uint64_t> byReduction;  ///< frames drawn at 1, 1/2, ... of width and height
     double stillMs = 0;               ///< a frame at full size before
-    double fullSizeAfterMs = 0;       ///< from the end of the motion until a frame at full size was drawn
+    std::optional<double> fullSizeAfterMs;  ///< from the end of the motion until a frame at full size was drawn; nothing: it never was
     std::string device;
     glm::ivec2 size{0};
 

@@ -1,8 +1,10 @@
 #include "viewer/opened_scene.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "viewer/interrupt.h"
 
@@ -46,12 +48,16 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         scene.file.datasets.push_back({path->string(), {}});
     }
     for (const SceneDataset& each : scene.file.datasets) {
+        const double done = static_cast<double>(scene.parts.size()) / static_cast<double>(scene.file.datasets.size());
+        if (progress && !progress({.stage = "opening", .fraction = done})) return Error{ErrorCode::Cancelled, "cancelled"};
         const auto path = datasetFor({each.file}, build, progress);
         if (!path) return path.error();
         auto open = openDataset(path->string(), source);
         if (!open) return open.error();
         scene.parts.push_back({*std::move(open), each.placement});
     }
+    const Box all = scene.bounds();
+    if (!std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", inputs.front()};
     return scene;
 }
 

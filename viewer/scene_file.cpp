@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
@@ -22,13 +23,20 @@ using Json = nlohmann::json;
 constexpr std::streamsize kLargestFile = 1 << 20;
 constexpr size_t kMostDatasets = 256;
 constexpr int kDeepest = 16;
+// What a scene may have of them: nothing else has a line of its own.
+constexpr int kDeepestLine = 5;
+constexpr size_t kLongestKey = 64, kMostItems = 1024;
+// So far apart that double precision resolves a millimetre where units are metres, and further.
+constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
 
 /// The line of each value of a JSON text, by its JSON pointer; of a member the line of its key.
 class LinesOf {
 public:
     /// Precondition: the text is valid JSON.
-    explicit LinesOf(std::string_view text) : text_(text) { value("", 0); }
+    explicit LinesOf(std::string_view text) : text_(text) { value("", 0, true); }
 
+    /// A member that is there twice, by its JSON pointer; its line is that of the second.
+    [[nodiscard]] const std::optional<std::pair<std::string, size_t>>& twice() const { return twice_; }
     [[nodiscard]] size_t operator()(const std::string& pointer) const {
         const auto found = lines_.find(pointer);
         return found == lines_.end() ? 1 : found->second;
@@ -48,20 +56,20 @@ private:
         return decoded.is_string() ? decoded.get<std::string>() : std::string();
     }
 
-    void value(const std::string& pointer, int depth) {
+    void value(const std::string& pointer, int depth, bool keep) {
         skipSpace();
-        lines_.emplace(pointer, line_);
+        if (keep) lines_.emplace(pointer, line_);
         if (at_ >= text_.size() || depth > kDeepest) return;
         if (text_[at_] == '"') {
             string();
         } else if (text_[at_] == '{' || text_[at_] == '[') {
-            members(pointer, depth);
+            members(pointer, depth, keep && depth < kDeepestLine);
         } else {
             while (at_ < text_.size() && std::string_view(",]} \t\r\n").find(text_[at_]) == std::string_view::npos) ++at_;
         }
     }
 
-    void members(const std::string& pointer, int depth) {
+    void members(const std::string& pointer, int depth, bool keep) {
         const bool isObject = text_[at_++] == '{';
         for (size_t i = 0;; ++i) {
             skipSpace();
@@ -75,20 +83,23 @@ private:
                 skipSpace();
             }
             std::string key = std::to_string(i);
+            bool keepThis = keep && i < kMostItems;
             if (isObject) {
                 const size_t line = line_;
                 key = string();
-                lines_.emplace(pointer + "/" + key, line);
+                keepThis = keepThis && key.size() <= kLongestKey;
+                if (keepThis && !lines_.emplace(pointer + "/" + key, line).second && !twice_) twice_.emplace(pointer + "/" + key, line);
                 skipSpace();
                 ++at_;
             }
-            value(pointer + "/" + key, depth + 1);
+            value(keepThis ? pointer + "/" + key : std::string(), depth + 1, keepThis);
         }
     }
 
     std::string_view text_;
     size_t at_ = 0, line_ = 1;
     std::map<std::string, size_t> lines_;
+    std::optional<std::pair<std::string, size_t>> twice_;
 };
 
 bool isDeeperThan(const Json& json, int depth) {
@@ -134,7 +145,8 @@ private:
     }
 
     double number(const Json& value, const std::string& at) {
-        if (!value.is_number() || !std::isfinite(value.get<double>())) return wrong(at, "must be a number"), 0;
+        if (!value.is_number()) return wrong(at, "must be a number"), 0;
+        if (!(std::abs(value.get<double>()) <= kLargestNumber)) return wrong(at, fmt::format("must be between -{0:g} and {0:g}", kLargestNumber)), 0;
         return value.get<double>();
     }
 
@@ -157,9 +169,13 @@ private:
         if (!object.contains(key)) return wrong(at, fmt::format("\"{}\" is missing", key)), glm::dvec3(1, 0, 0);
         const std::string there = at + "/" + key;
         const glm::dvec3 v = triple(object[key], there);
-        if (!(glm::length(v) > 0) || !std::isfinite(glm::length(v))) return wrong(there, "must not be zero"), glm::dvec3(1, 0, 0);
+        const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+        if (!(largest > 0)) return wrong(there, "must not be zero"), glm::dvec3(1, 0, 0);
         return v;
     }
+
+    /// Of any length above zero.
+    static glm::dvec3 unit(glm::dvec3 v) { return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)})); }
 
     bool isObject(const Json& value, const std::string& at) {
         if (!value.is_object()) wrong(at, "must be an object");
@@ -192,7 +208,7 @@ private:
     double scale(const Json& value, const std::string& at) {
         if (value.is_array()) return wrong(at, "must be one number: other scales along other axes are not supported"), 1;
         const double s = number(value, at);
-        if (!(s > 0)) return wrong(at, "must be above 0"), 1;
+        if (!error_ && !(s >= 1 / kLargestScale && s <= kLargestScale)) return wrong(at, fmt::format("must be above 0, from {:g} to {:g}", 1 / kLargestScale, kLargestScale)), 1;
         return s;
     }
 
@@ -202,7 +218,7 @@ private:
         if (!json.contains("degrees")) wrong(at, "needs \"degrees\"");
         const glm::dvec3 axis = direction(json, "axis", at);
         const double degrees = json.contains("degrees") ? number(json["degrees"], at + "/degrees") : 0;
-        return glm::angleAxis(std::remainder(degrees, 360) * std::numbers::pi / 180, glm::normalize(axis));
+        return glm::angleAxis(std::remainder(degrees, 360) * std::numbers::pi / 180, unit(axis));
     }
 
     Similarity matrix(const Json& json, const std::string& at) {
@@ -215,6 +231,9 @@ private:
         if (!good) return wrong(at, "must be four rows of four numbers"), Similarity{};
         const auto placement = similarityFromMatrix(rows);
         if (!placement) return wrong(at, placement.error().message), Similarity{};
+        const glm::dvec3 far = glm::abs(placement->translation);
+        if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale || placement->scale < 1 / kLargestScale)
+            return wrong(at, fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}", kLargestNumber, kLargestScale, 1 / kLargestScale)), Similarity{};
         return *placement;
     }
 
@@ -223,7 +242,7 @@ private:
         if (json.empty() || !isObject(json[0], "/lights/0")) return std::nullopt;
         onlyKeys(json[0], "/lights/0", {"direction", "follows_camera"});
         SceneLight made;
-        made.direction = glm::vec3(glm::normalize(direction(json[0], "direction", "/lights/0")));
+        made.direction = glm::vec3(unit(direction(json[0], "direction", "/lights/0")));
         made.followsCamera = json[0].contains("follows_camera") && flag(json[0]["follows_camera"], "/lights/0/follows_camera");
         return made;
     }
@@ -289,6 +308,10 @@ Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, 
     const Json json = Json::parse(text);
     if (isDeeperThan(json, kDeepest)) return Error{ErrorCode::InvalidInput, "not a scene: nested too deeply", name};
     const LinesOf lines(text);
+    if (lines.twice()) {
+        const std::string& at = lines.twice()->first;
+        return Error{ErrorCode::InvalidInput, fmt::format("\"{}\" is there twice", at.substr(at.rfind('/') + 1)), name, fmt::format("line {}", lines.twice()->second)};
+    }
     SceneReader reader(lines, name, folder);
     SceneFile scene = reader.scene(json);
     if (reader.error()) return *reader.error();

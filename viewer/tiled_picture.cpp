@@ -50,7 +50,8 @@ Result<bool> TiledPicture::step() {
     if (with.width != whole_.width || with.height != whole_.height) request.tile = {with.x, with.y, whole_.width, whole_.height};
     auto update = renderer_->update(request);
     if (!update) return update.error();
-    if (!update->problems.empty()) return update->problems.front();
+    if (!update->problems.empty() && !options_.problem) return update->problems.front();
+    for (const Error& problem : update->problems) options_.problem(problem);
     isWaiting_ = !update->settled;
     if (isWaiting_) return false;
     stats_.errorPixels = std::max(stats_.errorPixels, update->errorPixels);

@@ -21,6 +21,8 @@ struct TiledPictureOptions {
     bool depth = false, normals = false;
     /// Told the fraction done after each tile and while pages load; false cancels. May be empty.
     std::function<bool(double fraction)> progress;
+    /// Told of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
+    std::function<void(const Error& problem)> problem;
 };
 
 /// Rows of the picture, over its whole width, from the upper one on.

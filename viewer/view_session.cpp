@@ -92,13 +92,17 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         viewer_->setSections({});
         if (open.file.camera) camera = *open.file.camera;
     }
-    if (viewer_->sections().empty()) viewer_->setSections(open.file.sections);
-    if (!open.file.sections.empty()) viewer_->setSectionCaps(open.file.sectionCaps);
-    if (open.file.light) {
+    const bool hasOwnSections = viewer_->sections().empty() && !open.file.sections.empty();
+    if (hasOwnSections) viewer_->setSections(open.file.sections);
+    viewer_->setSectionCaps(options_.render.caps || (hasOwnSections && open.file.sectionCaps));
+    if (open.file.light || std::exchange(hasSceneLight_, false)) {
+        // What lit one scene does not light the next.
         Shading shading = viewer_->shading();
-        shading.lightFollowsCamera = open.file.light->followsCamera;
-        shading.lightDirection = open.file.light->direction;
+        const Shading chosen = options_.render.shadingChosen();
+        shading.lightFollowsCamera = open.file.light ? open.file.light->followsCamera : chosen.lightFollowsCamera;
+        shading.lightDirection = open.file.light ? open.file.light->direction : chosen.lightDirection;
         viewer_->setShading(shading);
+        hasSceneLight_ = open.file.light.has_value();
     }
     cancelSaving();
     if (pick_.valid()) pick_.wait(), pick_ = {};
@@ -210,7 +214,7 @@ void ViewSession::savePicture(glm::ivec2 size) {
     if (!png) return say(png.error().line());
     saving.view = *std::move(view);
     saving.png = *std::move(png);
-    saving.picture = std::make_unique<TiledPicture>(*saving.view, viewer_->pictureOf(size), TiledPictureOptions{.tile = kSavedTile, .progress = {}},
+    saving.picture = std::make_unique<TiledPicture>(*saving.view, viewer_->pictureOf(size), TiledPictureOptions{.tile = kSavedTile, .progress = {}, .problem = [this](const Error& problem) { say(problem.line()); }},
                                                     [rows = saving.png.get()](const PictureBand& band) { return rows->add(band.picture.rgba); });
     saving_ = std::move(saving);
 }

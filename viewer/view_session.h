@@ -102,7 +102,7 @@ private:
     std::unique_ptr<Viewer> viewer_;
     std::unique_ptr<DatasetOpening> opening_;
     std::string shown_;  // rememberedName of what is shown; empty: nothing
-    bool wasShown_ = false, showsFeedback_ = false;
+    bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
     std::string problem_, note_;
     Measurement measurement_;
     std::shared_ptr<ScenePick> finest_;

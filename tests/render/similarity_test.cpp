@@ -129,6 +129,29 @@ TEST_F(SeveralDatasets, ShareTheBudgetAndSurviveALostDevice) {
     EXPECT_LT(one.stats.hitPixels, before.stats.hitPixels);
 }
 
+TEST_F(SeveralDatasets, TakeNoMoreThanTheBudgetTogether) {
+    RendererOptions options;
+    options.budgetBytes = 1 << 20;
+    start(options);
+    const test::Scene scene = test::sphereScene(4);
+    const PlacedDataset first{scene.dataset, scene.source, {}}, second{scene.dataset, scene.source, besideAndSmaller(scene)};
+    ASSERT_TRUE(renderer_->open({first, second}));
+    FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {-0.3, -0.4, -1}, {0, 1, 0}, 0.8, 4.0 / 3));
+    request.errorPixels = 0.001;
+    for (const uint64_t budget : {1 << 20, 64 << 20, 1 << 20}) {
+        ASSERT_TRUE(renderer_->setBudgets(budget, 64 << 20));
+        const auto update = renderer_->settle(request);
+        ASSERT_TRUE(update) << update.error().line();
+        const auto stats = renderer_->render(request);
+        ASSERT_TRUE(stats);
+        EXPECT_LE(update->residentBytes, budget);
+        EXPECT_LE(stats->poolBytes, budget);
+        EXPECT_EQ(update->relaxed, budget == 1 << 20);
+    }
+    const auto refused = renderer_->setBudgets(1 << 20, 64 << 20);
+    EXPECT_TRUE(refused) << refused.error().line();
+}
+
 TEST(BudgetShares, WhatSmallOnesDoNotNeedGoesToTheLarge) {
     constexpr uint64_t kM = 1 << 20;
     EXPECT_EQ(budgetShares(100 * kM, std::array{uint64_t{7}}), std::vector{100 * kM}) << "one has all";

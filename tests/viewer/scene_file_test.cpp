@@ -64,6 +64,11 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {"{\n\n\"datasets\" [", 3, "JSON"},
         {"", 1, "JSON"},
         {beside("\"caps\":\n 1e999"), 4, "out of range"},
+        {beside("\"caps\": true,\n\"caps\": false"), 4, "\"caps\" is there twice"},
+        {inDataset("\"scale\": 1e200"), 4, "must be between"},
+        {inDataset("\"scale\": 1e-310"), 4, "above 0"},
+        {inDataset("\"translate\": [0, -1e13, 0]"), 4, "must be between"},
+        {inDataset("\"transform\": [[1,0,0,1e300],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), 4, "moves by more"},
     };
     for (const auto& [text, line, word] : wrong) {
         const auto refused = sceneFromJson(text, "wrong.json", {});
@@ -72,6 +77,11 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         EXPECT_NE(said.find(fmt::format("wrong.json: line {}: ", line)), std::string::npos) << said << "\n" << text;
         EXPECT_NE(said.find(word), std::string::npos) << said;
     }
+    // Lines are kept of nothing that a scene has not: this would be 50 GB of them.
+    const std::string key(500'000, 'k');
+    std::string zeros = "0";
+    for (int i = 0; i < 100'000; ++i) zeros += ",0";
+    EXPECT_FALSE(sceneFromJson("{\"" + key + "\": [" + zeros + "]}", "wide.json", {}));
     EXPECT_FALSE(sceneFromJson(std::string(5000, '['), "deep.json", {}));
     EXPECT_FALSE(sceneFromJson(std::string(40, '[') + std::string(40, ']'), "deep.json", {}));
 }
