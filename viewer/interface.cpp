@@ -227,6 +227,7 @@ void Interface::layOutLooks() {
     ImGui::SameLine();
     colourEdit("below", shading.backgroundBottom);
     ImGui::SameLine();
+    ImGui::AlignTextToFramePadding();
     text("background");
     if (shading != viewer.shading()) viewer.setShading(shading);
     bool follows = shading.lightFollowsCamera;
@@ -241,7 +242,7 @@ void Interface::layOutLimits() {
     auto error = static_cast<float>(viewer.errorPixels());
     if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic)) viewer.setErrorPixels(static_cast<double>(error));
     const UpdateResult& update = status.update;
-    wrapped(fmt::format("error now {:.2g} px{}", update.errorPixels, update.relaxed ? ": the budget is too small for less" : ""));
+    wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels), update.relaxed ? ": the budget is too small for less" : ""));
     const float part = static_cast<float>(update.residentBytes) / static_cast<float>(std::max<uint64_t>(status.budgetBytes, 1));
     const std::string filled = fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
     ImGui::ProgressBar(part, ImVec2(-1, 0), filled.c_str());
@@ -251,7 +252,7 @@ void Interface::layOutLimits() {
     if (ImGui::SmallButton("double")) budget *= 2;
     if (budget != status.budgetBytes)
         if (const auto set = viewer.setBudget(budget); !set) session_->say(set.error().line());
-    text(fmt::format("{} subvolumes drawn, {} resident", update.pagesInCut, update.pagesResident));
+    wrapped(fmt::format("{} subvolumes drawn, {} in memory", update.pagesInCut, update.pagesResident));
     text(update.settled ? "settled" : fmt::format("loading, {} missing", update.pagesMissing));
     text(fmt::format("{} read", formatBytes(update.bytesRead)));
     ImGui::Checkbox("subvolumes", &session_->showsPages);

@@ -57,6 +57,8 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 
 }  // namespace
 
+std::string formatPixels(double pixels) { return pixels < 10 ? fmt::format("{:.2g}", pixels) : fmt::format("{:.0f}", pixels); }
+
 std::string statusLine(const ViewerStatus& status, size_t most) {
     const std::string device = status.device + (status.software ? " (software)" : "");
     if (status.levels == 0) return device.substr(0, most);
@@ -67,7 +69,7 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
         const std::string levels = coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
         parts.push_back(fmt::format("{} (finest {})", levels, status.levels - 1));
-        if (coarsest + 1 < status.levels) parts.push_back(fmt::format("error {:.2g} px", status.update.errorPixels));
+        if (coarsest + 1 < status.levels) parts.push_back(fmt::format("error {} px", formatPixels(status.update.errorPixels)));
     }
     if (status.reduction > 1) parts.push_back(fmt::format("1/{} size", status.reduction));
     parts.push_back(fmt::format("{:.0f} ms", status.frame.msFrame));

@@ -93,6 +93,9 @@ struct ViewerStatus {
     std::string problem;   ///< the last thing that went wrong, in one line; empty when nothing has
 };
 
+/// "0.46", "510".
+std::string formatPixels(double pixels);
+
 /// The status in one line of at most so many characters: what matters less is left out.
 std::string statusLine(const ViewerStatus& status, size_t most = std::numeric_limits<size_t>::max());
 

@@ -545,6 +545,8 @@ TEST_F(ViewerTest, StatusLineKeepsToItsRoom) {
     EXPECT_NE(statusLine(status, 60).find("loading"), std::string::npos) << statusLine(status, 60);
     EXPECT_NE(statusLine(status).find(status.name), std::string::npos);
     EXPECT_NE(statusLine(status).find(status.device), std::string::npos);
+    EXPECT_EQ(formatPixels(0.456), "0.46");
+    EXPECT_EQ(formatPixels(512), "512");
     status.without = "no shadows";
     EXPECT_NE(statusLine(status, 60).find("no shadows"), std::string::npos);
 }

@@ -1,0 +1,89 @@
+#!/bin/bash
+# The pictures of docs/window.md, from a statue that make_scan makes, in a window under Xvfb that xdotool drives.
+# Usage: make_screenshots.sh VCP MAKE_SCAN. Writes images/window-*.jpg beside itself. Takes some minutes without a GPU.
+set -euo pipefail
+vcp=$(realpath "$1") makeScan=$(realpath "$2") images=$(dirname "$(realpath "$0")")/images
+folder=$(mktemp -d)
+trap 'kill ${viewer:-} ${xvfb:-} 2>/dev/null || true; rm -rf "$folder"' EXIT
+cd "$folder"
+export XDG_CACHE_HOME=$folder/cache XDG_CONFIG_HOME=$folder/config
+
+"$makeScan" --triangles 1000000 --colour -o statue.ply
+"$vcp" build statue.ply -o statue.vcp --progress none >/dev/null
+# A closed ball with a hollow: what is cut open can be filled.
+awk 'BEGIN { R=192; S=384; pi=atan2(0,-1)
+    print "ply\nformat ascii 1.0\nelement vertex " 2*(R+1)*S "\nproperty float x\nproperty float y\nproperty float z"
+    print "element face " 4*R*S "\nproperty list uchar int vertex_indices\nend_header"
+    for (k=0; k<2; k++) for (r=0; r<=R; r++) for (s=0; s<S; s++) { p=pi*r/R; a=2*pi*s/S
+        q=k ? 0.55+0.06*sin(5*p)*sin(6*a)*sin(p) : 1+0.08*sin(3*p)*sin(4*a)+0.015*sin(18*p)*sin(20*a)*sin(p)
+        print q*sin(p)*cos(a), q*cos(p), q*sin(p)*sin(a) }
+    for (k=0; k<2; k++) for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S; o=k*(R+1)*S; u=k?t:s; v=k?s:t
+        print 3, o+r*S+u, o+r*S+v, o+(r+1)*S+u; print 3, o+r*S+v, o+(r+1)*S+v, o+(r+1)*S+u } }' >ball.ply
+"$vcp" build ball.ply -o ball.vcp --progress none >/dev/null
+exec 3>display
+Xvfb -displayfd 3 -screen 0 1024x768x24 >/dev/null 2>&1 &
+xvfb=$!
+for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
+export DISPLAY=:$(cat display)
+
+# opens FILE ARGUMENT...
+opens() {
+    "$vcp" view "$@" --size 960x640 >/dev/null 2>log &
+    viewer=$! window=
+    for _ in $(seq 200); do
+        window=$(xdotool search --name "$1" 2>/dev/null | head -1) && [ -n "$window" ] && break
+        kill -0 $viewer 2>/dev/null || { cat log >&2; exit 1; }
+        sleep 0.1
+    done
+    at 5 300
+    sleep 3
+}
+closes() { kill -9 "$viewer"; wait "$viewer" 2>/dev/null || true; }
+at() { xdotool mousemove --window "$window" "$@"; }
+key() { local k; for k; do xdotool key --window "$window" "$k"; sleep 0.3; done; }
+busy() { awk '{ print $14 + $15 }' "/proc/$viewer/stat"; }
+# takes NAME: the picture, once the window has been at rest for two seconds.
+takes() {
+    local before
+    for _ in $(seq 60); do
+        before=$(busy); sleep 2
+        [ $(($(busy) - before)) -le 5 ] && break
+    done
+    import -silent -window "$window" now.png
+    convert now.png -quality 88 "$images/window-$1.jpg"
+}
+
+opens statue.vcp --shadows --occlusion 16
+at 480 320 click 5
+at 5 300
+takes whole
+key r
+for _ in $(seq 6); do at 490 150 click 4; sleep 0.5; done
+at 5 300
+takes close
+key r d
+sleep 1
+for point in "455 250" "490 300" "470 420"; do at $point click 1; sleep 5; done
+key Tab
+at 5 300
+takes measuring
+closes
+
+opens ball.vcp --camera iso --section 'z<50%' --caps --shadows
+for _ in 1 2 3; do at 480 320 click 4; sleep 0.5; done
+at 5 300
+takes section
+closes
+
+opens statue.vcp --shading steps
+takes steps
+closes
+
+# A budget that is too small, and views that miss pages: what the rays of the last one asked for stays in the inset.
+opens statue.vcp --budget 32M --error-pixels 0.25
+key i b
+for view in 7 9 1; do key $view; sleep 2; done
+for _ in 1 2 3; do at 480 200 click 4; sleep 0.5; done
+at 5 300
+takes streaming
+closes
