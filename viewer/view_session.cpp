@@ -207,7 +207,8 @@ void ViewSession::savePicture(glm::ivec2 size) {
     int number = 1;
     std::error_code failed;
     while (number < kMostExports && fs::exists(fmt::format("picture-{}.png", number), failed)) ++number;
-    Saving saving{.path = fmt::format("picture-{}.png", number), .view = {}, .png = {}, .picture = {}};
+    Saving saving;
+    saving.path = fmt::format("picture-{}.png", number);
     auto view = viewer_->renderer().addView();
     if (!view) return say(view.error().line());
     auto png = PngRows::create(saving.path, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
@@ -228,6 +229,10 @@ void ViewSession::cancelSaving() {
 
 void ViewSession::goOnSaving() {
     if (!saving_) return;
+    if (saving_->turnsBefore > 0) {
+        --saving_->turnsBefore;
+        return;
+    }
     auto done = saving_->picture->step();
     if (done && !*done) return;
     if (done)

@@ -112,6 +112,7 @@ private:
         std::unique_ptr<Renderer> view;
         std::unique_ptr<PngRows> png;
         std::unique_ptr<TiledPicture> picture;
+        int turnsBefore = 2;  // updates without a tile: the window lays its progress out, then shows it
     };
     std::optional<Saving> saving_;
 };
