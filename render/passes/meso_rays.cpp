@@ -41,7 +41,7 @@ Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const mes
     values_.view.picture.x = count_;
     auto set = resources_.makeSet({&constants_, &words_, &rays_, &results_, &none_, &none_});
     if (!set) return set.error();
-    set_ = *set;
+    set_ = *std::move(set);
     auto pipeline = resources_.pipeline(kMesoRaysSpirv, {arrays.constants.begin(), arrays.constants.end()});
     if (!pipeline) return pipeline.error();
     pipeline_ = *pipeline;
@@ -52,7 +52,7 @@ void MesoRaysPass::record(VkCommandBuffer commands) const {
     vkCmdUpdateBuffer(commands, constants_.handle(), 0, sizeof values_, &values_);
     barrierTransferToAll(commands);
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_);
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &set_, 0, nullptr);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &set_.set, 0, nullptr);
     vkCmdDispatch(commands, (count_ + kGroup - 1) / kGroup, 1, 1);
     barrierComputeToReadback(commands);
 }

@@ -11,7 +11,7 @@ class MesoRaysPass {
 public:
     MesoRaysPass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
 
-    /// Errors: Device, Limit. Uses up a descriptor set until resources.clearSets().
+    /// Errors: Device, Limit.
     Result<void> prepare(const MesoArrays& arrays, std::span<const meso::MarchRay> rays);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands) const;
@@ -24,7 +24,7 @@ private:
     MesoConstants values_{};
     MesoTexels words_, rays_;
     Buffer constants_, results_, none_;
-    VkDescriptorSet set_ = VK_NULL_HANDLE;
+    MesoSet set_;
     VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
 

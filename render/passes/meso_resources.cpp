@@ -38,7 +38,6 @@ Result<void> MesoResources::createLayout() {
 }
 
 MesoResources::~MesoResources() {
-    for (VkDescriptorPool pool : pools_) vkDestroyDescriptorPool(device_.handle(), pool, nullptr);
     vkDestroyPipelineLayout(device_.handle(), layout_, nullptr);
     vkDestroyDescriptorSetLayout(device_.handle(), setLayout_, nullptr);
 }
@@ -95,7 +94,7 @@ Result<Buffer> MesoResources::storage(uint64_t bytes) const {
     return device_.createBuffer(bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
 }
 
-Result<VkDescriptorSet> MesoResources::makeSet(const Bound& bound) {
+Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
     const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 3}, {kStorage, 3}};
     VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool.maxSets = 1;
@@ -103,13 +102,12 @@ Result<VkDescriptorSet> MesoResources::makeSet(const Bound& bound) {
     pool.pPoolSizes = sizes;
     VkDescriptorPool made = VK_NULL_HANDLE;
     VCP_VK(vkCreateDescriptorPool, device_.handle(), &pool, nullptr, &made);
-    pools_.push_back(made);
+    MesoSet owner(device_.handle(), made);
     VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
     allocation.descriptorPool = made;
     allocation.descriptorSetCount = 1;
     allocation.pSetLayouts = &setLayout_;
-    VkDescriptorSet set = VK_NULL_HANDLE;
-    VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &set);
+    VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &owner.set);
 
     const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE, bound.words->view.handle(), bound.words->quads.handle(), bound.input->view.handle()};
     const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr, nullptr, nullptr, bound.hits, bound.picture, bound.counters};
@@ -118,7 +116,7 @@ Result<VkDescriptorSet> MesoResources::makeSet(const Bound& bound) {
     for (uint32_t i = 0; i < kBindingCount; ++i) {
         if (buffers[i] != nullptr) infos[i] = {buffers[i]->handle(), 0, VK_WHOLE_SIZE};
         writes[i] = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
-        writes[i].dstSet = set;
+        writes[i].dstSet = owner.set;
         writes[i].dstBinding = i;
         writes[i].descriptorCount = 1;
         writes[i].descriptorType = kBindings[i];
@@ -126,12 +124,7 @@ Result<VkDescriptorSet> MesoResources::makeSet(const Bound& bound) {
         writes[i].pTexelBufferView = &views[i];
     }
     vkUpdateDescriptorSets(device_.handle(), kBindingCount, writes, 0, nullptr);
-    return set;
-}
-
-void MesoResources::clearSets() {
-    for (VkDescriptorPool pool : pools_) vkDestroyDescriptorPool(device_.handle(), pool, nullptr);
-    pools_.clear();
+    return owner;
 }
 
 Result<VkPipeline> MesoResources::pipeline(std::span<const uint32_t> spirv, const std::vector<uint32_t>& constants) {

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "render/meso_arrays.h"
@@ -32,6 +33,26 @@ struct MesoTexels {
     TexelView view, quads;  ///< quads: of words alone
 };
 
+/// A descriptor set with a pool of its own; frees both.
+class MesoSet {
+public:
+    MesoSet() = default;
+    MesoSet(VkDevice device, VkDescriptorPool pool) : device_(device), pool_(pool) {}
+    MesoSet(MesoSet&& other) noexcept { *this = std::move(other); }
+    MesoSet& operator=(MesoSet&& other) noexcept {
+        std::swap(device_, other.device_), std::swap(pool_, other.pool_), std::swap(set, other.set);
+        return *this;
+    }
+    ~MesoSet() {
+        if (pool_ != VK_NULL_HANDLE) vkDestroyDescriptorPool(device_, pool_, nullptr);
+    }
+    VkDescriptorSet set = VK_NULL_HANDLE;
+
+private:
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkDescriptorPool pool_ = VK_NULL_HANDLE;
+};
+
 class MesoResources {
 public:
     static Result<std::unique_ptr<MesoResources>> create(Device& device);
@@ -49,9 +70,8 @@ public:
         const MesoTexels *words, *input;
         const Buffer *hits, *picture, *counters;
     };
-    /// A set of its own for each that asks, until clearSets(). Errors: Device.
-    Result<VkDescriptorSet> makeSet(const Bound& bound);
-    void clearSets();
+    /// Errors: Device.
+    Result<MesoSet> makeSet(const Bound& bound) const;
 
     /// The pipeline of a shader and its constants, made on first use. Errors: Device.
     Result<VkPipeline> pipeline(std::span<const uint32_t> spirv, const std::vector<uint32_t>& constants);
@@ -66,7 +86,6 @@ private:
     Device& device_;
     VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
-    std::vector<VkDescriptorPool> pools_;  // one a set
     std::map<std::pair<const uint32_t*, std::vector<uint32_t>>, ComputePipeline> pipelines_;
 };
 

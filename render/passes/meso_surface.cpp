@@ -29,7 +29,6 @@ double shadowLift(const MesoArrays& arrays, double tileEdge) {
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
     surfaces_.clear();
-    resources_.clearSets();
     std::map<const MesoArrays*, std::shared_ptr<MesoTexels>> uploaded;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
@@ -74,16 +73,15 @@ Result<void> MesoSurfacePass::prepare(PictureSize size, bool shadows) {
         buffer = std::move(*made);
         return {};
     };
-    if (!(size == size_) || surfaces_.front().set == VK_NULL_HANDLE) {
+    if (!(size == size_) || surfaces_.front().set.set == VK_NULL_HANDLE) {
         VCP_TRY(make(hits_, size.pixels() * frame::kMesoPlanes * 4));
         VCP_TRY(make(picture_, size.pixels() * 4));
         VCP_TRY(make(counters_, 16));
-        resources_.clearSets();
         size_ = size;
         for (Placed& surface : surfaces_) {
             auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &hits_, &picture_, &counters_});
             if (!set) return set.error();
-            surface.set = *set;
+            surface.set = *std::move(set);
         }
     }
     for (Placed& surface : surfaces_) {
@@ -146,10 +144,10 @@ void MesoSurfacePass::record(VkCommandBuffer commands, const MesoLook& look, con
         vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
     }
     barrierTransferToAll(commands);
-    for (const Placed& surface : surfaces_) dispatch(commands, surface.cast, surface.set);
+    for (const Placed& surface : surfaces_) dispatch(commands, surface.cast, surface.set.set);
     if (look.shadows && !look.heat)
-        for (const Placed& surface : surfaces_) dispatch(commands, surface.shadow, surface.set);
-    dispatch(commands, shade_, surfaces_.front().set);
+        for (const Placed& surface : surfaces_) dispatch(commands, surface.shadow, surface.set.set);
+    dispatch(commands, shade_, surfaces_.front().set.set);
     barrierComputeToReadback(commands);
 }
 

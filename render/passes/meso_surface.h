@@ -62,7 +62,7 @@ private:
         Buffer constants;
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the camera
-        VkDescriptorSet set = VK_NULL_HANDLE;
+        MesoSet set;
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE;
     };
     MesoConstants constantsOf(const Placed& surface, const MesoLook& look) const;
