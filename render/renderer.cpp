@@ -469,8 +469,9 @@ Result<void> Renderer::open(std::vector<PlacedDataset> datasets) {
     const std::vector<uint64_t> shares = budgetShares(o.budgetBytes, bytes);
     for (size_t i = 0; i < datasets.size(); ++i) {
         options.budgetBytes = shares[i];
-        const uint64_t needed = datasets[i].source->bytesToRead(0, o.colour && datasets[i].dataset->hasColour());
-        if (datasets.size() > 1 && needed > options.loader.heldBytes) {
+        const bool isShared = datasets.size() > 1 && !datasets[i].dataset->pages.empty();
+        const uint64_t needed = isShared ? datasets[i].source->bytesToRead(0, o.colour && datasets[i].dataset->hasColour()) : 0;
+        if (needed > options.loader.heldBytes) {
             close();
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to read the coarsest page of one takes {}: allow more (--ram)",

@@ -148,8 +148,10 @@ TEST_F(SeveralDatasets, TakeNoMoreThanTheBudgetTogether) {
         EXPECT_LE(stats->poolBytes, budget);
         EXPECT_EQ(update->relaxed, budget == 1 << 20);
     }
-    const auto refused = renderer_->setBudgets(1 << 20, 64 << 20);
+    const auto refused = renderer_->open({first, second});
     EXPECT_TRUE(refused) << refused.error().line();
+    ASSERT_TRUE(renderer_->setBudgets(1 << 20, 4 << 10));
+    EXPECT_EQ(renderer_->open({first, second}).error().code, ErrorCode::Limit) << "no memory to read the coarsest pages";
 }
 
 TEST(BudgetShares, WhatSmallOnesDoNotNeedGoesToTheLarge) {
