@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -11,7 +12,7 @@
 namespace vcp {
 
 Box OpenedScene::bounds() const {
-    Box all = placedBox(parts.front().open.bounds(), parts.front().placement);
+    Box all{glm::dvec3(std::numeric_limits<double>::infinity()), glm::dvec3(-std::numeric_limits<double>::infinity())};
     for (const Part& part : parts) {
         const Box box = placedBox(part.open.bounds(), part.placement);
         all = {glm::min(all.low, box.low), glm::max(all.high, box.high)};
@@ -57,7 +58,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         scene.parts.push_back({*std::move(open), each.placement});
     }
     const Box all = scene.bounds();
-    if (!std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", inputs.front()};
+    if (!scene.parts.empty() && !std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", inputs.front()};
     return scene;
 }
 

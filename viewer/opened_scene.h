@@ -17,10 +17,10 @@ struct OpenedScene {
         OpenDataset open;
         Similarity placement;
     };
-    std::vector<Part> parts;  ///< at least one
-    SceneFile file;           ///< light, camera and sections of a scene file; empty without one
+    std::vector<Part> parts;  ///< at least one, or a surface of the file
+    SceneFile file;           ///< surfaces, light, camera and sections of a scene file; empty without one
 
-    /// Of all datasets where they are placed.
+    /// Of all datasets where they are placed; turned inside out where there is none.
     [[nodiscard]] Box bounds() const;
     [[nodiscard]] std::vector<PlacedDataset> placed() const;
     [[nodiscard]] uint32_t loaderThreads() const;

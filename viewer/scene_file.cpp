@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::streamsize kLargestFile = 1 << 20;
-constexpr size_t kMostDatasets = 256;
+constexpr size_t kMostDatasets = 256, kMostSurfaces = 64;
 constexpr int kDeepest = 16;
 // What a scene may have of them: nothing else has a line of its own.
 constexpr int kDeepestLine = 5;
@@ -117,10 +117,11 @@ public:
         SceneFile scene;
         if (!json.is_object()) return wrong("", "a scene must be a JSON object"), scene;
         onlyKeys(json, "", {"datasets", "lights", "camera", "sections", "caps", "mesostructure"});
-        if (json.contains("mesostructure")) wrong("/mesostructure", "surfaces with mesostructure are not supported in scenes yet");
-        if (!json.contains("datasets")) wrong("", "\"datasets\" is missing");
+        if (json.contains("mesostructure")) scene.surfaces = surfaces(json["mesostructure"]);
+        if (!json.contains("datasets") && scene.surfaces.empty()) wrong("", "\"datasets\" is missing");
         const Json& datasets = json.value("datasets", Json::array());
-        if (!datasets.is_array() || datasets.empty() || datasets.size() > kMostDatasets) wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostDatasets));
+        if (!datasets.is_array() || (datasets.empty() && scene.surfaces.empty()) || datasets.size() > kMostDatasets)
+            wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostDatasets));
         for (size_t i = 0; i < datasets.size() && !error_; ++i) scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
         if (json.contains("lights")) scene.light = light(json["lights"]);
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
@@ -199,6 +200,61 @@ private:
         if (json.contains("rotate")) made.placement.rotation = rotation(json["rotate"], at + "/rotate");
         if (json.contains("scale")) made.placement.scale = scale(json["scale"], at + "/scale");
         return made;
+    }
+
+    std::vector<MesoSurfaceDescription> surfaces(const Json& json) {
+        std::vector<MesoSurfaceDescription> all;
+        if (!json.is_array() || json.empty() || json.size() > kMostSurfaces) return wrong("/mesostructure", fmt::format("must be a list of 1 to {} surfaces", kMostSurfaces)), all;
+        for (size_t i = 0; i < json.size() && !error_; ++i) all.push_back(surface(json[i], fmt::format("/mesostructure/{}", i)));
+        return all;
+    }
+
+    MesoSurfaceDescription surface(const Json& json, const std::string& at) {
+        MesoSurfaceDescription made;
+        made.method.name = "boxes";
+        if (!isObject(json, at)) return made;
+        onlyKeys(json, at, {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "method", "base"});
+        if (!json.contains("asset")) wrong(at, "\"asset\" is missing");
+        else made.asset = named(json["asset"], at + "/asset", [](const std::string& name) { return name.ends_with(".meso"); });
+        // A base that is none by name is a mesh.
+        const auto bases = meso::baseSurfaceNames();
+        const auto isMesh = [&](const std::string& name) { return std::ranges::find(bases, name) == bases.end(); };
+        if (json.contains("surface")) made.base = named(json["surface"], at + "/surface", isMesh);
+        if (json.contains("tiles")) made.tiles = scale(json["tiles"], at + "/tiles");
+        if (json.contains("height")) made.heightScale = scale(json["height"], at + "/height");
+        if (json.contains("translate")) made.place = triple(json["translate"], at + "/translate");
+        if (json.contains("scale")) made.scale = scale(json["scale"], at + "/scale");
+        if (json.contains("up")) made.up = upAxis(json["up"], at + "/up");
+        if (json.contains("colour")) made.colour = colour(json["colour"], at + "/colour");
+        if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
+        if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
+        return made;
+    }
+
+    /// A name, or a file, which is taken from the scene's folder.
+    template <class IsFile>
+    std::string named(const Json& json, const std::string& at, IsFile isFile) {
+        if (!json.is_string() || json.get<std::string>().empty()) return wrong(at, "must be a name or a file's name"), std::string();
+        const std::string name = json.get<std::string>();
+        return isFile(name) ? fileNamed(name) : name;
+    }
+
+    UpAxis upAxis(const Json& json, const std::string& at) {
+        if (json != "y" && json != "z") wrong(at, "must be \"y\" or \"z\"");
+        return json == "y" ? UpAxis::Y : UpAxis::Z;
+    }
+
+    glm::vec3 colour(const Json& json, const std::string& at) {
+        const glm::dvec3 rgb = triple(json, at);
+        if (glm::clamp(rgb, 0.0, 1.0) != rgb) wrong(at, "must be red, green and blue from 0 to 1");
+        return rgb;
+    }
+
+    std::string methodNamed(const Json& json, const std::string& at) {
+        const auto names = meso::methodNames();
+        const std::string name = json.is_string() ? json.get<std::string>() : std::string();
+        if (std::ranges::find(names, name) == names.end()) wrong(at, fmt::format("must be one of {}", fmt::join(names, ", ")));
+        return name;
     }
 
     [[nodiscard]] std::string fileNamed(const std::string& file) const {

@@ -1,4 +1,4 @@
-// Scene files: several datasets with their places, light, camera and section planes, in JSON. docs/scenes.md has the
+// Scene files: several datasets and surfaces with mesostructure, each in its place, light, camera and section planes, in JSON. docs/scenes.md has the
 // schema and an example.
 //
 // Unknown keys are errors, so that a misspelt one is not passed over. Errors name the file, the line and the key.
@@ -12,6 +12,7 @@
 
 #include "octree/result.h"
 #include "render/renderer.h"
+#include "viewer/meso_scene.h"
 #include "viewer/orbit_camera.h"
 
 namespace vcp {
@@ -27,7 +28,8 @@ struct SceneLight {
 };
 
 struct SceneFile {
-    std::vector<SceneDataset> datasets;  ///< at least one
+    std::vector<SceneDataset> datasets;  ///< at least one, or a surface
+    std::vector<MesoSurfaceDescription> surfaces;
     std::optional<SceneLight> light;
     std::optional<OrbitCamera> camera;
     std::vector<SectionPlane> sections;  ///< at most kMostSections

@@ -75,6 +75,7 @@ void ViewSession::takeOpened() {
 }
 
 Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::string>& inputs) {
+    if (open.parts.empty()) return Error{ErrorCode::Usage, "surfaces with mesostructure alone are drawn by vcp render", inputs.front()};
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
     camera.up = user_.up;
@@ -110,6 +111,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     finest_ = std::make_shared<ScenePick>();
     for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
     VCP_TRY(viewer_->open(open.placed(), camera, nameOf(inputs)));
+    if (!open.file.surfaces.empty()) note("surfaces with mesostructure are drawn by vcp render, not in the window yet");
     shown_ = rememberedName(inputs.front());
     for (const std::string& input : inputs) user_.remember(input);
     return {};

@@ -1,7 +1,11 @@
 // vcp meso and vcp bench meso from the outside.
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <set>
 #include <sstream>
 #include <string>
@@ -81,6 +85,47 @@ TEST_F(MesoCommands, MeshesMustBeClosed) {
     EXPECT_NE(open.err.find("not closed"), std::string::npos) << open.err;
     EXPECT_NE(open.err.find("open.obj"), std::string::npos) << open.err;
     EXPECT_FALSE(std::filesystem::exists(path("c.meso")));
+}
+
+/// Pixels of a .pfm of depths that hit something, and the nearest.
+std::pair<size_t, float> hitsOf(const std::string& pfm) {
+    const std::string bytes = contentOf(pfm);
+    size_t at = 0;
+    for (int line = 0; line < 3; ++line) at = bytes.find('\n', at) + 1;
+    std::vector<float> depths((bytes.size() - at) / sizeof(float));
+    std::memcpy(depths.data(), bytes.data() + at, depths.size() * sizeof(float));
+    size_t hits = 0;
+    float nearest = std::numeric_limits<float>::infinity();
+    for (const float depth : depths) hits += std::isfinite(depth), nearest = std::min(nearest, depth);
+    return {hits, nearest};
+}
+
+TEST_F(MesoCommands, ScenesHaveSurfacesBesideDatasets) {
+    writeBall(path("ball.ply"), 20, 40);
+    const std::string surface = R"("mesostructure": [{"asset": "hemispheres", "tiles": 2, "up": "y", "method": "pyramid"}],
+        "camera": {"position": [0.5, 1, 1.2], "target": [0, 0, 0]})";
+    std::ofstream(path("alone.json")) << "{" << surface << "}";
+    std::ofstream(path("both.json")) << R"({"datasets": [{"file": "ball.ply", "scale": 0.2, "translate": [0, 0.3, 0]}], )" << surface << "}";
+    const auto draw = [&](const std::string& scene) {
+        const Ran ran = run("render " + path(scene) + " -o " + path("a.png") + " --size 64x48 --progress none --depth " + path("a.pfm") + " --normals " + path("n.png"));
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return hitsOf(path("a.pfm"));
+    };
+    const auto alone = draw("alone.json"), both = draw("both.json");
+    EXPECT_GT(alone.first, 500u);
+    EXPECT_GT(both.first, alone.first / 2);
+    EXPECT_LT(both.second, alone.second - 0.1f) << "the ball is nearer";
+    const Ran turned = run("render " + path("both.json") + " -o " + path("b.png") + " --turntable 3");
+    EXPECT_EQ(turned.status, 2) << turned.err;
+    EXPECT_NE(turned.err.find("one piece"), std::string::npos) << turned.err;
+}
+
+TEST_F(MesoCommands, TheScenesOfTheDocumentsAreDrawn) {
+    for (const std::string scene : {"maze_ball", "beads_gallery", "kitten_wall"}) {
+        const Ran ran = run("render " VCP_SOURCE_DIR "/docs/scenes/" + scene + ".json -o " + path("a.png") + " --size 96x64 --progress none --depth " + path("a.pfm"));
+        ASSERT_EQ(ran.status, 0) << ran.err;
+        EXPECT_GT(hitsOf(path("a.pfm")).first, 500u) << scene;
+    }
 }
 
 TEST_F(MesoCommands, SaysWhatIsWrong) {
