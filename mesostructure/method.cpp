@@ -85,7 +85,8 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
         return method;
     }
     const glm::ivec3 cells = cellsOf(asset, shape.extent(), options.cells);
-    if (asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
+    const bool isExact = name == "boxes" || name == "cells";
+    if (isExact && asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels", cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
     if (name == "sphere") {
@@ -93,7 +94,6 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
         VCP_TRY(take(buildSphereMap(shape, {.cells = cells}), method.sphere));
         return method;
     }
-    const bool isExact = name == "boxes" || name == "cells";
     VCP_TRY(addCells(method, asset, shape, cells, isExact));
     const bool isOwn = asset.occupancy && asset.occupancy->grid.cells == cells;
     if (name == "boxes") method.boxes = std::make_unique<OctantBoxes>(isOwn && asset.boxes ? *asset.boxes : buildOctantBoxes(*method.occupancy));

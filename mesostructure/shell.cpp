@@ -50,7 +50,8 @@ std::vector<dvec3> directionsOf(const BaseSurface& surface) {
         }
     });
     for (dvec3& sum : sums)
-        if (const double length = glm::length(sum); length > 0) sum /= length;
+        if (const double length = glm::length(sum); length > 1e-6) sum /= length;
+        else sum = dvec3(0);
     each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
         for (const uint32_t corner : t) least[corner] = std::min(least[corner], glm::dot(sums[corner], normal));
     });
@@ -65,7 +66,8 @@ public:
         for (size_t i = 0; i < surface.triangles.size(); ++i)
             for (int k = 0; k < 3; ++k) {
                 const Edge edge = edgeOf(surface, i, k);
-                uses_[edge.corners].push_back(edge.map);
+                // More than a few on one edge are no surface: the others are cut.
+                if (auto& uses = uses_[edge.corners]; uses.size() < 16) uses.push_back(edge.map);
             }
     }
     /// The edge from corner k to the next.
@@ -144,6 +146,7 @@ private:
             const double scale = glm::length(x) * glm::length(y) * glm::length(z);
             shell_.inverted += volume < 0;
             if (std::abs(volume) > 1e-12 * scale) pieces.push_back(made);
+            else ++shell_.flat;
         }
     }
 
@@ -249,7 +252,8 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
         for (const uint32_t corner : triangle) low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
     if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
     const std::vector<Piece> pieces = PieceMaker(surface, height, extent, shell).all();
-    if (pieces.empty()) return fail(ErrorCode::InvalidInput, "no triangle has an area");
+    if (pieces.empty())
+        return fail(ErrorCode::InvalidInput, shell.flat > 0 ? "all faces lie on their own backs: the surface has no outside" : "no triangle has an area");
     std::vector<uint32_t> order(pieces.size());
     std::iota(order.begin(), order.end(), 0u);
     shell.texels = TreeMaker(pieces, order).nodes();
@@ -257,6 +261,9 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
     shell.pieces = uint32_t(pieces.size());
     shell.low = shell.origin + dvec3(shell.texels[0]), shell.high = shell.origin + dvec3(shell.texels[1]);
     for (const uint32_t i : order) append(pieces[i], extent, shell.texels);
+    for (const glm::vec4& texel : shell.texels)
+        if (!std::isfinite(texel.x + texel.y + texel.z + texel.w))
+            return fail(ErrorCode::InvalidInput, "positions or texture coordinates are too large or too close together for single precision");
     return shell;
 }
 

@@ -8,7 +8,8 @@
 //
 // What a map or a surface may do to a shell is counted, not refused: triangles without area are left out; where the map
 // has no area (the texture is smeared along it); mirrored maps, which need nothing; tetrahedra that are turned inside out,
-// where the surface is more sharply concave than the shell is high, so that pieces overlap and the nearest wins.
+// where the surface is more sharply concave than the shell is high, so that pieces overlap and the nearest wins;
+// tetrahedra without volume, which are left out: where faces lie on their own backs there is no outside.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +28,7 @@ struct Shell {
     glm::dvec3 origin{0};  ///< what all coordinates are relative to: the middle of the base
     glm::dvec3 low{0}, high{0};  ///< of the shell, world
     uint32_t nodes = 0, pieces = 0;
-    uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0, inverted = 0;  ///< triangles; the last: pieces
+    uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0, inverted = 0, flat = 0;  ///< triangles; the last two: pieces
 
     /// `nodes` nodes, then `pieces` tetrahedra, as shaders read them:
     ///   node    (low, first child or first piece) (high, pieces; 0: two children, one after the other)
@@ -40,7 +41,7 @@ struct Shell {
 };
 
 /// `height`: of the shell over flat parts, world units; `extent`: of the tile, tile units. Errors: Usage (heights not
-/// above 0, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not finite); Limit (2^24 pieces).
+/// above 0, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not finite, also in single precision); Limit (2^24 pieces).
 Result<Shell> buildShell(const BaseSurface& surface, double height, glm::dvec3 extent);
 
 }  // namespace vcp::meso

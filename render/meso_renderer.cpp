@@ -157,6 +157,7 @@ Result<MesoFrameStats> MesoRenderer::render(const MesoRequest& request) {
     if (request.behind != nullptr &&
         (request.behind->picture.width != size.width || request.behind->picture.height != size.height || request.behind->depths.size() != size.pixels()))
         return fail("what is behind is of another size than the picture");
+    s.size = {};  // what was drawn is gone
     VCP_TRY(s.surfaces->prepare(size, request.look.shadows));
     MesoFrameStats stats;
     Picture under = background(request);

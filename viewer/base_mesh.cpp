@@ -14,6 +14,7 @@ namespace vcp {
 
 namespace {
 
+constexpr size_t kLongestLine = 1 << 20;
 constexpr size_t kMostTriangles = 5'000'000;
 
 Error noMap(const std::filesystem::path& path, std::string element = {}) {
@@ -33,6 +34,9 @@ public:
         if (!file) return Error{.code = ErrorCode::Io, .message = "cannot be opened", .file = path_.string()};
         for (std::string line; std::getline(file, line);) {
             ++line_;
+            if (line.size() > kLongestLine) return wrong("the line is longer than 1 MiB");
+            if (made_.positions.size() > 3 * kMostTriangles || coordinates_.size() > 3 * kMostTriangles)
+                return Error{.code = ErrorCode::Limit, .message = "a base surface has at most 15 million vertices and texture coordinates", .file = path_.string(), .element = fmt::format("line {}", line_)};
             text_ = line;
             const std::string_view word = nextWord();
             if (word == "v") VCP_TRY(readPosition());

@@ -332,6 +332,7 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         }
         if (options.checkRays > 0) VCP_TRY(check(**subject, options.checkRays, report.checks));
     }
+    if (report.rows.empty()) return Error{.code = ErrorCode::Usage, .message = "none of these methods is of these assets"};
     if (options.published) {
         report.published = publishedOf(report.rows);
         VCP_TRY(compareCompression(report.published));

@@ -77,17 +77,20 @@ Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
     const auto tiles = valueOf(c.tiles, i, count, 4.0, "--tiles"), height = valueOf(c.heights, i, count, 1.0, "--height"), scale = valueOf(c.scales, i, count, 1.0, "--scale");
     for (const auto* value : {&tiles, &height, &scale})
         if (!*value) return value->error();
-    if (!(*scale > 0)) return wrong("--scale must be above 0");
+    if (!(*scale > 0) || !std::isfinite(*scale)) return wrong("--scale must be above 0");
+    if (!(*tiles > 0) || *tiles > 4096) return wrong("--tiles must be above 0 and at most 4096");
+    if (!(*height > 0) || !std::isfinite(*height)) return wrong("--height must be above 0");
     const auto place = valueOf(c.places, i, count, std::string("0,0,0"), "--at"), colour = valueOf(c.colours, i, count, std::string(kColours[i % std::size(kColours)]), "--colour");
     for (const auto* value : {&place, &colour})
         if (!*value) return value->error();
     const auto at = threeOf(*place, "--at", "0,0.5,0"), rgb = threeOf(*colour, "--colour", "0.8,0.7,0.6");
     for (const auto* value : {&at, &rgb})
         if (!*value) return value->error();
-    const std::vector<double> cones = numbersOf(std::string(c.cones).replace(std::min(c.cones.find('x'), c.cones.size()), 1, ","));
-    if (cones.size() != 2) return wrong("--cones must be like 4x2, not \"" + c.cones + "\"");
+    if (glm::clamp(*rgb, 0.0, 1.0) != *rgb) return wrong("--colour must be three numbers from 0 to 1, not \"" + *colour + "\"");
+    const auto cones = parseSize(c.cones);
+    if (!cones || cones->x > 32 || cones->y > 16) return wrong("--cones must be whole numbers from 1x1 to 32x16, like 4x2, not \"" + c.cones + "\"");
     d.asset = c.assets[i], d.base = *surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale, d.place = *at, d.colour = glm::vec3(*rgb), d.up = upOf(c);
-    d.method.cones = {int(cones[0]), int(cones[1])};
+    d.method.cones = {cones->x, cones->y};
     return d;
 }
 
@@ -97,7 +100,13 @@ Result<std::vector<MesoSurfaceDescription>> descriptionsOf(const RenderMeso& c) 
         auto d = descriptionOf(c, i);
         if (!d) return d.error();
         // A base is drawn once: with the first asset on it, and not beside a quad where that has sunk a little.
-        d->withBase = !c.noBase && std::ranges::none_of(all, [&](const MesoSurfaceDescription& other) { return other.base == d->base && (other.place == d->place || d->base == "quad"); });
+        const auto hides = [&](const MesoSurfaceDescription& other) {
+            if (other.base != d->base) return false;
+            if (other.place == d->place && other.scale == d->scale) return true;
+            const glm::dvec3 off = glm::abs(other.place - d->place);
+            return d->base == "quad" && std::max(off.x, d->up == UpAxis::Y ? off.z : off.y) < other.scale;
+        };
+        d->withBase = !c.noBase && std::ranges::none_of(all, hides);
         all.push_back(*std::move(d));
     }
     return all;
@@ -208,6 +217,8 @@ Result<int> runRender(const RenderMeso& command) {
     if (command.methods.size() > 1 && !command.depth.empty()) return wrong("--depth is of one method");
     auto descriptions = descriptionsOf(command);
     if (!descriptions) return descriptions.error();
+    // What is wrong is said before anything is made.
+    if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
     std::unique_ptr<MesoRenderer> renderer;
     std::optional<MesoBackdrop> backdrop;
     std::optional<MesoBehind> behind;

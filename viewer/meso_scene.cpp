@@ -45,6 +45,7 @@ void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::
     };
     say(shell.withoutArea, "triangles without area are left out");
     say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
+    say(shell.flat, "pieces of the shell have no volume and are left out: faces on their own backs have no outside");
     say(shell.inverted, "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
 }
 
@@ -80,7 +81,11 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         const auto base = baseOf(d);
         if (!base) return base.error();
         auto arrays = arraysOf(*asset, d.method);
-        if (!arrays) return arrays.error();
+        if (!arrays) {
+            Error error = arrays.error();
+            if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
+            return error;
+        }
         const double edge = tileEdge(*base);
         auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
         if (!shell) {

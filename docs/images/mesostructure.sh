@@ -22,6 +22,8 @@ draw hemispheres_sphere hemispheres --surface sphere --tiles 2 --shadows --size 
 draw kitten_wall kitten --tiles 3 --shadows --light=0.6,-0.3,0.5 --size 360x270 --view=-70,50,1.15
 draw grazing beads --tiles 2 --shadows --light=0.3,-1,0.25 --size 360x180 --view 25,6,1.3
 
+"$build/vcp" render "$images/../scenes/beads_gallery.json" -o "$images/scene_beads.png" --size 480x240 --shadows --progress none
+
 # Iterations of five methods on the same rays.
 draw heat hemispheres --tiles 2 --method relief-binary,dm,ddm,ddm-quadric,boxes --heat --size 200x110 --view 30,12,1.5
 

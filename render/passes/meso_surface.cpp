@@ -74,15 +74,18 @@ Result<void> MesoSurfacePass::prepare(PictureSize size, bool shadows) {
         return {};
     };
     if (!(size == size_) || surfaces_.front().set.set == VK_NULL_HANDLE) {
+        // Nothing has a size or a set until all is made.
+        size_ = {};
+        for (Placed& surface : surfaces_) surface.set = MesoSet();
         VCP_TRY(make(hits_, size.pixels() * frame::kMesoPlanes * 4));
         VCP_TRY(make(picture_, size.pixels() * 4));
         VCP_TRY(make(counters_, 16));
-        size_ = size;
         for (Placed& surface : surfaces_) {
             auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &hits_, &picture_, &counters_});
             if (!set) return set.error();
             surface.set = *std::move(set);
         }
+        size_ = size;
     }
     for (Placed& surface : surfaces_) {
         std::vector<uint32_t> constants(surface.arrays->constants.begin(), surface.arrays->constants.end());

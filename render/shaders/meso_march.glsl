@@ -21,9 +21,9 @@ int coneOf(vec3 d) {
     else if ((cones.x & 3) == 0) {
         int most = cones.x / 4;
         vec2 a = (quarter & 1) == 0 ? abs(d.xy) : abs(d.yx);
-        azimuth = quarter * most + min(int(atan(a.y, a.x) * 0.636619772 * float(most)), most - 1);
+        azimuth = quarter * most + (a.x + a.y > 0.0 ? clamp(int(atan(a.y, a.x) * 0.636619772 * float(most)), 0, most - 1) : 0);
     } else if (cones.x > 1) {
-        float turn = atan(d.y, d.x) * 0.159154943;
+        float turn = d.x == 0.0 && d.y == 0.0 ? 0.0 : atan(d.y, d.x) * 0.159154943;
         if (turn < 0.0) turn += 1.0;
         azimuth = min(int(turn * float(cones.x)), cones.x - 1);
     }
