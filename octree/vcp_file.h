@@ -18,8 +18,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <memory>
-#include <ranges>
 #include <span>
 #include <string>
 #include <vector>
@@ -103,10 +103,36 @@ struct PageEntry {
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 && offsetof(PageEntry, childMask) == 72);
 
+/// Numbers of entries that follow each other. (std::views::iota does not compile with clang 14.)
+class EntryRange {
+public:
+    class Iterator {
+    public:
+        using iterator_category = std::input_iterator_tag;
+        using value_type = uint64_t;
+        using difference_type = std::ptrdiff_t;
+        using pointer = const uint64_t*;
+        using reference = uint64_t;
+
+        explicit Iterator(uint64_t at) : at_(at) {}
+        uint64_t operator*() const { return at_; }
+        Iterator& operator++() { return ++at_, *this; }
+        bool operator==(const Iterator&) const = default;
+
+    private:
+        uint64_t at_;
+    };
+    EntryRange(uint64_t first, uint64_t count) : first_(first), count_(count) {}
+    [[nodiscard]] Iterator begin() const { return Iterator(first_); }
+    [[nodiscard]] Iterator end() const { return Iterator(first_ + count_); }
+    [[nodiscard]] uint64_t size() const { return count_; }
+
+private:
+    uint64_t first_, count_;
+};
+
 /// The entries of a page's children, in octant order.
-inline std::ranges::iota_view<uint64_t, uint64_t> childrenOf(const PageEntry& page) {
-    return {page.firstChild, uint64_t{page.firstChild} + static_cast<uint64_t>(std::popcount(page.childMask))};
-}
+inline EntryRange childrenOf(const PageEntry& page) { return {page.firstChild, static_cast<uint64_t>(std::popcount(page.childMask))}; }
 
 struct CommitRecord {
     char magic[8] = {'V', 'C', 'P', 'c', 'o', 'm', 'm', 't'};

@@ -67,7 +67,8 @@ double excessOf(const Dataset& dataset, uint64_t page, std::span<const Selection
 }
 
 bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> states) {
-    return page.childMask != 0 && std::ranges::all_of(childrenOf(page), [&](uint64_t child) { return states[child] != kUnavailable; });
+    const EntryRange children = childrenOf(page);
+    return page.childMask != 0 && std::all_of(children.begin(), children.end(), [&](uint64_t child) { return states[child] != kUnavailable; });
 }
 
 struct ChildrenBytes {
@@ -142,14 +143,14 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
         ++drawable.pagesWanted;
         drawable.pagesMissing += resident[at.page] != 0 ? 0 : 1;
         const PageEntry& entry = dataset.pages[at.page];
-        const auto children = childrenOf(entry);
+        const EntryRange children = childrenOf(entry);
         const double error = errorInView(dataset, at.page, view);
         const bool refined = choice.refined[at.page] == kRefined && isTooCoarse(error, view);
         if (choice.refined[at.page] == kAwaited && isTooCoarse(error, view)) {
             drawable.pagesWanted += children.size();
             drawable.pagesMissing += children.size();
         }
-        const bool drawn = !at.isCovered && !(refined && std::ranges::all_of(children, [&](uint64_t child) { return resident[child] != 0; }));
+        const bool drawn = !at.isCovered && !(refined && std::all_of(children.begin(), children.end(), [&](uint64_t child) { return resident[child] != 0; }));
         if (refined)
             for (const uint64_t child : children) walk.push_back({child, at.isCovered || drawn});
         if (!refined && isTooCoarse(error, view) && entry.childMask != 0) drawable.isRelaxed = drawable.isRelaxed || choice.relaxed;
