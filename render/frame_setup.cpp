@@ -94,6 +94,12 @@ void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileH
 
 }  // namespace
 
+LightDirections lightDirections(const FrameRequest& request, const CameraBasis& basis) {
+    const glm::dvec3 light = glm::normalize(glm::dvec3(request.shading.lightDirection));
+    if (!request.shading.lightFollowsCamera) return {light, glm::normalize(request.camera.up)};
+    return {basis.right * light.x + basis.up * light.y - basis.forward * light.z, basis.up};
+}
+
 bool hasLight(const Shading& shading) {
     return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) && (shading.shadows || shading.occlusionRays > 0);
 }
@@ -128,12 +134,11 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.picture = {request.width, request.height, (request.width + frame::kTileSize - 1) / frame::kTileSize,
                  (request.height + frame::kTileSize - 1) / frame::kTileSize};
     c.mode = {header.log2Cells, header.levels - 1, stripes, shadingMode(request.shading.mode)};
-    const Shading& s = request.shading;
-    const glm::dvec3 light = glm::normalize(glm::dvec3(s.lightDirection));
-    c.lightDirection = toVec4(s.lightFollowsCamera ? basis.right * light.x + basis.up * light.y - basis.forward * light.z : light);
-    c.upDirection = toVec4(s.lightFollowsCamera ? basis.up : glm::normalize(request.camera.up));
-    c.clay = encoded(s.clay);
-    c.cap = encoded(s.cap);
+    const LightDirections directions = lightDirections(request, basis);
+    c.lightDirection = toVec4(directions.light);
+    c.upDirection = toVec4(directions.sky);
+    c.clay = encoded(request.shading.clay);
+    c.cap = encoded(request.shading.cap);
     c.extra.x = hitPlanes(request, colour) - 1;
     c.march.x = request.march.epsilon;
     c.march.y = static_cast<float>(header.cell * placement.scale);

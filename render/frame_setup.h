@@ -13,6 +13,12 @@ namespace vcp {
 frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels,
                                     const Similarity& placement = {});
 
+/// Towards the light and towards the middle of the sky, unit, in the axes of the request's camera.
+struct LightDirections {
+    glm::dvec3 light, sky;
+};
+LightDirections lightDirections(const FrameRequest& request, const CameraBasis& basis);
+
 /// Whether rays of light are traced: where shading asks for them and shows light.
 bool hasLight(const Shading& shading);
 

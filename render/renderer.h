@@ -27,6 +27,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -207,7 +208,7 @@ struct UpdateResult {
 struct FrameStats {
     uint64_t rays = 0;        ///< pixels
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
-    uint64_t hitPixels = 0;
+    uint64_t hitPixels = 0;   ///< that any dataset or surface is hit in
     double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0, msFeedback = 0;  ///< GPU timestamps; 0 where the device has none
     double msFrame = 0;       ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
@@ -215,6 +216,9 @@ struct FrameStats {
     uint64_t colourBytes = 0;   ///< of colour, in the pool
     uint32_t pagesInCut = 0;
     uint32_t pipelines = 0;     ///< made since create()
+    double msSurfaces = 0;      ///< of surfaces with mesostructure; GPU timestamps
+    uint64_t unresolvedRays = 0;  ///< rays that used up their iterations in mesostructure
+    uint64_t surfaceBytes = 0;  ///< of mesostructure on the device, beside the pool: assets and shells
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 
@@ -258,7 +262,10 @@ struct PixelHit {
     glm::vec3 normal;     ///< unit, towards the viewer
     size_t dataset = 0;   ///< number of the dataset, in the order of open()
     bool onCap = false;   ///< on what a section plane cut open
+    bool onSurface = false;  ///< on mesostructure; then `dataset` means nothing
 };
+
+struct MesoSurface;  // render/passes/meso_surface.h
 
 class Renderer {
 public:
@@ -283,6 +290,12 @@ public:
     Result<void> open(std::vector<PlacedDataset> datasets);
     /// Stops the loader and forgets all pages.
     void close();
+
+    /// Surfaces with mesostructure, in all views, in place of those before and whatever is open: drawn over the datasets, the
+    /// nearer is seen at each pixel. They take light, shadows, normals, unlit colours and steps (their iterations, 0 to 100) from the request;
+    /// they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be uploaded again to a device that
+    /// is made anew. Without any, nothing is made for them. On an error there are none. Errors: Device, Limit.
+    Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
 
     /// Other budgets than the options', from now on: what has no room goes at once, what is kept is not read again where
     /// `ramBytes` has room to carry it over. Waits for the copies. To be followed by update(). Errors: Usage; Limit,
@@ -315,6 +328,8 @@ public:
     /// The number behind the false colour of each pixel: steps, cells or fetches of its ray. Precondition: the last
     /// render() was shaded so.
     Result<std::vector<uint32_t>> readWork();
+    /// Iterations of each pixel's ray in mesostructure, in all pieces that it passed; all 0 without surfaces.
+    Result<std::vector<uint32_t>> readIterations();
     /// One pixel of the last render(); nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
 

@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "mesostructure/method.h"
-#include "render/meso_renderer.h"
+#include "render/meso_marcher.h"
 #include "viewer/meso_scene.h"
 
 namespace vcp {
@@ -176,7 +176,7 @@ void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
 }
 
 Result<BenchMesoRow> measure(const Subject& subject, const Measured& method, const RayView& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths,
-                             int repetitions, MesoRenderer* renderer) {
+                             int repetitions, MesoMarcher* renderer) {
     BenchMesoRow row;
     row.asset = subject.asset.name, row.view = view.name, row.method = method.name, row.knob = method.knob;
     row.rays = rays.size(), row.bytes = method.marcher->bytes(), row.preprocessSeconds = method.preprocessSeconds;
@@ -290,9 +290,9 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     VCP_TRY(knows("view", options.views, mesoViewNames()));
     std::vector<std::string> assets = options.assets;
     if (assets.empty()) assets = {"fbm", "hemispheres", "bricks", "maze", "needle", "beads", "chain", "weave", "ball", "scales", "kitten"};
-    std::unique_ptr<MesoRenderer> renderer;
+    std::unique_ptr<MesoMarcher> renderer;
     if (options.device) {
-        auto made = MesoRenderer::create({.device = *options.device});
+        auto made = MesoMarcher::create({.device = *options.device});
         if (!made) return made.error();
         renderer = *std::move(made);
     }

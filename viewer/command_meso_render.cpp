@@ -4,17 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <numbers>
-#include <optional>
+#include <numeric>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/common.hpp>
 
 #include "viewer/image_files.h"
-#include "viewer/meso_backdrop.h"
+#include "viewer/interrupt.h"
 #include "viewer/meso_scene.h"
+#include "viewer/opened_scene.h"
 #include "viewer/option_values.h"
 #include "viewer/render_settings.h"
 
@@ -150,8 +152,11 @@ Picture besideEachOther(const std::vector<Panel>& panels) {
     return all;
 }
 
-Result<MesoFrameStats> drawFrames(MesoRenderer& renderer, const MesoRequest& request, int frames) {
-    MesoFrameStats stats;
+Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, int frames) {
+    const auto update = renderer.settle(request, interrupted);
+    if (!update) return update.error();
+    if (!update->problems.empty()) return update->problems.front();
+    FrameStats stats;
     std::vector<double> times;
     for (int i = 0; i <= frames; ++i) {
         const auto drawn = renderer.render(request);
@@ -164,39 +169,40 @@ Result<MesoFrameStats> drawFrames(MesoRenderer& renderer, const MesoRequest& req
     return stats;
 }
 
-Result<Panel> drawPanel(MesoRenderer& renderer, const MesoRequest& request, const RenderMeso& command, const std::string& method) {
+Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const RenderMeso& command, const std::string& method) {
     const auto stats = drawFrames(renderer, request, command.frames);
     if (!stats) return stats.error();
     auto picture = renderer.readPicture();
     if (!picture) return picture.error();
-    const auto depth = renderer.readDepth();
-    if (!depth) return depth.error();
-    if (!command.depth.empty()) VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth));
+    if (!command.depth.empty()) {
+        const auto depth = renderer.readDepth();
+        if (!depth) return depth.error();
+        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth));
+    }
     const auto iterations = renderer.readIterations();
     if (!iterations) return iterations.error();
     const std::vector<std::string> problems = renderer.validationMessages();
     if (!problems.empty()) return Error{.code = ErrorCode::Device, .message = problems.front()};
-    uint64_t covered = 0;
-    double sum = 0;
-    for (const float d : *depth) covered += std::isfinite(d);
-    for (const uint32_t n : *iterations) sum += n;
-    const double mean = sum / double(depth->size());
+    const double mean = std::accumulate(iterations->begin(), iterations->end(), 0.0) / double(iterations->size());
     return Panel{*std::move(picture),
-                 {{"method", method}, {"ms_per_frame", stats->msFrame}, {"hit_pixels", covered}, {"iterations_mean", mean}, {"unresolved", stats->unresolved}, {"asset_bytes", stats->assetBytes}},
-                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame, mean, stats->unresolved, formatBytes(stats->assetBytes))};
+                 {{"method", method}, {"ms_per_frame", stats->msFrame}, {"hit_pixels", stats->hitPixels}, {"iterations_mean", mean}, {"unresolved", stats->unresolvedRays}, {"asset_bytes", stats->surfaceBytes}},
+                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame, mean, stats->unresolvedRays, formatBytes(stats->surfaceBytes))};
 }
 
-Result<MesoRequest> requestOf(const RenderMeso& command, const Box& bounds) {
+Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
     const auto size = parseSize(command.size);
     if (!size) return wrong("--size must be like 960x640, not \"" + command.size + "\"");
     const auto camera = cameraOf(command, bounds, *size);
     if (!camera) return camera.error();
     const auto light = command.light.empty() ? turnedUp({0.5, -0.4, 0.75}, upOf(command)) : parseDirection(command.light);
     if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
-    MesoRequest request;
-    request.look.camera = *camera, request.look.light = *light, request.look.up = turnedUp({0, 0, 1}, upOf(command));
-    request.look.shadows = command.shadows, request.look.heat = command.heat;
+    FrameRequest request;
+    request.camera = *camera;
     request.width = uint32_t(size->x), request.height = uint32_t(size->y);
+    request.shading.mode = command.heat ? ShadingMode::Steps : ShadingMode::Lit;
+    request.shading.lightFollowsCamera = false, request.shading.lightDirection = glm::vec3(*light);
+    request.shading.shadows = command.shadows;
+    request.shading.backgroundTop = {0.85f, 0.89f, 0.93f}, request.shading.backgroundBottom = {0.57f, 0.62f, 0.69f};
     return request;
 }
 
@@ -219,43 +225,37 @@ Result<int> runRender(const RenderMeso& command) {
     if (!descriptions) return descriptions.error();
     // What is wrong is said before anything is made.
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
-    std::unique_ptr<MesoRenderer> renderer;
-    std::optional<MesoBackdrop> backdrop;
-    std::optional<MesoBehind> behind;
-    std::vector<std::string> warnings;
+    const InterruptScope catching;
+    OpenedScene behind;
+    if (!command.scan.empty()) {
+        auto opened = openScene({command.scan}, BuildSettings{}, SourceSettings{}, ProgressStyle::None);
+        if (!opened) return opened.error();
+        behind = *std::move(opened);
+    }
+    RendererOptions options;
+    options.device = command.device, options.validation = command.validation;
+    options.loaderThreads = std::max(options.loaderThreads, behind.loaderThreads());
+    auto renderer = Renderer::create(options);
+    if (!renderer) return renderer.error();
+    VCP_TRY((*renderer)->open(behind.placed()));
+    std::vector<std::string> warnings = behind.surfaces.warnings;
     std::vector<Panel> panels;
     for (const std::string& method : command.methods) {
         for (MesoSurfaceDescription& d : *descriptions) d.method.name = method;
-        const auto scene = makeMesoScene(*descriptions);
+        auto scene = makeMesoScene(*descriptions);
         if (!scene) return scene.error();
-        if (!renderer) {
-            warnings = scene->warnings;
-            auto made = MesoRenderer::create({.device = command.device, .validation = command.validation});
-            if (!made) return made.error();
-            renderer = *std::move(made);
-            if (!command.scan.empty()) {
-                auto opened = MesoBackdrop::open(command.scan, command.device);
-                if (!opened) return opened.error();
-                backdrop = *std::move(opened);
-            }
-        }
-        Box bounds = scene->bounds;
-        if (backdrop) bounds = {glm::min(bounds.low, backdrop->bounds().low), glm::max(bounds.high, backdrop->bounds().high)};
-        auto request = requestOf(command, bounds);
+        if (panels.empty()) warnings.insert(warnings.end(), scene->warnings.begin(), scene->warnings.end());
+        const auto request = requestOf(command, scene->bounds.joined(behind.bounds()));
         if (!request) return request.error();
-        if (backdrop && !behind) {
-            auto drawn = backdrop->draw(*request);
-            if (!drawn) return drawn.error();
-            behind = *std::move(drawn);
-        }
-        if (behind) request->behind = &*behind;
-        VCP_TRY(renderer->setSurfaces(scene->surfaces));
-        auto panel = drawPanel(*renderer, *request, command, method);
+        std::vector<MesoSurface> surfaces = behind.surfaces.surfaces;
+        std::ranges::move(scene->surfaces, std::back_inserter(surfaces));
+        VCP_TRY((*renderer)->setSurfaces(surfaces));
+        auto panel = drawPanel(**renderer, *request, command, method);
         if (!panel) return panel.error();
         panels.push_back(*std::move(panel));
     }
     VCP_TRY(writePng(besideEachOther(panels), command.out));
-    return report(command, panels, warnings, renderer->device());
+    return report(command, panels, warnings, (*renderer)->device());
 }
 
 }  // namespace

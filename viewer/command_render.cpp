@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "render/meso_renderer.h"
 #include "render/renderer.h"
 #include "viewer/build_settings.h"
 #include "viewer/commands.h"
@@ -114,50 +113,6 @@ Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const R
     return writePng(*picture, command.output);
 }
 
-/// The light and the sky of a request, in the world.
-MesoLook lookOf(const FrameRequest& request) {
-    const Shading& s = request.shading;
-    const glm::dvec3 right = glm::normalize(glm::cross(request.camera.forward, request.camera.up)), up = glm::cross(right, request.camera.forward);
-    const glm::dvec3 light = glm::normalize(glm::dvec3(s.lightDirection));
-    MesoLook look;
-    look.camera = request.camera;
-    look.light = s.lightFollowsCamera ? right * light.x + up * light.y - request.camera.forward * light.z : light;
-    look.up = s.lightFollowsCamera ? up : glm::normalize(request.camera.up);
-    look.shadows = s.shadows;
-    return look;
-}
-
-/// What was drawn, with surfaces over it; the nearer wins.
-Result<void> writeWithSurfaces(Renderer& renderer, const MesoScene& scene, const FrameRequest& request, const RenderCommand& command) {
-    auto picture = renderer.readPicture();
-    if (!picture) return picture.error();
-    auto depths = renderer.readDepth();
-    if (!depths) return depths.error();
-    const MesoBehind behind{*std::move(picture), *std::move(depths)};
-    auto over = MesoRenderer::create({.device = command.render.device});
-    if (!over) return over.error();
-    VCP_TRY((*over)->setSurfaces(scene.surfaces));
-    const auto drawn = (*over)->render({.look = lookOf(request), .width = request.width, .height = request.height, .behind = &behind});
-    if (!drawn) return drawn.error();
-    if (!command.depth.empty()) {
-        const auto depth = (*over)->readDepth();
-        if (!depth) return depth.error();
-        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth));
-    }
-    if (!command.normals.empty()) {
-        auto normals = renderer.readNormals();
-        if (!normals) return normals.error();
-        const auto above = (*over)->readNormals();
-        if (!above) return above.error();
-        for (size_t i = 0; i < normals->size(); ++i)
-            if ((*above)[i] != glm::vec3(0)) (*normals)[i] = (*above)[i];
-        VCP_TRY(writeNormals(*normals, request.width, request.height, command.normals));
-    }
-    const auto all = (*over)->readPicture();
-    if (!all) return all.error();
-    return writePng(*all, command.output);
-}
-
 Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
     const FrameStats& stats = drawing.stats;
     return {{"width", request.width},
@@ -169,10 +124,13 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"ms_trace", stats.msTrace},
             {"ms_light", stats.msLight},
             {"ms_shade", stats.msShade},
+            {"ms_surfaces", stats.msSurfaces},
             {"rays_per_second", drawing.raysPerSecond()},
             {"rays", stats.rays},
             {"traced_rays", stats.tracedRays},
             {"hit_pixels", stats.hitPixels},
+            {"unresolved_rays", stats.unresolvedRays},
+            {"surface_bytes", stats.surfaceBytes},
             {"device", device.name},
             {"software", device.software},
             {"settled", drawing.update.settled},
@@ -291,10 +249,8 @@ Result<int> run(const RenderCommand& command) {
     if (!open) return open.error();
     if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
     const SceneFile& scene = open->file;
-    const auto surfaces = makeMesoScene(scene.surfaces);
-    if (!surfaces) return surfaces.error();
-    for (const std::string& warning : surfaces->warnings) fmt::print(stderr, "warning: {}\n", warning);
-    const Box bounds{glm::min(open->bounds().low, surfaces->bounds.low), glm::max(open->bounds().high, surfaces->bounds.high)};
+    for (const std::string& warning : open->surfaces.warnings) fmt::print(stderr, "warning: {}\n", warning);
+    const Box bounds = open->bounds();
     const auto camera = command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size);
     if (!camera) return camera.error();
     const auto cameras = camerasOf(command, *camera, bounds);
@@ -303,6 +259,7 @@ Result<int> run(const RenderCommand& command) {
     options.loaderThreads = open->loaderThreads();
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
+    VCP_TRY((*renderer)->setSurfaces(open->surfaces.surfaces));
     VCP_TRY((*renderer)->open(open->placed()));
 
     FrameRequest request;
@@ -325,14 +282,12 @@ Result<int> run(const RenderCommand& command) {
     request.march = command.render.march;
     const InterruptScope catching;
     if (command.isTiled(request)) {
-        if (!scene.surfaces.empty())
-            return Error{ErrorCode::Usage, "surfaces with mesostructure are drawn in one piece of at most 8 million pixels: no --tile, --turntable or --path"};
         VCP_TRY(makeTiled(**renderer, request, *cameras, command));
         return 0;
     }
     const auto drawing = draw(**renderer, request, command);
     if (!drawing) return drawing.error();
-    VCP_TRY(scene.surfaces.empty() ? writeFiles(**renderer, request, command) : writeWithSurfaces(**renderer, *surfaces, request, command));
+    VCP_TRY(writeFiles(**renderer, request, command));
     if (command.report.json)
         VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
     else

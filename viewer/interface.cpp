@@ -96,7 +96,7 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     size_ = framebuffer;
     scale_ = scale;
     statusHeight_ = ImGui::GetFrameHeight();
-    if (session_->viewer().dataset()) {
+    if (session_->viewer().isOpen()) {
         if (session_->showsPages) drawPages();
         drawScaleBar();
         drawMeasured();
@@ -143,7 +143,7 @@ void Interface::layOutMessages() {
     const std::string& said = problem.empty() ? session_->note() : problem;
     if (said.empty()) return;
     ImGui::SetNextWindowPos({kMargin * scale_, kMargin * scale_});
-    ImGui::SetNextWindowSize({size_.x - (2 * kMargin + (session_->user().panel && session_->viewer().dataset() ? kPanelWidth + kMargin : 0)) * scale_, 0});
+    ImGui::SetNextWindowSize({size_.x - (2 * kMargin + (session_->user().panel && session_->viewer().isOpen() ? kPanelWidth + kMargin : 0)) * scale_, 0});
     ImGui::PushStyleColor(ImGuiCol_WindowBg, problem.empty() ? ImVec4(0.1f, 0.2f, 0.3f, 0.9f) : ImVec4(0.45f, 0.08f, 0.05f, 0.95f));
     ImGui::Begin("message", nullptr, kBare);
     if (!problem.empty()) {

@@ -1,10 +1,8 @@
 #include "viewer/meso_scene.h"
 
 #include <algorithm>
-#include <limits>
 
 #include <fmt/format.h>
-#include <glm/common.hpp>
 
 #include "mesostructure/solids.h"
 #include "viewer/base_mesh.h"
@@ -74,7 +72,6 @@ Result<Asset> openMesoAsset(const std::string& name) {
 
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
     MesoScene scene;
-    scene.bounds.low = glm::dvec3(std::numeric_limits<double>::infinity()), scene.bounds.high = -scene.bounds.low;
     for (const MesoSurfaceDescription& d : descriptions) {
         const auto asset = openMesoAsset(d.asset);
         if (!asset) return asset.error();
@@ -94,7 +91,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             return error;
         }
         warn(d, *shell, scene.warnings);
-        scene.bounds.low = glm::min(scene.bounds.low, shell->low), scene.bounds.high = glm::max(scene.bounds.high, shell->high);
+        scene.bounds = scene.bounds.joined({shell->low, shell->high});
         MesoSurface surface;
         surface.lift = shadowLift(**arrays, edge);
         surface.arrays = *std::move(arrays), surface.shell = *std::move(shell), surface.colour = d.colour, surface.withBase = d.withBase;

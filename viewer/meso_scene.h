@@ -1,5 +1,5 @@
 // Mesostructure surfaces from what a person says of them: asset, method, base. What scenes and `vcp meso render` hand to the
-// renderer (render/meso_renderer.h).
+// renderer (Renderer::setSurfaces).
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mesostructure/method.h"
-#include "render/meso_renderer.h"
+#include "render/passes/meso_surface.h"
 #include "viewer/orbit_camera.h"
 
 namespace vcp {
@@ -33,7 +33,7 @@ inline glm::dvec3 turnedUp(glm::dvec3 p, UpAxis up) { return up == UpAxis::Z ? p
 
 struct MesoScene {
     std::vector<MesoSurface> surfaces;
-    Box bounds;
+    Box bounds = Box::nothing();
     std::vector<std::string> warnings;  ///< what shells and maps have that a picture may show
 };
 

@@ -76,7 +76,7 @@ Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Bo
     OrbitCamera start;
     start.look(View::Front, bounds, options.size);
     (*viewer)->resize(options.size);
-    VCP_TRY((*viewer)->open(std::move(datasets), start, "motion"));
+    VCP_TRY((*viewer)->open(std::move(datasets), {}, start, "motion"));
     Motion motion(**viewer, options);
     VCP_TRY(motion.settle());
     MotionReport report;

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "viewer/interrupt.h"
@@ -12,11 +10,8 @@
 namespace vcp {
 
 Box OpenedScene::bounds() const {
-    Box all{glm::dvec3(std::numeric_limits<double>::infinity()), glm::dvec3(-std::numeric_limits<double>::infinity())};
-    for (const Part& part : parts) {
-        const Box box = placedBox(part.open.bounds(), part.placement);
-        all = {glm::min(all.low, box.low), glm::max(all.high, box.high)};
-    }
+    Box all = surfaces.bounds;
+    for (const Part& part : parts) all = all.joined(placedBox(part.open.bounds(), part.placement));
     return all;
 }
 
@@ -57,8 +52,12 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         if (!open) return open.error();
         scene.parts.push_back({*std::move(open), each.placement});
     }
+    if (progress && !progress({.stage = "making surfaces", .fraction = 1})) return Error{ErrorCode::Cancelled, "cancelled"};
+    auto surfaces = makeMesoScene(scene.file.surfaces);
+    if (!surfaces) return surfaces.error();
+    scene.surfaces = *std::move(surfaces);
     const Box all = scene.bounds();
-    if (!scene.parts.empty() && !std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", inputs.front()};
+    if (!std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", inputs.front()};
     return scene;
 }
 

@@ -13,10 +13,12 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include <glm/common.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -34,6 +36,9 @@ struct Box {
 
     [[nodiscard]] glm::dvec3 centre() const { return 0.5 * (low + high); }
     [[nodiscard]] double diagonal() const;
+    /// Turned inside out: what is joined with it is what it then is.
+    static Box nothing() { return {glm::dvec3(std::numeric_limits<double>::infinity()), glm::dvec3(-std::numeric_limits<double>::infinity())}; }
+    [[nodiscard]] Box joined(const Box& other) const { return {glm::min(low, other.low), glm::max(high, other.high)}; }
 };
 
 /// Of a box that is placed: the box about its corners.

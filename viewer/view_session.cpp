@@ -75,7 +75,6 @@ void ViewSession::takeOpened() {
 }
 
 Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::string>& inputs) {
-    if (open.parts.empty()) return Error{ErrorCode::Usage, "surfaces with mesostructure alone are drawn by vcp render", inputs.front()};
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
     camera.up = user_.up;
@@ -110,8 +109,8 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     measurement_.clear();
     finest_ = std::make_shared<ScenePick>();
     for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
-    VCP_TRY(viewer_->open(open.placed(), camera, nameOf(inputs)));
-    if (!open.file.surfaces.empty()) note("surfaces with mesostructure are drawn by vcp render, not in the window yet");
+    VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
+    if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     shown_ = rememberedName(inputs.front());
     for (const std::string& input : inputs) user_.remember(input);
     return {};
@@ -172,6 +171,7 @@ void ViewSession::pasteCamera(const std::string& json) {
 
 void ViewSession::measureAt(glm::dvec2 pixel) {
     if (!finest_ || pick_.valid()) return;
+    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface) return note("mesostructure is not measured: it has no certified error");
     // A cap is the section plane itself: its points are exact.
     if (const auto cap = viewer_->capAt(pixel)) {
         measurement_.add({*cap, 0, viewer_->status().levels - 1});
@@ -204,7 +204,7 @@ void ViewSession::exportMeasurement() {
 }
 
 void ViewSession::savePicture(glm::ivec2 size) {
-    if (saving_ || !viewer_->dataset()) return;
+    if (saving_ || !viewer_->isOpen()) return;
     namespace fs = std::filesystem;
     int number = 1;
     std::error_code failed;
@@ -253,7 +253,7 @@ void ViewSession::collectSettings() {
     user_.backgroundBottom = shading.backgroundBottom;
     user_.errorPixels = viewer_->errorPixels();
     user_.budgetBytes = viewer_->status().budgetBytes;
-    if (viewer_->dataset()) user_.up = viewer_->camera().up;
+    if (viewer_->isOpen()) user_.up = viewer_->camera().up;
 }
 
 }  // namespace vcp

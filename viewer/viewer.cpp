@@ -61,11 +61,11 @@ std::string formatPixels(double pixels) { return pixels < 10 ? fmt::format("{:.2
 
 std::string statusLine(const ViewerStatus& status, size_t most) {
     const std::string device = status.device + (status.software ? " (software)" : "");
-    if (status.levels == 0) return device.substr(0, most);
+    if (status.name.empty()) return device.substr(0, most);
     // What matters most comes first: a narrow window has no room for the rest.
     std::vector<std::string> parts{shortened(status.name, most / 3), status.update.settled ? "settled" : "loading"};
     if (!status.without.empty()) parts.push_back(status.without);
-    if (status.update.drawable) {
+    if (status.update.drawable && status.levels > 0) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
         const std::string levels = coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
         parts.push_back(fmt::format("{} (finest {})", levels, status.levels - 1));
@@ -73,8 +73,9 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
     }
     if (status.reduction > 1) parts.push_back(fmt::format("1/{} size", status.reduction));
     parts.push_back(fmt::format("{:.0f} ms", status.frame.msFrame));
-    parts.push_back(formatCount(status.triangles) + " triangles");
-    if (status.update.drawable) parts.push_back(fmt::format("{} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes)));
+    if (status.levels > 0) parts.push_back(formatCount(status.triangles) + " triangles");
+    if (status.frame.surfaceBytes > 0) parts.push_back("mesostructure " + formatBytes(status.frame.surfaceBytes));
+    if (status.update.drawable && status.levels > 0) parts.push_back(fmt::format("{} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes)));
     parts.push_back(device);
     std::string line = parts.front();
     for (size_t i = 1; i < parts.size() && line.size() + 3 + parts[i].size() <= most; ++i) line += " | " + parts[i];
@@ -102,25 +103,27 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
                           const OrbitCamera& camera, std::string name) {
     std::vector<PlacedDataset> one;
     one.push_back({std::move(dataset), std::move(source), {}});
-    return open(std::move(one), camera, std::move(name));
+    return open(std::move(one), {}, camera, std::move(name));
 }
 
-Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const OrbitCamera& camera, std::string name) {
-    if (datasets.empty()) return Error{.code = ErrorCode::Usage, .message = "there is nothing to open"};
+Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name) {
+    if (datasets.empty() && surfaces.surfaces.empty()) return Error{.code = ErrorCode::Usage, .message = "there is nothing to open"};
+    VCP_TRY(renderer_->setSurfaces(surfaces.surfaces));
     VCP_TRY(renderer_->open(datasets));
-    show(datasets, camera, std::move(name));
+    show(datasets, surfaces, camera, std::move(name));
     return {};
 }
 
-void Viewer::show(const std::vector<PlacedDataset>& datasets, const OrbitCamera& camera, std::string name) {
-    dataset_ = datasets.front().dataset;
-    isPaper_ = true;
+void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name) {
+    dataset_ = datasets.empty() ? nullptr : datasets.front().dataset;
+    isOpen_ = true;
+    isPaper_ = !datasets.empty() && surfaces.surfaces.empty();
+    bounds_ = surfaces.bounds;
     status_.triangles = status_.levels = 0;
     for (const PlacedDataset& each : datasets) {
         const FileHeader& header = each.dataset->header;
-        const Box box = placedBox({{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
-                                   {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}}, each.placement);
-        bounds_ = &each == datasets.data() ? box : Box{glm::min(bounds_.low, box.low), glm::max(bounds_.high, box.high)};
+        bounds_ = bounds_.joined(placedBox({{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
+                                            {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}}, each.placement));
         isPaper_ = isPaper_ && header.method == Method::Paper;
         status_.triangles += header.triangles;
         status_.levels = std::max(status_.levels, header.levels);
@@ -187,7 +190,7 @@ glm::dvec3 Viewer::pointOfInterest(glm::dvec2 pixel) {
 }
 
 void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
-    if (drag_ != Drag::None || !hasSize() || !dataset_) return;
+    if (drag_ != Drag::None || !hasSize() || !isOpen_) return;
     move_.reset();
     dragButton_ = button;
     cursor_ = pixel;
@@ -228,7 +231,7 @@ void Viewer::setSections(std::vector<SectionPlane> planes) {
 
 std::vector<SectionHandle> Viewer::sectionHandles() const {
     std::vector<SectionHandle> handles;
-    if (handleScale_ <= 0 || !dataset_ || !hasSize()) return handles;
+    if (handleScale_ <= 0 || !isOpen_ || !hasSize()) return handles;
     for (size_t i = 0; i < sections_.size(); ++i) {
         const glm::dvec3 anchor = onPlane(sections_[i], i < sectionAnchors_.size() ? sectionAnchors_[i] : bounds_.centre());
         if (auto handle = sectionHandle(sections_[i], i, anchor, camera_, size_, handleScale_)) handles.push_back(*std::move(handle));
@@ -267,7 +270,7 @@ bool Viewer::cancelSectionDrag() {
 }
 
 void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
-    if (!hasSize() || !dataset_ || steps == 0) return;
+    if (!hasSize() || !isOpen_ || steps == 0) return;
     if (shift && !sections_.empty()) return moveSections(steps);
     move_.reset();
     if (isFlying_) {
@@ -280,7 +283,7 @@ void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
 }
 
 void Viewer::moveTo(const OrbitCamera& camera) {
-    if (!dataset_) return;
+    if (!isOpen_) return;
     move_.reset();
     if (options_.moveSeconds <= 0)
         camera_ = camera;
@@ -350,7 +353,7 @@ void Viewer::moveSections(double steps) {
 }
 
 std::string Viewer::whyWithout(ViewerAction action) const {
-    if (!isPaper_ || !dataset_) return {};
+    if (!isPaper_) return {};
     if (action == ViewerAction::ToggleShadows) return "files of the method paper are drawn without shadows";
     if (action == ViewerAction::ToggleOcclusion) return "files of the method paper are drawn without ambient occlusion";
     if (action == ViewerAction::ToggleSection && !sections_.empty()) return "sections of files of the method paper have no caps";
@@ -358,7 +361,7 @@ std::string Viewer::whyWithout(ViewerAction action) const {
 }
 
 void Viewer::act(ViewerAction action) {
-    if (!dataset_ || !hasSize()) return;
+    if (!isOpen_ || !hasSize()) return;
     switch (action) {
         case ViewerAction::Fit: {
             OrbitCamera there = camera_;
@@ -426,7 +429,7 @@ bool Viewer::refinementIsDue(double now) const {
 }
 
 Result<NextStep> Viewer::update(double now) {
-    if (dataset_) advanceCamera(now);
+    if (isOpen_) advanceCamera(now);
     now_ = now;
     if (!hasSize()) return NextStep{};
     if (drawn_ && (!sameView(camera_, seen_) || (sectionDrag_ && sections_ != request_.sections))) movedAt_ = now;
@@ -444,7 +447,7 @@ Result<NextStep> Viewer::update(double now) {
 NextStep Viewer::nextStep(double now) const {
     NextStep next;
     // Without a dataset, and where its coarsest page cannot be read, the background is shown.
-    const bool canDraw = status_.update.drawable || !status_.problem.empty() || !dataset_;
+    const bool canDraw = status_.update.drawable || !status_.problem.empty() || !isOpen_;
     next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now));
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
     const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
@@ -460,7 +463,7 @@ Result<void> Viewer::draw() {
     status_.frame = *stats;
     status_.reduction = requestReduction_;
     const bool wantsLight = request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
-    status_.without = isPaper_ && dataset_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
+    status_.without = isPaper_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
     // The first frame also compiles; it says nothing about the next. Nor does a moving one trace occlusion.
     if (framesDrawn_ > 0)
         fullFrameMs_ = requestReduction_ * requestReduction_ * (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));

@@ -30,6 +30,7 @@
 
 #include "octree/result.h"
 #include "render/renderer.h"
+#include "viewer/meso_scene.h"
 #include "viewer/orbit_camera.h"
 #include "viewer/section_handle.h"
 
@@ -111,11 +112,12 @@ public:
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source,
                       const OrbitCamera& camera, std::string name);
 
-    /// Shows several datasets where they are placed. Errors: those of Renderer::open.
-    Result<void> open(std::vector<PlacedDataset> datasets, const OrbitCamera& camera, std::string name);
+    /// Shows several datasets where they are placed, and surfaces with mesostructure. Errors: Usage, where there is neither; those of
+    /// Renderer::open and setSurfaces.
+    Result<void> open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name);
 
-    /// The same, where a view that shares the device has opened the datasets already; their sources are not looked at.
-    void show(const std::vector<PlacedDataset>& datasets, const OrbitCamera& camera, std::string name);
+    /// The same, where a view that shares the device has opened it all already; what it is made of is not looked at.
+    void show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name);
 
     /// Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);
@@ -159,6 +161,8 @@ public:
     /// At once.
     void setCamera(const OrbitCamera& camera) { camera_ = camera; move_.reset(); }
     [[nodiscard]] const Box& bounds() const { return bounds_; }
+    /// Whether anything was opened.
+    [[nodiscard]] bool isOpen() const { return isOpen_; }
     /// The first one; null without any.
     [[nodiscard]] const std::shared_ptr<const Dataset>& dataset() const { return dataset_; }
     /// Why an action shows nothing on what is open; empty where it shows something.
@@ -219,6 +223,7 @@ private:
     ViewerOptions options_;
     std::unique_ptr<Renderer> renderer_;
     std::shared_ptr<const Dataset> dataset_;
+    bool isOpen_ = false;
     bool isPaper_ = false;  // all datasets are of that method
     Box bounds_;
     OrbitCamera camera_, home_;

@@ -112,7 +112,7 @@ public:
             if (!painter_) VCP_TRY(makePainter());
             VCP_TRY(present(next->draw));
             if (!report.windowSeconds) report.windowSeconds = seconds();
-            const bool isShown = viewer.dataset() && viewer.status().frame.pagesInCut > 0;
+            const bool isShown = viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);
             if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
             if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
             wait(*next);

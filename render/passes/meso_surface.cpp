@@ -1,9 +1,8 @@
 #include "render/passes/meso_surface.h"
 
 #include <algorithm>
-#include <bit>
-#include <limits>
 #include <map>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -29,6 +28,7 @@ double shadowLift(const MesoArrays& arrays, double tileEdge) {
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
     surfaces_.clear();
+    ++version_;
     std::map<const MesoArrays*, std::shared_ptr<MesoTexels>> uploaded;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
@@ -65,27 +65,21 @@ uint64_t MesoSurfacePass::assetBytes() const {
     return sum;
 }
 
-Result<void> MesoSurfacePass::prepare(PictureSize size, bool shadows) {
-    if (isEmpty()) return {};
-    const auto make = [&](Buffer& buffer, uint64_t bytes) -> Result<void> {
-        auto made = resources_.storage(bytes);
-        if (!made) return made.error();
-        buffer = std::move(*made);
-        return {};
-    };
-    if (!(size == size_) || surfaces_.front().set.set == VK_NULL_HANDLE) {
-        // Nothing has a size or a set until all is made.
-        size_ = {};
-        for (Placed& surface : surfaces_) surface.set = MesoSet();
-        VCP_TRY(make(hits_, size.pixels() * frame::kMesoPlanes * 4));
-        VCP_TRY(make(picture_, size.pixels() * 4));
-        VCP_TRY(make(counters_, 16));
-        for (Placed& surface : surfaces_) {
-            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &hits_, &picture_, &counters_});
-            if (!set) return set.error();
-            surface.set = *std::move(set);
+Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows) {
+    if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.handle()) {
+        // Nothing has a size until all is made.
+        target = {};
+        for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4), std::pair(&target.counters, uint64_t{16})}) {
+            auto made = resources_.storage(bytes);
+            if (!made) return made.error();
+            *buffer = std::move(*made);
         }
-        size_ = size;
+        for (const Placed& surface : surfaces_) {
+            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits, &picture, &target.counters});
+            if (!set) return set.error();
+            target.sets.push_back(*std::move(set));
+        }
+        target.size = size, target.surfaces = version_, target.picture = picture.handle();
     }
     for (Placed& surface : surfaces_) {
         std::vector<uint32_t> constants(surface.arrays->constants.begin(), surface.arrays->constants.end());
@@ -105,11 +99,13 @@ Result<void> MesoSurfacePass::prepare(PictureSize size, bool shadows) {
     return {};
 }
 
-MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, const MesoLook& look) const {
+MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize size, const MesoLook& look) const {
     MesoConstants c{surface.arrays->record, surface.view};
-    const CameraBasis basis = cameraBasis(look.camera, size_.width, size_.height);
-    const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / size_.width), stepY = basis.up * (-2 * basis.halfHeight / size_.height);
-    const glm::dvec3 corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth, eye = look.camera.eye - surface.origin;
+    const PictureTile& tile = look.tile;
+    const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
+    const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth), stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
+    const glm::dvec3 corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + double(tile.x) * stepX + double(tile.y) * stepY;
+    const glm::dvec3 eye = look.camera.eye - surface.origin;
     if (look.camera.projection == Projection::Orthographic) {
         c.view.eye = toVec4(eye + corner), c.view.eyeX = toVec4(stepX), c.view.eyeY = toVec4(stepY);
         c.view.forward = toVec4(basis.forward);
@@ -117,40 +113,34 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, const MesoLook
         c.view.eye = toVec4(eye);
         c.view.forward = toVec4(basis.forward + corner), c.view.forwardX = toVec4(stepX), c.view.forwardY = toVec4(stepY);
     }
-    c.view.picture.x = size_.width, c.view.picture.y = size_.height;
-    c.view.light = toVec4(glm::normalize(look.light), surface.view.light.w);
-    c.view.up = toVec4(glm::normalize(look.up), look.heat ? 1 : 0);
+    c.view.picture.x = size.width, c.view.picture.y = size.height;
+    c.view.light = toVec4(look.light, surface.view.light.w);
+    c.view.up = toVec4(look.up, double(look.shading));
     return c;
 }
 
-void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, VkDescriptorSet set) const {
+void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &set, 0, nullptr);
-    vkCmdDispatch(commands, (size_.width + 7) / 8, (size_.height + 7) / 8, 1);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &target.sets[surface].set, 0, nullptr);
+    vkCmdDispatch(commands, (target.size.width + 7) / 8, (target.size.height + 7) / 8, 1);
     barrierComputeToCompute(commands);
 }
 
-void MesoSurfacePass::record(VkCommandBuffer commands, const MesoLook& look, const Buffer* depths) {
-    if (isEmpty()) return;
-    const uint64_t plane = size_.pixels() * 4;
-    if (depths != nullptr) {
-        const VkBufferCopy region{0, 0, plane};
-        vkCmdCopyBuffer(commands, depths->handle(), hits_.handle(), 1, &region);
-    } else {
-        // The shader's kNoHit.
-        vkCmdFillBuffer(commands, hits_.handle(), 0, plane, std::bit_cast<uint32_t>(1e30f));
-    }
-    vkCmdFillBuffer(commands, hits_.handle(), plane, 3 * plane, 0);
-    vkCmdFillBuffer(commands, counters_.handle(), 0, VK_WHOLE_SIZE, 0);
+void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths) {
+    const uint64_t plane = target.size.pixels() * 4;
+    const VkBufferCopy region{0, 0, plane};
+    vkCmdCopyBuffer(commands, depths.handle(), target.hits.handle(), 1, &region);
+    vkCmdFillBuffer(commands, target.hits.handle(), plane, 3 * plane, 0);
+    vkCmdFillBuffer(commands, target.counters.handle(), 0, VK_WHOLE_SIZE, 0);
     for (const Placed& surface : surfaces_) {
-        const MesoConstants constants = constantsOf(surface, look);
+        const MesoConstants constants = constantsOf(surface, target.size, look);
         vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
     }
     barrierTransferToAll(commands);
-    for (const Placed& surface : surfaces_) dispatch(commands, surface.cast, surface.set.set);
-    if (look.shadows && !look.heat)
-        for (const Placed& surface : surfaces_) dispatch(commands, surface.shadow, surface.set.set);
-    dispatch(commands, shade_, surfaces_.front().set.set);
+    for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].cast, target, i);
+    if (look.shadows && look.shading == MesoShading::Lit)
+        for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].shadow, target, i);
+    dispatch(commands, shade_, target, 0);
     barrierComputeToReadback(commands);
 }
 

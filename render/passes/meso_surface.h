@@ -1,17 +1,21 @@
-// Pictures of mesostructure on surfaces (shaders/meso_surface.comp, meso_shade.comp): for each surface a dispatch that finds
-// first hits in its shell and keeps the nearest of all, then one that casts shadow rays, then one that shades. Depths and
-// normals are those of the other passes' hits, but in world units, so surfaces compose with whatever else has depths.
+// Mesostructure on surfaces, over the picture that the datasets left (shaders/meso_surface.comp, meso_shade.comp): for each
+// surface a dispatch that finds first hits in its shell and keeps the nearest of all, then one that casts shadow rays, then
+// one that shades. Normals are as the other passes pack them; depths are in world units, as those of the compose pass, from
+// which they start.
 //
-// Reads the shells and assets; writes hits, picture, counters. Barriers are recorded here; ends with
-// barrierComputeToReadback. Without surfaces nothing is made: no pipeline, no buffer but the picture's.
+// Reads shells, assets and the composed depths; writes hits, picture, counters. Barriers are recorded here; ends with
+// barrierComputeToReadback. Without surfaces nothing is made: no pipeline, no buffer.
 #pragma once
 
-#include <optional>
+#include <memory>
+#include <span>
+#include <vector>
 
 #include "mesostructure/shell.h"
 #include "render/camera.h"
 #include "render/passes/frame_resources.h"
 #include "render/passes/meso_resources.h"
+#include "render/renderer.h"
 
 namespace vcp {
 
@@ -27,30 +31,44 @@ struct MesoSurface {
 /// A good lift: some texels or a part of a cell. `tileEdge` in world units.
 double shadowLift(const MesoArrays& arrays, double tileEdge);
 
+enum class MesoShading : uint32_t {
+    Lit = frame::kMesoLit,
+    Heat = frame::kMesoHeat,  ///< iterations of each pixel's ray, blue to red: 0 to 100
+    Normals = frame::kMesoNormals,
+    Unlit = frame::kMesoUnlit,
+};
+
 struct MesoLook {
-    Camera camera;
-    glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light
-    glm::dvec3 up{0, 0, 1};            ///< of the sky
+    Camera camera;                     ///< of the whole, where the picture is a tile
+    PictureTile tile;
+    glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light, unit
+    glm::dvec3 up{0, 0, 1};            ///< of the sky, unit
     bool shadows = false;
-    bool heat = false;                 ///< iterations of each pixel's ray, blue to red: 0 to 100
+    MesoShading shading = MesoShading::Lit;
+};
+
+/// What one view's pictures of the surfaces are drawn into.
+struct MesoTarget {
+    PictureSize size;          ///< 0: nothing is made
+    uint64_t surfaces = 0;     ///< MesoSurfacePass::version() that the sets are of
+    Buffer hits, counters;
+    VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
+    std::vector<MesoSet> sets;  ///< of each surface
 };
 
 class MesoSurfacePass {
 public:
     MesoSurfacePass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
 
-    /// Replaces the surfaces; waits for nothing: no frame may be in flight. Errors: Device, Limit.
+    /// Replaces the surfaces; waits for nothing: no frame may be in flight. On an error there are none. Errors: Device, Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
-    /// Makes buffers and pipelines where there are surfaces. Errors: Device, Limit.
-    Result<void> prepare(PictureSize size, bool shadows);
+    /// Makes buffers and pipelines. Precondition: there are surfaces. Errors: Device, Limit.
+    Result<void> prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows);
     /// Precondition: prepare(); the picture is as it shall be where there is no mesostructure. `depths`: a float a pixel,
-    /// world units along the unit ray, of what is there already; null: nothing is.
-    void record(VkCommandBuffer commands, const MesoLook& look, const Buffer* depths);
+    /// world units along the unit ray, of what is there already.
+    void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths);
 
-    [[nodiscard]] bool isEmpty() const { return surfaces_.empty(); }
-    [[nodiscard]] const Buffer& picture() const { return picture_; }
-    [[nodiscard]] const Buffer& hits() const { return hits_; }
-    [[nodiscard]] const Buffer& counters() const { return counters_; }
+    [[nodiscard]] uint64_t version() const { return version_; }
     /// Of assets and shells.
     [[nodiscard]] uint64_t assetBytes() const;
 
@@ -62,17 +80,15 @@ private:
         Buffer constants;
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the camera
-        MesoSet set;
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE;
     };
-    MesoConstants constantsOf(const Placed& surface, const MesoLook& look) const;
-    void dispatch(VkCommandBuffer commands, VkPipeline pipeline, VkDescriptorSet set) const;
+    MesoConstants constantsOf(const Placed& surface, PictureSize size, const MesoLook& look) const;
+    void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const;
 
     Device& device_;
     MesoResources& resources_;
     std::vector<Placed> surfaces_;
-    PictureSize size_;
-    Buffer hits_, picture_, counters_;
+    uint64_t version_ = 0;
     VkPipeline shade_ = VK_NULL_HANDLE;
 };
 

@@ -1,6 +1,10 @@
 #include "render/passes/readback.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+
+#include <glm/geometric.hpp>
 
 #include "render/vulkan/compute_pipeline.h"
 
@@ -21,6 +25,15 @@ Result<std::vector<uint32_t>> readWords(Device& device, const Buffer& source, ui
     }));
     std::memcpy(result.data(), staging->mapped(), words * 4);
     return result;
+}
+
+glm::vec3 unpackNormal(uint32_t code) {
+    glm::vec3 n(float(code & 0xffff) / 65535.0f * 2 - 1, float(code >> 16) / 65535.0f * 2 - 1, 0);
+    n.z = 1 - std::abs(n.x) - std::abs(n.y);
+    const float fold = std::max(-n.z, 0.0f);
+    n.x += n.x >= 0 ? -fold : fold;
+    n.y += n.y >= 0 ? -fold : fold;
+    return glm::normalize(n);
 }
 
 }  // namespace vcp

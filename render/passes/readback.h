@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include "render/vulkan/device.h"
 
 namespace vcp {
@@ -11,5 +13,8 @@ namespace vcp {
 /// Copies `words` 32-bit words from `firstWord` on. Precondition: no frame in flight; `source` may be
 /// copied from. Errors: Device.
 Result<std::vector<uint32_t>> readWords(Device& device, const Buffer& source, uint64_t firstWord, uint64_t words);
+
+/// A unit vector as hit_records.glsl packs it.
+glm::vec3 unpackNormal(uint32_t code);
 
 }  // namespace vcp

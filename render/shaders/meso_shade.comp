@@ -8,6 +8,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 
+const float kFarthest = 1e30;  // of what is hit
+
 // Blue through green to red.
 vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
@@ -15,7 +17,9 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(pixel, view.picture.xy))) return;
     uint index = pixel.y * view.picture.x + pixel.x, plane = view.picture.x * view.picture.y;
-    if (view.up.w > 0.0) {
+    if (uintBitsToFloat(hits[index]) < kFarthest) atomicAdd(counters[1], 1u);
+    uint shown = uint(view.up.w);
+    if (shown == kMesoHeat) {
         uint iterations = hits[3u * plane + index];
         if (iterations > 0u) picturePixels[index] = packUnorm4x8(vec4(heat(min(float(iterations) / kMesoMostIterations, 1.0)), 1.0));
         return;
@@ -25,5 +29,7 @@ void main() {
     vec3 n = unpackHitNormal(code);
     vec4 colour = unpackUnorm4x8(hits[2u * plane + index]);
     float sun = max(dot(n, view.light.xyz), 0.0) * colour.w, sky = 0.5 + 0.5 * dot(n, view.up.xyz);
-    picturePixels[index] = packUnorm4x8(vec4(colour.xyz * pow(0.72 * sun + 0.10 + 0.18 * sky, 1.0 / 2.2), 1.0));
+    vec3 lit = colour.xyz * pow(0.72 * sun + 0.10 + 0.18 * sky, 1.0 / 2.2);
+    vec3 result = shown == kMesoNormals ? n * 0.5 + 0.5 : shown == kMesoUnlit ? colour.xyz : lit;
+    picturePixels[index] = packUnorm4x8(vec4(result, 1.0));
 }

@@ -25,6 +25,9 @@ struct MesoRecord {
     uvec4 levels[kMesoMaxLevels];  // compressed: steps, entries, edge * 65536 + factor, bricks; pyramid: maxima, columns, rows
 };
 
+// What pictures show.
+const uint kMesoLit = 0u, kMesoHeat = 1u, kMesoNormals = 2u, kMesoUnlit = 3u;
+
 // A picture of one surface, in the space of its shell. Hits of a pixel: the depth along the unit ray, the packed
 // normal (hit_records.glsl), colour and light, iterations.
 struct MesoView {
@@ -33,7 +36,7 @@ struct MesoView {
     uvec4 picture;                   // width, height; z: nodes of the shell; w: 1: the base is drawn too
     vec4 light;                      // unit, towards the light; w: world units by which shadow rays start above a hit
     vec4 colour;                     // of what the surface is made; w: 1: shadows
-    vec4 up;                         // unit; w: 1: the picture shows iterations
+    vec4 up;                         // unit; w: what the picture shows
 };
 
 const uint kMesoPlanes = 4u;

@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "render/meso_renderer.h"
+#include "render/meso_marcher.h"
 #include "tests/mesostructure/meso_rays.h"
 
 namespace vcp {
@@ -16,7 +16,7 @@ using namespace meso;
 class MesoMarch : public testing::Test {
 protected:
     void SetUp() override {
-        auto made = MesoRenderer::create({.validation = true});
+        auto made = MesoMarcher::create({.validation = true});
         ASSERT_TRUE(made) << made.error().line();
         renderer_ = std::move(*made);
     }
@@ -84,7 +84,7 @@ protected:
         return rays;
     }
 
-    std::unique_ptr<MesoRenderer> renderer_;
+    std::unique_ptr<MesoMarcher> renderer_;
 };
 
 TEST_F(MesoMarch, HeightFieldsAsTheReference) {

@@ -1,11 +1,13 @@
 // Mesostructure on surfaces: pictures whose answer is known.
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include <gtest/gtest.h>
 
-#include "render/meso_renderer.h"
+#include "render/passes/meso_surface.h"
 #include "tests/mesostructure/meso_rays.h"
+#include "tests/render/renderer_fixture.h"
 
 namespace vcp {
 namespace {
@@ -25,23 +27,17 @@ Asset heightAsset(const std::string& name, HeightMap map) {
 /// Everywhere 3/5 of the slab high.
 Asset plateau() { return heightAsset("plateau", {{8, 8}, 0.25, std::vector<uint16_t>(64, 39321)}); }
 
-class MesoSurfaces : public testing::Test {
+class MesoSurfaces : public vcp::test::RendererFixture {
 protected:
-    void SetUp() override {
-        auto made = MesoRenderer::create({.validation = true});
-        ASSERT_TRUE(made) << made.error().line();
-        renderer_ = std::move(*made);
-    }
-    void TearDown() override {
-        if (!renderer_) return;
-        for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
-    }
+    void SetUp() override { start(); }
 
-    static MesoSurface surfaceOf(const Asset& asset, const std::string& method, std::string_view base, double height, double tiles = 2) {
+    static MesoSurface surfaceOf(const Asset& asset, const std::string& method, std::string_view base, double height, double tiles = 2,
+                                 glm::dvec3 place = glm::dvec3(0)) {
         const auto shape = shapeOf(asset);
         const auto made = buildMethod(asset, **shape, {.name = method, .cells = 8});
         EXPECT_TRUE(made) << made.error().line();
-        const BaseSurface surface = *makeBaseSurface(base, tiles);
+        BaseSurface surface = *makeBaseSurface(base, tiles);
+        for (glm::dvec3& p : surface.positions) p += place;
         MesoSurface placed;
         placed.arrays = std::make_shared<const MesoArrays>(*packMesoArrays(*made));
         placed.shell = *buildShell(surface, height, asset.extent);
@@ -49,22 +45,18 @@ protected:
         return placed;
     }
     /// Orthographic, from above, 3 units across.
-    static MesoRequest fromAbove() {
-        MesoRequest request;
+    static FrameRequest fromAbove() {
+        FrameRequest request;
         request.width = request.height = kEdge;
-        request.look.camera = {.eye = {0, 0, 5}, .forward = {0, 0, -1}, .up = {0, 1, 0}, .projection = Projection::Orthographic, .orthographicHeight = 3};
+        request.camera = {.eye = {0, 0, 5}, .forward = {0, 0, -1}, .up = {0, 1, 0}, .projection = Projection::Orthographic, .orthographicHeight = 3};
         return request;
     }
-    MesoFrameStats draw(const std::vector<MesoSurface>& surfaces, const MesoRequest& request) {
+    FrameStats draw(const std::vector<MesoSurface>& surfaces, const FrameRequest& request) {
         EXPECT_TRUE(renderer_->setSurfaces(surfaces).ok());
-        const auto stats = renderer_->render(request);
-        EXPECT_TRUE(stats) << stats.error().line();
-        return *stats;
+        return RendererFixture::draw(request);
     }
     /// Distance of a pixel's middle from the picture's, world units.
     static glm::dvec2 placeOf(uint32_t x, uint32_t y) { return {(x + 0.5) / kEdge * 3 - 1.5, 1.5 - (y + 0.5) / kEdge * 3}; }
-
-    std::unique_ptr<MesoRenderer> renderer_;
 };
 
 TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
@@ -91,8 +83,8 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
 }
 
 TEST_F(MesoSurfaces, BordersShowTheCut) {
-    MesoRequest request = fromAbove();
-    request.look.camera.eye = {5, 0, 0}, request.look.camera.forward = {-1, 0, 0}, request.look.camera.up = {0, 0, 1};
+    FrameRequest request = fromAbove();
+    request.camera.eye = {5, 0, 0}, request.camera.forward = {-1, 0, 0}, request.camera.up = {0, 0, 1};
     for (const char* method : {"boxes", "cells", "pyramid", "relief-illinois", "sphere"}) {
         SCOPED_TRACE(method);
         draw({surfaceOf(plateau(), method, "quad", 1)}, request);
@@ -135,15 +127,15 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
 }
 
 TEST_F(MesoSurfaces, WaysToSkipShowTheSame) {
-    MesoRequest request = fromAbove();
-    request.look.camera.forward = {0.5, 0.3, -0.4}, request.look.camera.eye = -5.0 * request.look.camera.forward;
+    FrameRequest request = fromAbove();
+    request.camera.forward = {0.5, 0.3, -0.4}, request.camera.eye = -5.0 * request.camera.forward;
     uint64_t many = 0, few = 0;
     // Many small pieces, and a few large ones with little in them.
     for (const auto& [name, base] : {std::pair("beads", "torus"), std::pair("ball", "quad")}) {
         SCOPED_TRACE(name);
         Asset asset;
         asset.name = asset.solid = name;
-        asset.extent = test::solid(name)->extent();
+        asset.extent = meso::test::solid(name)->extent();
         const auto depthsAndWork = [&](const char* method, uint64_t& work) {
             draw({surfaceOf(asset, method, base, 0.2)}, request);
             const auto iterations = *renderer_->readIterations();
@@ -162,28 +154,113 @@ TEST_F(MesoSurfaces, WaysToSkipShowTheSame) {
     EXPECT_LT(few, many);
 }
 
-TEST_F(MesoSurfaces, ComposesByDepth) {
-    const std::vector<MesoSurface> surfaces = {surfaceOf(plateau(), "boxes", "quad", 0.5)};
-    MesoBehind behind{{kEdge, kEdge, std::vector<uint8_t>(4 * kEdge * kEdge, 7)}, std::vector<float>(kEdge * kEdge, 4.0f)};
-    for (uint32_t i = 0; i < kEdge * kEdge / 2; ++i) behind.depths[i] = 4.9f;
-    MesoRequest request = fromAbove();
-    request.behind = &behind;
-    draw(surfaces, request);
+/// A cube from 4 to 12 from above, with a plateau on top of it, one within it and one beside it.
+struct OverACube {
+    vcp::test::Scene scene = vcp::test::cubeScene(0);
+    FrameRequest request;
+    OverACube() {
+        request.width = request.height = kEdge;
+        request.camera = {.eye = {8, 8, 20}, .forward = {0, 0, -1}, .up = {0, 1, 0}, .projection = Projection::Orthographic, .orthographicHeight = 16};
+    }
+    static size_t pixelOf(double x, double y) { return size_t((16 - y) / 16 * kEdge) * kEdge + size_t(x / 16 * kEdge); }
+};
+
+TEST_F(MesoSurfaces, NearerOfDatasetAndSurfaceIsSeen) {
+    const OverACube over;
+    show(over.scene);
+    const FrameStats alone = RendererFixture::draw(over.request);
+    const auto cube = *renderer_->readPicture();
+    const FrameStats stats = draw({surfaceOf(plateau(), "boxes", "quad", 1, 2, {6, 8, 11.9}), surfaceOf(plateau(), "boxes", "quad", 1, 2, {10, 8, 10}),
+                                   surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})}, over.request);
     const auto picture = *renderer_->readPicture();
     const auto depths = *renderer_->readDepth();
-    const auto isBehind = [&](uint32_t x, uint32_t y) { return picture.rgba[4 * (y * kEdge + x)] == 7; };
-    EXPECT_FALSE(isBehind(kEdge / 2, kEdge / 4));
-    EXPECT_NEAR(depths[kEdge / 4 * kEdge + kEdge / 2], 4.7f, 1e-3f);
-    EXPECT_TRUE(isBehind(kEdge / 2, 3 * kEdge / 4));
-    EXPECT_EQ(depths[3 * kEdge / 4 * kEdge + kEdge / 2], 4.0f);
-    EXPECT_TRUE(isBehind(0, 0));
+    const auto normals = *renderer_->readNormals();
+    const size_t on = OverACube::pixelOf(6, 8), within = OverACube::pixelOf(10, 8), beside = OverACube::pixelOf(14, 8), nothing = OverACube::pixelOf(1, 1);
+    EXPECT_NEAR(depths[on], 20 - 12.5, 1e-3);
+    EXPECT_NEAR(depths[within], 8, 1e-3);
+    EXPECT_NEAR(depths[beside], 20 - 10.6, 1e-3);
+    EXPECT_TRUE(std::isinf(depths[nothing]));
+    for (const size_t i : {on, within, beside}) EXPECT_GT(normals[i].z, 0.99f) << i;
+    EXPECT_TRUE(std::equal(&picture.rgba[4 * within], &picture.rgba[4 * within + 4], &cube.rgba[4 * within]));
+    EXPECT_FALSE(std::equal(&picture.rgba[4 * beside], &picture.rgba[4 * beside + 4], &cube.rgba[4 * beside]));
+    const auto pickAt = [&](size_t i) { return **renderer_->pick(uint32_t(i % kEdge), uint32_t(i / kEdge)); };
+    EXPECT_TRUE(pickAt(on).onSurface);
+    EXPECT_NEAR(pickAt(on).position.z, 12.5, 1e-3);
+    EXPECT_FALSE(pickAt(within).onSurface);
+    const auto finite = uint64_t(std::count_if(depths.begin(), depths.end(), [](float d) { return std::isfinite(d); }));
+    EXPECT_EQ(stats.hitPixels, finite);
+    EXPECT_GT(finite, alone.hitPixels);
+}
+
+TEST_F(MesoSurfaces, TilesAreCutFromTheWhole) {
+    const OverACube over;
+    show(over.scene);
+    const std::vector<MesoSurface> surfaces = {surfaceOf(plateau(), "boxes", "sphere", 0.2, 3, {11, 8, 12})};
+    FrameRequest request = over.request;
+    for (const Projection projection : {Projection::Orthographic, Projection::Perspective}) {
+        request.camera.projection = projection;
+        request.tile.reset();
+        request.width = request.height = kEdge;
+        draw(surfaces, request);
+        const auto whole = *renderer_->readPicture();
+        request.width = 40, request.height = 24;
+        request.tile = PictureTile{48, 32, kEdge, kEdge};
+        draw(surfaces, request);
+        const auto tile = *renderer_->readPicture();
+        int largest = 0;
+        for (uint32_t y = 0; y < 24; ++y)
+            for (uint32_t i = 0; i < 160; ++i) largest = std::max(largest, std::abs(int(tile.rgba[y * 160 + i]) - int(whole.rgba[4 * ((y + 32) * kEdge + 48) + i])));
+        EXPECT_LE(largest, 2);
+    }
+}
+
+TEST_F(MesoSurfaces, AllViewsShowThemAndHearOfThem) {
+    const OverACube over;
+    show(over.scene);
+    auto view = *renderer_->addView();
+    ASSERT_TRUE(view->settle(over.request));
+    ASSERT_TRUE(view->render(over.request));
+    const auto before = *view->readPicture();
+    EXPECT_FALSE(view->update(over.request)->changed);
+    draw({surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})}, over.request);
+    EXPECT_TRUE(view->update(over.request)->changed);
+    EXPECT_FALSE(view->update(over.request)->changed);
+    ASSERT_TRUE(view->render(over.request));
+    EXPECT_EQ(*view->readPicture(), *renderer_->readPicture());
+    EXPECT_NE(*view->readPicture(), before);
+    // Taken away again, nothing is left of them.
+    EXPECT_EQ(draw({}, over.request).surfaceBytes, 0u);
+    EXPECT_EQ(*renderer_->readPicture(), before);
+    ASSERT_TRUE(view->update(over.request));
+    ASSERT_TRUE(view->render(over.request));
+    EXPECT_EQ(*view->readPicture(), before);
+}
+
+TEST_F(MesoSurfaces, SurviveALostDevice) {
+    const OverACube over;
+    const std::vector<MesoSurface> surfaces = {surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})};
+    show(over.scene);
+    draw(surfaces, over.request);
+    const auto expected = *renderer_->readPicture();
+    for (const uint64_t submission : {4, 6, 8}) {
+        RendererOptions options;
+        options.faults.lostAtSubmission = submission;
+        start(options);
+        show(over.scene);
+        ASSERT_TRUE(renderer_->setSurfaces(surfaces).ok());
+        for (int i = 0; i < 6; ++i) RendererFixture::draw(over.request);
+        EXPECT_EQ(renderer_->update(over.request)->deviceLosses, 1u) << submission;
+        RendererFixture::draw(over.request);
+        EXPECT_EQ(*renderer_->readPicture(), expected) << submission;
+    }
 }
 
 TEST_F(MesoSurfaces, ShadowsFallBehindWhatStands) {
-    MesoRequest request = fromAbove();
-    request.look.light = {0.8, 0.2, 0.35};
+    FrameRequest request = fromAbove();
+    request.shading.lightFollowsCamera = false;
+    request.shading.lightDirection = {0.8f, 0.2f, 0.35f};
     const auto brightness = [&](const Asset& asset, bool shadows) {
-        request.look.shadows = shadows;
+        request.shading.shadows = shadows;
         draw({surfaceOf(asset, "boxes", "quad", 0.3)}, request);
         uint64_t sum = 0;
         const Picture picture = *renderer_->readPicture();
@@ -196,35 +273,23 @@ TEST_F(MesoSurfaces, ShadowsFallBehindWhatStands) {
     EXPECT_EQ(brightness(plateau(), true), brightness(plateau(), false));
 }
 
-TEST_F(MesoSurfaces, SceneWithoutMesostructureMakesNothing) {
-    MesoBehind behind{{kEdge, kEdge, std::vector<uint8_t>(4 * kEdge * kEdge, 9)}, std::vector<float>(kEdge * kEdge, 2.0f)};
-    MesoRequest request = fromAbove();
-    request.behind = &behind;
-    const MesoFrameStats stats = draw({}, request);
-    EXPECT_EQ(stats.pipelines, 0u);
-    EXPECT_EQ(stats.assetBytes, 0u);
-    EXPECT_EQ(*renderer_->readPicture(), behind.picture);
-    EXPECT_EQ(*renderer_->readDepth(), behind.depths);
+TEST_F(MesoSurfaces, SceneWithoutMesostructurePaysNothing) {
+    const OverACube over;
+    show(over.scene);
+    const FrameStats never = RendererFixture::draw(over.request);
+    const FrameStats none = draw({}, over.request);
+    EXPECT_EQ(none.pipelines, never.pipelines);
+    EXPECT_EQ(none.surfaceBytes, 0u);
+    EXPECT_EQ(none.msSurfaces, 0);
 }
 
 TEST_F(MesoSurfaces, OnePipelineAMethod) {
     const Asset asset = plateau();
     const MesoSurface boxes = surfaceOf(asset, "boxes", "quad", 0.5), pyramid = surfaceOf(asset, "pyramid", "quad", 0.5);
-    // With the one that shades.
-    EXPECT_EQ(draw({boxes, boxes}, fromAbove()).pipelines, 2u);
-    EXPECT_EQ(draw({boxes, pyramid}, fromAbove()).pipelines, 3u);
-    EXPECT_EQ(draw({pyramid}, fromAbove()).pipelines, 3u);
-}
-
-TEST_F(MesoSurfaces, RefusesPicturesOfNoSize) {
-    MesoRequest request = fromAbove();
-    request.width = 0;
-    EXPECT_EQ(renderer_->render(request).error().code, ErrorCode::Usage);
-    request = fromAbove();
-    const MesoBehind behind{{4, 4, std::vector<uint8_t>(64)}, std::vector<float>(16)};
-    request.behind = &behind;
-    EXPECT_EQ(renderer_->render(request).error().code, ErrorCode::Usage);
-    EXPECT_EQ(renderer_->readPicture().error().code, ErrorCode::Usage);
+    const uint32_t one = draw({boxes}, fromAbove()).pipelines;
+    EXPECT_EQ(draw({boxes, boxes}, fromAbove()).pipelines, one);
+    EXPECT_EQ(draw({boxes, pyramid}, fromAbove()).pipelines, one + 1);
+    EXPECT_EQ(draw({pyramid}, fromAbove()).pipelines, one + 1);
 }
 
 }  // namespace

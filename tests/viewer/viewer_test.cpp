@@ -574,7 +574,7 @@ TEST_F(ViewerTest, TwoDatasetsAreOneScene) {
     auto reader = openFile(*folder_ / "ball.vcp").value();
     const auto source = [&] { return std::make_shared<FilePageSource>(reader, dataset); };
     const Similarity beside{glm::angleAxis(1.0, glm::dvec3(0, 0, 1)), 0.5, {3, 0, 0}};
-    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, viewer_->camera(), "two balls"));
+    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, {}, viewer_->camera(), "two balls"));
     EXPECT_EQ(viewer_->status().triangles, 2 * triangles);
     EXPECT_GT(viewer_->bounds().high.x, 3.4);
     viewer_->act(ViewerAction::Fit);
@@ -590,12 +590,51 @@ TEST_F(ViewerTest, TwoDatasetsAreOneScene) {
     for (const PageBox& page : pages) EXPECT_NEAR(glm::length(page.edges[0]), glm::length(page.edges[2]), 1e-9);
     EXPECT_FALSE(viewer_->renderer().feedbackPicture());
     viewer_->renderer().keepFeedback(true);
-    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, viewer_->camera(), "two balls"));
+    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, {}, viewer_->camera(), "two balls"));
     settle();
     const auto& heard = viewer_->renderer().feedbackPicture();
     ASSERT_TRUE(heard) << "no frame missed pages";
     EXPECT_GT(std::count_if(heard->errorPixels.begin(), heard->errorPixels.end(), [](float error) { return error > 0; }), 10);
     EXPECT_LT(heard->errorPixels[0], 0) << "nothing is in the corner";
+}
+
+TEST_F(ViewerTest, SurfacesAreShownWithAndWithoutDatasets) {
+    openViewer();
+    MesoSurfaceDescription relief;
+    relief.asset = "hemispheres", relief.tiles = 2, relief.place = {3, 0, 0}, relief.method.name = "pyramid";
+    const auto surfaces = makeMesoScene({&relief, 1});
+    ASSERT_TRUE(surfaces) << surfaces.error().line();
+    const auto dataset = viewer_->dataset();
+    const Box ball = viewer_->bounds();
+    auto reader = openFile(*folder_ / "ball.vcp").value();
+    for (const bool withBall : {false, true}) {
+        std::vector<PlacedDataset> datasets;
+        if (withBall) datasets.push_back({dataset, std::make_shared<FilePageSource>(reader, dataset), {}});
+        const Box bounds = withBall ? surfaces->bounds.joined(ball) : surfaces->bounds;
+        OrbitCamera camera;
+        camera.look(View::Isometric, bounds, kSize);
+        ASSERT_TRUE(viewer_->open(datasets, *surfaces, camera, "relief"));
+        EXPECT_EQ(viewer_->bounds().low, bounds.low);
+        settle();
+        const auto hit = viewer_->hitAt(pixelOf({3, 0, 0}));
+        ASSERT_TRUE(hit);
+        EXPECT_TRUE(hit->onSurface);
+        // The point under the cursor stays where it is while the camera turns about it.
+        const glm::dvec2 cursor = pixelOf(hit->position);
+        viewer_->press(MouseButton::Left, cursor);
+        viewer_->move(cursor + glm::dvec2(40, 10));
+        viewer_->release(MouseButton::Left);
+        EXPECT_TRUE(turn(0.1));
+        EXPECT_LT(glm::distance(pixelOf(hit->position), cursor), 2);
+        settle();
+        EXPECT_EQ(viewer_->status().update.pagesInCut > 0, withBall);
+        EXPECT_NE(statusLine(viewer_->status()).find("mesostructure"), std::string::npos);
+    }
+    // What is opened next is shown without them.
+    openViewer();
+    settle();
+    EXPECT_EQ(viewer_->status().frame.surfaceBytes, 0u);
+    EXPECT_FALSE(viewer_->open(std::vector<PlacedDataset>{}, MesoScene{}, viewer_->camera(), "nothing"));
 }
 
 TEST_F(ViewerTest, CallsBeforeADatasetDoNothing) {

@@ -340,7 +340,7 @@ void vcp_view::showDataset() {
     vcp::OrbitCamera camera;
     camera.up = up;
     camera.look(vcp::View::Fit, context->open->bounds(), size.x > 0 && size.y > 0 ? size : kUsualSize);
-    viewer->show({{context->open->dataset, nullptr, {}}}, camera, context->name);
+    viewer->show({{context->open->dataset, nullptr, {}}}, {}, camera, context->name);
     wasSettled = false;
     fly = glm::dvec3(0);
 }

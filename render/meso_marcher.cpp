@@ -1,0 +1,83 @@
+#include "render/meso_marcher.h"
+
+#include <chrono>
+
+#include <fmt/format.h>
+
+#include "render/passes/meso_rays.h"
+#include "render/vulkan/pass_timer.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr uint64_t kMostRays = 65535 * 64;  // of one dispatch, on every device
+
+}  // namespace
+
+struct MesoMarcher::State {
+    std::unique_ptr<Instance> instance;
+    std::unique_ptr<Device> device;
+    std::unique_ptr<MesoResources> resources;
+    PassTimer timer;
+
+    /// Of what is recorded: of the queue's clock, or without one of the call's.
+    Result<double> milliseconds(const MesoRaysPass& pass) {
+        const auto start = std::chrono::steady_clock::now();
+        VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) {
+            timer.reset(commands);
+            timer.mark(commands, 0);
+            pass.record(commands);
+            timer.mark(commands, 1);
+        }));
+        if (!timer.hasClock()) return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        const auto ms = timer.read();
+        if (!ms) return ms.error();
+        return ms->front();
+    }
+};
+
+MesoMarcher::MesoMarcher(std::unique_ptr<State> state) : state_(std::move(state)) {}
+MesoMarcher::~MesoMarcher() = default;
+
+Result<std::unique_ptr<MesoMarcher>> MesoMarcher::create(const MesoMarcherOptions& options) {
+    auto state = std::make_unique<State>();
+    auto instance = Instance::create(options.validation, {});
+    if (!instance) return instance.error();
+    state->instance = std::move(*instance);
+    auto device = Device::create(*state->instance, options.device, VK_NULL_HANDLE, false);
+    if (!device) return device.error();
+    state->device = std::move(*device);
+    auto resources = MesoResources::create(*state->device);
+    if (!resources) return resources.error();
+    state->resources = std::move(*resources);
+    auto timer = PassTimer::create(*state->device, 2);
+    if (!timer) return timer.error();
+    state->timer = *std::move(timer);
+    return std::unique_ptr<MesoMarcher>(new MesoMarcher(std::move(state)));
+}
+
+const DeviceInfo& MesoMarcher::device() const { return state_->device->info(); }
+
+Result<MesoMarched> MesoMarcher::march(const meso::Method& method, std::span<const meso::MarchRay> rays, int repetitions) {
+    MesoMarched marched;
+    if (rays.empty()) return marched;
+    if (rays.size() > kMostRays) return Error{.code = ErrorCode::Limit, .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
+    const auto arrays = packMesoArrays(method);
+    if (!arrays) return arrays.error();
+    auto pass = MesoRaysPass(*state_->device, *state_->resources);
+    VCP_TRY(pass.prepare(*arrays, rays));
+    for (int i = 0; i <= repetitions; ++i) {
+        const auto ms = state_->milliseconds(pass);
+        if (!ms) return ms.error();
+        if (i > 0) marched.nsPerRay.push_back(*ms * 1e6 / double(rays.size()));
+    }
+    auto results = pass.read();
+    if (!results) return results.error();
+    marched.results = *std::move(results);
+    return marched;
+}
+
+std::vector<std::string> MesoMarcher::validationMessages() const { return state_->instance->log().messages(); }
+
+}  // namespace vcp

@@ -1,0 +1,34 @@
+// Clock readings of the queue between passes.
+#pragma once
+
+#include <vector>
+
+#include "octree/result.h"
+#include "render/vulkan/device.h"
+
+namespace vcp {
+
+class PassTimer {
+public:
+    /// `marks`: readings a recording. Without a clock on the queue nothing is made and all times are 0. Errors: Device.
+    static Result<PassTimer> create(const Device& device, uint32_t marks);
+    PassTimer() = default;
+    PassTimer(PassTimer&& other) noexcept { *this = std::move(other); }
+    PassTimer& operator=(PassTimer&& other) noexcept;
+    ~PassTimer();
+
+    [[nodiscard]] bool hasClock() const { return pool_ != VK_NULL_HANDLE; }
+    /// Before the first mark of a recording.
+    void reset(VkCommandBuffer commands) const;
+    /// When all before it is done.
+    void mark(VkCommandBuffer commands, uint32_t i) const;
+    /// Milliseconds between consecutive marks. Precondition: what was recorded is done. Errors: Device.
+    [[nodiscard]] Result<std::vector<double>> read() const;
+
+private:
+    const Device* device_ = nullptr;  // not owned
+    uint32_t marks_ = 0;
+    VkQueryPool pool_ = VK_NULL_HANDLE;
+};
+
+}  // namespace vcp
