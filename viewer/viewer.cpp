@@ -24,7 +24,7 @@ constexpr double kLoadingPollSeconds = 0.01;
 constexpr double kRefineSeconds = 0.1;
 constexpr double kRefineFrames = 3;
 
-constexpr int kLargestReduction = 4;
+constexpr int kLargestReduction = 8;
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
 constexpr double kFarthestSection = 4;  // of the diagonal, that a drag moves a plane

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <sstream>
 #include <string>
@@ -23,10 +22,7 @@ class BenchBuild : public testing::Test {
 protected:
     BenchBuild() : folder_("vcp_bench_build_test"), ball_((folder_ / "ball.ply").string()) { writeBall(ball_, 30, 60); }
 
-    [[nodiscard]] Ran run(const std::string& arguments) const {
-        std::istringstream words("bench build " + arguments);
-        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
-    }
+    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords("bench build " + arguments); }
 
     static constexpr const char* kQuick = " --repetitions 1 --samples 500 --json";
 

@@ -1,10 +1,8 @@
 // vcp bench rays from the outside: the rows that programs rely on, methods and knobs, and the report's other forms.
 #include <filesystem>
-#include <iterator>
 #include <map>
 #include <random>
 #include <set>
-#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -32,10 +30,7 @@ protected:
         EXPECT_TRUE(writePly(test::sphereMesh({3, 4, 5}, 1, 48), ball_));
     }
 
-    [[nodiscard]] Ran run(const std::string& arguments) const {
-        std::istringstream words("bench rays " + arguments);
-        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
-    }
+    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords("bench rays " + arguments); }
 
     static constexpr const char* kQuick = " --repetitions 1 --size 48x32 --cell 0.1 --json";
 

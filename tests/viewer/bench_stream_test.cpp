@@ -1,7 +1,6 @@
 // vcp bench stream from the outside: the rows that programs rely on, in all forms of the report.
 #include <algorithm>
 #include <filesystem>
-#include <iterator>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -21,10 +20,7 @@ class BenchStream : public testing::Test {
 protected:
     BenchStream() : folder_("vcp_bench_stream_test"), ball_((folder_ / "ball.ply").string()) { writeBall(ball_, 60, 120); }
 
-    [[nodiscard]] Ran run(const std::string& arguments) const {
-        std::istringstream words("bench stream " + arguments);
-        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
-    }
+    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords("bench stream " + arguments); }
 
     /// Of a line of CSV.
     static long columns(const std::string& line) {

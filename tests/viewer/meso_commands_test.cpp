@@ -3,9 +3,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -25,10 +23,7 @@ class MesoCommands : public testing::Test {
 protected:
     MesoCommands() : folder_("vcp_meso_test") {}
 
-    [[nodiscard]] Ran run(const std::string& arguments) const {
-        std::istringstream words(arguments);
-        return VcpProgram(folder_).run({std::istream_iterator<std::string>(words), {}});
-    }
+    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords(arguments); }
     [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
     /// A ramp along x, 16 x 8 texels.

@@ -3,6 +3,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
+#include <sstream>
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -30,6 +32,11 @@ pid_t VcpProgram::start(const std::vector<std::string>& arguments, const std::st
     argv.push_back(nullptr);
     execv(VCP_EXECUTABLE, argv.data());
     _exit(127);
+}
+
+Ran VcpProgram::runWords(const std::string& words) const {
+    std::istringstream stream(words);
+    return run({std::istream_iterator<std::string>(stream), {}});
 }
 
 Ran VcpProgram::wait(pid_t child) const {

@@ -27,6 +27,8 @@ public:
     [[nodiscard]] pid_t start(const std::vector<std::string>& arguments, const std::string& out = "stdout", bool smallFiles = false) const;
     [[nodiscard]] Ran wait(pid_t child) const;
     [[nodiscard]] Ran run(const std::vector<std::string>& arguments) const { return wait(start(arguments)); }
+    /// Words with spaces between.
+    [[nodiscard]] Ran runWords(const std::string& words) const;
 
 private:
     const TestFolder& folder_;
