@@ -12,24 +12,17 @@ struct Space {
     float reach;
 };
 
-// coneOf (mesostructure/distance_map.cpp).
+// coneOf (mesostructure/distance_map.h): signs and products, which no device may round further off than it says there.
 int coneOf(vec3 d) {
-    ivec2 cones = meso.cones.xy;
-    int azimuth = 0, elevation = 0, quarter = d.y < 0.0 ? (d.x < 0.0 ? 2 : 3) : (d.x < 0.0 ? 1 : 0);
-    if (cones.x == 2) azimuth = int(d.y < 0.0);
-    else if (cones.x == 4) azimuth = quarter;
-    else if ((cones.x & 3) == 0) {
-        int most = cones.x / 4;
-        vec2 a = (quarter & 1) == 0 ? abs(d.xy) : abs(d.yx);
-        azimuth = quarter * most + (a.x + a.y > 0.0 ? clamp(int(atan(a.y, a.x) * 0.636619772 * float(most)), 0, most - 1) : 0);
-    } else if (cones.x > 1) {
-        float turn = d.x == 0.0 && d.y == 0.0 ? 0.0 : atan(d.y, d.x) * 0.159154943;
-        if (turn < 0.0) turn += 1.0;
-        azimuth = min(int(turn * float(cones.x)), cones.x - 1);
+    int azimuth = 0, elevation = 0;
+    bool isLower = d.y < 0.0;
+    for (int k = 1; k < meso.cones.x; k++) {
+        float along = meso.borders[k].x * d.y, across = meso.borders[k].y * d.x;
+        azimuth += int(2 * k < meso.cones.x ? isLower || along > across : isLower && along >= across);
     }
-    if (cones.y == 2) elevation = int(d.z >= 0.0);
-    else if (cones.y > 1) elevation = clamp(int((atan(d.z, length(d.xy)) * 0.318309886 + 0.5) * float(cones.y)), 0, cones.y - 1);
-    return elevation * cones.x + azimuth;
+    float flatness = d.x * d.x + d.y * d.y, height = d.z * abs(d.z);
+    for (int k = 1; k < meso.cones.y; k++) elevation += int(height * meso.borders[k].z >= meso.borders[k].w * flatness);
+    return elevation * meso.cones.x + azimuth;
 }
 
 // CompressedMap::lookUp.
