@@ -139,6 +139,7 @@ Result<void> writeWithSurfaces(Renderer& renderer, const MesoScene& scene, const
     VCP_TRY((*over)->setSurfaces(scene.surfaces));
     const auto drawn = (*over)->render({.look = lookOf(request), .width = request.width, .height = request.height, .behind = &behind});
     if (!drawn) return drawn.error();
+    if (drawn->unresolved > 0) fmt::print(stderr, "warning: {} rays of mesostructure were given up: too many pieces of a base, or of its map, along them\n", drawn->unresolved);
     if (!command.depth.empty()) {
         const auto depth = (*over)->readDepth();
         if (!depth) return depth.error();

@@ -134,6 +134,29 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
     }
 }
 
+/// Many triangles in one place: what a ray may look at is bounded, and it is said that it was not all.
+TEST_F(MesoSurfaces, RaysThroughCoincidentPiecesAreBounded) {
+    const Asset asset = plateau();
+    MesoSurface surface = surfaceOf(asset, "boxes", "quad", 0.5);
+    MesoRequest request = fromAbove();
+    request.look.shadows = true;
+    EXPECT_EQ(draw({surface}, request).unresolved, 0u);
+    BaseSurface base = *makeBaseSurface("quad", 2);
+    for (int copy = 0; copy < 40'000; ++copy)
+        for (size_t i = 0; i < 2; ++i) {
+            const auto triangle = base.triangles[i];
+            const auto map = base.uvs[i];
+            base.triangles.push_back(triangle), base.uvs.push_back(map);
+        }
+    surface.shell = *buildShell(base, 0.5, asset.extent);
+    request.width = request.height = 8;
+    EXPECT_GT(draw({surface}, request).unresolved, 0u);
+    // No ray marched more than the cap, and one more piece.
+    for (const uint32_t iterations : *renderer_->readIterations()) EXPECT_LE(iterations, 65536u + 8193u);
+    const auto depths = *renderer_->readDepth();
+    EXPECT_NEAR(depths[3 * 8 + 3], 5 - 0.5 * 0.6, 2e-3);
+}
+
 TEST_F(MesoSurfaces, WaysToSkipShowTheSame) {
     MesoRequest request = fromAbove();
     request.look.camera.forward = {0.5, 0.3, -0.4}, request.look.camera.eye = -5.0 * request.look.camera.forward;
