@@ -125,22 +125,27 @@ Result<std::unique_ptr<MesoRenderer>> MesoRenderer::create(const MesoRendererOpt
 
 const DeviceInfo& MesoRenderer::device() const { return state_->device->info(); }
 
-Result<MesoMarched> MesoRenderer::march(const meso::Method& method, std::span<const meso::MarchRay> rays, int repetitions) {
-    MesoMarched marched;
+Result<std::vector<MesoMarched>> MesoRenderer::march(std::span<const meso::Method* const> methods, std::span<const meso::MarchRay> rays, int rounds) {
+    std::vector<MesoMarched> marched(methods.size());
     if (rays.empty()) return marched;
     if (rays.size() > kMostRays) return Error{.code = ErrorCode::Limit, .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
-    const auto arrays = packMesoArrays(method);
-    if (!arrays) return arrays.error();
-    auto resources = MesoRaysPass(*state_->device, *state_->resources);
-    VCP_TRY(resources.prepare(*arrays, rays));
-    for (int i = 0; i <= repetitions; ++i) {
-        const auto ms = state_->watch->milliseconds([&](VkCommandBuffer commands) { resources.record(commands); });
-        if (!ms) return ms.error();
-        if (i > 0) marched.nsPerRay.push_back(*ms * 1e6 / double(rays.size()));
+    std::vector<MesoRaysPass> passes;
+    for (const meso::Method* method : methods) {
+        const auto arrays = packMesoArrays(*method);
+        if (!arrays) return arrays.error();
+        VCP_TRY(passes.emplace_back(*state_->device, *state_->resources).prepare(*arrays, rays));
     }
-    auto results = resources.read();
-    if (!results) return results.error();
-    marched.results = *std::move(results);
+    for (int round = 0; round <= rounds; ++round)
+        for (size_t i = 0; i < passes.size(); ++i) {
+            const auto ms = state_->watch->milliseconds([&](VkCommandBuffer commands) { passes[i].record(commands); });
+            if (!ms) return ms.error();
+            if (round > 0) marched[i].nsPerRay.push_back(*ms * 1e6 / double(rays.size()));
+        }
+    for (size_t i = 0; i < passes.size(); ++i) {
+        auto results = passes[i].read();
+        if (!results) return results.error();
+        marched[i].results = *std::move(results);
+    }
     return marched;
 }
 

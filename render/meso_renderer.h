@@ -42,7 +42,7 @@ struct MesoFrameStats {
 
 struct MesoMarched {
     std::vector<meso::MarchResult> results;
-    std::vector<double> nsPerRay;  ///< of each repetition
+    std::vector<double> nsPerRay;  ///< of each round
 };
 
 class MesoRenderer {
@@ -55,8 +55,9 @@ public:
 
     [[nodiscard]] const DeviceInfo& device() const;
 
-    /// All rays, once to warm up and then `repetitions` times. Errors: those of packMesoArrays; Device; Limit.
-    Result<MesoMarched> march(const meso::Method& method, std::span<const meso::MarchRay> rays, int repetitions);
+    /// All rays by each method: a round over the methods to warm up and then `rounds` rounds, so that what else the machine does
+    /// falls on all alike. Errors: those of packMesoArrays; Device; Limit.
+    Result<std::vector<MesoMarched>> march(std::span<const meso::Method* const> methods, std::span<const meso::MarchRay> rays, int rounds);
 
     /// Replaces what is drawn. Errors: Device, Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
