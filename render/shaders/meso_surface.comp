@@ -151,7 +151,7 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     int depth = 1;
     uint piece = 0u, left = 0u, visits = 0u;
     // All rays of a group look for their next piece, then all march: a piece is long work, and done for one ray at a time otherwise.
-    while (true) {
+    while ((left > 0u || depth > 0) && visits < kMostVisits && best.iterations < kMostVisits) {
         Passage passage;
         bool passes = false;
         while (!passes && (left > 0u || depth > 0) && visits < kMostVisits) {
@@ -178,10 +178,11 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
             if (min(e0, e1) < kNoHit) stack[depth++] = child + swapped;
         }
         if (passes) castPiece(passage, o, d, start, best);
-        if (visits >= kMostVisits || best.iterations >= kMostVisits) best.unresolved = true;
-        if (!passes || best.iterations >= kMostVisits) return best;
         if (kShadow != 0u && best.t < tMax) return best;
     }
+    // Also where the device ends a long loop by itself, as software ones do.
+    if (left > 0u || depth > 0) best.unresolved = true;
+    return best;
 }
 
 void main() {
