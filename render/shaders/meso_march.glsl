@@ -191,29 +191,33 @@ void marchGrid(MesoRay ray, inout MesoResult result) {
     Walk w = startWalk(ray, meso.cells.xyz);
     int direction = kSkip == kMesoOccupancy ? 0 : kSkip == kMesoBoxes ? int(w.d.x < 0.0) | int(w.d.y < 0.0) << 1 | int(w.d.z < 0.0) << 2 : coneOf(w.d * meso.cell.xyz);
     Side side = Side(w.startsAtTop || ray.isOutside, !ray.isOutside);
-    while (w.cell.z >= 0 && w.cell.z < meso.cells.z && w.t <= w.tMax) {
-        if (result.iterations++ == kMostIterations) {
-            result.state = kMesoUnresolved;
-            return;
-        }
-        Space space = spaceAt(direction, w.cell, result.fetches);
-        int axisOut;
-        float exit = walkExit(w, space.further, axisOut);
-        if (space.occupied) {
-            float entry = walkEntry(w), end = max(entry, min(exit, w.tMax));
-            if (meetSurface(w, entry, end, side, result)) {
-                result.state = kMesoHit;
+    // All rays of a group look for their next occupied cell, then all solve: solving is long work, and done for one ray at a time otherwise.
+    while (true) {
+        bool found = false;
+        float exit = kFar;
+        int axisOut = -1;
+        while (!found && w.cell.z >= 0 && w.cell.z < meso.cells.z && w.t <= w.tMax) {
+            if (result.iterations++ == kMostIterations) {
+                result.state = kMesoUnresolved;
                 return;
             }
-        } else {
+            Space space = spaceAt(direction, w.cell, result.fetches);
+            exit = walkExit(w, space.further, axisOut);
+            found = space.occupied;
+            if (found) break;
             side.inRun = false;
-            if (space.reach > 0.0 && w.t + space.reach > exit) {
-                walkJump(w, w.t + space.reach);
-                continue;
-            }
+            if (space.reach > 0.0 && w.t + space.reach > exit) walkJump(w, w.t + space.reach);
+            else if (exit >= kFar) break;
+            else walkLeave(w, space.further, exit, axisOut);
+        }
+        if (!found) break;
+        float entry = walkEntry(w), end = max(entry, min(exit, w.tMax));
+        if (meetSurface(w, entry, end, side, result)) {
+            result.state = kMesoHit;
+            return;
         }
         if (exit >= kFar) break;
-        walkLeave(w, space.occupied ? ivec3(0) : space.further, exit, axisOut);
+        walkLeave(w, ivec3(0), exit, axisOut);
     }
     if (kSurface == kMesoHeights && w.cell.z < 0 && w.sign.z < 0 && side.outside && w.t <= w.tMax) {
         result.state = kMesoHit;
