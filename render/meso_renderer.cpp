@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <limits>
 
 #include <fmt/format.h>
@@ -137,9 +138,11 @@ Result<std::vector<MesoMarched>> MesoRenderer::march(std::span<const meso::Metho
     }
     for (int round = 0; round <= rounds; ++round)
         for (size_t i = 0; i < passes.size(); ++i) {
+            const std::clock_t start = std::clock();
             const auto ms = state_->watch->milliseconds([&](VkCommandBuffer commands) { passes[i].record(commands); });
             if (!ms) return ms.error();
-            if (round > 0) marched[i].nsPerRay.push_back(*ms * 1e6 / double(rays.size()));
+            const double processorMs = double(std::clock() - start) * 1e3 / CLOCKS_PER_SEC;
+            if (round > 0) marched[i].nsPerRay.push_back((device().software ? processorMs : *ms) * 1e6 / double(rays.size()));
         }
     for (size_t i = 0; i < passes.size(); ++i) {
         auto results = passes[i].read();

@@ -42,7 +42,7 @@ struct MesoFrameStats {
 
 struct MesoMarched {
     std::vector<meso::MarchResult> results;
-    std::vector<double> nsPerRay;  ///< of each round
+    std::vector<double> nsPerRay;  ///< of each round: the queue's time; on a software device the processor's, of all threads
 };
 
 class MesoRenderer {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -119,7 +120,7 @@ std::vector<Entry> entries() {
     for (const int cells : {32, 128}) all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
     for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
     for (const int cells : {16, 32, 64}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
-    for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128, 256}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
     all.push_back({"grid 64", true, {.name = "cells", .cells = 64}});
     return all;
 }
@@ -130,9 +131,9 @@ std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const s
     for (int round = 0; round <= rounds; ++round)
         for (size_t m = 0; m < methods.size(); ++m) {
             all[m].results.resize(rays.size());
-            const auto start = Clock::now();
+            const std::clock_t start = std::clock();
             for (size_t i = 0; i < rays.size(); ++i) all[m].results[i] = methods[m].marcher->march(rays[i]);
-            if (round > 0) all[m].nsPerRay.push_back(secondsSince(start) * 1e9 / double(std::max<size_t>(1, rays.size())));
+            if (round > 0) all[m].nsPerRay.push_back(double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC / double(std::max<size_t>(1, rays.size())));
         }
     return all;
 }

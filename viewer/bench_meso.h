@@ -3,9 +3,9 @@
 //
 // Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes and
 // the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the solving
-// alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times are taken in rounds over all methods after a
-// warm-up, and each method's is divided by that of one peer in the same round: the median of these ratios is what a machine that does
-// other things as well says reliably.
+// alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times are the processor's (of all threads of a
+// software device; a GPU's are its queue's), taken in rounds over all methods after a warm-up, and each method's is divided by that of one peer
+// in the same round. The median of these ratios is what a machine that does other things as well says reliably.
 #pragma once
 
 #include <array>
