@@ -44,16 +44,18 @@ CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
         Real low = ends[i], high = ends[i + 1];
         Real fLow = i == 0 ? c0 : f(low), fHigh = f(high);
         if (outside && fHigh <= 0) {
-            // Monotone and bracketed: Illinois, with a bisection wherever it gains too little.
-            for (int k = 0; k < 60 && high - low > Real(4) * std::numeric_limits<Real>::epsilon() * high; ++k) {
-                Real u = low + (high - low) * (fLow / (fLow - fHigh));
-                if (!(u > low && u < high) || k % 4 == 3) u = Real(0.5) * (low + high);
-                if (!(u > low && u < high)) break;
+            // Monotone and bracketed: Newton, or a bisection where that leaves the bracket.
+            Real u = low + (high - low) * (fLow / (fLow - fHigh));
+            for (int k = 0; k < 24; ++k) {
+                if (!(u > low && u < high)) u = Real(0.5) * (low + high);
                 const Real value = f(u);
-                if (value > 0) low = u, fLow = value;
-                else high = u, fHigh = value;
+                if (value > 0) low = u;
+                else high = u;
+                const Real step = value / ((Real(3) * c3 * u + Real(2) * c2) * u + c1);
+                if (std::abs(step) <= Real(2) * std::numeric_limits<Real>::epsilon() * u) break;
+                u -= step;
             }
-            return {true, high, false};
+            return {true, u >= low && u <= high ? u : high, false};
         }
         outside = fHigh > 0;
     }

@@ -87,26 +87,40 @@ Result<Occupancy> occupy(const Shape& shape, glm::ivec3 cells) {
     return occupancy;
 }
 
-int coneOf(Cones cones, glm::vec3 d) {
+namespace {
+
+/// Cosine and sine of a part of a turn; exact at quarters, and alike but for signs from quarter to quarter.
+glm::dvec2 onCircle(int part, int parts) {
+    const int quarter = 4 * part / parts, rest = 4 * part % parts;
+    const double angle = 0.5 * kPi * rest / parts;
+    const glm::dvec2 p(std::cos(angle), std::sin(angle));
+    const glm::dvec2 turned[] = {{p.x, p.y}, {-p.y, p.x}, {-p.x, -p.y}, {p.y, -p.x}};
+    return turned[quarter % 4];
+}
+
+}  // namespace
+
+ConeBorders::ConeBorders(Cones of) : cones(of) {
+    for (int k = 0; k < std::min(cones.azimuth, kMostAzimuths); ++k) azimuths[k] = onCircle(k, cones.azimuth);
+    for (int k = 0; k < std::min(cones.elevation, kMostElevations); ++k) {
+        // An elevation of -90 degrees is three quarters of a turn.
+        const glm::dvec2 p = onCircle(3 * cones.elevation + 2 * k, 4 * cones.elevation);
+        elevations[k] = glm::vec2(p.x * p.x, p.y * std::abs(p.y));
+    }
+}
+
+int coneOf(const ConeBorders& borders, glm::vec3 d) {
+    const int azimuths = borders.cones.azimuth;
     int azimuth = 0, elevation = 0;
-    if (cones.azimuth == 2) azimuth = d.y < 0;
-    else if (cones.azimuth == 4) azimuth = d.y < 0 ? (d.x < 0 ? 2 : 3) : (d.x < 0 ? 1 : 0);
-    else if (cones.azimuth % 4 == 0) {
-        // The quarter by signs, turned to the first one.
-        const int quarter = d.y < 0 ? (d.x < 0 ? 2 : 3) : (d.x < 0 ? 1 : 0), most = cones.azimuth / 4;
-        const float x = std::abs(quarter % 2 == 0 ? d.x : d.y), y = std::abs(quarter % 2 == 0 ? d.y : d.x);
-        azimuth = quarter * most + std::min(int(std::atan2(y, x) * float(2 / kPi) * float(most)), most - 1);
-    } else if (cones.azimuth > 1) {
-        float turn = std::atan2(d.y, d.x) * float(0.5 / kPi);
-        if (turn < 0) turn += 1;
-        azimuth = std::min(int(turn * float(cones.azimuth)), cones.azimuth - 1);
+    // A direction of the lower half turn is past all borders of the upper one.
+    const bool isLower = d.y < 0;
+    for (int k = 1; k < azimuths; ++k) {
+        const float along = borders.azimuths[k].x * d.y, across = borders.azimuths[k].y * d.x;
+        azimuth += 2 * k < azimuths ? isLower || along > across : isLower && along >= across;
     }
-    if (cones.elevation == 2) elevation = d.z >= 0;
-    else if (cones.elevation > 1) {
-        const float height = std::atan2(d.z, std::sqrt(d.x * d.x + d.y * d.y)) * float(1 / kPi) + 0.5f;
-        elevation = std::clamp(int(height * float(cones.elevation)), 0, cones.elevation - 1);
-    }
-    return elevation * cones.azimuth + azimuth;
+    const float flat = d.x * d.x + d.y * d.y, height = d.z * std::abs(d.z);
+    for (int k = 1; k < borders.cones.elevation; ++k) elevation += height * borders.elevations[k].x >= borders.elevations[k].y * flat;
+    return elevation * azimuths + azimuth;
 }
 
 std::vector<float> signedConeDistances(const Occupancy& occupancy, glm::ivec3 sign, bool betweenCentres) {

@@ -12,14 +12,17 @@
 // axes, the square of the gap is a sum over the axes, and its least value is three one-sided lower envelopes of
 // parabolas, one axis after the other: exact, in time linear in the cells (after Felzenszwalb and Huttenlocher 2012,
 // one-sided). Other cones are searched cell by cell in the order of distance, up to `cap`; they are widened by
-// kConeSlack for the rounding of a ray's azimuth.
+// kConeSlack for the rounding of a ray's cone.
 //
 // Lengths above the cap are cut to it (an empty cone has no least distance on a repeated tile), and values are rounded
 // down to a byte. Whether a cell is occupied is a byte of its own, kOccupied: 0 is a length, not a flag.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
+
+#include <glm/vec2.hpp>
 
 #include "mesostructure/shape.h"
 
@@ -37,18 +40,34 @@ struct Occupancy {
 /// Errors: Limit (more than kMaxGridCells or kMaxGridEdge), Usage (no cells); InvalidInput where no cell is occupied.
 Result<Occupancy> occupy(const Shape& shape, glm::ivec3 cells);
 
+inline constexpr int kMostAzimuths = 32, kMostElevations = 16;
+
 struct Cones {
-    int azimuth = 1;    ///< 1 to 32
-    int elevation = 1;  ///< 1 to 16
+    int azimuth = 1;    ///< 1 to kMostAzimuths
+    int elevation = 1;  ///< 1 to kMostElevations
 
     [[nodiscard]] int count() const { return azimuth * elevation; }
     /// Whether each cone is a sign for each of some axes.
     [[nodiscard]] bool areSigns() const { return (azimuth == 1 || azimuth == 2 || azimuth == 4) && elevation <= 2; }
 };
-inline constexpr double kConeSlack = 1e-6;  ///< radians
+/// Where cones meet, for coneOf. Of azimuth k from 0, a half turn at most: cosine and sine. Of elevation k from -90
+/// degrees: the cosine's square and the sine's with the sine's sign. On the axes both are exact.
+struct ConeBorders {
+    explicit ConeBorders(Cones cones);
+
+    Cones cones;
+    std::array<glm::vec2, kMostAzimuths> azimuths{};
+    std::array<glm::vec2, kMostElevations> elevations{};
+};
 
 /// The cone of a direction: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as shaders find it.
-int coneOf(Cones cones, glm::vec3 direction);
+///
+/// By signs and products only, which every device rounds correctly; an atan may be off by 4096 units of the last place there.
+/// Let u be 2^-23, the most that a product or a sum is off, whichever way it is rounded. Against a border of azimuth the
+/// comparison is off by 1.5 u of the direction's length, of elevation by 1.5 u as well (6 u of the tangent's square), and a
+/// shader's direction by 1.5 u: a direction is within 3 u, 4e-7 radians, of the cone that is found. kConeSlack is more.
+int coneOf(const ConeBorders& borders, glm::vec3 direction);
+inline constexpr double kConeSlack = 1e-6;  ///< radians
 
 enum class DistanceRule {
     AnyPoint,  ///< from any point of the cell to any point of an occupied cell: conservative

@@ -29,10 +29,12 @@ struct SkipNothing {
 };
 
 struct SkipDistances {
+    explicit SkipDistances(const DistanceMap& of) : map(of), borders(of.cones) {}
     const DistanceMap& map;
+    ConeBorders borders;
     [[nodiscard]] const TileGrid& grid() const { return map.grid; }
     [[nodiscard]] uint64_t bytes() const { return map.bytes(); }
-    [[nodiscard]] int direction(vec3 d) const { return coneOf(map.cones, d); }
+    [[nodiscard]] int direction(vec3 d) const { return coneOf(borders, d); }
     Space at(int cone, ivec3 cell, uint32_t& fetches) const {
         ++fetches;
         const uint8_t step = map.steps[map.slot(cone, cell)];
@@ -41,10 +43,12 @@ struct SkipDistances {
 };
 
 struct SkipCompressed {
+    explicit SkipCompressed(const CompressedMap& of) : map(of), borders(of.cones) {}
     const CompressedMap& map;
+    ConeBorders borders;
     [[nodiscard]] const TileGrid& grid() const { return map.grid; }
     [[nodiscard]] uint64_t bytes() const { return map.bytes(); }
-    [[nodiscard]] int direction(vec3 d) const { return coneOf(map.cones, d); }
+    [[nodiscard]] int direction(vec3 d) const { return coneOf(borders, d); }
     Space at(int cone, ivec3 cell, uint32_t& fetches) const {
         const CompressedMap::Found found = map.lookUp(cone, cell);
         fetches += uint32_t(found.fetches);
@@ -270,8 +274,8 @@ Result<std::unique_ptr<Marcher>> withSurface(Skip skip, const Surface& surface) 
 Result<std::unique_ptr<Marcher>> gridMarcher(const Skipping& skipping, const Surface& surface) {
     if ((skipping.occupancy != nullptr) + (skipping.distances != nullptr) + (skipping.compressed != nullptr) + (skipping.boxes != nullptr) != 1)
         return Error{.code = ErrorCode::Usage, .message = "a walk skips in one way"};
-    if (skipping.distances != nullptr) return withSurface(SkipDistances{*skipping.distances}, surface);
-    if (skipping.compressed != nullptr) return withSurface(SkipCompressed{*skipping.compressed}, surface);
+    if (skipping.distances != nullptr) return withSurface(SkipDistances(*skipping.distances), surface);
+    if (skipping.compressed != nullptr) return withSurface(SkipCompressed(*skipping.compressed), surface);
     if (skipping.boxes != nullptr) return withSurface(SkipBoxes{*skipping.boxes}, surface);
     return withSurface(SkipNothing{*skipping.occupancy}, surface);
 }

@@ -34,9 +34,16 @@ void addHeights(const meso::HeightMap& map, Packer& packer, MesoRecord& record) 
     record.at.y = packer.add(map.texels);
 }
 
+void addCones(meso::Cones cones, int levels, MesoRecord& record) {
+    static_assert(kMesoMostBorders >= meso::kMostAzimuths && kMesoMostBorders >= meso::kMostElevations);
+    record.cones = {cones.azimuth, cones.elevation, levels, 0};
+    const meso::ConeBorders borders(cones);
+    for (int k = 0; k < meso::kMostAzimuths; ++k) record.borders[k] = glm::vec4(borders.azimuths[k], k < meso::kMostElevations ? borders.elevations[k] : glm::vec2(0));
+}
+
 void addCompressed(const meso::CompressedMap& map, Packer& packer, MesoRecord& record) {
     record.extent.w = map.unit;
-    record.cones = {map.cones.azimuth, map.cones.elevation, int(map.levels.size()), 0};
+    addCones(map.cones, int(map.levels.size()), record);
     record.top = glm::ivec4(map.top, 0);
     for (size_t i = 0; i < map.levels.size(); ++i) {
         const auto& level = map.levels[i];
@@ -60,7 +67,7 @@ void addSkipping(const meso::Skipping& skipping, Packer& packer, MesoArrays& arr
         arrays.constants[1] = kMesoDistances;
         addGrid(map.grid, record);
         record.extent.w = map.unit;
-        record.cones = {map.cones.azimuth, map.cones.elevation, 0, 0};
+        addCones(map.cones, 0, record);
         record.at.x = packer.add(map.steps);
     } else {
         arrays.constants[1] = kMesoOccupancy;

@@ -1,6 +1,7 @@
 #include "render/meso_marcher.h"
 
 #include <chrono>
+#include <ctime>
 
 #include <fmt/format.h>
 
@@ -59,22 +60,29 @@ Result<std::unique_ptr<MesoMarcher>> MesoMarcher::create(const MesoMarcherOption
 
 const DeviceInfo& MesoMarcher::device() const { return state_->device->info(); }
 
-Result<MesoMarched> MesoMarcher::march(const meso::Method& method, std::span<const meso::MarchRay> rays, int repetitions) {
-    MesoMarched marched;
+Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method* const> methods, std::span<const meso::MarchRay> rays, int rounds) {
+    std::vector<MesoMarched> marched(methods.size());
     if (rays.empty()) return marched;
     if (rays.size() > kMostRays) return Error{.code = ErrorCode::Limit, .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
-    const auto arrays = packMesoArrays(method);
-    if (!arrays) return arrays.error();
-    auto pass = MesoRaysPass(*state_->device, *state_->resources);
-    VCP_TRY(pass.prepare(*arrays, rays));
-    for (int i = 0; i <= repetitions; ++i) {
-        const auto ms = state_->milliseconds(pass);
-        if (!ms) return ms.error();
-        if (i > 0) marched.nsPerRay.push_back(*ms * 1e6 / double(rays.size()));
+    std::vector<MesoRaysPass> passes;
+    for (const meso::Method* method : methods) {
+        const auto arrays = packMesoArrays(*method);
+        if (!arrays) return arrays.error();
+        VCP_TRY(passes.emplace_back(*state_->device, *state_->resources).prepare(*arrays, rays));
     }
-    auto results = pass.read();
-    if (!results) return results.error();
-    marched.results = *std::move(results);
+    for (int round = 0; round <= rounds; ++round)
+        for (size_t i = 0; i < passes.size(); ++i) {
+            const std::clock_t start = std::clock();
+            const auto ms = state_->milliseconds(passes[i]);
+            if (!ms) return ms.error();
+            const double processorMs = double(std::clock() - start) * 1e3 / CLOCKS_PER_SEC;
+            if (round > 0) marched[i].nsPerRay.push_back((device().software ? processorMs : *ms) * 1e6 / double(rays.size()));
+        }
+    for (size_t i = 0; i < passes.size(); ++i) {
+        auto results = passes[i].read();
+        if (!results) return results.error();
+        marched[i].results = *std::move(results);
+    }
     return marched;
 }
 

@@ -21,7 +21,7 @@ struct MesoMarcherOptions {
 
 struct MesoMarched {
     std::vector<meso::MarchResult> results;
-    std::vector<double> nsPerRay;  ///< of each repetition: of the queue's clock, or without one of the call's
+    std::vector<double> nsPerRay;  ///< of each round: the queue's time, or without its clock the call's; on a software device the processor's, of all threads
 };
 
 class MesoMarcher {
@@ -34,8 +34,9 @@ public:
 
     [[nodiscard]] const DeviceInfo& device() const;
 
-    /// All rays, once to warm up and then `repetitions` times. Errors: those of packMesoArrays; Device; Limit.
-    Result<MesoMarched> march(const meso::Method& method, std::span<const meso::MarchRay> rays, int repetitions);
+    /// All rays by each method: a round over the methods to warm up and then `rounds` rounds, so that what else the machine does
+    /// falls on all alike. Errors: those of packMesoArrays; Device; Limit.
+    Result<std::vector<MesoMarched>> march(std::span<const meso::Method* const> methods, std::span<const meso::MarchRay> rays, int rounds);
 
     [[nodiscard]] std::vector<std::string> validationMessages() const;
 

@@ -217,7 +217,7 @@ struct FrameStats {
     uint32_t pagesInCut = 0;
     uint32_t pipelines = 0;     ///< made since create()
     double msSurfaces = 0;      ///< of surfaces with mesostructure; GPU timestamps
-    uint64_t unresolvedRays = 0;  ///< rays that used up their iterations in mesostructure
+    uint64_t unresolvedRays = 0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
     uint64_t surfaceBytes = 0;  ///< of mesostructure on the device, beside the pool: assets and shells
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };

@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <string>
 
 #include <fast_float/fast_float.h>
@@ -17,40 +16,46 @@ namespace {
 constexpr size_t kLongestLine = 1 << 20;
 constexpr size_t kMostTriangles = 5'000'000;
 
-Error noMap(const std::filesystem::path& path, std::string element = {}) {
+Error noMap(const std::string& name, std::string element = {}) {
     return {.code = ErrorCode::InvalidInput,
             .message = "has no texture coordinates, which say where the mesostructure goes; unwrap the mesh first",
-            .file = path.string(),
+            .file = name,
             .element = std::move(element)};
+}
+
+Result<meso::BaseSurface> finished(meso::BaseSurface made, const std::string& name) {
+    if (!(meso::tileEdge(made) > 0)) return noMap(name);
+    meso::joinPositions(made);
+    return made;
 }
 
 /// The lines that say what a base is: v, vt, f. Others are passed over.
 class ObjBase {
 public:
-    ObjBase(const std::filesystem::path& path, double tiles) : path_(path), tiles_(tiles) {}
+    ObjBase(ByteSource source, double tiles) : source_(std::move(source)), tiles_(tiles) {}
 
     Result<meso::BaseSurface> read() {
-        std::ifstream file(path_, std::ios::binary);
-        if (!file) return Error{.code = ErrorCode::Io, .message = "cannot be opened", .file = path_.string()};
-        for (std::string line; std::getline(file, line);) {
+        while (true) {
             ++line_;
-            if (line.size() > kLongestLine) return wrong("the line is longer than 1 MiB");
-            if (made_.positions.size() > 3 * kMostTriangles || coordinates_.size() > 3 * kMostTriangles)
-                return Error{.code = ErrorCode::Limit, .message = "a base surface has at most 15 million vertices and texture coordinates", .file = path_.string(), .element = fmt::format("line {}", line_)};
-            text_ = line;
+            const auto line = source_.line(kLongestLine);
+            if (!line) return line.error().code == ErrorCode::Limit ? wrong("the line is longer than 1 MiB") : line.error();
+            if (!*line) break;
+            text_ = (*line)->substr(0, (*line)->find('#'));
             const std::string_view word = nextWord();
             if (word == "v") VCP_TRY(readPosition());
             else if (word == "vt") VCP_TRY(readCoordinate());
             else if (word == "f") VCP_TRY(readFace());
+            if (made_.positions.size() > 3 * kMostTriangles || coordinates_.size() > 3 * kMostTriangles)
+                return wrong("a base surface has at most 15 million vertices and texture coordinates", ErrorCode::Limit);
+            if (made_.triangles.size() > kMostTriangles) return wrong("a base surface has at most 5 million triangles", ErrorCode::Limit);
         }
-        if (file.bad()) return Error{.code = ErrorCode::Io, .message = "cannot be read", .file = path_.string()};
-        if (made_.triangles.empty()) return wrong("has no faces", false);
-        return std::move(made_);
+        if (made_.triangles.empty()) return source_.error(ErrorCode::InvalidInput, "", std::nullopt, "has no faces");
+        return finished(std::move(made_), source_.name());
     }
 
 private:
-    Error wrong(std::string message, bool hasLine = true) const {
-        return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = path_.string(), .element = hasLine ? fmt::format("line {}", line_) : std::string()};
+    Error wrong(std::string message, ErrorCode code = ErrorCode::InvalidInput) const {
+        return source_.error(code, fmt::format("line {}", line_), std::nullopt, std::move(message));
     }
     std::string_view nextWord() {
         constexpr std::string_view kBlanks = " \t\r\v\f";
@@ -92,7 +97,7 @@ private:
             const size_t slash = word.find('/');
             std::pair<uint32_t, uint32_t> corner;
             if (!at(word.substr(0, slash), made_.positions, corner.first)) return wrong(fmt::format("\"{}\" names no vertex before it", word.substr(0, 40)));
-            if (slash == std::string_view::npos || slash + 1 == word.size() || word[slash + 1] == '/') return noMap(path_, fmt::format("line {}", line_));
+            if (slash == std::string_view::npos || slash + 1 == word.size() || word[slash + 1] == '/') return noMap(source_.name(), fmt::format("line {}", line_));
             const std::string_view rest = word.substr(slash + 1);
             if (!at(rest.substr(0, rest.find('/')), coordinates_, corner.second)) return wrong(fmt::format("\"{}\" names no texture coordinates before it", word.substr(0, 40)));
             corners.push_back(corner);
@@ -102,11 +107,10 @@ private:
             made_.triangles.push_back({corners[0].first, corners[i - 1].first, corners[i].first});
             made_.uvs.push_back({coordinates_[corners[0].second], coordinates_[corners[i - 1].second], coordinates_[corners[i].second]});
         }
-        if (made_.triangles.size() > kMostTriangles) return Error{.code = ErrorCode::Limit, .message = "a base surface has at most 5 million triangles", .file = path_.string()};
         return {};
     }
 
-    std::filesystem::path path_;
+    ByteSource source_;
     double tiles_;
     meso::BaseSurface made_;
     std::vector<glm::dvec2> coordinates_;
@@ -122,7 +126,7 @@ Result<meso::BaseSurface> readStream(const std::filesystem::path& path, double t
         const auto more = (*stream)->next(chunk);
         if (!more) return more.error();
         if (!*more) break;
-        if (chunk.uvs.size() != chunk.triangles.size()) return noMap(path);
+        if (chunk.uvs.size() != chunk.triangles.size()) return noMap(path.string());
         made.positions.insert(made.positions.end(), chunk.positions.begin(), chunk.positions.end());
         for (size_t i = 0; i < chunk.triangles.size(); ++i) {
             const auto& t = chunk.triangles[i];
@@ -134,19 +138,20 @@ Result<meso::BaseSurface> readStream(const std::filesystem::path& path, double t
         if (made.triangles.size() > kMostTriangles || made.positions.size() > 3 * kMostTriangles)
             return Error{.code = ErrorCode::Limit, .message = "a base surface has at most 5 million triangles", .file = path.string()};
     }
-    return made;
+    return finished(std::move(made), path.string());
 }
 
 }  // namespace
 
+Result<meso::BaseSurface> readBaseObj(ByteSource source, double tiles) { return ObjBase(std::move(source), tiles).read(); }
+
 Result<meso::BaseSurface> readBaseMesh(const std::filesystem::path& path, double tiles) {
     std::string extension = path.extension().string();
     for (char& letter : extension) letter = char(std::tolower(static_cast<unsigned char>(letter)));
-    auto made = extension == ".obj" ? ObjBase(path, tiles).read() : readStream(path, tiles);
-    if (!made) return made;
-    if (!(meso::tileEdge(*made) > 0)) return noMap(path);
-    meso::joinPositions(*made);
-    return made;
+    if (extension != ".obj") return readStream(path, tiles);
+    auto source = ByteSource::open(path);
+    if (!source) return source.error();
+    return readBaseObj(*std::move(source), tiles);
 }
 
 }  // namespace vcp

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -53,6 +54,9 @@ Result<std::unique_ptr<Subject>> subjectOf(const std::string& name) {
     auto shape = shapeOf(subject->asset);
     if (!shape) return shape.error();
     subject->shape = *std::move(shape);
+    // What is measured is built here, not copied from the file.
+    Asset& a = subject->asset;
+    a.field.reset(), a.occupancy.reset(), a.distances.reset(), a.compressed.reset(), a.boxes.reset(), a.patches.reset();
     subject->texel = subject->asset.heights ? 1.0 / subject->asset.heights->size.x : 1.0 / 128;
     return subject;
 }
@@ -116,128 +120,62 @@ std::vector<Entry> entries() {
     for (const int cells : {32, 128}) all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
     for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
     for (const int cells : {16, 32, 64}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
-    for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128, 256}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
     all.push_back({"grid 64", true, {.name = "cells", .cells = 64}});
     return all;
 }
 
-/// The value that this part of the sorted values does not exceed.
-double quantile(std::vector<double>& values, double part) {
-    if (values.empty()) return 0;
-    std::ranges::sort(values);
-    return values[std::min(values.size() - 1, size_t(part * double(values.size())))];
-}
-
-MesoJudged judge(const std::vector<MarchResult>& results, const std::vector<TruthHit>& truths, double texel) {
-    MesoJudged judged;
-    std::vector<double> errors, angles;
-    double counted = 0;
-    std::array<double, 6> counts{};
-    for (size_t i = 0; i < results.size(); ++i) {
-        const MarchResult& found = results[i];
-        const TruthHit& truth = truths[i];
-        if (!truth.resolved) continue;
-        ++counted;
-        MesoClass c = MesoClass::Unresolved;
-        if (found.state == MarchState::Miss) c = truth.hit ? MesoClass::Missed : MesoClass::Miss;
-        if (found.state == MarchState::Hit) {
-            const double error = std::abs(found.t - truth.t) / texel;
-            c = !truth.hit ? MesoClass::False : error > 2 ? MesoClass::WrongFeature : MesoClass::Hit;
-            if (c == MesoClass::Hit) {
-                errors.push_back(error);
-                if (found.normal != glm::vec3(0)) angles.push_back(std::acos(std::clamp(glm::dot(glm::dvec3(found.normal), truth.normal), -1.0, 1.0)) * 180 / std::numbers::pi);
-            }
+/// Rounds over the methods, one after the other, so that whatever else the machine does falls on all; the first is a warm-up.
+std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const std::vector<MarchRay>& rays, int rounds) {
+    std::vector<MesoMarched> all(methods.size());
+    for (int round = 0; round <= rounds; ++round)
+        for (size_t m = 0; m < methods.size(); ++m) {
+            all[m].results.resize(rays.size());
+            const std::clock_t start = std::clock();
+            for (size_t i = 0; i < rays.size(); ++i) all[m].results[i] = methods[m].marcher->march(rays[i]);
+            if (round > 0) all[m].nsPerRay.push_back(double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC / double(std::max<size_t>(1, rays.size())));
         }
-        ++counts[size_t(c)];
-    }
-    for (size_t i = 0; i < counts.size(); ++i) judged.fractions[i] = counted > 0 ? counts[i] / counted : 0;
-    judged.p50 = quantile(errors, 0.5), judged.p95 = quantile(errors, 0.95), judged.p99 = quantile(errors, 0.99), judged.max = quantile(errors, 1);
-    judged.normalP50 = quantile(angles, 0.5), judged.normalP95 = quantile(angles, 0.95);
-    return judged;
+    return all;
 }
 
-void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
-    std::vector<double> iterations;
-    for (const MarchResult& r : results) {
-        row.fetchesMean += r.fetches, row.iterationsMean += r.iterations, row.surfaceTestsMean += r.surfaceTests;
-        row.iterationBins[r.iterations <= 10 ? 0 : r.iterations <= 34 ? 1 : r.iterations <= 59 ? 2 : 3] += 1;
-        iterations.push_back(r.iterations);
-    }
-    const double n = std::max<double>(1, double(results.size()));
-    for (double* sum : {&row.fetchesMean, &row.iterationsMean, &row.surfaceTestsMean, &row.iterationBins[0], &row.iterationBins[1], &row.iterationBins[2], &row.iterationBins[3]}) *sum /= n;
-    int groups = 0;
-    for (size_t i = 0; i + 8 <= iterations.size(); i += 8, ++groups) {
-        double most = 0, sum = 0;
-        for (size_t k = i; k < i + 8; ++k) most = std::max(most, iterations[k]), sum += iterations[k];
-        row.divergence8 += most / (sum / 8);
-    }
-    if (groups > 0) row.divergence8 /= groups;
-    row.iterationsP95 = quantile(iterations, 0.95);
+Result<std::vector<MesoMarched>> march(MesoMarcher* renderer, const std::vector<Measured>& methods, const std::vector<MarchRay>& rays, int rounds) {
+    if (renderer == nullptr) return marchHere(methods, rays, rounds);
+    std::vector<const meso::Method*> all;
+    for (const Measured& m : methods) all.push_back(&m.method);
+    return renderer->march(all, rays, rounds);
 }
 
-Result<BenchMesoRow> measure(const Subject& subject, const Measured& method, const RayView& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths,
-                             int repetitions, MesoMarcher* renderer) {
+BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths, const MesoMarched& marched,
+                   const std::vector<double>& peer) {
     BenchMesoRow row;
     row.asset = subject.asset.name, row.view = view.name, row.method = method.name, row.knob = method.knob;
     row.rays = rays.size(), row.bytes = method.marcher->bytes(), row.preprocessSeconds = method.preprocessSeconds;
-    std::vector<MarchResult> results(rays.size());
-    std::vector<double> times;
-    if (renderer != nullptr) {
-        row.device = renderer->device().name;
-        auto marched = renderer->march(method.method, rays, repetitions);
-        if (!marched) return marched.error();
-        results = std::move(marched->results), times = std::move(marched->nsPerRay);
-    }
-    for (int repetition = 0; repetition <= repetitions && renderer == nullptr; ++repetition) {
-        const auto start = Clock::now();
-        for (size_t i = 0; i < rays.size(); ++i) results[i] = method.marcher->march(rays[i]);
-        if (repetition > 0) times.push_back(secondsSince(start) * 1e9 / double(std::max<size_t>(1, rays.size())));
-    }
-    row.nsPerRay = quantile(times, 0.5);
-    row.shape = judge(results, truths, subject.texel);
-    countWork(results, row);
+    row.nsPerRay = quantile(marched.nsPerRay, 0.5);
+    std::vector<double> ratios;
+    for (size_t i = 0; i < peer.size(); ++i) ratios.push_back(peer[i] > 0 ? marched.nsPerRay[i] / peer[i] : 0);
+    row.ratioToPeer = quantile(ratios, 0.5), row.ratioLow = quantile(ratios, 0.25), row.ratioHigh = quantile(ratios, 0.75);
+    row.shape = judgeMeso(marched.results, truths, subject.texel);
+    countWork(marched.results, row);
     if (method.method.field) {
         std::vector<TruthHit> own;
         for (const MarchRay& ray : rays) own.push_back(traceField(*method.method.field, ray));
-        row.solver = judge(results, own, subject.texel), row.hasSolver = true;
+        row.solver = judgeMeso(marched.results, own, subject.texel), row.hasSolver = true;
     }
     return row;
 }
 
-/// Rays from random points of empty cells: the surface must not be nearer than the map says.
-Result<void> check(const Subject& subject, uint64_t rays, std::vector<MesoCheck>& checks) {
-    const auto occupancy = occupy(*subject.shape, cellsOf(subject, 32));
-    if (!occupancy) return occupancy.error();
-    const glm::dvec3 extent = subject.shape->extent();
-    struct Case {
-        std::string name;
-        DistanceOptions options;
-    };
-    const Case cases[] = {{"1x1", {.cones = {1, 1}}},
-                          {"4x2", {.cones = {4, 2}}},
-                          {"8x1", {.cones = {8, 1}, .cap = 0.125}},
-                          {"4x2 paper", {.cones = {4, 2}, .rule = DistanceRule::Paper}}};
-    for (const Case& c : cases) {
-        const auto map = buildDistanceMap(*occupancy, c.options, subject.shape.get());
-        if (!map) return map.error();
-        MesoCheck result{subject.asset.name, c.name};
-        std::mt19937 random(31);
-        std::uniform_real_distribution<double> unit(0, 1);
-        std::normal_distribution<double> bell;
-        while (result.rays < rays) {
-            const glm::dvec3 from(unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z);
-            const glm::dvec3 direction = glm::normalize(glm::dvec3(bell(random), bell(random), bell(random)));
-            const glm::ivec3 cell(glm::floor(from / map->grid.cell));
-            const int cone = coneOf(map->cones, glm::vec3(direction));
-            ++result.rays;
-            if (cell.z >= map->grid.cells.z || map->steps[map->slot(cone, cell)] == kOccupied || subject.shape->field(from) <= 0) continue;
-            const double length = map->length(cone, cell);
-            const TruthHit truth = subject.shape->trace(from, direction, length);
-            if (truth.hit && truth.t < length) ++result.oversteps, result.worstTexels = std::max(result.worstTexels, (length - truth.t) / subject.texel);
-        }
-        checks.push_back(result);
-    }
-    return {};
+Result<Measured> measuredOf(const Subject& subject, const Entry& entry) {
+    Measured method;
+    method.name = entry.options.name, method.knob = entry.knob;
+    const auto start = Clock::now();
+    auto made = buildMethod(subject.asset, *subject.shape, entry.options);
+    if (!made) return made.error();
+    method.method = *std::move(made);
+    method.preprocessSeconds = secondsSince(start);
+    auto marcher = method.method.marcher();
+    if (!marcher) return marcher.error();
+    method.marcher = *std::move(marcher);
+    return method;
 }
 
 /// Table 3: texels of the plain map over those of lookup and atlas, at the paper's resolution.
@@ -270,7 +208,49 @@ Result<void> knows(const char* what, const std::vector<std::string>& asked, cons
 
 bool isAsked(const std::vector<std::string>& asked, std::string_view name) { return asked.empty() || std::ranges::find(asked, name) != asked.end(); }
 
+Error cancelled() { return {.code = ErrorCode::Cancelled, .message = "cancelled"}; }
+
+/// All methods that are asked for over all views; the rows of a method stand together.
+Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer, const std::function<bool(const std::string&)>& told) {
+    const auto isMeasured = [&](const Entry& e) { return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) && methodFits(e.options.name, subject.asset); };
+    // The peer is measured with them, asked for or not.
+    const std::string_view peerName = mesoPeer(subject.asset.heights.has_value());
+    std::vector<Measured> methods;
+    std::vector<bool> isShown;
+    size_t peer = 0;
+    for (const Entry& entry : entries()) {
+        const bool isPeer = entry.options.name == peerName && entry.isDefault;
+        if (!isPeer && !isMeasured(entry)) continue;
+        if (!told(entry.options.name)) return cancelled();
+        auto made = measuredOf(subject, entry);
+        if (!made) return made.error();
+        if (isPeer) peer = methods.size();
+        methods.push_back(*std::move(made));
+        isShown.push_back(isMeasured(entry));
+    }
+    std::vector<std::vector<BenchMesoRow>> byMethod(methods.size());
+    for (const RayView& view : kViews) {
+        if (!isAsked(options.views, view.name)) continue;
+        if (!told(std::string(view.name))) return cancelled();
+        const std::vector<MarchRay> rays = raysOf(subject, view, options.rays);
+        std::vector<TruthHit> truths;
+        for (const MarchRay& ray : rays) truths.push_back(subject.shape->trace(ray.origin, ray.direction, ray.tMax));
+        const auto marched = march(renderer, methods, rays, options.repetitions);
+        if (!marched) return marched.error();
+        for (size_t m = 0; m < methods.size(); ++m) {
+            if (!isShown[m]) continue;
+            byMethod[m].push_back(rowOf(subject, methods[m], view, rays, truths, (*marched)[m], (*marched)[peer].nsPerRay));
+            if (renderer != nullptr) byMethod[m].back().device = renderer->device().name;
+        }
+    }
+    std::vector<BenchMesoRow> rows;
+    for (const auto& each : byMethod) rows.insert(rows.end(), each.begin(), each.end());
+    return rows;
+}
+
 }  // namespace
+
+std::string_view mesoPeer(bool isHeightField) { return isHeightField ? "relief-binary" : "dm"; }
 
 std::vector<std::string> mesoMethodNames() {
     std::vector<std::string> names;
@@ -298,39 +278,17 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     }
     BenchMesoReport report;
     for (size_t a = 0; a < assets.size(); ++a) {
+        const auto told = [&](const std::string& what) { return !options.progress || options.progress(assets[a] + ": " + what, double(a) / double(assets.size())); };
         const auto subject = subjectOf(assets[a]);
         if (!subject) return subject.error();
-        std::vector<const RayView*> views;
-        std::vector<std::vector<MarchRay>> rays;
-        std::vector<std::vector<TruthHit>> truths;
-        for (const RayView& view : kViews) {
-            if (!isAsked(options.views, view.name)) continue;
-            views.push_back(&view);
-            rays.push_back(raysOf(**subject, view, options.rays));
-            truths.emplace_back();
-            for (const MarchRay& ray : rays.back()) truths.back().push_back((*subject)->shape->trace(ray.origin, ray.direction, ray.tMax));
-        }
-        for (const Entry& entry : entries()) {
-            if (!isAsked(options.methods, entry.options.name) || !(options.sweep || entry.isDefault) || !methodFits(entry.options.name, (*subject)->asset)) continue;
-            if (options.progress && !options.progress(assets[a] + ": " + entry.options.name, double(a) / double(assets.size())))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
-            Measured method;
-            method.name = entry.options.name, method.knob = entry.knob;
-            const auto start = Clock::now();
-            auto made = buildMethod((*subject)->asset, *(*subject)->shape, entry.options);
-            if (!made) return made.error();
-            method.method = *std::move(made);
-            auto marcher = method.method.marcher();
-            if (!marcher) return marcher.error();
-            method.marcher = *std::move(marcher);
-            method.preprocessSeconds = secondsSince(start);
-            for (size_t v = 0; v < views.size(); ++v) {
-                auto row = measure(**subject, method, *views[v], rays[v], truths[v], options.repetitions, renderer.get());
-                if (!row) return row.error();
-                report.rows.push_back(*std::move(row));
-            }
-        }
-        if (options.checkRays > 0) VCP_TRY(check(**subject, options.checkRays, report.checks));
+        auto rows = rowsOf(**subject, options, renderer.get(), told);
+        if (!rows) return rows.error();
+        report.rows.insert(report.rows.end(), rows->begin(), rows->end());
+        if (options.checkRays == 0) continue;
+        if (!told("conservative maps")) return cancelled();
+        const auto checks = checkMesoMaps((*subject)->asset.name, *(*subject)->shape, (*subject)->texel, options.checkRays);
+        if (!checks) return checks.error();
+        report.checks.insert(report.checks.end(), checks->begin(), checks->end());
     }
     if (report.rows.empty()) return Error{.code = ErrorCode::Usage, .message = "none of these methods is of these assets"};
     if (options.published) {

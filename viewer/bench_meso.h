@@ -3,7 +3,9 @@
 //
 // Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes and
 // the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the solving
-// alone costs. On the CPU rays go one by one in one thread, on a device all at once; times are the median of the repetitions after a warm-up.
+// alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times are the processor's (of all threads of a
+// software device; a GPU's are its queue's), taken in rounds over all methods after a warm-up, and each method's is divided by that of one peer
+// in the same round. The median of these ratios is what a machine that does other things as well says reliably.
 #pragma once
 
 #include <array>
@@ -27,7 +29,7 @@ struct BenchMesoOptions {
     std::optional<std::string> device; ///< march there, as RendererOptions::device; absent: on the CPU
     bool sweep = false;                ///< each method at several values of its knob
     int rays = 2000;                   ///< a view
-    int repetitions = 3;
+    int repetitions = 3;               ///< rounds over the methods
     bool published = false;            ///< beside the paper's tables; its Table 3 is made anew
     uint64_t checkRays = 0;            ///< rays of the conservative test an asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
@@ -52,7 +54,8 @@ struct MesoJudged {
 struct BenchMesoRow {
     std::string asset, view, method, knob, device = "cpu";
     uint64_t rays = 0;
-    double nsPerRay = 0;
+    double nsPerRay = 0;        ///< median of the rounds
+    double ratioToPeer = 0, ratioLow = 0, ratioHigh = 0;  ///< time over mesoPeer's in the same round: median and quartiles
     MesoJudged shape;           ///< against the shape
     bool hasSolver = false;
     MesoJudged solver;          ///< against the method's own data
@@ -60,7 +63,7 @@ struct BenchMesoRow {
     std::array<double, 4> iterationBins{};  ///< parts of the rays: up to 10, 34, 59 iterations, and more (the bins of the paper's Fig. 7)
     double divergence8 = 0;     ///< mean over groups of 8 rays of most over mean iterations
     uint64_t bytes = 0;
-    double preprocessSeconds = 0;
+    double preprocessSeconds = 0;  ///< of building the method's arrays from the shape, also where an asset file holds them
 };
 
 /// The conservative test: rays from anywhere, against what the map of their cell says.
@@ -83,20 +86,46 @@ struct MesoPublished {
     [[nodiscard]] bool isNear() const { return ours >= 0.75 * least && ours <= 1.25 * most; }
 };
 
+/// What a method needs for a right picture of an asset: its cheapest knob with at most 0.1 % wrong rays over all views together
+/// and p95 of the error within 0.25 texels in each. By fetches and by time, which may be at different knobs.
+struct MesoHeadline {
+    std::string asset, method;
+    std::string fetchesKnob, timeKnob;
+    double fetches = 0;      ///< a ray, mean over the views
+    double ratioToPeer = 0;  ///< mean over the views
+};
+
 struct BenchMesoReport {
     std::vector<BenchMesoRow> rows;
     std::vector<MesoCheck> checks;
     std::vector<MesoPublished> published;
 };
 
+/// The method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height fields; the plain distance map
+/// for solids, which relief mapping has no picture of.
+std::string_view mesoPeer(bool isHeightField);
 std::vector<std::string> mesoMethodNames();
 std::vector<std::string> mesoViewNames();
 
 /// Errors: Usage (no such asset, method or view), those of the builders, Cancelled.
 Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options);
 
+/// The conservative test of all kinds of maps over a grid of 32 cells: `rays` rays from outside the surface in cells that are not
+/// occupied, each against the shape. Errors: the builders'.
+Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const meso::Shape& shape, double texel, uint64_t rays);
+
+/// Of the rays whose truth is known; `texel` in tile units.
+MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths, double texel);
+/// The mean work, its bins and divergence into the row.
+void countWork(const std::vector<meso::MarchResult>& results, BenchMesoRow& row);
+/// The value that this part of the sorted values does not exceed; 0 of none.
+double quantile(std::vector<double> values, double part);
+
 /// Tables 1 and 2 and the secant's claim, of the rows that there are.
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);
+
+/// Methods with a knob that qualifies, by asset in the order of the rows.
+std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows);
 
 std::string benchMesoJson(const BenchMesoReport& report);
 std::string benchMesoCsv(const BenchMesoReport& report);

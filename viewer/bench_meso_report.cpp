@@ -23,6 +23,9 @@ Json toJson(const BenchMesoRow& row) {
                  {"device", row.device},
                  {"rays", row.rays},
                  {"ns_per_ray", row.nsPerRay},
+                 {"ratio_to_peer", row.ratioToPeer},
+                 {"ratio_p25", row.ratioLow},
+                 {"ratio_p75", row.ratioHigh},
                  {"fetches_mean", row.fetchesMean},
                  {"iterations_mean", row.iterationsMean},
                  {"iterations_p95", row.iterationsP95},
@@ -71,16 +74,16 @@ std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string tit
     return plotSvg(plot);
 }
 
-/// Time and work of a method on an asset, summed over the views; count 0 where it was not measured.
+/// Of a method on an asset, summed over the views; count 0 where it was not measured.
 struct Cost {
-    double time = 0, fetches = 0, tests = 0, count = 0;
+    double ratio = 0, fetches = 0, tests = 0, count = 0;
 };
 
 Cost costOf(const std::vector<BenchMesoRow>& rows, const std::string& asset, std::string_view method, std::string_view knob) {
     Cost cost;
     for (const BenchMesoRow& row : rows)
         if (row.asset == asset && row.method == method && row.knob == knob)
-            cost.time += row.nsPerRay, cost.fetches += row.fetchesMean, cost.tests += row.surfaceTestsMean, ++cost.count;
+            cost.ratio += row.ratioToPeer, cost.fetches += row.fetchesMean, cost.tests += row.surfaceTestsMean, ++cost.count;
     return cost;
 }
 
@@ -111,9 +114,38 @@ std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
             if (of.count == 0 || base.count == 0) continue;
             const double work = ratio.isOfRefinements ? of.tests / base.tests : of.fetches / base.fetches;
             if (!std::isfinite(work)) continue;
-            published.push_back({ratio.what, asset, ratio.isOfRefinements ? "refinements" : "fetches", ratio.least, ratio.most, work, of.time / base.time});
+            published.push_back({ratio.what, asset, ratio.isOfRefinements ? "refinements" : "fetches", ratio.least, ratio.most, work, of.ratio / base.ratio});
         }
     return published;
+}
+
+std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows) {
+    struct Sum {
+        std::string asset, method, knob;
+        double wrong = 0, worstP95 = 0, fetches = 0, ratio = 0, views = 0;
+    };
+    std::vector<Sum> sums;
+    for (const BenchMesoRow& row : rows) {
+        const auto isOf = [&](const Sum& s) { return s.asset == row.asset && s.method == row.method && s.knob == row.knob; };
+        auto sum = std::ranges::find_if(sums, isOf);
+        if (sum == sums.end()) sum = sums.insert(sum, Sum{row.asset, row.method, row.knob});
+        sum->wrong += row.shape.wrong(), sum->worstP95 = std::max(sum->worstP95, row.shape.p95);
+        sum->fetches += row.fetchesMean, sum->ratio += row.ratioToPeer, ++sum->views;
+    }
+    std::vector<MesoHeadline> headlines;
+    for (const Sum& sum : sums) {
+        if (sum.wrong / sum.views > 1e-3 || sum.worstP95 > 0.25) continue;
+        const double fetches = sum.fetches / sum.views, ratio = sum.ratio / sum.views;
+        const auto isOf = [&](const MesoHeadline& h) { return h.asset == sum.asset && h.method == sum.method; };
+        const auto found = std::ranges::find_if(headlines, isOf);
+        if (found == headlines.end()) {
+            headlines.push_back({sum.asset, sum.method, sum.knob, sum.knob, fetches, ratio});
+            continue;
+        }
+        if (fetches < found->fetches) found->fetches = fetches, found->fetchesKnob = sum.knob;
+        if (ratio < found->ratioToPeer) found->ratioToPeer = ratio, found->timeKnob = sum.knob;
+    }
+    return headlines;
 }
 
 std::string benchMesoJson(const BenchMesoReport& report) {
@@ -123,22 +155,29 @@ std::string benchMesoJson(const BenchMesoReport& report) {
     Json published = Json::array();
     for (const MesoPublished& row : report.published)
         published.push_back({{"what", row.what}, {"asset", row.asset}, {"published_least", row.least}, {"published_most", row.most}, {"of", row.of}, {"ours", row.ours}, {"ours_time", row.oursTime}, {"near", row.isNear()}});
-    return Json{{"rows", rowsOf(report)}, {"checks", checks}, {"published", published}}.dump();
+    Json headlines = Json::array();
+    for (const MesoHeadline& h : headlinesOf(report.rows))
+        headlines.push_back({{"asset", h.asset}, {"method", h.method}, {"fetches_mean", h.fetches}, {"fetches_knob", h.fetchesKnob}, {"ratio_to_peer", h.ratioToPeer}, {"ratio_knob", h.timeKnob}});
+    return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks}, {"published", published}}.dump();
 }
 
 std::string benchMesoCsv(const BenchMesoReport& report) { return csvOf(rowsOf(report)); }
 
 std::string benchMesoMarkdown(const BenchMesoReport& report) {
     std::string text =
-        "| asset | view | method | knob | ns/ray | fetches | iterations | hit % | missed % | false % | wrong feature % | unresolved % | p50 | p95 | p99 texels | "
-        "solver wrong % | MB | built s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        "| asset | view | method | knob | ns/ray | time over peer | fetches | iterations | hit % | missed % | false % | wrong feature % | unresolved % | p50 | p95 | p99 texels | "
+        "solver wrong % | MB | built s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for (const BenchMesoRow& row : report.rows) {
         const auto percent = [&](MesoClass c) { return 100 * row.shape.fraction(c); };
-        text += fmt::format("| {} | {} | {} | {} | {:.0f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ", row.asset, row.view, row.method, row.knob, row.nsPerRay,
-                            row.fetchesMean, row.iterationsMean, percent(MesoClass::Hit), percent(MesoClass::Missed), percent(MesoClass::False), percent(MesoClass::WrongFeature),
+        text += fmt::format("| {} | {} | {} | {} | {:.0f} | {:.3f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ", row.asset, row.view, row.method, row.knob, row.nsPerRay,
+                            row.ratioToPeer, row.fetchesMean, row.iterationsMean, percent(MesoClass::Hit), percent(MesoClass::Missed), percent(MesoClass::False), percent(MesoClass::WrongFeature),
                             percent(MesoClass::Unresolved));
         text += fmt::format("| {:.4f} | {:.4f} | {:.4f} | {} | {:.2f} | {:.2f} |\n", row.shape.p50, row.shape.p95, row.shape.p99,
                             row.hasSolver ? fmt::format("{:.3f}", 100 * row.solver.wrong()) : std::string(), double(row.bytes) * 1e-6, row.preprocessSeconds);
+    }
+    if (const auto headlines = headlinesOf(report.rows); !headlines.empty()) {
+        text += "\n| least work for <= 0.1 % wrong, p95 <= 0.25 texels | method | fetches | knob | time over peer | knob |\n|---|---|---|---|---|---|\n";
+        for (const MesoHeadline& h : headlines) text += fmt::format("| {} | {} | {:.1f} | {} | {:.3f} | {} |\n", h.asset, h.method, h.fetches, h.fetchesKnob, h.ratioToPeer, h.timeKnob);
     }
     if (!report.published.empty()) {
         text += "\n| published | asset | ratio there | of | ours | within 25 % | ours, times |\n|---|---|---|---|---|---|---|\n";
@@ -165,7 +204,7 @@ std::vector<std::pair<std::string, std::string>> benchMesoPlots(const BenchMesoR
         const auto wrong = [](const BenchMesoRow& row) { return std::max(row.shape.wrong(), 0.5 / double(std::max<uint64_t>(row.rays, 1))); };
         std::string name = asset.substr(asset.rfind('/') + 1);
         plots.emplace_back("bench_meso_" + name + "_p95_time",
-                           plotOf(rows, name + ": error, p95", "ns a ray", "texels", [](const BenchMesoRow& r) { return std::pair(r.nsPerRay, r.shape.p95); }));
+                           plotOf(rows, name + ": error, p95", "time over the peer's", "texels", [](const BenchMesoRow& r) { return std::pair(r.ratioToPeer, r.shape.p95); }));
         plots.emplace_back("bench_meso_" + name + "_wrong_fetches",
                            plotOf(rows, name + ": wrong rays", "fetches a ray", "fraction; none: half a ray", [&](const BenchMesoRow& r) { return std::pair(r.fetchesMean, wrong(r)); }));
         plots.emplace_back("bench_meso_" + name + "_p95_bytes",

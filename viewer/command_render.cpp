@@ -288,6 +288,8 @@ Result<int> run(const RenderCommand& command) {
     const auto drawing = draw(**renderer, request, command);
     if (!drawing) return drawing.error();
     VCP_TRY(writeFiles(**renderer, request, command));
+    if (drawing->stats.unresolvedRays > 0)
+        fmt::print(stderr, "warning: {} rays of mesostructure were given up: too many pieces of a base, or of its map, along them\n", drawing->stats.unresolvedRays);
     if (command.report.json)
         VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
     else

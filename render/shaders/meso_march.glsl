@@ -12,24 +12,17 @@ struct Space {
     float reach;
 };
 
-// coneOf (mesostructure/distance_map.cpp).
+// coneOf (mesostructure/distance_map.h): signs and products, which no device may round further off than it says there.
 int coneOf(vec3 d) {
-    ivec2 cones = meso.cones.xy;
-    int azimuth = 0, elevation = 0, quarter = d.y < 0.0 ? (d.x < 0.0 ? 2 : 3) : (d.x < 0.0 ? 1 : 0);
-    if (cones.x == 2) azimuth = int(d.y < 0.0);
-    else if (cones.x == 4) azimuth = quarter;
-    else if ((cones.x & 3) == 0) {
-        int most = cones.x / 4;
-        vec2 a = (quarter & 1) == 0 ? abs(d.xy) : abs(d.yx);
-        azimuth = quarter * most + (a.x + a.y > 0.0 ? clamp(int(atan(a.y, a.x) * 0.636619772 * float(most)), 0, most - 1) : 0);
-    } else if (cones.x > 1) {
-        float turn = d.x == 0.0 && d.y == 0.0 ? 0.0 : atan(d.y, d.x) * 0.159154943;
-        if (turn < 0.0) turn += 1.0;
-        azimuth = min(int(turn * float(cones.x)), cones.x - 1);
+    int azimuth = 0, elevation = 0;
+    bool isLower = d.y < 0.0;
+    for (int k = 1; k < meso.cones.x; k++) {
+        float along = meso.borders[k].x * d.y, across = meso.borders[k].y * d.x;
+        azimuth += int(2 * k < meso.cones.x ? isLower || along > across : isLower && along >= across);
     }
-    if (cones.y == 2) elevation = int(d.z >= 0.0);
-    else if (cones.y > 1) elevation = clamp(int((atan(d.z, length(d.xy)) * 0.318309886 + 0.5) * float(cones.y)), 0, cones.y - 1);
-    return elevation * cones.x + azimuth;
+    float flatness = d.x * d.x + d.y * d.y, height = d.z * abs(d.z);
+    for (int k = 1; k < meso.cones.y; k++) elevation += int(height * meso.borders[k].z >= meso.borders[k].w * flatness);
+    return elevation * meso.cones.x + azimuth;
 }
 
 // CompressedMap::lookUp.
@@ -198,29 +191,33 @@ void marchGrid(MesoRay ray, inout MesoResult result) {
     Walk w = startWalk(ray, meso.cells.xyz);
     int direction = kSkip == kMesoOccupancy ? 0 : kSkip == kMesoBoxes ? int(w.d.x < 0.0) | int(w.d.y < 0.0) << 1 | int(w.d.z < 0.0) << 2 : coneOf(w.d * meso.cell.xyz);
     Side side = Side(w.startsAtTop || ray.isOutside, !ray.isOutside);
-    while (w.cell.z >= 0 && w.cell.z < meso.cells.z && w.t <= w.tMax) {
-        if (result.iterations++ == kMostIterations) {
-            result.state = kMesoUnresolved;
-            return;
-        }
-        Space space = spaceAt(direction, w.cell, result.fetches);
-        int axisOut;
-        float exit = walkExit(w, space.further, axisOut);
-        if (space.occupied) {
-            float entry = walkEntry(w), end = max(entry, min(exit, w.tMax));
-            if (meetSurface(w, entry, end, side, result)) {
-                result.state = kMesoHit;
+    // All rays of a group look for their next occupied cell, then all solve: solving is long work, and done for one ray at a time otherwise.
+    while (true) {
+        bool found = false;
+        float exit = kFar;
+        int axisOut = -1;
+        while (!found && w.cell.z >= 0 && w.cell.z < meso.cells.z && w.t <= w.tMax) {
+            if (result.iterations++ == kMostIterations) {
+                result.state = kMesoUnresolved;
                 return;
             }
-        } else {
+            Space space = spaceAt(direction, w.cell, result.fetches);
+            exit = walkExit(w, space.further, axisOut);
+            found = space.occupied;
+            if (found) break;
             side.inRun = false;
-            if (space.reach > 0.0 && w.t + space.reach > exit) {
-                walkJump(w, w.t + space.reach);
-                continue;
-            }
+            if (space.reach > 0.0 && w.t + space.reach > exit) walkJump(w, w.t + space.reach);
+            else if (exit >= kFar) break;
+            else walkLeave(w, space.further, exit, axisOut);
+        }
+        if (!found) break;
+        float entry = walkEntry(w), end = max(entry, min(exit, w.tMax));
+        if (meetSurface(w, entry, end, side, result)) {
+            result.state = kMesoHit;
+            return;
         }
         if (exit >= kFar) break;
-        walkLeave(w, space.occupied ? ivec3(0) : space.further, exit, axisOut);
+        walkLeave(w, ivec3(0), exit, axisOut);
     }
     if (kSurface == kMesoHeights && w.cell.z < 0 && w.sign.z < 0 && side.outside && w.t <= w.tMax) {
         result.state = kMesoHit;

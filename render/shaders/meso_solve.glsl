@@ -25,15 +25,17 @@ CellHit firstFall(float c0, float c1, float c2, float c3, bool outside) {
         float low = ends[i], high = ends[i + 1];
         float fLow = ((c3 * low + c2) * low + c1) * low + c0, fHigh = ((c3 * high + c2) * high + c1) * high + c0;
         if (outside && fHigh <= 0.0) {
-            for (int k = 0; k < 60 && high - low > 4.8e-7 * high; k++) {
-                float u = low + (high - low) * (fLow / (fLow - fHigh));
-                if (!(u > low && u < high) || (k & 3) == 3) u = 0.5 * (low + high);
-                if (!(u > low && u < high)) break;
+            float u = low + (high - low) * (fLow / (fLow - fHigh));
+            for (int k = 0; k < 24; k++) {
+                if (!(u > low && u < high)) u = 0.5 * (low + high);
                 float value = ((c3 * u + c2) * u + c1) * u + c0;
-                if (value > 0.0) { low = u; fLow = value; }
-                else { high = u; fHigh = value; }
+                if (value > 0.0) low = u;
+                else high = u;
+                float step = value / ((3.0 * c3 * u + 2.0 * c2) * u + c1);
+                if (abs(step) <= 2.4e-7 * u) break;
+                u -= step;
             }
-            return CellHit(true, high, false);
+            return CellHit(true, u >= low && u <= high ? u : high, false);
         }
         outside = fHigh > 0.0;
     }

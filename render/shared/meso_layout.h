@@ -3,6 +3,7 @@
 // aligned fours ("quads"); bytes and 16-bit values are packed low end first.
 
 const uint kMesoMaxLevels = 14u;
+const uint kMesoMostBorders = 32u;
 
 // Specialization constants, in the order of their ids.
 const uint kMesoGrid = 0u, kMesoRelief = 1u, kMesoPyramid = 2u, kMesoSphere = 3u;                          // kWalk
@@ -23,6 +24,7 @@ struct MesoRecord {
     uvec4 at;        // first words: what skips; texels, samples or ranks; rows; first quad of the patches
     vec4 scale;      // height of a step, of the slab; (relief) tolerance; (sphere) tile units of a step
     uvec4 levels[kMesoMaxLevels];  // compressed: steps, entries, edge * 65536 + factor, bricks; pyramid: maxima, columns, rows
+    vec4 borders[kMesoMostBorders];  // of cones: azimuth x y, elevation x y (meso::ConeBorders)
 };
 
 // What pictures show.

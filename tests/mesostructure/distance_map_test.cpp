@@ -91,11 +91,40 @@ TEST(DistanceMap, ConesOfDirectionsAreClosedUnderTheirSigns) {
             const glm::dvec3 d = test::rayAnywhere(random, glm::dvec3(1)).direction;
             const double turn = std::atan2(d.y, d.x) < 0 ? std::atan2(d.y, d.x) + 2 * M_PI : std::atan2(d.y, d.x), height = std::asin(d.z);
             const int expected = int((height / M_PI + 0.5) * cones.elevation) * cones.azimuth + int(turn / (2 * M_PI) * cones.azimuth);
-            ASSERT_EQ(coneOf(cones, glm::vec3(d)), expected) << i;
+            ASSERT_EQ(coneOf(ConeBorders(cones), glm::vec3(d)), expected) << i;
         }
     }
-    EXPECT_EQ(coneOf({4, 2}, {0, 0, -1}), 0);
-    EXPECT_EQ(coneOf({4, 2}, {1, 0, 0}), 4);
+    EXPECT_EQ(coneOf(ConeBorders({4, 2}), {0, 0, -1}), 0);
+    EXPECT_EQ(coneOf(ConeBorders({4, 2}), {1, 0, 0}), 4);
+}
+
+/// Directions close to the borders: never farther outside the cone that is found than its header says, and in the right one from
+/// there on.
+TEST(DistanceMap, ConesAreFoundToAFewUnitsOfTheLastPlace) {
+    constexpr double kBound = 4e-7;
+    static_assert(kBound < kConeSlack);
+    for (int azimuths = 1; azimuths <= kMostAzimuths; ++azimuths)
+        for (const int elevations : {1, 2, 3, 5, 8, 16}) {
+            const Cones cones{azimuths, elevations};
+            const ConeBorders borders(cones);
+            const double wedge = 2 * M_PI / azimuths, band = M_PI / elevations;
+            std::mt19937 random{uint32_t(17 * azimuths + elevations)};
+            std::uniform_real_distribution<double> unit(0, 1);
+            for (int i = 0; i < 400; ++i) {
+                const double off = (i % 2 == 0 ? 1e-6 : 6e-6) * (unit(random) - 0.5);
+                // On a border of azimuth, anywhere in elevation, or the other way round.
+                const double turn = (i / 2 % 2 == 0 ? std::floor(unit(random) * azimuths) * wedge + off : unit(random) * 2 * M_PI);
+                const double height = (i / 2 % 2 == 1 ? -M_PI / 2 + std::floor(unit(random) * elevations) * band + off : (unit(random) - 0.5) * M_PI);
+                // As the rounded direction has it.
+                const glm::vec3 d(std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn), std::sin(height));
+                const double x = d.x, y = d.y, z = d.z, isTurn = std::atan2(y, x), isHeight = std::atan2(z, std::hypot(x, y));
+                const int cone = coneOf(borders, d);
+                const double middle = (cone % azimuths + 0.5) * wedge, low = -M_PI / 2 + cone / azimuths * band;
+                ASSERT_LE(std::abs(std::remainder(isTurn - middle, 2 * M_PI)), wedge / 2 + kBound) << azimuths << "x" << elevations << " ray " << i;
+                ASSERT_GE(isHeight, low - kBound) << azimuths << "x" << elevations << " ray " << i;
+                ASSERT_LE(isHeight, low + band + kBound) << azimuths << "x" << elevations << " ray " << i;
+            }
+        }
 }
 
 /// Rays from random points: the surface is never nearer than what their cell says of their cone.
@@ -109,7 +138,7 @@ Oversteps countOversteps(const Shape& shape, const DistanceMap& map, uint32_t se
     for (int i = 0; i < rays; ++i) {
         const MarchRay ray = test::rayAnywhere(random, shape.extent());
         const glm::ivec3 cell(glm::floor(ray.origin / map.grid.cell));
-        const int cone = coneOf(map.cones, glm::vec3(ray.direction));
+        const int cone = coneOf(ConeBorders(map.cones), glm::vec3(ray.direction));
         if (cell.z >= map.grid.cells.z || map.steps[map.slot(cone, cell)] == kOccupied || shape.field(ray.origin) <= 0) continue;
         const TruthHit truth = shape.trace(ray.origin, ray.direction, 2);
         const double length = map.length(cone, cell);
@@ -123,7 +152,7 @@ TEST(DistanceMap, NoStepPassesTheSurface) {
     for (const char* name : {"beads", "weave", "scales", "kitten"}) {
         const auto shape = test::solid(name);
         const Occupancy occupancy = test::occupied(*shape, {24, 24, 8});
-        for (const Cones cones : {Cones{1, 1}, Cones{4, 1}, Cones{4, 2}, Cones{6, 3}}) {
+        for (const Cones cones : {Cones{1, 1}, Cones{4, 1}, Cones{4, 2}, Cones{8, 1}, Cones{6, 3}}) {
             const Oversteps found = countOversteps(*shape, test::distances(occupancy, {.cones = cones}), 9, 1500);
             EXPECT_GT(found.rays, 300u) << name;
             EXPECT_EQ(found.over, 0u) << name << " " << cones.azimuth << "x" << cones.elevation << " by " << found.worst;

@@ -56,7 +56,8 @@ TEST(FrameLayout, Mesostructure) {
     using frame::MesoRecord, frame::MesoView;
     const auto words = [](std::initializer_list<size_t> all) { return std::vector<uint32_t>(all.begin(), all.end()); };
     EXPECT_EQ(offsets.at("MesoRecord"), words({offsetof(MesoRecord, extent), offsetof(MesoRecord, cell), offsetof(MesoRecord, cells), offsetof(MesoRecord, fine), offsetof(MesoRecord, ratio),
-                                               offsetof(MesoRecord, cones), offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale), offsetof(MesoRecord, levels)}));
+                                               offsetof(MesoRecord, cones), offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale), offsetof(MesoRecord, levels),
+                                               offsetof(MesoRecord, borders)}));
     EXPECT_EQ(offsets.at("MesoView"), words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward), offsetof(MesoView, forwardX),
                                              offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up)}));
 }

@@ -1,4 +1,5 @@
 // The marchers on the GPU, ray by ray against the reference on the CPU.
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -34,12 +35,12 @@ protected:
         ASSERT_TRUE(method) << method.error().line();
         const auto marcher = method->marcher();
         ASSERT_TRUE(marcher) << marcher.error().line();
-        const auto marched = renderer_->march(*method, rays, 0);
+        const auto marched = renderer_->march(std::array{&*method}, rays, 0);
         ASSERT_TRUE(marched) << marched.error().line();
-        ASSERT_EQ(marched->results.size(), rays.size());
+        ASSERT_EQ(marched->front().results.size(), rays.size());
         size_t hits = 0, nearby = 0;
         for (size_t i = 0; i < rays.size(); ++i) {
-            const MarchResult& found = marched->results[i];
+            const MarchResult& found = marched->front().results[i];
             const MarchResult expected = (*marcher)->march(rays[i]);
             hits += expected.state == MarchState::Hit;
             if (isSame(expected, found)) continue;
@@ -117,9 +118,9 @@ TEST_F(MesoMarch, CapsAreUnresolved) {
     const std::vector<MarchRay> along = {{{0.01, 0.03, 0.5 * shape->extent().z}, {1, 0, 0}}};
     const auto method = buildMethod(asset, *shape, {.name = "cells", .cells = 16});
     ASSERT_TRUE(method);
-    const auto marched = renderer_->march(*method, along, 0);
+    const auto marched = renderer_->march(std::array{&*method}, along, 0);
     ASSERT_TRUE(marched) << marched.error().line();
-    EXPECT_EQ(marched->results[0].state, MarchState::Unresolved);
+    EXPECT_EQ(marched->front().results[0].state, MarchState::Unresolved);
     EXPECT_EQ((*method->marcher())->march(along[0]).state, MarchState::Unresolved);
 }
 

@@ -126,6 +126,30 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
     }
 }
 
+/// Many triangles in one place: what a ray may look at is bounded, and it is said that it was not all.
+TEST_F(MesoSurfaces, RaysThroughCoincidentPiecesAreBounded) {
+    const Asset asset = plateau();
+    MesoSurface surface = surfaceOf(asset, "boxes", "quad", 0.5);
+    FrameRequest request = fromAbove();
+    request.shading.shadows = true;
+    EXPECT_EQ(draw({surface}, request).unresolvedRays, 0u);
+    BaseSurface base = *makeBaseSurface("quad", 2);
+    for (int copy = 0; copy < 40'000; ++copy)
+        for (size_t i = 0; i < 2; ++i) {
+            const auto triangle = base.triangles[i];
+            const auto map = base.uvs[i];
+            base.triangles.push_back(triangle), base.uvs.push_back(map);
+        }
+    surface.shell = *buildShell(base, 0.5, asset.extent);
+    request.width = request.height = 8;
+    EXPECT_GT(draw({surface}, request).unresolvedRays, 0u);
+    // No ray marched more than the cap, and one more piece.
+    const auto iterations = *renderer_->readIterations();
+    EXPECT_LE(*std::ranges::max_element(iterations), 65536u + 8193u);
+    const auto depths = *renderer_->readDepth();
+    EXPECT_NEAR(depths[3 * 8 + 3], 5 - 0.5 * 0.6, 2e-3);
+}
+
 TEST_F(MesoSurfaces, WaysToSkipShowTheSame) {
     FrameRequest request = fromAbove();
     request.camera.forward = {0.5, 0.3, -0.4}, request.camera.eye = -5.0 * request.camera.forward;

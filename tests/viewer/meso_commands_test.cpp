@@ -156,7 +156,7 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
     const Json report = Json::parse(ran.out);
     std::set<std::string> methods;
     for (const Json& row : report["rows"]) {
-        for (const char* field : {"asset", "view", "method", "knob", "ns_per_ray", "fetches_mean", "iterations_mean", "missed", "false", "wrong_feature", "unresolved", "p50_texels", "p95_texels",
+        for (const char* field : {"asset", "view", "method", "knob", "ns_per_ray", "ratio_to_peer", "ratio_p25", "ratio_p75", "fetches_mean", "iterations_mean", "missed", "false", "wrong_feature", "unresolved", "p50_texels", "p95_texels",
                                   "p99_texels", "bytes", "preprocess_seconds"})
             ASSERT_TRUE(row.contains(field)) << field;
         double sum = 0;
@@ -171,7 +171,7 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
     }
     EXPECT_EQ(methods.size(), 3u);
     for (const Json& check : report["checks"])
-        EXPECT_TRUE(check["map"] == "4x2 paper" || check["oversteps"] == 0) << check;
+        EXPECT_TRUE(check["map"] == "4x1 paper" || check["oversteps"] == 0) << check;
     for (const char* file : {"bench_meso.json", "bench_meso.csv", "bench_meso.md", "bench_meso_beads_p95_time.svg"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
     EXPECT_EQ(run("bench meso beads --methods nothing").status, 2);
     EXPECT_EQ(run("bench meso nothing").status, 2);

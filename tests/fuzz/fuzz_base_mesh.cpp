@@ -1,0 +1,42 @@
+// What a hostile base mesh may do: it is read as it stands, or refused in one line; what was read has a shell of finite numbers,
+// or none.
+#include <cmath>
+
+#include "mesostructure/shell.h"
+#include "tests/fuzz/mesh_fuzz.h"
+#include "viewer/base_mesh.h"
+
+namespace {
+
+using vcp::fuzz::require;
+
+vcp::Result<vcp::meso::BaseSurface> read(std::string_view bytes, size_t window) {
+    return vcp::readBaseObj(vcp::ByteSource::fromMemory(bytes, "fuzz", window), 3);
+}
+
+void checkShell(const vcp::meso::BaseSurface& base) {
+    const auto shell = vcp::meso::buildShell(base, 0.1 * vcp::meso::tileEdge(base), {1, 1, 0.1});
+    if (!shell) return require(shell.error().line().find('\n') == std::string::npos, "an error is one line");
+    require(shell->pieces > 0 && shell->pieces <= 3 * base.triangles.size(), "three pieces a triangle at most");
+    require(shell->texels.size() == size_t{2} * shell->nodes + size_t{7} * shell->pieces, "nodes and pieces");
+    for (const glm::vec4& texel : shell->texels) require(std::isfinite(texel.x + texel.y + texel.z + texel.w), "a shell is finite");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+    const auto base = read(bytes, vcp::ByteSource::kWindowBytes), cut = read(bytes, 37);
+    require(base.ok() == cut.ok(), "windows do not change the outcome");
+    if (!base) {
+        require(base.error().line() == cut.error().line(), "nor the error");
+        require(base.error().line().find('\n') == std::string::npos, "an error is one line");
+        return 0;
+    }
+    require(base->positions == cut->positions && base->triangles == cut->triangles && base->uvs == cut->uvs, "nor the surface");
+    require(!base->triangles.empty() && base->uvs.size() == base->triangles.size(), "a map of each triangle");
+    for (const auto& triangle : base->triangles)
+        for (const uint32_t corner : triangle) require(corner < base->positions.size(), "corners are in range");
+    checkShell(*base);
+    return 0;
+}
