@@ -290,7 +290,7 @@ void Viewer::moveTo(const OrbitCamera& camera) {
 
 void Viewer::look(View view) {
     OrbitCamera there = camera_;
-    there.look(view, bounds_, size_);
+    there.look(view, bounds_, size_, covered_);
     moveTo(there);
 }
 
@@ -362,7 +362,7 @@ void Viewer::act(ViewerAction action) {
     switch (action) {
         case ViewerAction::Fit: {
             OrbitCamera there = camera_;
-            there.fit(bounds_, size_);
+            there.fit(bounds_, size_, covered_);
             moveTo(there);
             break;
         }
