@@ -4,6 +4,7 @@
 #include <glm/exponential.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "viewer/dataset_opening.h"
 #include "viewer/interrupt.h"
 
 namespace vcp {
