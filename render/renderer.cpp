@@ -234,12 +234,19 @@ std::vector<std::string> Renderer::validationMessages() const { return state_->i
 Result<void> Renderer::open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
     std::vector<PlacedDataset> one;
     one.push_back({std::move(dataset), std::move(source), {}});
-    return open(std::move(one));
+    return open(std::move(one), {});
 }
 
-Result<void> Renderer::open(std::vector<PlacedDataset> datasets) {
+Result<void> Renderer::open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces) {
     if (!state_->device) return kGone;
     close();
+    VCP_TRY(setSurfaces(surfaces));
+    const auto opened = openDatasets(std::move(datasets));
+    if (!opened) VCP_TRY(setSurfaces({}));
+    return opened;
+}
+
+Result<void> Renderer::openDatasets(std::vector<PlacedDataset> datasets) {
     const RendererOptions& o = state_->options;
     ResidencyOptions options;
     options.order = o.order;

@@ -286,12 +286,12 @@ public:
     /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
     /// Shows several, each drawn by itself and the nearest surface seen; shadows and occlusion are within each. Budgets are
-    /// shared out (budgetShares). Errors: those of open of one; then none is shown.
-    Result<void> open(std::vector<PlacedDataset> datasets);
+    /// shared out (budgetShares). `surfaces`: as setSurfaces. Errors: those of open of one and of setSurfaces; then nothing is shown.
+    Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces = {});
     /// Stops the loader and forgets all pages.
     void close();
 
-    /// Surfaces with mesostructure, in all views, in place of those before and whatever is open: drawn over the datasets, the
+    /// Surfaces with mesostructure, in all views, in place of those before: drawn over the datasets that are open, the
     /// nearer is seen at each pixel. They take light, shadows, normals, unlit colours and steps (their iterations, 0 to 100) from the request;
     /// they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be uploaded again to a device that
     /// is made anew. Without any, nothing is made for them. On an error there are none. Errors: Device, Limit.
@@ -357,6 +357,7 @@ private:
     struct Shared;
     struct State;
     explicit Renderer(std::unique_ptr<State> state);
+    Result<void> openDatasets(std::vector<PlacedDataset> datasets);
     std::unique_ptr<State> state_;
 };
 

@@ -16,7 +16,7 @@
 #include "viewer/image_files.h"
 #include "viewer/interrupt.h"
 #include "viewer/meso_scene.h"
-#include "viewer/opened_scene.h"
+#include "viewer/dataset_opening.h"
 #include "viewer/option_values.h"
 #include "viewer/render_settings.h"
 

@@ -1,24 +1,21 @@
 // vcp render: pictures without a window: one, one larger than the device draws at once, or a sequence.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <fstream>
-#include <iterator>
-#include <numbers>
 #include <thread>
 
 #include <fmt/format.h>
 
 #include "render/renderer.h"
 #include "viewer/build_settings.h"
+#include "viewer/camera_path.h"
 #include "viewer/commands.h"
+#include "viewer/dataset_opening.h"
 #include "viewer/image_files.h"
 #include "viewer/interrupt.h"
-#include "viewer/opened_scene.h"
 #include "viewer/option_values.h"
-#include "viewer/png_rows.h"
+#include "viewer/picture_sequence.h"
 #include "viewer/render_settings.h"
-#include "viewer/stress_path.h"
-#include "viewer/tiled_picture.h"
 
 namespace vcp {
 
@@ -28,7 +25,7 @@ namespace {
 constexpr uint64_t kMostPixelsAtOnce = 8 << 20;
 constexpr uint32_t kTile = 2048;
 constexpr int kPathFrames = 120;
-constexpr std::uintmax_t kLargestPathFile = 64 << 20;
+constexpr std::chrono::milliseconds kWait(100);
 
 struct RenderCommand {
     std::vector<std::string> inputs;
@@ -152,52 +149,19 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
                        error, update.settled ? "settled" : "not settled");
 }
 
-/// "statue.png" and 7: "statue-0007.png".
-std::string numbered(const std::string& path, size_t number) {
-    const std::filesystem::path p(path);
-    return (p.parent_path() / fmt::format("{}-{:04}{}", p.stem().string(), number, p.extension().string())).string();
-}
-
-/// Draws into files tile by tile. `progress` of this picture.
-Result<TiledPictureStats> drawTiledFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command, const std::string& output,
-                                         const std::function<bool(double)>& progress) {
-    auto png = PngRows::create(output, request.width, request.height);
-    if (!png) return png.error();
-    TiledPictureOptions options;
-    options.tile = command.tile > 0 ? command.tile : kTile;
-    options.depth = !command.depth.empty();
-    options.normals = !command.normals.empty();
-    options.progress = progress;
-    std::vector<float> depth;
-    std::vector<glm::vec3> normals;
-    const auto stats = drawTiled(renderer, request, options, [&](const PictureBand& band) {
-        depth.insert(depth.end(), band.depth.begin(), band.depth.end());
-        normals.insert(normals.end(), band.normals.begin(), band.normals.end());
-        return (*png)->add(band.picture.rgba);
-    });
-    if (!stats) return stats;
-    if (options.depth) VCP_TRY(writeDepth(depth, request.width, request.height, command.depth));
-    if (options.normals) VCP_TRY(writeNormals(normals, request.width, request.height, command.normals));
-    VCP_TRY((*png)->finish());
-    return stats;
-}
-
 /// The cameras of a sequence, or the one camera.
 Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
-    std::vector<Camera> cameras;
-    for (int i = 0; i < command.turntable; ++i) {
-        OrbitCamera turned = camera;
-        turned.orbit(bounds.centre(), 2 * std::numbers::pi * i / command.turntable, 0);
-        cameras.push_back(turned.current());
+    std::vector<OrbitCamera> cameras{camera};
+    if (command.turntable > 0) {
+        cameras = turntable(camera, bounds.centre(), command.turntable);
+    } else if (!command.path.empty()) {
+        const auto keys = readCameras(command.path);
+        if (!keys) return keys.error();
+        cameras = cameraPath(*keys, command.frames > 0 ? command.frames : kPathFrames);
     }
-    if (command.turntable > 0) return cameras;
-    if (command.path.empty()) return std::vector{camera.current()};
-    std::error_code failed;
-    std::ifstream file(command.path, std::ios::binary);
-    if (!file || std::filesystem::file_size(command.path, failed) > kLargestPathFile || failed)
-        return Error{ErrorCode::Io, "cannot be opened; a path is a JSON array of cameras", command.path};
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    return stressPathFromJson(text, command.path, command.frames > 0 ? command.frames : kPathFrames);
+    std::vector<Camera> current;
+    for (const OrbitCamera& each : cameras) current.push_back(each.current());
+    return current;
 }
 
 Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& device, const FrameRequest& request) {
@@ -211,35 +175,33 @@ Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& d
             {"hit_pixels", total.hitPixels},
             {"device", device.name},
             {"software", device.software},
-            {"settled", total.settled},
+            {"settled", total.update.settled},
             {"error_pixels", total.errorPixels},
             {"resident_bytes", total.update.residentBytes},
             {"bytes_read", total.update.bytesRead}};
 }
 
 /// Pictures in tiles and sequences, with progress; what is finished when it is cancelled stays.
-Result<void> makeTiled(Renderer& renderer, FrameRequest request, const std::vector<Camera>& cameras, const RenderCommand& command) {
+Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras, const RenderCommand& command) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
-    TiledPictureStats total;
-    for (size_t i = 0; i < cameras.size(); ++i) {
-        request.camera = cameras[i];
-        const std::string output = command.isSequence() ? numbered(command.output, i + 1) : command.output;
-        const auto stats = drawTiledFiles(renderer, request, command, output, [&](double fraction) {
-            display.update("drawing", (static_cast<double>(i) + fraction) / static_cast<double>(cameras.size()));
-            return !interrupted();
-        });
-        if (!stats) return stats.error();
-        total.tiles += stats->tiles;
-        total.rays += stats->rays;
-        total.hitPixels += stats->hitPixels;
-        total.ms += stats->ms;
-        total.errorPixels = std::max(total.errorPixels, stats->errorPixels);
-        total.settled = total.settled && stats->settled;
-        total.update = stats->update;
+    PictureSequence sequence(renderer, {.request = request,
+                                        .cameras = cameras,
+                                        .files = {command.output, command.depth, command.normals},
+                                        .isNumbered = command.isSequence(),
+                                        .tile = command.tile > 0 ? command.tile : kTile,
+                                        .problem = {}});
+    for (bool isDone = false; !isDone;) {
+        const auto step = sequence.step();
+        if (!step) return step.error();
+        isDone = *step;
+        display.update("drawing", sequence.fraction());
+        if (!isDone && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        if (sequence.isWaiting()) renderer.waitForPage(kWait);
     }
     display.finish();
+    const TiledPictureStats& total = sequence.stats();
     if (command.report.json) return printJson(toJson(total, cameras.size(), renderer.device(), request));
-    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1), numbered(command.output, cameras.size())) : command.output;
+    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(), numbered(command.output, cameras.size()).string()) : command.output;
     return printLine(fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles, formatSeconds(1e-3 * total.ms)));
 }
 
@@ -259,8 +221,7 @@ Result<int> run(const RenderCommand& command) {
     options.loaderThreads = open->loaderThreads();
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->setSurfaces(open->surfaces.surfaces));
-    VCP_TRY((*renderer)->open(open->placed()));
+    VCP_TRY((*renderer)->open(open->placed(), open->surfaces.surfaces));
 
     FrameRequest request;
     request.camera = camera->current();
@@ -320,21 +281,19 @@ Command addRender(CLI::App& vcp) {
     CLI::Option* turntable = app->add_option("--turntable", command->turntable, "So many pictures once around the up axis: OUT-0001.png and so on")
                                  ->type_name("N")
                                  ->check(CLI::Range(1, 9999));
-    CLI::Option* path = app->add_option("--path", command->path, "Pictures along the cameras of a JSON array, --frames of them [120]: OUT-0001.png and so on")
-                            ->type_name("FILE")
-                            ->excludes(turntable);
+    app->add_option("--path", command->path, "Pictures along a smooth path through the cameras of a JSON array, --frames of them [120]: OUT-0001.png and so on")
+        ->type_name("FILE")
+        ->excludes(turntable);
     app->add_option("--tile", command->tile, fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
         ->type_name("PIXELS")
         ->check(CLI::Range(16, 8192));
-    CLI::Option* depth = app->add_option("--depth", command->depth, "Write also the distance along each ray: .pfm (float, world units) or .png "
+    app->add_option("--depth", command->depth, "Write also the distance along each ray: .pfm (float, world units) or .png "
                                                "(16-bit, 0 no hit, 1 nearest to 65535 farthest)")
         ->type_name("FILE")
         ->check(checkPlane);
-    CLI::Option* normals = app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
+    app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
         ->type_name("FILE")
         ->check(checkPlane);
-    for (CLI::Option* sequence : {turntable, path})
-        for (CLI::Option* plane : {depth, normals}) sequence->excludes(plane);
     app->add_option("--frames", command->frames, "Draw so many frames after the first and report their median time [0; 5 with --json]")
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));

@@ -14,6 +14,41 @@ std::string nameOf(const std::vector<std::string>& inputs) {
     return inputs.size() == 1 ? first : fmt::format("{} and {} more", first, inputs.size() - 1);
 }
 
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source,
+                              const std::function<bool(const BuildProgress&)>& progress) {
+    const auto kind = kindOf(inputs);
+    if (!kind) return kind.error();
+    SceneFile file;
+    if (*kind == InputKind::Scene) {
+        auto read = readScene(inputs.front());
+        if (!read) return read.error();
+        file = *std::move(read);
+    } else if (*kind == InputKind::Datasets) {
+        for (const std::string& input : inputs) file.datasets.push_back({input, {}});
+    } else {
+        const auto path = datasetFor(inputs, build, progress);
+        if (!path) return path.error();
+        file.datasets.push_back({path->string(), {}});
+    }
+    const auto count = static_cast<double>(file.datasets.size());
+    double opened = 0;
+    return openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
+        if (progress && !progress({.stage = "opening", .fraction = opened++ / count})) return Error{ErrorCode::Cancelled, "cancelled"};
+        const auto path = datasetFor({each}, build, progress);
+        if (!path) return path.error();
+        return openDataset(path->string(), source);
+    });
+}
+
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress) {
+    ProgressDisplay display(progress, stderr);
+    const InterruptScope catching;
+    return openScene(inputs, build, source, [&](const BuildProgress& at) {
+        display.update(at.stage, at.fraction, detailsOf(at));
+        return !interrupted();
+    });
+}
+
 DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style)
     : inputs_(std::move(inputs)), build_(std::move(build)), source_(std::move(source)), style_(style) {
     thread_ = std::thread([this] {

@@ -1,7 +1,8 @@
-// Opens what a person points at, in a thread of its own: meshes are built into the cache first.
+// Opens what a person points at, at once or in a thread of its own: meshes are built into the cache first.
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -16,6 +17,15 @@ namespace vcp {
 
 /// "statue.ply", or "statue.ply and 2 more".
 std::string nameOf(const std::vector<std::string>& inputs);
+
+/// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
+/// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. Any thread. Errors:
+/// Usage (.vcp files among meshes); those of readScene, MeshCache and openDataset.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source,
+                              const std::function<bool(const BuildProgress&)>& progress);
+
+/// The same with progress on stderr, cancelled by Ctrl-C.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress);
 
 /// One thread may call; destroying it cancels and waits for the build to notice.
 class DatasetOpening {

@@ -97,8 +97,8 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
     return nearest;
 }
 
-Result<std::optional<RayHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections) {
-    std::optional<RayHit> nearest;
+Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections) {
+    std::optional<SceneHit> nearest;
     for (Part& part : parts_) {
         // Of all together no more than one alone may keep, beside those that are cast into now.
         uint64_t kept = 0;
@@ -111,10 +111,10 @@ Result<std::optional<RayHit>> ScenePick::cast(const Ray& ray, std::span<const Se
         local.tMax = (nearest ? std::min(nearest->t, ray.tMax) : ray.tMax) / placement.scale;
         std::vector<SectionPlane> planes;
         for (const SectionPlane& plane : sections) planes.push_back(planeIn(placement, plane));
-        auto hit = part.pick.cast(local, planes);
-        if (!hit) return hit;
+        const auto hit = part.pick.cast(local, planes);
+        if (!hit) return hit.error();
         if (!*hit || (nearest && nearest->t <= (*hit)->t * placement.scale)) continue;
-        nearest = *std::move(hit);
+        nearest = SceneHit{**hit, static_cast<size_t>(&part - parts_.data())};
         nearest->t *= placement.scale;
         nearest->certifiedError *= placement.scale;
         nearest->position = placement.toWorld(nearest->position);

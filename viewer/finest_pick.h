@@ -29,13 +29,17 @@ private:
     PageCache pages_;
 };
 
+struct SceneHit : RayHit {
+    size_t dataset = 0;  ///< number of the dataset, in the order of add()
+};
+
 /// The same over several datasets, each where it is placed; the nearest hit, in the world.
 class ScenePick {
 public:
     void add(std::shared_ptr<const ByteReader> reader, const Dataset& dataset, const Similarity& placement) {
         parts_.push_back({FinestPick(std::move(reader), dataset), placement});
     }
-    Result<std::optional<RayHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {});
+    Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {});
 
 private:
     struct Part {

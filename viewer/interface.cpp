@@ -31,8 +31,11 @@ constexpr uint32_t kOcclusionRays = 8;
 
 constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "cells", "fetches", "level", "error"};
 
-constexpr const char* kPictureSizeNames[] = {"as shown", "3840 x 2160", "7680 x 4320", "16384 x 9216", "16384 x 16384"};
-constexpr glm::ivec2 kPictureSizes[] = {{0, 0}, {3840, 2160}, {7680, 4320}, {16384, 9216}, {16384, 16384}};
+constexpr int kMostPictures = 3600;
+constexpr double kPicturesPerSecond = 30;
+
+constexpr const char* kPictureSizeNames[] = {"as shown", "1920 x 1080", "3840 x 2160", "7680 x 4320", "16384 x 9216", "16384 x 16384"};
+constexpr glm::ivec2 kPictureSizes[] = {{0, 0}, {1920, 1080}, {3840, 2160}, {7680, 4320}, {16384, 9216}, {16384, 16384}};
 
 ImVec2 vec(glm::vec2 v) { return {v.x, v.y}; }
 
@@ -96,6 +99,8 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     size_ = framebuffer;
     scale_ = scale;
     statusHeight_ = ImGui::GetFrameHeight();
+    panelWidth_ = session_->user().panel ? std::min(kPanelWidth * scale_, 0.5f * size_.x) : 0;
+    session_->viewer().setCovered({.right = panelWidth_, .bottom = statusHeight_});
     if (session_->viewer().isOpen()) {
         if (session_->showsPages) drawPages();
         drawScaleBar();
@@ -109,7 +114,7 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     layOutStatus();
     layOutMessages();
     if (session_->opening()) layOutOpening();
-    else if (const auto fraction = session_->savingFraction()) layOutSaving(*fraction);
+    else if (const auto saving = session_->saving()) layOutSaving(*saving);
     if (showsHelp) layOutHelp();
 }
 
@@ -156,12 +161,11 @@ void Interface::layOutMessages() {
 }
 
 void Interface::layOutPanel() {
-    const float width = std::min(kPanelWidth * scale_, 0.5f * size_.x);
-    ImGui::SetNextWindowPos({size_.x - width, 0});
-    ImGui::SetNextWindowSize({width, size_.y - statusHeight_});
+    ImGui::SetNextWindowPos({size_.x - panelWidth_, 0});
+    ImGui::SetNextWindowSize({panelWidth_, size_.y - statusHeight_});
     ImGui::SetNextWindowBgAlpha(0.8f);
     ImGui::Begin("panel", nullptr, kFixed | ImGuiWindowFlags_NoTitleBar);
-    ImGui::PushItemWidth(0.5f * width);
+    ImGui::PushItemWidth(0.5f * panelWidth_);
     if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) layOutViews();
     if (ImGui::CollapsingHeader("Look", ImGuiTreeNodeFlags_DefaultOpen)) layOutLooks();
     if (ImGui::CollapsingHeader("Measure", ImGuiTreeNodeFlags_DefaultOpen)) layOutMeasuring();
@@ -256,7 +260,6 @@ void Interface::layOutLimits() {
     text(update.settled ? "settled" : fmt::format("loading, {} missing", update.pagesMissing));
     text(fmt::format("{} read", formatBytes(update.bytesRead)));
     ImGui::Checkbox("subvolumes", &session_->showsPages);
-    ImGui::SameLine();
     bool feedback = session_->showsFeedback();
     if (ImGui::Checkbox("what rays ask for", &feedback)) session_->showFeedback(feedback);
 }
@@ -275,17 +278,26 @@ void Interface::layOutMeasuring() {
 
 void Interface::layOutPicture() {
     ImGui::Combo("size", &pictureSize_, kPictureSizeNames, static_cast<int>(std::size(kPictureSizeNames)));
-    ImGui::BeginDisabled(session_->savingFraction().has_value());
+    ImGui::Checkbox("transparent", &picture_.transparent);
+    ImGui::SameLine();
+    ImGui::Checkbox("depth (.pfm)", &picture_.depth);
+    ImGui::BeginDisabled(session_->saving().has_value());
     if (ImGui::Button("Save picture")) savePicture();
+    ImGui::SliderInt("pictures", &sequencePictures_, 2, kMostPictures, "%d", kNoTyping | ImGuiSliderFlags_Logarithmic);
+    if (ImGui::Button("Turntable")) saveTurntable();
+    ImGui::SameLine();
+    if (ImGui::Button("Through bookmarks")) savePath();
     ImGui::EndDisabled();
+    wrapped(fmt::format("{:.1f} seconds at {} a second", sequencePictures_ / kPicturesPerSecond, kPicturesPerSecond));
 }
 
-void Interface::layOutSaving(double fraction) {
+void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
     ImGui::SetNextWindowPos({0.5f * size_.x, size_.y - statusHeight_ - 2 * kMargin * scale_}, ImGuiCond_Always, {0.5f, 1});
     ImGui::SetNextWindowSize({std::min(300 * scale_, size_.x), 0});
     ImGui::Begin("saving", nullptr, kBare);
-    const std::string percent = fmt::format("{:.0f} %", 100 * fraction);
-    ImGui::ProgressBar(static_cast<float>(fraction), ImVec2(-1, 0), percent.c_str());
+    wrapped(saving.pictures > 1 ? fmt::format("{}: {} of {} pictures", saving.name, saving.finished, saving.pictures) : saving.name);
+    const std::string percent = fmt::format("{:.0f} %", 100 * saving.fraction);
+    ImGui::ProgressBar(static_cast<float>(saving.fraction), ImVec2(-1, 0), percent.c_str());
     if (ImGui::Button("Cancel (Esc)")) session_->cancelSaving();
     ImGui::End();
 }
@@ -451,8 +463,16 @@ void Interface::copyMeasurement() {
     session_->note("measurement copied");
 }
 
-void Interface::savePicture() {
-    session_->savePicture(pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_]);
+PictureChoice Interface::pictureChosen() const {
+    PictureChoice choice = picture_;
+    choice.size = pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_];
+    return choice;
 }
+
+void Interface::savePicture() { session_->savePicture(pictureChosen()); }
+
+void Interface::saveTurntable() { session_->saveTurntable(pictureChosen(), sequencePictures_); }
+
+void Interface::savePath() { session_->savePath(pictureChosen(), sequencePictures_); }
 
 }  // namespace vcp

@@ -25,15 +25,17 @@ public:
 
     bool showsHelp = false;
 
-    /// Lays everything out. `scale`: pixels of the display a unit of the layout.
+    /// Lays everything out and tells the viewer what it covers. `scale`: pixels of the display a unit of the layout.
     void layOut(glm::ivec2 framebuffer, float scale);
 
     /// Copies the camera, or, with text on the clipboard, goes to the camera it describes.
     void copyCamera();
     void pasteCamera();
     void copyMeasurement();
-    /// Of the size chosen in the panel.
+    /// As chosen in the panel.
     void savePicture();
+    void saveTurntable();
+    void savePath();
 
 private:
     void layOutStatus();
@@ -45,7 +47,8 @@ private:
     void layOutMeasuring();
     void layOutFiles();
     void layOutPicture();
-    void layOutSaving(double fraction);
+    void layOutSaving(const ViewSession::SavingProgress& saving);
+    [[nodiscard]] PictureChoice pictureChosen() const;
     void layOutHelp();
     void layOutStart();
     void layOutOpening();
@@ -60,8 +63,10 @@ private:
     InterfaceHost host_;
     glm::vec2 size_{0};
     float scale_ = 1;
-    float statusHeight_ = 0;
+    float statusHeight_ = 0, panelWidth_ = 0;
     int pictureSize_ = 0;  // of kPictureSizes
+    PictureChoice picture_;
+    int sequencePictures_ = 120;
 };
 
 }  // namespace vcp

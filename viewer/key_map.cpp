@@ -35,6 +35,8 @@ constexpr KeyHelp kKeyMap[] = {
     {"D", "measure: click points; Enter ends a line, Backspace takes a point back"},
     {"Ctrl+E", "write what is measured: measurement-1.csv, .json"},
     {"Ctrl+S", "save the picture: picture-1.png, of the size chosen in the panel"},
+    {"Ctrl+T", "save a turntable: turntable-1/picture-0001.png and so on, as chosen in the panel"},
+    {"Ctrl+B", "save a path through the bookmarks: path-1/picture-0001.png and so on"},
     {"Tab", "the panel"},
     {"F1", "this list"},
     {"Esc", "ends what is going on, else the program"},

@@ -1,4 +1,4 @@
-// What `vcp view` and `vcp render` show: the datasets that a command line or a scene file names, opened.
+// A scene with its datasets opened: what `vcp view`, `vcp render` and the widget show.
 #pragma once
 
 #include <functional>
@@ -6,9 +6,8 @@
 #include <vector>
 
 #include "render/renderer.h"
-#include "viewer/build_settings.h"
+#include "viewer/open_dataset.h"
 #include "viewer/scene_file.h"
-#include "viewer/source_settings.h"
 
 namespace vcp {
 
@@ -27,13 +26,8 @@ struct OpenedScene {
     [[nodiscard]] uint32_t loaderThreads() const;
 };
 
-/// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
-/// dataset in the cache first; meshes of a scene are built one by one, its surfaces after them. `progress` as in BuildOptions. Any thread. Errors:
-/// Usage (.vcp files among meshes); those of readScene, MeshCache, openDataset and makeMesoScene.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source,
-                              const std::function<bool(const BuildProgress&)>& progress);
-
-/// The same with progress on stderr, cancelled by Ctrl-C.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress);
+/// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for the scene in
+/// errors. Errors: those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
+Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std::function<Result<OpenDataset>(const std::string& file)>& open);
 
 }  // namespace vcp

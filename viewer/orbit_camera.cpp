@@ -37,6 +37,19 @@ glm::dvec2 normalised(glm::dvec2 pixel, glm::ivec2 size) {
     return {2 * pixel.x / extent.x - 1, 1 - 2 * pixel.y / extent.y};
 }
 
+/// The part of a picture that is not covered, where the picture is [-1, 1] on both axes, y up.
+struct FreePart {
+    glm::dvec2 middle{0}, extent{1};  // half its width and height
+};
+
+FreePart freePart(glm::ivec2 size, const PictureMargins& covered) {
+    const glm::dvec2 all = glm::max(glm::dvec2(size), glm::dvec2(1));
+    const glm::dvec2 low(covered.left, covered.bottom), high(covered.right, covered.top);
+    const glm::dvec2 left = all - low - high;
+    if (left.x < 0.5 * all.x || left.y < 0.5 * all.y) return {};
+    return {(low - high) / all, left / all};
+}
+
 std::array<glm::dvec3, 8> cornersOf(const Box& box) {
     std::array<glm::dvec3, 8> corners;
     for (int i = 0; i < 8; ++i)
@@ -152,29 +165,28 @@ void OrbitCamera::zoomAbout(glm::dvec3 point, double factor) {
     focusDistance = depth > 0 ? depth : focusDistance * factor;
 }
 
-void OrbitCamera::fit(const Box& box, glm::ivec2 size) {
+void OrbitCamera::fit(const Box& box, glm::ivec2 size, const PictureMargins& covered) {
     const glm::dvec3 centre = box.centre();
-    const glm::dvec2 tangent = tangents(fovY, size) / kFitMargin;
+    const FreePart free = freePart(size, covered);
+    const glm::dvec2 picture = tangents(fovY, size), tangent = picture * free.extent / kFitMargin;
+    const glm::dvec2 middle = picture * free.middle;  // sideways, a unit ahead
     double distance = 0;
     double flat = 0;
     for (const glm::dvec3& corner : cornersOf(box)) {
         const glm::dvec3 local = glm::conjugate(orientation) * (corner - centre);
-        const double sideways = std::max(std::abs(local.x) / tangent.x, std::abs(local.y) / tangent.y);
-        distance = std::max(distance, sideways + local.z);
-        flat = std::max(flat, sideways);
+        // Nearer than the middle of the box, what is off the axis is farther off.
+        const glm::dvec2 off = glm::abs(glm::dvec2(local) + middle * local.z) / tangent;
+        distance = std::max(distance, std::max(off.x, off.y) + local.z);
+        flat = std::max({flat, std::abs(local.x) / tangent.x, std::abs(local.y) / tangent.y});
     }
     const double radius = std::max(0.5 * box.diagonal(), 1e-12 * std::max(1e-300, glm::length(centre)));
-    if (projection == Projection::Orthographic) {
-        focusDistance = std::max(flat, radius * 1e-3);
-        // Outside the box, whatever the height of the picture.
-        position = centre - forwardVector() * std::max(focusDistance, 2 * radius);
-        return;
-    }
-    focusDistance = std::max(distance, radius * 1e-3);
-    position = centre - forwardVector() * focusDistance;
+    focusDistance = std::max(projection == Projection::Orthographic ? flat : distance, radius * 1e-3);
+    // An orthographic eye is outside the box, whatever the height of the picture.
+    const double back = projection == Projection::Orthographic ? std::max(focusDistance, 2 * radius) : focusDistance;
+    position = centre - forwardVector() * back - orientation * glm::dvec3(middle * focusDistance, 0);
 }
 
-void OrbitCamera::look(View view, const Box& box, glm::ivec2 size) {
+void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const PictureMargins& covered) {
     // With y up the front faces +z; with z up it faces -y. The other views follow from front and up.
     const glm::dvec3 upward = axisOf(up);
     const glm::dvec3 front = up == UpAxis::Y ? glm::dvec3(0, 0, 1) : glm::dvec3(0, -1, 0);
@@ -189,7 +201,7 @@ void OrbitCamera::look(View view, const Box& box, glm::ivec2 size) {
         case View::Bottom: orientation = facing(upward, front); break;
         case View::Isometric: orientation = facing(-(front + right + upward), upward); break;
     }
-    fit(box, size);
+    fit(box, size, covered);
 }
 
 namespace {

@@ -49,6 +49,12 @@ enum class UpAxis { Y, Z };
 /// Standard views of a box. `Fit` is the view a dataset opens with: the front.
 enum class View { Fit, Front, Back, Left, Right, Top, Bottom, Isometric };
 
+/// What of a picture is covered along its sides, pixels: the rest is where something fitted into it goes. All of it where less than
+/// half is left either way.
+struct PictureMargins {
+    double left = 0, right = 0, top = 0, bottom = 0;
+};
+
 struct OrbitCamera {
     glm::dvec3 position{0};
     glm::dquat orientation{1, 0, 0, 0};  ///< world from camera, unit
@@ -88,11 +94,12 @@ struct OrbitCamera {
     /// moves with it. Stops where doubles could no longer tell the eye from the point.
     void zoomAbout(glm::dvec3 point, double factor);
 
-    /// Moves along the view axis and sideways so that the box just fits into the picture.
-    void fit(const Box& box, glm::ivec2 size);
+    /// Moves along the view axis and sideways so that the box just fits into what of the picture is not covered, its middle in the
+    /// middle of that.
+    void fit(const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 
     /// Turns to a standard view and fits.
-    void look(View view, const Box& box, glm::ivec2 size);
+    void look(View view, const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 
     /// Turns the view with the eye where it is: `yaw` about the up axis, `pitch` about the camera's x axis. The
     /// pitch stops short of the poles.

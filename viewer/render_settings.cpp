@@ -84,12 +84,12 @@ std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const
     return planes;
 }
 
-Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size) const {
+Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered) const {
     const auto view = viewNamed(camera);
     if (!view) return readCamera(camera);
     OrbitCamera fitted;
     fitted.up = upAxis();
-    fitted.look(*view, bounds, size);
+    fitted.look(*view, bounds, size, covered);
     return fitted;
 }
 

@@ -38,8 +38,8 @@ struct RenderSettings {
     [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
-    /// The view or the camera file. Errors: those of readCamera.
-    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size) const;
+    /// The view, or the camera file. Errors: those of readCamera.
+    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered = {}) const;
 };
 
 void addRenderSettings(CLI::App& app, RenderSettings& settings);

@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::streamsize kLargestFile = 1 << 20;
-constexpr size_t kMostDatasets = 256, kMostSurfaces = 64;
+constexpr size_t kMostSurfaces = 64;
 constexpr int kDeepest = 16;
 // What a scene may have of them: nothing else has a line of its own.
 constexpr int kDeepestLine = 5;
@@ -120,8 +120,8 @@ public:
         if (json.contains("mesostructure")) scene.surfaces = surfaces(json["mesostructure"]);
         if (!json.contains("datasets") && scene.surfaces.empty()) wrong("", "\"datasets\" is missing");
         const Json& datasets = json.value("datasets", Json::array());
-        if (!datasets.is_array() || (datasets.empty() && scene.surfaces.empty()) || datasets.size() > kMostDatasets)
-            wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostDatasets));
+        if (!datasets.is_array() || (datasets.empty() && scene.surfaces.empty()) || datasets.size() > kMostSceneDatasets)
+            wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostSceneDatasets));
         for (size_t i = 0; i < datasets.size() && !error_; ++i) scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
         if (json.contains("lights")) scene.light = light(json["lights"]);
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
@@ -285,11 +285,8 @@ private:
             if (good) rows[i] = json[i / 4][i % 4].get<double>();
         }
         if (!good) return wrong(at, "must be four rows of four numbers"), Similarity{};
-        const auto placement = similarityFromMatrix(rows);
+        const auto placement = scenePlacement(rows);
         if (!placement) return wrong(at, placement.error().message), Similarity{};
-        const glm::dvec3 far = glm::abs(placement->translation);
-        if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale || placement->scale < 1 / kLargestScale)
-            return wrong(at, fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}", kLargestNumber, kLargestScale, 1 / kLargestScale)), Similarity{};
         return *placement;
     }
 
@@ -356,6 +353,15 @@ std::optional<Error> notJson(std::string_view text, const std::string& name) {
 }
 
 }  // namespace
+
+Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
+    auto placement = similarityFromMatrix(rows);
+    if (!placement) return placement;
+    const glm::dvec3 far = glm::abs(placement->translation);
+    if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale || placement->scale < 1 / kLargestScale)
+        return Error{ErrorCode::Usage, fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}", kLargestNumber, kLargestScale, 1 / kLargestScale)};
+    return placement;
+}
 
 bool isSceneName(const std::string& name) { return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json"; }
 

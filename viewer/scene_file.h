@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +36,12 @@ struct SceneFile {
     std::vector<SectionPlane> sections;  ///< at most kMostSections
     bool sectionCaps = false;
 };
+
+/// At most so many datasets in one scene.
+constexpr size_t kMostSceneDatasets = 256;
+
+/// similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9. Errors: Usage.
+Result<Similarity> scenePlacement(std::span<const double, 16> rows);
 
 /// Whether a name stands for a scene file: it ends in .json.
 bool isSceneName(const std::string& name);

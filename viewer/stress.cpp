@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "render/frame_setup.h"
 #include "streaming/residency_policy.h"
+#include "viewer/camera_path.h"
 #include "viewer/stress_path.h"
 
 namespace vcp {
@@ -194,12 +193,10 @@ private:
             cameras_ = *std::move(known);
             return {};
         }
-        std::ifstream file(o_.path, std::ios::binary);
-        if (!file) return Error{ErrorCode::Io, "is neither a path's name nor a file that can be read", o_.path};
-        const std::string text{std::istreambuf_iterator<char>(file), {}};
-        auto cameras = stressPathFromJson(text, o_.path, o_.frames);
-        if (!cameras) return cameras.error();
-        cameras_ = *std::move(cameras);
+        const auto keys = readCameras(o_.path);
+        if (!keys && keys.error().code == ErrorCode::Io) return Error{ErrorCode::Io, "is neither a path's name nor a file that can be read", o_.path};
+        if (!keys) return keys.error();
+        for (const OrbitCamera& camera : cameraPath(*keys, o_.frames)) cameras_.push_back(camera.current());
         return {};
     }
 

@@ -6,9 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 
 #include "viewer/option_values.h"
 
@@ -20,7 +18,6 @@ constexpr double kVerticalFov = 0.6;
 constexpr double kDiveCells = 32;
 constexpr int kTeleportFrames = 10;
 constexpr double kDefaultStallRate = 0.02;
-constexpr size_t kMaxPathCameras = 10000;
 
 /// From 0 to below 1, the same everywhere.
 class Random {
@@ -98,8 +95,6 @@ private:
     double reach_ = 1;
 };
 
-glm::dvec3 mixed(glm::dvec3 a, glm::dvec3 b, double t) { return a + (b - a) * t; }
-
 std::optional<double> parseTime(std::string_view text) {
     const double unit = text.ends_with("ms") ? 1e-3 : 1;
     if (!text.ends_with('s')) return std::nullopt;
@@ -136,30 +131,6 @@ std::optional<std::vector<Camera>> stressPath(const StressPathOptions& options) 
                           : options.name == "fly"      ? path.fly(t)
                           : options.name == "teleport" ? path.teleport(frame)
                                                        : path.jitter());
-    }
-    return cameras;
-}
-
-Result<std::vector<Camera>> stressPathFromJson(std::string_view text, const std::string& name, int frames) {
-    const auto json = nlohmann::json::parse(text, nullptr, false);
-    if (!json.is_array() || json.empty() || json.size() > kMaxPathCameras)
-        return Error{ErrorCode::InvalidInput, "is not a JSON array of cameras", name};
-    std::vector<Camera> keys;
-    for (const auto& element : json) {
-        auto camera = cameraFromJson(element.dump(), name);
-        if (!camera) return camera.error();
-        keys.push_back(camera->current());
-    }
-    std::vector<Camera> cameras;
-    for (int frame = 0; frame < frames; ++frame) {
-        const double at = frames > 1 ? static_cast<double>(frame) / (frames - 1) * static_cast<double>(keys.size() - 1) : 0;
-        const size_t i = std::min(static_cast<size_t>(at), keys.size() - 1), next = std::min(i + 1, keys.size() - 1);
-        Camera camera = keys[i];
-        const double t = at - static_cast<double>(i);
-        camera.eye = mixed(camera.eye, keys[next].eye, t);
-        camera.forward = mixed(camera.forward, keys[next].forward, t);
-        camera.up = mixed(camera.up, keys[next].up, t);
-        cameras.push_back(camera);
     }
     return cameras;
 }

@@ -15,7 +15,6 @@
 
 #include <glm/vec2.hpp>
 
-#include "octree/result.h"
 #include "render/camera.h"
 #include "streaming/faulty_reader.h"
 #include "viewer/orbit_camera.h"
@@ -36,10 +35,6 @@ const std::vector<std::string>& stressPathNames();
 
 /// A camera for each frame; nothing for an unknown name.
 std::optional<std::vector<Camera>> stressPath(const StressPathOptions& options);
-
-/// Cameras of a JSON array of what cameraToJson writes, with straight lines between them. `name` stands for the
-/// file in errors; the text may be hostile. Errors: InvalidInput.
-Result<std::vector<Camera>> stressPathFromJson(std::string_view text, const std::string& name, int frames);
 
 /// "error=0.1,corrupt=0.01,stall=500ms,stalls=0.05,latency=50ms,spread=20ms,bandwidth=2.5M": rates from 0 to 1;
 /// times with ms or s; stalls is the rate of stalls, 0.02 unless given; bandwidth in bytes a second. Nothing

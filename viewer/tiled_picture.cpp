@@ -1,7 +1,6 @@
 #include "viewer/tiled_picture.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 namespace vcp {
@@ -98,18 +97,6 @@ Result<void> TiledPicture::copyTile(const Rect& outer, const Rect& inner) {
         copyInto(band_.normals, whole_.width, *normals, outer, inner, 1);
     }
     return {};
-}
-
-Result<TiledPictureStats> drawTiled(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options,
-                                    const TiledPicture::Take& take) {
-    TiledPicture picture(renderer, request, options, take);
-    for (;;) {
-        const auto done = picture.step();
-        if (!done) return done.error();
-        if (options.progress && !options.progress(picture.fraction())) return Error{ErrorCode::Cancelled, "cancelled"};
-        if (*done) return picture.stats();
-        if (picture.isWaiting()) renderer.waitForPage(std::chrono::milliseconds(100));
-    }
 }
 
 }  // namespace vcp

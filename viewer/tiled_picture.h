@@ -19,8 +19,6 @@ namespace vcp {
 struct TiledPictureOptions {
     uint32_t tile = 2048;  ///< edge in pixels, at least 16
     bool depth = false, normals = false;
-    /// Told the fraction done after each tile and while pages load; false cancels. May be empty.
-    std::function<bool(double fraction)> progress;
     /// Told of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
     std::function<void(const Error& problem)> problem;
 };
@@ -36,7 +34,6 @@ struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
     double ms = 0;  ///< of drawing alone
     double errorPixels = 0;      ///< largest of the tiles'
-    bool settled = true;         ///< all of them
     UpdateResult update;         ///< of the last tile
 };
 
@@ -45,7 +42,7 @@ class TiledPicture {
 public:
     using Take = std::function<Result<void>(const PictureBand&)>;
 
-    /// `request`: its width and height may be up to 2^20 here. `options.progress` is not asked. `take` gets each band.
+    /// `request`: its width and height may be up to 2^20 here. `take` gets each band.
     TiledPicture(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 
@@ -75,9 +72,5 @@ private:
     bool isWaiting_ = false;
     TiledPictureStats stats_;
 };
-
-/// Draws `request` as TiledPicture does and hands each band to `take`. Errors: also Cancelled.
-Result<TiledPictureStats> drawTiled(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options,
-                                    const TiledPicture::Take& take);
 
 }  // namespace vcp

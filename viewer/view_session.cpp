@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 
 #include "streaming/http_reader.h"
+#include "viewer/camera_path.h"
 
 namespace vcp {
 
@@ -22,6 +23,24 @@ constexpr uint32_t kRemoteLoaderThreads = 8;
 constexpr int kMostExports = 10000;
 constexpr uint32_t kSavedTile = 512;  // small: the window goes on between tiles
 
+/// The first number from 1 on that is free; of too many the last.
+template <class IsTaken>
+int freeNumber(IsTaken isTaken) {
+    int number = 1;
+    while (number < kMostExports && isTaken(number)) ++number;
+    return number;
+}
+
+bool isThere(const std::filesystem::path& path) {
+    std::error_code failed;
+    return std::filesystem::exists(path, failed);
+}
+
+std::string workingFolder() {
+    std::error_code failed;
+    return std::filesystem::current_path(failed).string();
+}
+
 bool writeText(const std::filesystem::path& path, const std::string& text) {
     std::ofstream file(path, std::ios::binary);
     return static_cast<bool>((file << text).flush());
@@ -29,7 +48,7 @@ bool writeText(const std::filesystem::path& path, const std::string& text) {
 
 }  // namespace
 
-Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options, SurfaceSource surface) {
+Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options, std::optional<SurfaceSource> surface) {
     ViewerOptions viewerOptions;
     viewerOptions.renderer = options.render.rendererOptions();
     // Any shading may be chosen later.
@@ -51,6 +70,7 @@ ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> 
     : options_(options), user_(options.user), viewer_(std::move(viewer)) {}
 
 ViewSession::~ViewSession() {
+    cancelSaving();
     if (pick_.valid()) pick_.wait();
 }
 
@@ -78,10 +98,10 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
     camera.up = user_.up;
-    camera.look(View::Fit, open.bounds(), size);
+    camera.look(View::Fit, open.bounds(), size, viewer_->covered());
     // What the command line says is for what it opens.
     if (!std::exchange(wasShown_, true)) {
-        const auto asked = options_.render.cameraFor(open.bounds(), size);
+        const auto asked = options_.render.cameraFor(open.bounds(), size, viewer_->covered());
         if (asked)
             camera = *asked;
         else
@@ -123,7 +143,7 @@ Result<NextStep> ViewSession::update(double now) {
     auto next = viewer_->update(now);
     if (!next) return next;
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
-    if (saving_) next->waitSeconds = saving_->picture->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
+    if (saving_) next->waitSeconds = saving_->pictures->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
     if (pick_.valid()) next->waitSeconds = std::min(next->waitSeconds, kPickPollSeconds);
     return next;
 }
@@ -192,41 +212,84 @@ void ViewSession::takePicked() {
 
 void ViewSession::exportMeasurement() {
     if (measurement_.empty()) return note("nothing is measured yet: D, then click");
-    namespace fs = std::filesystem;
-    for (int i = 1; i < kMostExports; ++i) {
-        const std::string name = fmt::format("measurement-{}", i);
-        std::error_code failed;
-        if (fs::exists(name + ".csv", failed) || fs::exists(name + ".json", failed)) continue;
-        if (!writeText(name + ".csv", measurementCsv(measurement_)) || !writeText(name + ".json", measurementJson(measurement_)))
-            return say(fs::absolute(name + ".csv", failed).string() + ": cannot be written");
-        return note(fmt::format("written: {}.csv and .json in {}", name, fs::current_path(failed).string()));
-    }
-}
-
-void ViewSession::savePicture(glm::ivec2 size) {
-    if (saving_ || !viewer_->isOpen()) return;
-    namespace fs = std::filesystem;
-    int number = 1;
+    const auto nameOf = [](int number) { return fmt::format("measurement-{}", number); };
+    const std::string name = nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
     std::error_code failed;
-    while (number < kMostExports && fs::exists(fmt::format("picture-{}.png", number), failed)) ++number;
-    Saving saving;
-    saving.path = fmt::format("picture-{}.png", number);
-    auto view = viewer_->renderer().addView();
-    if (!view) return say(view.error().line());
-    auto png = PngRows::create(saving.path, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
-    if (!png) return say(png.error().line());
-    saving.view = *std::move(view);
-    saving.png = *std::move(png);
-    saving.picture = std::make_unique<TiledPicture>(*saving.view, viewer_->pictureOf(size), TiledPictureOptions{.tile = kSavedTile, .progress = {}, .problem = [this](const Error& problem) { say(problem.line()); }},
-                                                    [rows = saving.png.get()](const PictureBand& band) { return rows->add(band.picture.rgba); });
-    saving_ = std::move(saving);
+    if (!writeText(name + ".csv", measurementCsv(measurement_)) || !writeText(name + ".json", measurementJson(measurement_)))
+        return say(std::filesystem::absolute(name + ".csv", failed).string() + ": cannot be written");
+    note(fmt::format("written: {}.csv and .json in {}", name, workingFolder()));
 }
 
-std::optional<double> ViewSession::savingFraction() const { return saving_ ? std::optional(saving_->picture->fraction()) : std::nullopt; }
+void ViewSession::savePicture(const PictureChoice& choice) {
+    if (saving_ || !viewer_->isOpen()) return;
+    const auto filesOf = [&](int number) {
+        PictureFiles files{fmt::format("picture-{}.png", number), {}, {}};
+        if (choice.depth) files.depth = fmt::format("picture-{}-depth.pfm", number);
+        return files;
+    };
+    const PictureFiles files = filesOf(freeNumber([&](int i) { return isThere(filesOf(i).picture) || isThere(fmt::format("picture-{}-depth.pfm", i)); }));
+    beginSaving(choice, files.picture, files, {viewer_->camera()}, false);
+}
+
+void ViewSession::saveTurntable(const PictureChoice& choice, int pictures) {
+    if (saving_ || !viewer_->isOpen()) return;
+    saveSequence(choice, "turntable", turntable(viewer_->camera(), viewer_->bounds().centre(), pictures));
+}
+
+void ViewSession::savePath(const PictureChoice& choice, int pictures) {
+    if (saving_ || !viewer_->isOpen()) return;
+    std::vector<OrbitCamera> keys;
+    if (const auto* kept = bookmarks())
+        for (const auto& [number, camera] : *kept) keys.push_back(camera);
+    if (keys.size() < 2) return note("a path goes through bookmarks: keep two or more, with Ctrl+1, Ctrl+2, ...");
+    saveSequence(choice, "path", cameraPath(keys, pictures));
+}
+
+void ViewSession::saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras) {
+    const auto folderOf = [&](int number) { return std::filesystem::path(fmt::format("{}-{}", name, number)); };
+    const std::filesystem::path folder = folderOf(freeNumber([&](int i) { return isThere(folderOf(i)); }));
+    std::error_code failed;
+    if (!std::filesystem::create_directory(folder, failed)) return say(fmt::format("{}: no such folder can be made in {}", folder.string(), workingFolder()));
+    PictureFiles files{folder / "picture.png", {}, {}};
+    if (choice.depth) files.depth = folder / "depth.pfm";
+    beginSaving(choice, folder, files, cameras, true);
+}
+
+void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence) {
+    auto view = viewer_->renderer().addView();
+    if (!view) {
+        std::error_code failed;
+        if (isSequence) std::filesystem::remove(name, failed);
+        return say(view.error().line());
+    }
+    FrameRequest request = viewer_->pictureOf(choice.size);
+    request.shading.transparent = choice.transparent;
+    PictureSequenceOptions options{.request = request, .cameras = {}, .files = std::move(files), .isNumbered = isSequence, .tile = kSavedTile,
+                                   .problem = [this](const Error& problem) { say(problem.line()); }};
+    for (const OrbitCamera& camera : cameras) options.cameras.push_back(camera.current());
+    auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
+    saving_ = Saving{std::move(name), *std::move(view), std::move(pictures), isSequence};
+}
+
+std::optional<ViewSession::SavingProgress> ViewSession::saving() const {
+    if (!saving_) return std::nullopt;
+    const PictureSequence& pictures = *saving_->pictures;
+    return SavingProgress{saving_->name.string(), pictures.fraction(), pictures.finished(), pictures.pictures()};
+}
+
+/// What is there of it, in words.
+std::string ViewSession::endSaving() {
+    Saving saving = *std::exchange(saving_, std::nullopt);
+    const auto [finished, pictures] = std::pair(saving.pictures->finished(), saving.pictures->pictures());
+    saving.pictures.reset();  // with it goes what is half-written
+    std::error_code failed;
+    if (saving.isSequence && finished == 0) std::filesystem::remove(saving.name, failed);
+    if (finished == 0) return fmt::format("{}: nothing is written", saving.name.string());
+    return fmt::format("written: {}{} in {}", saving.isSequence ? fmt::format("{} of {} pictures, ", finished, pictures) : "", saving.name.string(), workingFolder());
+}
 
 void ViewSession::cancelSaving() {
-    if (saving_) note(saving_->path + ": cancelled, nothing is written");
-    saving_.reset();
+    if (saving_) note("cancelled; " + endSaving());
 }
 
 void ViewSession::goOnSaving() {
@@ -235,14 +298,10 @@ void ViewSession::goOnSaving() {
         --saving_->turnsBefore;
         return;
     }
-    auto done = saving_->picture->step();
+    const auto done = saving_->pictures->step();
     if (done && !*done) return;
-    if (done)
-        if (const auto finished = saving_->png->finish(); !finished) done = finished.error();
-    std::error_code failed;
-    if (done) note(fmt::format("written: {} in {}", saving_->path, std::filesystem::current_path(failed).string()));
-    else say(done.error().line());
-    saving_.reset();
+    if (!done) say(done.error().line());
+    note(endSaving());
 }
 
 void ViewSession::collectSettings() {

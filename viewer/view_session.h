@@ -5,6 +5,7 @@
 // One thread; times as in viewer.h.
 #pragma once
 
+#include <filesystem>
 #include <future>
 #include <memory>
 #include <optional>
@@ -14,9 +15,8 @@
 #include "viewer/dataset_opening.h"
 #include "viewer/finest_pick.h"
 #include "viewer/measurement.h"
-#include "viewer/png_rows.h"
+#include "viewer/picture_sequence.h"
 #include "viewer/render_settings.h"
-#include "viewer/tiled_picture.h"
 #include "viewer/user_settings.h"
 #include "viewer/viewer.h"
 
@@ -30,10 +30,17 @@ struct SessionOptions {
     ProgressStyle progress = ProgressStyle::None;
 };
 
+/// Pictures to be saved: the switches of the panel.
+struct PictureChoice {
+    glm::ivec2 size{1920, 1080};  ///< up to 16384 each
+    bool transparent = false;     ///< no background
+    bool depth = false;           ///< also the distance along each ray, as .pfm
+};
+
 class ViewSession {
 public:
-    /// Errors: those of Renderer::create.
-    static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options, SurfaceSource surface);
+    /// `surface`: of the window; without one nothing may be presented. Errors: those of Renderer::create.
+    static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options, std::optional<SurfaceSource> surface);
     ~ViewSession();
 
     [[nodiscard]] Viewer& viewer() { return *viewer_; }
@@ -78,24 +85,38 @@ public:
     /// measurement-1.csv and .json in the working folder, or the next free number; says so.
     void exportMeasurement();
 
-    /// picture-1.png in the working folder, or the next free number: what is shown, of any size up to 16384 each way, tile
-    /// by tile between frames of the window.
-    void savePicture(glm::ivec2 size);
-    /// 0 to 1; nothing where no picture is being saved.
-    [[nodiscard]] std::optional<double> savingFraction() const;
+    /// What is shown, into the working folder, tile by tile between frames of the window: one at a time, and what is chosen
+    /// later changes nothing of it. picture-1.png, or the next free number, and picture-1-depth.pfm.
+    void savePicture(const PictureChoice& choice);
+    /// Once around the middle of all, about the up axis, from the view as it is: turntable-1/picture-0001.png and so on, a new folder.
+    void saveTurntable(const PictureChoice& choice, int pictures);
+    /// From the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on. Says so where there are
+    /// fewer than two.
+    void savePath(const PictureChoice& choice, int pictures);
+    struct SavingProgress {
+        std::string name;  ///< of the file or folder
+        double fraction;   ///< 0 to 1
+        size_t finished, pictures;
+    };
+    /// Nothing where nothing is being saved.
+    [[nodiscard]] std::optional<SavingProgress> saving() const;
+    /// Pictures of a sequence that are finished stay; nothing half-written does.
     void cancelSaving();
 
     /// Looks that are remembered, from the viewer into user().
     void collectSettings();
 
 private:
-    using Picked = Result<std::optional<RayHit>>;
+    using Picked = Result<std::optional<SceneHit>>;
 
     ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
     void takeOpened();
     Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
+    void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
+    void beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence);
     void goOnSaving();
+    [[nodiscard]] std::string endSaving();
 
     SessionOptions options_;
     UserSettings user_;
@@ -108,10 +129,10 @@ private:
     std::shared_ptr<ScenePick> finest_;
     std::future<Picked> pick_;
     struct Saving {
-        std::string path;
+        std::filesystem::path name;  // of the file; of the folder of a sequence
         std::unique_ptr<Renderer> view;
-        std::unique_ptr<PngRows> png;
-        std::unique_ptr<TiledPicture> picture;
+        std::unique_ptr<PictureSequence> pictures;  // by that view
+        bool isSequence = false;
         int turnsBefore = 2;  // updates without a tile: the window lays its progress out, then shows it
     };
     std::optional<Saving> saving_;

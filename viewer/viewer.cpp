@@ -108,8 +108,7 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
 
 Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name) {
     if (datasets.empty() && surfaces.surfaces.empty()) return Error{.code = ErrorCode::Usage, .message = "there is nothing to open"};
-    VCP_TRY(renderer_->setSurfaces(surfaces.surfaces));
-    VCP_TRY(renderer_->open(datasets));
+    VCP_TRY(renderer_->open(datasets, surfaces.surfaces));
     show(datasets, surfaces, camera, std::move(name));
     return {};
 }
@@ -293,7 +292,7 @@ void Viewer::moveTo(const OrbitCamera& camera) {
 
 void Viewer::look(View view) {
     OrbitCamera there = camera_;
-    there.look(view, bounds_, size_);
+    there.look(view, bounds_, size_, covered_);
     moveTo(there);
 }
 
@@ -365,7 +364,7 @@ void Viewer::act(ViewerAction action) {
     switch (action) {
         case ViewerAction::Fit: {
             OrbitCamera there = camera_;
-            there.fit(bounds_, size_);
+            there.fit(bounds_, size_, covered_);
             moveTo(there);
             break;
         }

@@ -168,6 +168,9 @@ public:
     /// Why an action shows nothing on what is open; empty where it shows something.
     [[nodiscard]] std::string whyWithout(ViewerAction action) const;
     [[nodiscard]] glm::ivec2 size() const { return size_; }
+    /// What panels of the host cover: Fit and the standard views keep clear of it from now on.
+    void setCovered(const PictureMargins& covered) { covered_ = covered; }
+    [[nodiscard]] const PictureMargins& covered() const { return covered_; }
 
     /// How things look, for panels to show and to change.
     [[nodiscard]] const Shading& shading() const { return shading_; }
@@ -234,6 +237,7 @@ private:
     std::optional<SectionDrag> sectionDrag_;
     bool sectionCaps_ = false;
     glm::ivec2 size_{0};
+    PictureMargins covered_;
 
     Drag drag_ = Drag::None;
     MouseButton dragButton_ = MouseButton::Left;

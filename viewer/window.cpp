@@ -92,6 +92,7 @@ public:
         int width = 0, height = 0;
         glfwGetFramebufferSize(window_, &width, &height);
         resize({width, height});
+        layOut();
         glfwGetCursorPos(window_, &cursor_.x, &cursor_.y);
     }
 
@@ -252,6 +253,8 @@ private:
         if (key == GLFW_KEY_V) interface_.pasteCamera();
         if (key == GLFW_KEY_E) session_->exportMeasurement();
         if (key == GLFW_KEY_S) interface_.savePicture();
+        if (key == GLFW_KEY_T) interface_.saveTurntable();
+        if (key == GLFW_KEY_B) interface_.savePath();
         if (key == GLFW_KEY_Q) glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }
 
@@ -259,7 +262,7 @@ private:
         switch (key) {
             case GLFW_KEY_ESCAPE: escape(); break;
             case GLFW_KEY_F1: interface_.showsHelp = !interface_.showsHelp; break;
-            case GLFW_KEY_TAB: session_->user().panel = !session_->user().panel; break;
+            case GLFW_KEY_TAB: togglePanel(); break;
             case GLFW_KEY_D: session_->isMeasuring = !session_->isMeasuring; break;
             case GLFW_KEY_ENTER: session_->measurement().finishLine(); break;
             case GLFW_KEY_BACKSPACE: session_->measurement().takeBack(); break;
@@ -273,6 +276,11 @@ private:
         }
     }
 
+    void togglePanel() {
+        session_->user().panel = !session_->user().panel;
+        layOut();  // what is fitted next keeps clear of it
+    }
+
     void toggleFly() {
         letGo();
         session_->act(ViewerAction::ToggleFly);
@@ -282,7 +290,7 @@ private:
         if (session_->viewer().cancelSectionDrag()) return;
         if (interface_.showsHelp) interface_.showsHelp = false;
         else if (session_->opening()) session_->opening()->cancel();
-        else if (session_->savingFraction()) session_->cancelSaving();
+        else if (session_->saving()) session_->cancelSaving();
         else if (session_->viewer().isFlying()) toggleFly();
         else if (session_->isMeasuring) session_->isMeasuring = false;
         else glfwSetWindowShouldClose(window_, GLFW_TRUE);

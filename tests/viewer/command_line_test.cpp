@@ -369,7 +369,11 @@ TEST_F(CommandLine, PicturesInTilesAndSequences) {
     write(path, "[{]");
     expectFailure(render("x.png", {"--path", path.string()}), 1, path.string());
     expectFailure(render("x.png", {"--path", path.string(), "--turntable", "3"}), 2, "--turntable");
-    expectFailure(render("x.png", {"--turntable", "3", "--depth", "x.pfm"}), 2, "--depth");
+
+    ASSERT_EQ(render("deep.png", {"--turntable", "2", "--depth", (*folder_ / "deep.pfm").string(), "--normals", (*folder_ / "normal.png").string()}).status, 0);
+    for (const char* name : {"deep-0001.pfm", "deep-0002.pfm", "normal-0001.png", "normal-0002.png"}) EXPECT_TRUE(fs::exists(*folder_ / name)) << name;
+    EXPECT_NE(contentOf(*folder_ / "deep-0001.pfm"), contentOf(*folder_ / "deep-0002.pfm"));
+    EXPECT_FALSE(fs::exists(*folder_ / "deep.pfm") || fs::exists(*folder_ / "deep-0003.pfm"));
 }
 
 TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {

@@ -115,6 +115,35 @@ TEST_P(CameraMoves, FitShowsTheWholeBoxAndNearlyFillsThePicture) {
     }
 }
 
+TEST_P(CameraMoves, FitKeepsClearOfWhatIsCovered) {
+    const Box box{{10, 20, 30}, {13, 21, 35}};
+    const glm::ivec2 size(1280, 720);
+    for (const PictureMargins covered : {PictureMargins{.right = 400, .bottom = 20}, PictureMargins{.left = 100, .top = 300}, PictureMargins{.right = 640}}) {
+        for (const View view : {View::Front, View::Right, View::Top, View::Isometric}) {
+            OrbitCamera camera;
+            camera.projection = GetParam();
+            camera.look(view, box, size, covered);
+            const glm::dvec2 low(covered.left, covered.top), high(size.x - covered.right, size.y - covered.bottom);
+            double reach = 0;
+            for (int i = 0; i < 8; ++i) {
+                const auto pixel = camera.pixelOf({i & 1 ? 13 : 10, i & 2 ? 21 : 20, i & 4 ? 35 : 30}, size);
+                ASSERT_TRUE(pixel);
+                const glm::dvec2 at = glm::abs((*pixel - low) / (high - low) * 2.0 - 1.0);
+                reach = std::max({reach, at.x, at.y});
+            }
+            EXPECT_LE(reach, 1.0);
+            EXPECT_GT(reach, 0.9);
+            expectNear(camera.pixelOf(box.centre(), size).value(), 0.5 * (low + high), 1e-9, 0);
+        }
+    }
+    // Where next to nothing is left, all of the picture is taken.
+    OrbitCamera camera, whole;
+    camera.projection = whole.projection = GetParam();
+    camera.look(View::Front, box, size, {.left = 400, .right = 400});
+    whole.look(View::Front, box, size);
+    EXPECT_EQ(camera.position, whole.position);
+}
+
 INSTANTIATE_TEST_SUITE_P(Projections, CameraMoves,
                          testing::Values(Projection::Perspective, Projection::Orthographic),
                          [](const auto& projection) { return projection.param == Projection::Perspective ? "Perspective" : "Orthographic"; });

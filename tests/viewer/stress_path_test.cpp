@@ -55,21 +55,6 @@ TEST(StressPath, DoesWhatItsNameSays) {
     EXPECT_LT(glm::distance(jitter[0].eye, jitter[1].eye), 0.1 * glm::distance(jitter[0].eye, optionsFor("jitter").bounds.centre()));
 }
 
-TEST(StressPath, AFileOfCamerasHasStraightLinesBetween) {
-    const std::string two = R"([{"position":[0,0,5],"target":[0,0,0]},{"position":[2,0,5],"target":[2,0,0]}])";
-    const auto path = stressPathFromJson(two, "path.json", 5);
-    ASSERT_TRUE(path) << path.error().line();
-    ASSERT_EQ(path->size(), 5u);
-    for (int i = 0; i < 5; ++i) EXPECT_NEAR((*path)[i].eye.x, 0.5 * i, 1e-12);
-    EXPECT_EQ(stressPathFromJson(two, "path.json", 1)->size(), 1u);
-    for (const char* bad : {"", "{}", "[]", "[1]", "[{}]", "[", R"([{"position":[0,0,"x"],"target":[0,0,0]}])"}) {
-        const auto broken = stressPathFromJson(bad, "path.json", 5);
-        ASSERT_FALSE(broken) << bad;
-        EXPECT_EQ(broken.error().code, ErrorCode::InvalidInput);
-        EXPECT_TRUE(broken.error().line().starts_with("path.json"));
-    }
-}
-
 TEST(StressPath, FaultsAsText) {
     const Faults all = *parseFaults("error=0.1,corrupt=0.01,stall=500ms,stalls=0.5,latency=0.05s,spread=20ms,bandwidth=2M");
     EXPECT_EQ(all, (Faults{.errorRate = 0.1, .corruptRate = 0.01, .stallRate = 0.5, .stallSeconds = 0.5, .latencySeconds = 0.05,

@@ -111,6 +111,17 @@ TEST_F(ViewerTest, DrawsOnlyWhenSomethingChanged) {
     EXPECT_FALSE(turn(0.1));
 }
 
+TEST_F(ViewerTest, FitAndTheViewsKeepClearOfWhatTheHostCovers) {
+    openViewer();
+    viewer_->setCovered({.right = 120, .bottom = 20});
+    for (const ViewerAction action : {ViewerAction::Fit, ViewerAction::ViewTop}) {
+        viewer_->act(action);
+        const glm::dvec2 middle = pixelOf(viewer_->bounds().centre());
+        EXPECT_NEAR(middle.x, 100, 1e-9);
+        EXPECT_NEAR(middle.y, 110, 1e-9);
+    }
+}
+
 TEST_F(ViewerTest, LooksAreSwitchedAndSwitchedBack) {
     openViewer();
     settle();

@@ -123,13 +123,25 @@ waits_for "no picture is saved" is_saved
 [ "$(convert front.png -crop 640x400+0+0 +repage shown.png; convert picture-1.png -crop 640x400+0+0 +repage saved.png
     compare -metric AE -fuzz 2% shown.png saved.png null: 2>&1 || true)" -lt 100 ] || fail "what is saved is not what was shown"
 differs front noted
+# A turntable is saved between frames of the window; Esc ends it and keeps what is finished, whole.
+key ctrl+t
+has_begun() { [ -s turntable-1/picture-0002.png ]; }
+waits_for "no turntable is saved" has_begun
+key Escape
+is_ended() { kill -0 $viewer && local first=$(ls turntable-1 | wc -l) && sleep 1 && [ "$(ls turntable-1 | wc -l)" = "$first" ]; }
+waits_for "Esc does not end the turntable" is_ended
+[ "$(ls turntable-1 | wc -l)" -lt 120 ] || fail "the turntable was not ended"
+ls turntable-1 | grep -v '^picture-0[0-9]*\.png$' && fail "something half-written is left of the turntable"
+[ "$(identify -format '%w ' turntable-1/*.png | tr ' ' '\n' | sort -u | grep -c .)" = 1 ] || fail "pictures of the turntable cannot be read"
+[ "$(convert picture-1.png turntable-1/picture-0001.png -metric AE -compare -format '%[distortion]' info:)" = 0 ] || fail "the turntable does not begin with the view as it was"
+shot noted
 key x
-# The section's handle is in the middle of the window; Esc puts the plane back, and the window stays.
+# The section's handle is in the middle of what the status line leaves; Esc puts the plane back, and the window stays.
 waits_for "no section" is_other noted section
-xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 320 190
+xdotool mousemove --window $window 320 230 mousedown 1 mousemove --window $window 320 180
 waits_for "the section does not move" is_other section moved
 key Escape
-xdotool mousemove --window $window 320 240
+xdotool mousemove --window $window 320 230
 waits_for "Esc does not put the section back" is_same section unmoved
 xdotool mouseup 1 mousemove --window $window 320 240
 key x d

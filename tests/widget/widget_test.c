@@ -18,7 +18,7 @@
 
 enum { WIDTH = 96, HEIGHT = 64, PIXELS = WIDTH * HEIGHT };
 
-static char ply[4096], tree[4096];
+static char ply[4096], tree[4096], scene[4096];
 
 static void check_ok(vcp_status status, const char* call, int line) {
     if (status == VCP_OK) return;
@@ -401,6 +401,153 @@ static void sharing(void) {
     OK(vcp_context_destroy(context));
 }
 
+static void write_scene(const char* text) {
+    FILE* file = fopen(scene, "w");
+    CHECK(file && fputs(text, file) >= 0 && fclose(file) == 0);
+}
+
+static void look_from(vcp_view* view, double x) {
+    vcp_camera camera = VCP_INIT(vcp_camera);
+    camera.position[0] = camera.target[0] = x;
+    camera.position[2] = 5;
+    OK(vcp_view_set_camera(view, &camera));
+}
+
+/* Two balls: one where it lies, one half as large, 3 to the right of it. */
+static void open_two(vcp_context* context) {
+    vcp_placed two[2] = {VCP_INIT(vcp_placed), VCP_INIT(vcp_placed)};
+    two[0].path = two[1].path = tree;
+    two[1].world_from_dataset[0] = two[1].world_from_dataset[5] = two[1].world_from_dataset[10] = 0.5;
+    two[1].world_from_dataset[3] = 3;
+    two[1].world_from_dataset[15] = 1;
+    OK(vcp_context_open_placed(context, two, 2, NULL));
+}
+
+static void placed(void) {
+    build_ball(0);
+    vcp_context* context = make_context(NULL);
+    vcp_view* view = make_view(context);
+    OK(vcp_context_open(context, tree, NULL));
+    vcp_dataset_info one = VCP_INIT(vcp_dataset_info), info = VCP_INIT(vcp_dataset_info);
+    OK(vcp_context_dataset(context, &one));
+    CHECK(one.datasets == 1);
+    open_two(context);
+    OK(vcp_context_dataset(context, &info));
+    CHECK(info.datasets == 2 && info.triangles == 2 * one.triangles && info.levels == one.levels && info.certified_error == one.certified_error);
+    CHECK(fabs(info.cell - 0.5 * one.cell) < 1e-12);
+    CHECK(fabs(info.bounds_min[0] - one.bounds_min[0]) < 1e-12 && fabs(info.bounds_max[0] - 3 - 0.5 * one.bounds_max[0]) < 1e-12);
+    /* All of both is in the picture. */
+    OK(vcp_view_settle(view, 60));
+    static float depth[PIXELS];
+    static uint8_t rgba[4 * PIXELS];
+    read_frame(view, rgba, depth);
+    CHECK(isfinite(depth[PIXELS / 2 + WIDTH / 4]) && isfinite(depth[PIXELS / 2 + WIDTH * 8 / 10]) && isinf(depth[0]));
+    vcp_pick pick = VCP_INIT(vcp_pick);
+    for (uint32_t i = 0; i < 2; ++i) {
+        look_from(view, 3.0 * i);
+        OK(vcp_view_pick(view, WIDTH / 2, HEIGHT / 2, &pick));
+        CHECK(pick.hit && pick.dataset == i && fabs(pick.position[0] - 3.0 * i) < 0.01 && fabs(pick.position[2] - (i ? 0.5 : 1)) < 0.01);
+        CHECK(fabs(pick.error - (i ? 0.5 : 1) * one.certified_error) < 1e-12 && fabs(pick.distance - (i ? 4.5 : 4)) < 0.01);
+    }
+
+    /* Wrong ones change nothing. */
+    vcp_placed wrong[2] = {VCP_INIT(vcp_placed), VCP_INIT(vcp_placed)};
+    wrong[0].path = wrong[1].path = tree;
+    CHECK(vcp_context_open_placed(context, NULL, 1, NULL) == VCP_USAGE && vcp_context_open_placed(NULL, wrong, 2, NULL) == VCP_USAGE);
+    CHECK(vcp_context_open_placed(context, wrong, 0, NULL) == VCP_USAGE && vcp_context_open_placed(context, wrong, 257, NULL) == VCP_USAGE);
+    for (int i = 0; i < 16; ++i) wrong[1].world_from_dataset[i] = i % 5 ? 0 : 1;
+    wrong[1].world_from_dataset[0] = -1;
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE && strstr(vcp_context_last_error(context), "dataset 1") && strstr(vcp_context_last_error(context), "mirrors"));
+    wrong[1].world_from_dataset[0] = NAN;
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE);
+    wrong[1].world_from_dataset[0] = 1;
+    wrong[1].world_from_dataset[3] = 1e13;
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE);
+    wrong[1].world_from_dataset[3] = 0;
+    wrong[1].struct_size = 8;
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE);
+    wrong[1].struct_size = sizeof(wrong[1]);
+    wrong[1].path = NULL;
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE);
+    wrong[1].path = "/nowhere/at.vcp";
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_IO && strstr(vcp_context_last_error(context), "/nowhere/at.vcp"));
+    OK(vcp_context_dataset(context, &info));
+    CHECK(info.datasets == 2);
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(context));
+}
+
+/* A scene file shows what the same datasets, camera, light and section set by calls show. */
+static void scenes(void) {
+    build_ball(0);
+    static char text[12288];
+    const char* name = strrchr(tree, '/') + 1;
+    snprintf(text, sizeof(text),
+             "{\"datasets\": [{\"file\": \"%s\"}, {\"file\": \"%s\", \"transform\": [[0.5, 0, 0, 3], [0, 0.5, 0, 0], [0, 0, 0.5, 0], [0, 0, 0, 1]]}], \"lights\": [{\"direction\": [0, 1, 0]}],"
+             "\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0]}, \"sections\": [{\"normal\": [1, 0, 0], \"offset\": 0.1}]}",
+             name, name);
+    write_scene(text);
+    vcp_context* context = make_context(NULL);
+    vcp_view* view = make_view(context);
+    OK(vcp_context_open(context, scene, NULL));
+    vcp_view* later = make_view(context);
+    vcp_look look = VCP_INIT(vcp_look), plain = VCP_INIT(vcp_look);
+    OK(vcp_view_get_look(later, &look));
+    CHECK(look.section_count == 1 && look.sections[0][3] == 0.1 && look.light_in_world && look.light[1] > 0.999f);
+    static uint8_t a[4 * PIXELS], b[4 * PIXELS];
+    static float depth[PIXELS];
+    OK(vcp_view_settle(view, 60));
+    OK(vcp_view_settle(later, 60));
+    read_frame(view, a, depth);
+    CHECK(isinf(depth[PIXELS / 2 + WIDTH / 2 - 4]) && isfinite(depth[PIXELS / 2 + WIDTH / 2 + 8]));
+    read_frame(later, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) == 0);
+
+    vcp_context* by_calls = make_context(NULL);
+    vcp_view* other = make_view(by_calls);
+    open_two(by_calls);
+    OK(vcp_view_get_look(other, &plain));
+    OK(vcp_view_set_look(other, &look));
+    look_from(other, 0);
+    OK(vcp_view_settle(other, 60));
+    read_frame(other, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) == 0);
+    OK(vcp_view_destroy(other));
+    OK(vcp_context_destroy(by_calls));
+
+    /* What was wrong leaves what is open. */
+    write_scene("{\n\"datasets\": [{\"flie\": 1}]}");
+    CHECK(vcp_context_open(context, scene, NULL) == VCP_INVALID_INPUT && strstr(vcp_context_last_error(context), "line 2"));
+    write_scene("{\"datasets\": [{\"file\": \"none.vcp\"}]}");
+    CHECK(vcp_context_open(context, scene, NULL) == VCP_IO && strstr(vcp_context_last_error(context), "none.vcp"));
+    snprintf(text, sizeof(text), "{\"datasets\": [{\"file\": \"%s\"}]}", strrchr(ply, '/') + 1);
+    write_scene(text);
+    CHECK(vcp_context_open(context, scene, NULL) == VCP_INVALID_INPUT);
+    write_scene("{\"mesostructure\": [{\"asset\": \"bumps\"}]}");
+    CHECK(vcp_context_open(context, scene, NULL) != VCP_OK);
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) == 0);
+
+    /* A surface without a dataset. */
+    write_scene("{\"mesostructure\": [{\"asset\": \"hemispheres\", \"tiles\": 2}]}");
+    OK(vcp_context_open(context, scene, NULL));
+    vcp_dataset_info info = VCP_INIT(vcp_dataset_info);
+    OK(vcp_context_dataset(context, &info));
+    CHECK(info.datasets == 0 && info.bounds_max[0] > 0.9);
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, b, depth);
+    CHECK(isfinite(depth[PIXELS / 2 + WIDTH / 2]));
+
+    /* What comes next is lit and cut as it would be without. */
+    OK(vcp_context_open(context, tree, NULL));
+    OK(vcp_view_get_look(view, &look));
+    CHECK(memcmp(&look, &plain, sizeof(look)) == 0);
+    OK(vcp_view_destroy(view));
+    OK(vcp_view_destroy(later));
+    OK(vcp_context_destroy(context));
+}
+
 /* Made and destroyed again and again: VCP_TEST_CYCLES times. */
 static void cycles(void) {
     build_ball(0);
@@ -469,10 +616,11 @@ int main(int argc, char** argv) {
     static const struct {
         const char* name;
         void (*run)(void);
-    } cases[] = {{"picture", picture}, {"input", input}, {"callbacks", callbacks}, {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"cycles", cycles}, {"threads", threads}};
+    } cases[] = {{"picture", picture}, {"input", input}, {"callbacks", callbacks}, {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"placed", placed}, {"scenes", scenes}, {"cycles", cycles}, {"threads", threads}};
     if (argc != 3) return 2;
     snprintf(ply, sizeof(ply), "%s/ball-%s.ply", argv[2], argv[1]);
     snprintf(tree, sizeof(tree), "%s/ball-%s.vcp", argv[2], argv[1]);
+    snprintf(scene, sizeof(scene), "%s/scene-%s.json", argv[2], argv[1]);
     /* Kept to the end, so that the driver stays loaded and leak checkers know its name. */
     static vcp_context* probe = NULL;
     if (vcp_context_create(NULL, &probe) != VCP_OK) return 77;

@@ -2,6 +2,8 @@
 #include "viewer/widget/window_surface.h"
 
 #include <cmath>
+#include <limits>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -43,37 +45,94 @@ Result<std::unique_ptr<vcp_context>> createContext(const vcp_context_options& gi
     return made;
 }
 
-Result<void> openFor(vcp_context& context, const char* path, const vcp_open_options* given) {
+Result<SourceAccess> accessFor(const vcp_open_options* given) {
     const auto options = taken(given);
     if (!options) return options.error();
-    if (!path || *path == '\0') return wrong("there is no path to open");
     SourceAccess access{textOf(options->ca_file), textOf(options->cache_folder)};
     if (options->cache_bytes > 0) access.cacheBytes = options->cache_bytes;
-    auto open = openDataset(path, access);
+    return access;
+}
+
+Result<void> openFor(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
+    const auto access = accessFor(options);
+    if (!access) return access.error();
+    auto open = openScene(std::move(file), name, [&](const std::string& each) { return openDataset(each, *access); });
     if (!open) return open.error();
     context.finest.reset();
     context.open.reset();
-    VCP_TRY(context.renderer->open(open->dataset, open->source));
+    VCP_TRY(context.renderer->open(open->placed(), open->surfaces.surfaces));
     context.open = *std::move(open);
-    context.name = std::filesystem::path(path).filename().string();
-    context.finest = std::make_unique<FinestPick>(context.open->reader, *context.open->dataset);
-    context.log(VCP_LOG_INFO, fmt::format("{}: {} triangles in {} levels", path, context.open->dataset->header.triangles, context.open->dataset->header.levels));
+    context.name = std::filesystem::path(name).filename().string();
+    context.finest = std::make_unique<ScenePick>();
+    for (const OpenedScene::Part& part : context.open->parts) {
+        context.finest->add(part.open.reader, *part.open.dataset, part.placement);
+        const FileHeader& header = part.open.dataset->header;
+        context.log(VCP_LOG_INFO, fmt::format("{}: {} triangles in {} levels", part.open.reader->name(), header.triangles, header.levels));
+    }
+    for (const std::string& warning : context.open->surfaces.warnings) context.log(VCP_LOG_WARNING, warning);
     for (vcp_view* view : context.views) {
-        view->showDataset();
+        view->showScene();
         view->redrawIsNeeded();
     }
     return {};
 }
 
-vcp_dataset_info infoOf(const Dataset& dataset) {
-    const FileHeader& header = dataset.header;
+Result<void> openPath(vcp_context& context, const char* path, const vcp_open_options* options) {
+    if (!path || *path == '\0') return wrong("there is no path to open");
+    SceneFile file;
+    if (!isSceneName(path)) {
+        file.datasets.push_back({path, {}});
+        return openFor(context, std::move(file), path, options);
+    }
+    auto read = readScene(path);
+    if (!read) return read.error();
+    return openFor(context, *std::move(read), path, options);
+}
+
+Result<SceneDataset> placedFrom(const vcp_placed& given, uint32_t number) {
+    const std::string who = fmt::format("dataset {}", number);
+    if (!given.path || *given.path == '\0') return Error{.code = ErrorCode::Usage, .message = "has no path", .element = who};
+    SceneDataset dataset{given.path, {}};
+    const std::span<const double, 16> rows(given.world_from_dataset);
+    if (std::all_of(rows.begin(), rows.end(), [](double x) { return x == 0; })) return dataset;
+    const auto placement = scenePlacement(rows);
+    if (!placement) return Error{.code = ErrorCode::Usage, .message = "its matrix " + placement.error().message, .file = given.path, .element = who};
+    dataset.placement = *placement;
+    return dataset;
+}
+
+Result<void> openPlaced(vcp_context& context, const vcp_placed* datasets, uint32_t count, const vcp_open_options* options) {
+    if (count < 1 || count > kMostSceneDatasets) return wrong(fmt::format("a scene has 1 to {} datasets", kMostSceneDatasets));
+    const auto stride = structSize(datasets);
+    if (!stride) return stride.error();
+    SceneFile file;
+    for (uint32_t i = 0; i < count; ++i) {
+        // The host's structs may be longer than ours.
+        const void* at = reinterpret_cast<const char*>(datasets) + size_t{*stride} * i;
+        if (const auto size = structSize(at); !size || *size != *stride) return wrong("struct_size is not the same in all of an array");
+        vcp_placed each{};
+        VCP_TRY(takeStruct(at, &each, sizeof(each)));
+        auto dataset = placedFrom(each, i);
+        if (!dataset) return dataset.error();
+        file.datasets.push_back(*std::move(dataset));
+    }
+    const std::string name = file.datasets.front().file;
+    return openFor(context, std::move(file), name, options);
+}
+
+vcp_dataset_info infoOf(const OpenedScene& open) {
     vcp_dataset_info info{};
-    info.levels = header.levels;
-    info.triangles = header.triangles;
-    std::copy_n(header.boundsMin, 3, info.bounds_min);
-    std::copy_n(header.boundsMax, 3, info.bounds_max);
-    info.cell = header.cell;
-    info.certified_error = header.certifiedErrorMax;
+    info.datasets = static_cast<uint32_t>(open.parts.size());
+    info.cell = open.parts.empty() ? 0 : std::numeric_limits<double>::infinity();
+    for (const OpenedScene::Part& part : open.parts) {
+        const FileHeader& header = part.open.dataset->header;
+        info.levels = std::max(info.levels, header.levels);
+        info.triangles += header.triangles;
+        info.cell = std::min(info.cell, header.cell * part.placement.scale);
+        info.certified_error = std::max(info.certified_error, header.certifiedErrorMax * part.placement.scale);
+    }
+    const Box box = open.bounds();
+    for (int i = 0; i < 3; ++i) info.bounds_min[i] = box.low[i], info.bounds_max[i] = box.high[i];
     return info;
 }
 
@@ -115,13 +174,17 @@ vcp_status vcp_context_destroy(vcp_context* context) {
 const char* vcp_context_last_error(const vcp_context* context) { return context ? context->lastError.c_str() : "there is no context"; }
 
 vcp_status vcp_context_open(vcp_context* context, const char* path, const vcp_open_options* options) {
-    return inTurn(context, [&] { return openFor(*context, path, options); });
+    return inTurn(context, [&] { return openPath(*context, path, options); });
+}
+
+vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count, const vcp_open_options* options) {
+    return inTurn(context, [&] { return openPlaced(*context, datasets, count, options); });
 }
 
 vcp_status vcp_context_dataset(vcp_context* context, vcp_dataset_info* info) {
     return inTurn(context, [&]() -> vcp::Result<void> {
         if (!context->open) return wrong("nothing is open");
-        return give(info, infoOf(*context->open->dataset));
+        return give(info, infoOf(*context->open));
     });
 }
 

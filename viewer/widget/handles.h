@@ -16,7 +16,7 @@
 #include <glm/vec2.hpp>
 
 #include "viewer/finest_pick.h"
-#include "viewer/open_dataset.h"
+#include "viewer/opened_scene.h"
 #include "viewer/viewer.h"
 #include "viewer/widget/vcp.h"
 
@@ -29,9 +29,9 @@ struct vcp_context {
     uint64_t gpuBytes = 0, ramBytes = 0;
     std::unique_ptr<vcp::Renderer> renderer;  // of a view that nobody looks at; all others are added to it
     std::vector<vcp_view*> views;
-    std::optional<vcp::OpenDataset> open;
+    std::optional<vcp::OpenedScene> open;
     std::string name;
-    std::unique_ptr<vcp::FinestPick> finest;
+    std::unique_ptr<vcp::ScenePick> finest;
 
     [[nodiscard]] double now() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
     void log(vcp_log_level level, const std::string& text) const {
@@ -47,13 +47,14 @@ struct vcp_view {
     vcp::UpAxis up = vcp::UpAxis::Y;
     bool isUpdated = false;   // since it was made
     bool wasSettled = false;
+    bool hasSceneLight = false, hasSceneSections = false;  // of the scene file that is open
     uint32_t losses = 0;
     vcp::NextStep next;       // of the last update, less what was drawn since
     glm::dvec2 cursor{0};
     glm::dvec3 fly{0};
 
-    /// It shows the context's dataset.
-    void showDataset();
+    /// It shows what the context has open.
+    void showScene();
     void redrawIsNeeded() {
         if (context->callbacks.needs_redraw) context->callbacks.needs_redraw(context->callbacks.user, this);
     }

@@ -5,6 +5,8 @@
 #include <pybind11/stl.h>
 
 #include <cstring>
+#include <optional>
+#include <variant>
 
 #include "viewer/widget/vcp.hpp"
 
@@ -55,7 +57,7 @@ py::object pickOf(View& view, double x, double y) {
         p = view.pick(x, y);
     }
     if (p.hit == 0) return py::none();
-    return py::dict("position"_a = triple(p.position), "normal"_a = triple(p.normal), "distance"_a = p.distance, "error"_a = p.error, "level"_a = p.level);
+    return py::dict("position"_a = triple(p.position), "normal"_a = triple(p.normal), "distance"_a = p.distance, "error"_a = p.error, "level"_a = p.level, "dataset"_a = p.dataset);
 }
 
 /// (height, width, 4) of uint8, and (height, width) of float32.
@@ -101,13 +103,22 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
                     "certified_error"_a = report.certified_error, "seconds"_a = report.seconds);
 }
 
+/// One path, or several with a matrix of 16 numbers each, row by row, or none.
+using Paths = std::variant<std::string, std::vector<std::pair<std::string, std::optional<std::array<double, 16>>>>>;
+
 /// A view that keeps its context.
-std::unique_ptr<View> openView(const std::string& path, uint32_t width, uint32_t height, uint64_t gpuBytes, const std::string& device, bool zIsUp) {
+std::unique_ptr<View> openView(const Paths& paths, uint32_t width, uint32_t height, uint64_t gpuBytes, const std::string& device, bool zIsUp) {
     vcp_context_options options = sized<vcp_context_options>();
     options.gpu_bytes = gpuBytes;
     options.device = device.c_str();
     Context context(options);
-    context.open(path);
+    if (const auto* path = std::get_if<std::string>(&paths)) {
+        context.open(*path);
+    } else {
+        std::vector<Placed> placed;
+        for (const auto& [each, matrix] : std::get<1>(paths)) placed.push_back({each, matrix.value_or(std::array<double, 16>{})});
+        context.open(placed);
+    }
     vcp_view_options how = sized<vcp_view_options>();
     how.width = width;
     how.height = height;
@@ -119,7 +130,7 @@ py::dict datasetOf(const View& view) {
     using namespace py::literals;
     const vcp_dataset_info info = view.context().dataset();
     return py::dict("triangles"_a = info.triangles, "levels"_a = info.levels, "bounds_min"_a = triple(info.bounds_min), "bounds_max"_a = triple(info.bounds_max),
-                    "cell"_a = info.cell, "certified_error"_a = info.certified_error);
+                    "cell"_a = info.cell, "certified_error"_a = info.certified_error, "datasets"_a = info.datasets);
 }
 
 }  // namespace
@@ -132,7 +143,8 @@ PYBIND11_MODULE(vcp, module) {
     module.def("build", buildWith, "inputs"_a, "output"_a, "cell"_a = 0.0, "error"_a = 0.0, "memory_bytes"_a = 0, "threads"_a = 0, "progress"_a = py::none(),
                "Meshes to one .vcp file. progress(stage, fraction) returns False to cancel.");
     module.def("open", openView, "path"_a, "width"_a = 1280, "height"_a = 720, "gpu_bytes"_a = 0, "device"_a = "", "z_is_up"_a = false,
-               py::call_guard<py::gil_scoped_release>(), "A view of a .vcp file, or of its http(s) address.");
+               py::call_guard<py::gil_scoped_release>(), "A view of a .vcp file or its http(s) address, of a scene file (.json), or of several: [(path, matrix), ...], the "
+               "matrix 16 numbers row by row, or None.");
     py::class_<View>(module, "View")
         .def("resize", &View::resize, "width"_a, "height"_a)
         .def("settle", &View::settle, "seconds"_a = 60.0, py::call_guard<py::gil_scoped_release>(), "Loads and draws all that the view wants; False where the time was over.")

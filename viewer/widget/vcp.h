@@ -1,7 +1,7 @@
 /* vcp.h: the viewer of .vcp files as a part of your own program, in C.
  *
- *   vcp_context   a device, its budgets and one dataset; as many as you like, independent of each other
- *   vcp_view      a picture of the context's dataset: in a window of yours, in your memory or in your Vulkan image;
+ *   vcp_context   a device, its budgets and a dataset, or several in their places; as many as you like, independent of each other
+ *   vcp_view      a picture of what the context has open: in a window of yours, in your memory or in your Vulkan image;
  *                 the views of a context share its device, its budgets and what is read
  *
  *   vcp_context_create(&options, &context);          vcp_context_open(context, "statue.vcp", NULL);
@@ -26,7 +26,8 @@
  * different threads at once. vcp_build and vcp_version need no context and may be called from any thread. Callbacks come from
  * within a call of yours, in its thread, and must not throw. There is no global state.
  *
- * Texts are UTF-8. Pixels have their origin at the upper left, y down. Lengths are in the dataset's own unit. */
+ * Texts are UTF-8. Pixels have their origin at the upper left, y down. Lengths are in the dataset's own unit; of several
+ * datasets, in that of the world that they are placed in. */
 #ifndef VCP_H
 #define VCP_H
 
@@ -128,8 +129,26 @@ typedef struct vcp_open_options {
 } vcp_open_options;
 
 /* Opens a .vcp file, or its http:// or https:// address, and shows all of it in all views, in place of what was open. A
- * mesh is built first: vcp_build. When it fails nothing is open, or what was open before. */
+ * mesh is built first: vcp_build. When it fails nothing is open, or what was open before.
+ *
+ * A path that ends in .json is a scene file (docs/scenes.md): all its datasets and surfaces are shown where it places them, and its camera,
+ * light, section planes and caps, where it has any, go to all views, those that are made later too. What is opened next takes a scene's
+ * light and planes away again. */
 VCP_API vcp_status vcp_context_open(vcp_context* context, const char* path, const vcp_open_options* options);
+
+/* A dataset in its place. */
+typedef struct vcp_placed {
+    uint32_t struct_size;      /* the same in all of an array */
+    uint32_t reserved;
+    const char* path;          /* a .vcp file, or its address */
+    double world_from_dataset[16]; /* a matrix, row by row, for columns (x, y, z, 1): turns, moves, and scales all axes by one number; all zero: where
+                                * it lies by itself */
+} vcp_placed;
+
+/* Opens `count` datasets, 1 to 256, and shows them together, as vcp_context_open does one. Each gets a share of the budgets and at
+ * least one loader thread. VCP_USAGE where a matrix mirrors, shears, stretches one axis more than another, moves by more than 1e12 or
+ * scales by more than 1e9 or less than 1e-9. */
+VCP_API vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count, const vcp_open_options* options);
 
 typedef struct vcp_dataset_info {
     uint32_t struct_size;
@@ -138,9 +157,12 @@ typedef struct vcp_dataset_info {
     double bounds_min[3], bounds_max[3];
     double cell;            /* edge of the finest cells */
     double certified_error; /* of the finest level: at most so far from the mesh */
+    uint32_t datasets;      /* so many are open */
+    uint32_t reserved;
 } vcp_dataset_info;
 
-/* VCP_USAGE where nothing is open. */
+/* Of all that is open together, in the world: most levels, all triangles, the box about all, the smallest cell, the largest
+ * error. VCP_USAGE where nothing is open. */
 VCP_API vcp_status vcp_context_dataset(vcp_context* context, vcp_dataset_info* info);
 
 typedef struct vcp_device_info {
@@ -227,7 +249,7 @@ VCP_API vcp_status vcp_view_act(vcp_view* view, vcp_action action);
  * shading, G fly with W A S D E Q, ...). Others do nothing. */
 VCP_API vcp_status vcp_view_key(vcp_view* view, uint32_t key, uint32_t pressed);
 
-/* position, target and up in the dataset's coordinates. */
+/* position, target and up in the dataset's coordinates; of several, in the world's. */
 typedef struct vcp_camera {
     uint32_t struct_size;
     uint32_t orthographic; /* 1: parallel rays; the height shown is that at the target */
@@ -327,7 +349,7 @@ typedef struct vcp_pick {
     double distance;  /* from the eye's ray's origin */
     double error;     /* certified: the mesh is at most so far from `position`'s surface */
     uint32_t level;   /* of the page that was asked: the finest there is */
-    uint32_t reserved;
+    uint32_t dataset; /* number of the dataset that was hit, in the order in which they were placed */
 } vcp_pick;
 
 /* What is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads from the file

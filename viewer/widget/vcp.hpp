@@ -2,6 +2,7 @@
 // of type vcp::widget::Error; callbacks are std::function. What calls mean, and in which threads, says vcp.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -46,6 +47,12 @@ struct Callbacks {
     std::function<void(vcp_view*)> needsRedraw, settled;
 };
 
+/// A dataset in its place: a .vcp file or its address, and a matrix row by row (vcp_placed); all zero: where it lies by itself.
+struct Placed {
+    std::string path;
+    std::array<double, 16> worldFromDataset{};
+};
+
 /// A picture: RGBA, and the distance of each pixel.
 struct Frame {
     uint32_t width = 0, height = 0;
@@ -73,6 +80,16 @@ public:
     }
 
     void open(const std::string& path, const vcp_open_options* options = nullptr) { check(vcp_context_open(handle(), path.c_str(), options)); }
+    /// Several together, each in its place.
+    void open(const std::vector<Placed>& datasets, const vcp_open_options* options = nullptr) {
+        std::vector<vcp_placed> placed;
+        for (const Placed& dataset : datasets) {
+            placed.push_back(sized<vcp_placed>());
+            placed.back().path = dataset.path.c_str();
+            std::copy(dataset.worldFromDataset.begin(), dataset.worldFromDataset.end(), placed.back().world_from_dataset);
+        }
+        check(vcp_context_open_placed(handle(), placed.data(), static_cast<uint32_t>(placed.size()), options));
+    }
     [[nodiscard]] vcp_dataset_info dataset() const { return got(vcp_context_dataset); }
     [[nodiscard]] vcp_device_info device() const { return got(vcp_context_device); }
     /// 0: as it is.

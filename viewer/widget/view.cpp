@@ -39,7 +39,7 @@ Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_vie
     made->up = given.z_is_up != 0 ? UpAxis::Z : UpAxis::Y;
     made->viewer = Viewer::on(*std::move(renderer), options);
     made->viewer->resize({given.width, given.height});
-    if (context.open) made->showDataset();
+    if (context.open) made->showScene();
     context.views.push_back(made.get());
     return made;
 }
@@ -145,6 +145,7 @@ Result<void> pick(vcp_view& view, double x, double y, vcp_pick* out) {
             picked.distance = (*hit)->t;
             picked.error = (*hit)->certifiedError;
             picked.level = (*hit)->level;
+            picked.dataset = static_cast<uint32_t>((*hit)->dataset);
         }
     }
     return give(out, picked);
@@ -335,12 +336,25 @@ static_assert(VCP_RIGHT == static_cast<int>(MouseButton::Right) && VCP_MIDDLE ==
 
 using namespace vcp::widget;
 
-void vcp_view::showDataset() {
+void vcp_view::showScene() {
+    const vcp::OpenedScene& scene = *context->open;
     const glm::ivec2 size = viewer->size();
     vcp::OrbitCamera camera;
     camera.up = up;
-    camera.look(vcp::View::Fit, context->open->bounds(), size.x > 0 && size.y > 0 ? size : kUsualSize);
-    viewer->show({{context->open->dataset, nullptr, {}}}, {}, camera, context->name);
+    camera.look(vcp::View::Fit, scene.bounds(), size.x > 0 && size.y > 0 ? size : kUsualSize);
+    viewer->show(scene.placed(), scene.surfaces, scene.file.camera.value_or(camera), context->name);
+    // What lit and cut one scene does not light and cut the next.
+    if (std::exchange(hasSceneLight, scene.file.light.has_value()) || hasSceneLight) {
+        vcp::Shading shading = viewer->shading();
+        const vcp::SceneLight light = scene.file.light.value_or(vcp::SceneLight{true, vcp::Shading{}.lightDirection});
+        shading.lightFollowsCamera = light.followsCamera;
+        shading.lightDirection = light.direction;
+        viewer->setShading(shading);
+    }
+    if (std::exchange(hasSceneSections, !scene.file.sections.empty()) || hasSceneSections) {
+        viewer->setSections(scene.file.sections);
+        viewer->setSectionCaps(scene.file.sectionCaps);
+    }
     wasSettled = false;
     fly = glm::dvec3(0);
 }

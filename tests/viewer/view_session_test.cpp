@@ -1,0 +1,202 @@
+// What the window of vcp view does, without the window: saving pictures between its frames.
+#include "viewer/view_session.h"
+
+#include <chrono>
+#include <functional>
+#include <set>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "builder/build.h"
+#include "render/picture.h"
+#include "test_folder.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr PictureChoice kSmall{.size = {64, 48}};
+constexpr PictureChoice kTwoTiles{.size = {600, 32}};
+
+class ViewSessionTest : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        folder_ = std::make_unique<TestFolder>("vcp_view_session_test");
+        writeBall(*folder_ / "ball.ply", 60, 120);
+        BuildOptions options;
+        options.inputs = {*folder_ / "ball.ply"};
+        options.output = *folder_ / "ball.vcp";
+        const auto report = buildOctree(options);
+        ASSERT_TRUE(report) << report.error().line();
+    }
+    static void TearDownTestSuite() { folder_.reset(); }
+
+    /// A working folder of the test's own, and the ball in a session.
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+        before_ = fs::current_path();
+        fs::create_directory(*folder_ / "work");
+        fs::current_path(*folder_ / "work");
+        SessionOptions options;
+        options.render.budget = "64M";
+        auto session = ViewSession::create(options, {});
+        ASSERT_TRUE(session) << session.error().line();
+        session_ = *std::move(session);
+        session_->viewer().resize({96, 64});
+        session_->open({(*folder_ / "ball.vcp").string()});
+        ASSERT_TRUE(turnUntil([&] { return session_->viewer().dataset() && session_->viewer().status().update.settled; }));
+    }
+    void TearDown() override {
+        session_.reset();
+        if (!before_.empty()) fs::current_path(before_);
+        fs::remove_all(*folder_ / "work");
+    }
+
+    /// One turn of the window's loop.
+    void turn() {
+        const auto next = session_->update(now_ += 0.02);
+        ASSERT_TRUE(next) << next.error().line();
+        if (next->draw) {
+            ASSERT_TRUE(session_->viewer().draw());
+        }
+        if (next->waitSeconds > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    bool turnUntil(const std::function<bool()>& isDone) {
+        for (int i = 0; i < 10000 && !HasFatalFailure(); ++i) {
+            if (isDone()) return true;
+            turn();
+        }
+        return false;
+    }
+    bool isSaved() {
+        return turnUntil([&] { return !session_->saving(); }) && session_->problem().empty();
+    }
+    /// Goes elsewhere at once.
+    void orbit(double yaw) {
+        OrbitCamera camera = session_->viewer().camera();
+        camera.orbit(session_->viewer().bounds().centre(), yaw, 0.2);
+        session_->viewer().setCamera(camera);
+    }
+
+    static std::set<std::string> filesIn(const fs::path& path) {
+        std::set<std::string> names;
+        for (const fs::directory_entry& each : fs::directory_iterator(path)) names.insert(each.path().filename().string());
+        return names;
+    }
+    static Picture picture(const fs::path& path) { return readPng(path).value(); }
+
+    static std::unique_ptr<TestFolder> folder_;
+    fs::path before_;
+    std::unique_ptr<ViewSession> session_;
+    double now_ = 0;
+};
+std::unique_ptr<TestFolder> ViewSessionTest::folder_;
+
+TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(isSaved());
+    session_->saveTurntable(kSmall, 3);
+    ASSERT_TRUE(session_->saving());
+    EXPECT_EQ(session_->saving()->name, "turntable-1");
+    EXPECT_EQ(session_->saving()->pictures, 3u);
+    session_->saveTurntable(kSmall, 3);
+    // The window goes on, and what it shows by now is not what is saved.
+    orbit(1);
+    session_->viewer().act(ViewerAction::NextShading);
+    const uint64_t drawn = session_->viewer().framesDrawn();
+    ASSERT_TRUE(isSaved());
+    EXPECT_GT(session_->viewer().framesDrawn(), drawn);
+    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"picture-0001.png", "picture-0002.png", "picture-0003.png"}));
+    EXPECT_EQ(picture("turntable-1/picture-0001.png"), picture("picture-1.png")) << "it begins with the view as it was";
+    EXPECT_NE(picture("turntable-1/picture-0002.png"), picture("turntable-1/picture-0001.png"));
+    EXPECT_NE(picture("turntable-1/picture-0003.png"), picture("turntable-1/picture-0002.png"));
+    EXPECT_FALSE(fs::exists("turntable-2")) << "one at a time";
+    session_->saveTurntable(kSmall, 2);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("turntable-2").size(), 2u);
+    EXPECT_NE(session_->note().find("turntable-2"), std::string::npos) << session_->note();
+}
+
+TEST_F(ViewSessionTest, APathGoesThroughTheBookmarks) {
+    session_->keepBookmark(4);
+    session_->savePath(kSmall, 3);
+    EXPECT_FALSE(session_->saving());
+    EXPECT_NE(session_->note().find("bookmarks"), std::string::npos) << session_->note();
+    orbit(0.8);
+    session_->keepBookmark(2);
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(isSaved());
+    orbit(2);
+    session_->savePath(kSmall, 3);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("path-1").size(), 3u);
+    EXPECT_EQ(picture("path-1/picture-0001.png"), picture("picture-1.png")) << "from the bookmark with the lower number";
+    EXPECT_NE(picture("path-1/picture-0002.png"), picture("path-1/picture-0001.png"));
+    EXPECT_NE(picture("path-1/picture-0003.png"), picture("path-1/picture-0002.png"));
+}
+
+TEST_F(ViewSessionTest, DepthAndTransparencyAreChosen) {
+    session_->savePicture({.size = {64, 48}, .transparent = true, .depth = true});
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("."), (std::set<std::string>{"picture-1.png", "picture-1-depth.pfm"}));
+    EXPECT_EQ(picture("picture-1.png").rgba[3], 0);
+    EXPECT_EQ(contentOf("picture-1-depth.pfm").size(), std::string("Pf\n64 48\n-1.0\n").size() + 4 * 64 * 48);
+    fs::remove("picture-1.png");
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(picture("picture-2.png").rgba[3], 255) << "what belongs to the depth that is left has another number";
+    session_->saveTurntable({.size = {64, 48}, .depth = true}, 2);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"depth-0001.pfm", "depth-0002.pfm", "picture-0001.png", "picture-0002.png"}));
+}
+
+TEST_F(ViewSessionTest, WhatIsCancelledLeavesWhatIsFinished) {
+    session_->saveTurntable(kTwoTiles, 5);
+    ASSERT_TRUE(turnUntil([&] { return !session_->saving() || fs::exists("turntable-1/picture-0003.png.partial"); }));
+    ASSERT_TRUE(session_->saving());
+    EXPECT_EQ(session_->saving()->finished, 2u);
+    EXPECT_GT(session_->saving()->fraction, 0.4);
+    EXPECT_LT(session_->saving()->fraction, 0.6);
+    session_->cancelSaving();
+    EXPECT_FALSE(session_->saving());
+    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"picture-0001.png", "picture-0002.png"}));
+    EXPECT_NE(session_->note().find("2 of 5"), std::string::npos) << session_->note();
+
+    session_->saveTurntable(kTwoTiles, 5);
+    ASSERT_TRUE(turnUntil([&] { return fs::exists("turntable-2/picture-0001.png.partial"); }));
+    session_->cancelSaving();
+    EXPECT_FALSE(fs::exists("turntable-2")) << "an empty folder is of no use";
+
+    session_->savePicture(kTwoTiles);
+    ASSERT_TRUE(turnUntil([&] { return fs::exists("picture-1.png.partial"); }));
+    session_.reset();
+    EXPECT_EQ(filesIn("."), (std::set<std::string>{"turntable-1"}));
+}
+
+TEST_F(ViewSessionTest, WhatIsOpenedNextCancels) {
+    session_->saveTurntable(kTwoTiles, 100);
+    session_->open({(*folder_ / "ball.vcp").string()});
+    ASSERT_TRUE(turnUntil([&] { return !session_->opening(); }));
+    EXPECT_FALSE(session_->saving());
+    turn();
+    EXPECT_EQ(session_->problem(), "");
+}
+
+TEST_F(ViewSessionTest, AFolderThatIsGoneIsSaid) {
+    fs::create_directory("gone");
+    fs::current_path("gone");
+    fs::remove(*folder_ / "work" / "gone");
+    session_->saveTurntable(kSmall, 3);
+    EXPECT_FALSE(session_->saving());
+    EXPECT_NE(session_->problem().find("turntable-1"), std::string::npos) << session_->problem();
+    session_->dismissProblem();
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(turnUntil([&] { return !session_->saving(); }));
+    EXPECT_NE(session_->problem().find("picture-1.png"), std::string::npos) << session_->problem();
+    fs::current_path(*folder_ / "work");
+}
+
+}  // namespace
+}  // namespace vcp
