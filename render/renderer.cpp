@@ -315,13 +315,19 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
 
 Result<void> Renderer::Shared::uploadSurfaces() {
     if (!meso) return {};
-    auto made = MesoResources::create(*device);
-    if (!made) return made.error();
-    auto clock = PassTimer::create(*device, 2);
-    if (!clock) return clock.error();
-    meso->resources = *std::move(made), meso->timer = *std::move(clock);
-    meso->pass = std::make_unique<MesoSurfacePass>(*device, *meso->resources);
-    return meso->pass->setSurfaces(meso->surfaces);
+    const auto upload = [&]() -> Result<void> {
+        if (meso->pass) return meso->pass->setSurfaces(meso->surfaces);
+        auto made = MesoResources::create(*device);
+        if (!made) return made.error();
+        auto clock = PassTimer::create(*device, 2);
+        if (!clock) return clock.error();
+        meso->resources = *std::move(made), meso->timer = *std::move(clock);
+        meso->pass = std::make_unique<MesoSurfacePass>(*device, *meso->resources);
+        return meso->pass->setSurfaces(meso->surfaces);
+    };
+    const auto done = upload();
+    if (!done) meso.reset();
+    return done;
 }
 
 Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
@@ -330,13 +336,13 @@ Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     std::unique_ptr<Shared::Meso>& meso = s.shared->meso;
     for (State* view : s.shared->views) view->mesoTarget = {}, view->drawn.reset();
     ++s.shared->mesoVersion;
-    Result<void> done;
-    if (!surfaces.empty()) {
+    if (surfaces.empty()) {
+        meso.reset();
+    } else {
         if (!meso) meso = std::make_unique<Shared::Meso>();
         meso->surfaces.assign(surfaces.begin(), surfaces.end());
-        done = meso->pass ? meso->pass->setSurfaces(meso->surfaces) : s.shared->uploadSurfaces();
     }
-    if (surfaces.empty() || !done) meso.reset();
+    const auto done = s.shared->uploadSurfaces();
     for (State* view : s.shared->views) VCP_TRY(view->makeLayers());
     return done;
 }

@@ -193,13 +193,13 @@ Result<void> Renderer::State::drawSurfaces(const FrameRequest& request, FrameSta
         meso.timer.mark(commands, 1);
     }));
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    const auto counters = readWords(*device, mesoTarget.counters, 0, 2);
+    const auto counters = readWords(*device, mesoTarget.counters, 0, 3);
     if (!counters) return counters.error();
     const auto ms = meso.timer.read();
     if (!ms) return ms.error();
     stats.msFrame += took.count();
     stats.msSurfaces = ms->front();
-    stats.unresolvedRays = (*counters)[0], stats.hitPixels = (*counters)[1];
+    stats.unresolvedRays = (*counters)[0], stats.hitPixels = (*counters)[2];
     stats.pipelines += meso.resources->pipelinesMade();
     stats.surfaceBytes = meso.pass->assetBytes();
     return {};

@@ -59,7 +59,7 @@ struct Renderer::Shared {
     std::vector<State*> views;
     ViewNumber nextNumber = 0;
 
-    /// From the copies of the surfaces to the device.
+    /// From the copies of the surfaces to the device. On an error there are none.
     Result<void> uploadSurfaces();
 };
 

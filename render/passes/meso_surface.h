@@ -32,10 +32,10 @@ struct MesoSurface {
 double shadowLift(const MesoArrays& arrays, double tileEdge);
 
 enum class MesoShading : uint32_t {
-    Lit = frame::kMesoLit,
-    Heat = frame::kMesoHeat,  ///< iterations of each pixel's ray, blue to red: 0 to 100
-    Normals = frame::kMesoNormals,
-    Unlit = frame::kMesoUnlit,
+    Lit = frame::kMesoShowLit,
+    Heat = frame::kMesoShowHeat,  ///< iterations of each pixel's ray, blue to red: 0 to 100
+    Normals = frame::kMesoShowNormals,
+    Unlit = frame::kMesoShowUnlit,
 };
 
 struct MesoLook {

@@ -17,9 +17,9 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(pixel, view.picture.xy))) return;
     uint index = pixel.y * view.picture.x + pixel.x, plane = view.picture.x * view.picture.y;
-    if (uintBitsToFloat(hits[index]) < kFarthest) atomicAdd(counters[1], 1u);
+    if (uintBitsToFloat(hits[index]) < kFarthest) atomicAdd(counters[2], 1u);
     uint shown = uint(view.up.w);
-    if (shown == kMesoHeat) {
+    if (shown == kMesoShowHeat) {
         uint iterations = hits[3u * plane + index];
         if (iterations > 0u) picturePixels[index] = packUnorm4x8(vec4(heat(min(float(iterations) / kMesoMostIterations, 1.0)), 1.0));
         return;
@@ -30,6 +30,6 @@ void main() {
     vec4 colour = unpackUnorm4x8(hits[2u * plane + index]);
     float sun = max(dot(n, view.light.xyz), 0.0) * colour.w, sky = 0.5 + 0.5 * dot(n, view.up.xyz);
     vec3 lit = colour.xyz * pow(0.72 * sun + 0.10 + 0.18 * sky, 1.0 / 2.2);
-    vec3 result = shown == kMesoNormals ? n * 0.5 + 0.5 : shown == kMesoUnlit ? colour.xyz : lit;
+    vec3 result = shown == kMesoShowNormals ? n * 0.5 + 0.5 : shown == kMesoShowUnlit ? colour.xyz : lit;
     picturePixels[index] = packUnorm4x8(vec4(result, 1.0));
 }

@@ -28,7 +28,7 @@ struct MesoRecord {
 };
 
 // What pictures show.
-const uint kMesoLit = 0u, kMesoHeat = 1u, kMesoNormals = 2u, kMesoUnlit = 3u;
+const uint kMesoShowLit = 0u, kMesoShowHeat = 1u, kMesoShowNormals = 2u, kMesoShowUnlit = 3u;
 
 // A picture of one surface, in the space of its shell. Hits of a pixel: the depth along the unit ray, the packed
 // normal (hit_records.glsl), colour and light, iterations.
