@@ -137,7 +137,7 @@ TEST_F(MesoCommands, SaysWhatIsWrong) {
         std::string arguments;
         int status;
         std::string says;
-    } cases[] = {{"meso build " + path("empty.png"), 1, "empty"},       {"meso build " + path("text.png"), 1, "not a PNG"},
+    } cases[] = {{"meso build " + path("empty.png"), 1, "empty"},       {"meso build " + path("text.png"), 1, "neither a PNG"},
                  {"meso build " + path("cut.png"), 1, "damaged"},       {"meso build " + path("a.exr"), 1, "EXR"},
                  {"meso build " + path("none.png"), 1, "none.png"},     {"meso build nothing", 2, "no procedural one"},
                  {"meso build fbm --texels 60 --grid 7", 2, "divide"},  {"meso build beads --cones 0x1", 2, "--cones"},
