@@ -178,9 +178,9 @@ Result<MesoFrameStats> MesoRenderer::render(const MesoRequest& request) {
             s.surfaces->record(commands, request.look, request.behind != nullptr ? &depths : nullptr);
         });
         if (!ms) return ms.error();
-        const auto counters = readWords(*s.device, s.surfaces->counters(), 0, 1);
+        const auto counters = readWords(*s.device, s.surfaces->counters(), 0, 2);
         if (!counters) return counters.error();
-        stats.msFrame = *ms, stats.unresolved = counters->front();
+        stats.msFrame = *ms, stats.unresolved = (*counters)[0], stats.farHits = (*counters)[1];
     }
     s.size = size;
     s.empty = std::move(under);

@@ -36,6 +36,7 @@ struct MesoRequest {
 struct MesoFrameStats {
     double msFrame = 0;        ///< of the queue, where it has timestamps, else of the call
     uint64_t unresolved = 0;   ///< rays that used up their iterations in some piece
+    uint64_t farHits = 0;      ///< of pixels and surfaces, that were not marched for (MesoLook::errorPixels)
     uint32_t pipelines = 0;    ///< made since create()
     uint64_t assetBytes = 0;   ///< of assets and shells on the device
 };

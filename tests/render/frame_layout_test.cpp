@@ -58,7 +58,8 @@ TEST(FrameLayout, Mesostructure) {
     EXPECT_EQ(offsets.at("MesoRecord"), words({offsetof(MesoRecord, extent), offsetof(MesoRecord, cell), offsetof(MesoRecord, cells), offsetof(MesoRecord, fine), offsetof(MesoRecord, ratio),
                                                offsetof(MesoRecord, cones), offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale), offsetof(MesoRecord, levels)}));
     EXPECT_EQ(offsets.at("MesoView"), words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward), offsetof(MesoView, forwardX),
-                                             offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up)}));
+                                             offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up),
+                                             offsetof(MesoView, colours), offsetof(MesoView, normals), offsetof(MesoView, far)}));
 }
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }
