@@ -1,4 +1,4 @@
-// make_scan: writes a procedural scan of any size as a binary PLY file, to a file or a pipe.
+// make_scan: writes a procedural scan of any size as a binary PLY file, or a dog as an OBJ, to a file or a pipe.
 #include <cerrno>
 #include <charconv>
 #include <csignal>
@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "datasets_scripts/dog.h"
 #include "datasets_scripts/scan_mesh.h"
 
 namespace {
@@ -24,8 +25,10 @@ constexpr std::string_view kHelp =
     "make_scan: writes a procedural statue as a binary PLY file, as a scanner might have left it:\n"
     "carved, noisy, with thin parts, slivers, an open border, holes and overlapping passes.\n"
     "\n"
-    "usage: make_scan [--triangles N] [--seed S] [--colour] [--utm] [--parts] -o FILE|-\n"
+    "usage: make_scan [--shape statue|dog] [--triangles N] [--seed S] [--colour] [--utm] [--parts] -o FILE|-\n"
     "\n"
+    "  --shape dog    a dog as an OBJ with texture coordinates, to lay mesostructure on: about N triangles, 10k to 200k,\n"
+    "                 always the same one\n"
     "  --triangles N  exactly so many triangles, 10k to 1G (500k)\n"
     "  --seed S       another pose, other folds, other stone (1); the same seed gives the same bytes\n"
     "  --colour       vertex colours\n"
@@ -39,7 +42,7 @@ constexpr std::string_view kHelp =
 struct Arguments {
     ScanOptions scan;
     std::string out;
-    bool help = false, parts = false;
+    bool help = false, parts = false, isDog = false, isStatueOnly = false;  ///< isStatueOnly: an option of the statue was given
 };
 
 Result<uint64_t> number(std::string_view option, std::string_view text, uint64_t least, uint64_t most) {
@@ -59,8 +62,9 @@ Result<Arguments> parse(int argc, char** argv) {
     Arguments arguments;
     for (int i = 1; i < argc; ++i) {
         const std::string_view option = argv[i];
-        const bool takesValue = option == "--triangles" || option == "--seed" || option == "-o";
+        const bool takesValue = option == "--shape" || option == "--triangles" || option == "--seed" || option == "-o";
         if (takesValue && i + 1 == argc) return Error{ErrorCode::Usage, std::string(option) + " wants a value"};
+        arguments.isStatueOnly = arguments.isStatueOnly || option == "--seed" || option == "--colour" || option == "--utm" || option == "--parts";
         if (option == "--help" || option == "-h")
             arguments.help = true;
         else if (option == "--colour")
@@ -71,6 +75,11 @@ Result<Arguments> parse(int argc, char** argv) {
             arguments.parts = true;
         else if (option == "-o")
             arguments.out = argv[++i];
+        else if (option == "--shape") {
+            const std::string_view shape = argv[++i];
+            if (shape != "statue" && shape != "dog") return Error{ErrorCode::Usage, "--shape is statue or dog, not '" + std::string(shape) + "'"};
+            arguments.isDog = shape == "dog";
+        }
         else if (option == "--triangles") {
             const auto value = number(option, argv[++i], kMinTriangles, kMaxTriangles);
             if (!value) return value.error();
@@ -84,6 +93,9 @@ Result<Arguments> parse(int argc, char** argv) {
     }
     if (!arguments.help && arguments.out.empty())
         return Error{ErrorCode::Usage, "-o FILE is missing (or -o - for a pipe)"};
+    if (arguments.isDog && arguments.isStatueOnly) return Error{ErrorCode::Usage, "--seed, --colour, --utm and --parts are of the statue"};
+    if (arguments.isDog && arguments.scan.triangles > kMostDogTriangles)
+        return Error{ErrorCode::Usage, "a dog has at most " + std::to_string(kMostDogTriangles) + " triangles"};
     return arguments;
 }
 
@@ -147,12 +159,17 @@ void printParts(const ScanMesh& mesh) {
                      static_cast<unsigned long long>(grid.triangles));
 }
 
-Result<void> run(const Arguments& arguments) {
+Result<void> writeStatue(const Arguments& arguments, const Output& output) {
     const ScanMesh mesh(arguments.scan);
     if (arguments.parts) printParts(mesh);
+    return mesh.writePly([&](std::span<const std::byte> bytes) { return output.write(bytes); });
+}
+
+Result<void> run(const Arguments& arguments) {
     auto output = Output::open(arguments.out);
     if (!output) return output.error();
-    auto result = mesh.writePly([&](std::span<const std::byte> bytes) { return output->write(bytes); });
+    auto result = arguments.isDog ? writeObj(dog(arguments.scan.triangles), [&](std::string_view text) { return output->write(std::as_bytes(std::span(text))); })
+                                  : writeStatue(arguments, *output);
     if (result) result = output->finish();
     if (!result) output->discard();
     return result;

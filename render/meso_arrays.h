@@ -24,7 +24,7 @@ using uvec4 = glm::uvec4;
 #include "render/shared/meso_layout.h"
 
 static_assert(sizeof(MesoRecord) == 144 + 16 * (kMesoMaxLevels + kMesoMostBorders) && offsetof(MesoRecord, levels) == 144);
-static_assert(sizeof(MesoView) == 160 && offsetof(MesoView, picture) == 96);
+static_assert(sizeof(MesoView) == 208 && offsetof(MesoView, picture) == 96);
 
 }  // namespace frame
 

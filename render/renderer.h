@@ -218,6 +218,7 @@ struct FrameStats {
     uint32_t pipelines = 0;     ///< made since create()
     double msSurfaces = 0;      ///< of surfaces with mesostructure; GPU timestamps
     uint64_t unresolvedRays = 0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
+    uint64_t farHits = 0;       ///< of pixels and surfaces, shown by what they are from far and not marched
     uint64_t surfaceBytes = 0;  ///< of mesostructure on the device, beside the pool: assets and shells
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
@@ -293,7 +294,8 @@ public:
 
     /// Surfaces with mesostructure, in all views, in place of those before: drawn over the datasets that are open, the
     /// nearer is seen at each pixel. They take light, shadows, normals, unlit colours and steps (their iterations, 0 to 100) from the request;
-    /// they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be uploaded again to a device that
+    /// what strays less than the request's errorPixels from its mean height
+    /// is shown by its light from far; they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be uploaded again to a device that
     /// is made anew. Without any, nothing is made for them. On an error there are none. Errors: Device, Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
 

@@ -44,7 +44,7 @@ MesoShading mesoShading(ShadingMode mode) {
 MesoLook mesoLook(const FrameRequest& request) {
     const PictureTile tile = wholePicture(request);
     const LightDirections directions = lightDirections(request, cameraBasis(request.camera, tile.fullWidth, tile.fullHeight));
-    return {request.camera, tile, directions.light, directions.sky, request.shading.shadows, mesoShading(request.shading.mode)};
+    return {request.camera, tile, directions.light, directions.sky, request.shading.shadows, mesoShading(request.shading.mode), request.errorPixels};
 }
 
 }  // namespace
@@ -199,7 +199,7 @@ Result<void> Renderer::State::drawSurfaces(const FrameRequest& request, FrameSta
     if (!ms) return ms.error();
     stats.msFrame += took.count();
     stats.msSurfaces = ms->front();
-    stats.unresolvedRays = (*counters)[0], stats.hitPixels = (*counters)[2];
+    stats.unresolvedRays = (*counters)[0], stats.farHits = (*counters)[1], stats.hitPixels = (*counters)[2];
     stats.pipelines += meso.resources->pipelinesMade();
     stats.surfaceBytes = meso.pass->assetBytes();
     return {};

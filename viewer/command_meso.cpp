@@ -190,11 +190,11 @@ RunCommand addMesoBuild(CLI::App& meso) {
     auto command = std::make_shared<BuildMeso>();
     CLI::App* app = meso.add_subcommand("build", "Make an asset from a height map, a mesh, or a procedural one");
     app->add_option("SOURCE", command->source,
-                    fmt::format("A PNG of heights, a closed mesh, or one of {}; {}", fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")))
+                    fmt::format("A PNG or EXR of heights, a closed mesh, or one of {}; {}", fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")))
         ->type_name("")
         ->required();
     app->add_option("-o,--output", command->out, "The asset to write")->type_name("FILE")->required();
-    app->add_option("--height", command->height, "Height of white, in tile edges [0.1, or the procedural one's own]")->type_name("H")->check(CLI::Range(1e-4, 16.0));
+    app->add_option("--height", command->height, "Height of a PNG's white, of an EXR's greatest value over its least, in tile edges [0.1, or the procedural one's own]")->type_name("H")->check(CLI::Range(1e-4, 16.0));
     app->add_option("--texels", command->texels, "Texels an edge of a procedural height field")->type_name("N")->capture_default_str()->check(CLI::Range(8, kMaxGridEdge));
     app->add_option("--seed", command->seed, "Of procedural ones")->type_name("N")->capture_default_str();
     app->add_option("--grid", command->grid, "Cells: 64 along x, or 64x64x16")->type_name("N")->capture_default_str();

@@ -27,11 +27,12 @@ namespace {
 constexpr double kFov = 0.6;
 
 struct RenderMeso {
-    std::vector<std::string> assets, surfaces, colours, places, methods{"boxes"};
+    std::vector<std::string> assets, surfaces, colours, textures, normalTextures, places, methods{"boxes"};
     std::vector<double> tiles, heights, scales;
     MesoSurfaceDescription description;
     std::string out, size = "960x640", view = "30,35", camera, light, up = "z", scan, device, depth, cones = "4x1";
     bool shadows = false, heat = false, noBase = false, validation = false;
+    double errorPixels = 0.5;
     int frames = 0;
     ReportOptions report;
 };
@@ -91,6 +92,11 @@ Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
     if (glm::clamp(*rgb, 0.0, 1.0) != *rgb) return wrong("--colour must be three numbers from 0 to 1, not \"" + *colour + "\"");
     const auto cones = parseSize(c.cones);
     if (!cones || cones->x > 32 || cones->y > 16) return wrong("--cones must be whole numbers from 1x1 to 32x16, like 4x2, not \"" + c.cones + "\"");
+    const auto texture = valueOf(c.textures, i, count, std::string(), "--texture"), normals = valueOf(c.normalTextures, i, count, std::string(), "--normal-texture");
+    for (const auto* value : {&texture, &normals})
+        if (!*value) return value->error();
+    d.withFar = c.errorPixels > 0;
+    d.colourTexture = *texture, d.normalTexture = *normals;
     d.asset = c.assets[i], d.base = *surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale, d.place = *at, d.colour = glm::vec3(*rgb), d.up = upOf(c);
     d.method.cones = {cones->x, cones->y};
     return d;
@@ -185,7 +191,7 @@ Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const R
     if (!problems.empty()) return Error{.code = ErrorCode::Device, .message = problems.front()};
     const double mean = std::accumulate(iterations->begin(), iterations->end(), 0.0) / double(iterations->size());
     return Panel{*std::move(picture),
-                 {{"method", method}, {"ms_per_frame", stats->msFrame}, {"hit_pixels", stats->hitPixels}, {"iterations_mean", mean}, {"unresolved", stats->unresolvedRays}, {"asset_bytes", stats->surfaceBytes}},
+                 {{"method", method}, {"ms_per_frame", stats->msFrame}, {"hit_pixels", stats->hitPixels}, {"iterations_mean", mean}, {"unresolved", stats->unresolvedRays}, {"far_hits", stats->farHits}, {"asset_bytes", stats->surfaceBytes}},
                  fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame, mean, stats->unresolvedRays, formatBytes(stats->surfaceBytes))};
 }
 
@@ -198,6 +204,7 @@ Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
     if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
     FrameRequest request;
     request.camera = *camera;
+    if (command.errorPixels > 0) request.errorPixels = command.errorPixels;  // without, surfaces have no look from far
     request.width = uint32_t(size->x), request.height = uint32_t(size->y);
     request.shading.mode = command.heat ? ShadingMode::Steps : ShadingMode::Lit;
     request.shading.lightFollowsCamera = false, request.shading.lightDirection = glm::vec3(*light);
@@ -283,6 +290,10 @@ RunCommand addMesoRender(CLI::App& meso) {
     app->add_option("--tiles", command->tiles, "Tile edges along the surface, or a unit of a mesh's coordinates; for all assets, or each [4]")->type_name("N")->allow_extra_args(false);
     app->add_option("--height", command->heights, "Times the asset's own height; for all assets, or each [1]")->type_name("X")->allow_extra_args(false);
     app->add_option("--colour", command->colours, "Red, green, blue up to 1, as the screen has them; for all assets, or each")->type_name("R,G,B")->allow_extra_args(false);
+    app->add_option("--texture", command->textures, "A picture (PNG, JPEG) over the tile, in place of --colour; for all assets, or each")->type_name("FILE")->allow_extra_args(false);
+    app->add_option("--normal-texture", command->normalTextures, "A picture of normals over the tile (OpenGL: green is up) that bends those of the asset; for all assets, or each")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
     app->add_option("--size", command->size, "Pixels")->type_name("WxH")->capture_default_str();
     app->add_option("--view", command->view, "Azimuth and elevation of the eye in degrees, magnification")->type_name("A,E,M")->capture_default_str();
     app->add_option("--camera", command->camera, "fit, front, ..., isometric, or a camera file, in place of --view")->type_name("CAMERA");
@@ -290,6 +301,10 @@ RunCommand addMesoRender(CLI::App& meso) {
     app->add_option("--depth", command->depth, "Distances along the rays, as `vcp render --depth`")->type_name("FILE");
     app->add_option("--frames", command->frames, "Draw so many more frames and report their median")->type_name("N")->check(CLI::Range(0, 10000));
     app->add_option("--device", command->device, "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")->type_name("DEVICE");
+    app->add_option("--error-pixels", command->errorPixels, "Mesostructure that strays less than that from its mean height, with tiles of at most eight times that, is not marched; 0: all is")
+        ->type_name("X")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 64.0));
     app->add_flag("--shadows", command->shadows, "A shadow ray from each hit");
     app->add_flag("--heat", command->heat, "Iterations of each pixel's ray, blue to red: 0 to 100");
     app->add_flag("--no-base", command->noBase, "The base itself is not drawn");

@@ -127,6 +127,7 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"traced_rays", stats.tracedRays},
             {"hit_pixels", stats.hitPixels},
             {"unresolved_rays", stats.unresolvedRays},
+            {"far_hits", stats.farHits},
             {"surface_bytes", stats.surfaceBytes},
             {"device", device.name},
             {"software", device.software},

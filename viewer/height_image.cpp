@@ -1,7 +1,9 @@
 #include "viewer/height_image.h"
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -10,6 +12,7 @@
 #include <png.h>
 
 #include "octree/durable_file.h"
+#include "viewer/exr_picture.h"
 
 namespace vcp {
 
@@ -53,7 +56,41 @@ bool readRows(PngReader& reader, png_bytepp rows) {
     return true;
 }
 
+constexpr size_t kMostExrBytes = size_t{1} << 29;
+
+Result<std::vector<std::byte>> wholeFile(std::FILE* file) {
+    std::vector<std::byte> bytes;
+    while (true) {
+        const size_t had = bytes.size();
+        bytes.resize(std::max<size_t>(2 * had, 1 << 16));
+        const size_t got = std::fread(bytes.data() + had, 1, bytes.size() - had, file);
+        bytes.resize(had + got);
+        if (std::ferror(file)) return Error{.code = ErrorCode::Io, .message = "cannot be read"};
+        if (bytes.size() > kMostExrBytes) return Error{.code = ErrorCode::Limit, .message = "is larger than 512 MiB"};
+        if (got == 0) return bytes;
+    }
+}
+
+Result<meso::HeightMap> exrHeights(std::FILE* file, double range) {
+    const auto bytes = wholeFile(file);
+    if (!bytes) return bytes.error();
+    const auto picture = decodeExr(*bytes, meso::kMaxGridEdge);
+    if (!picture) return picture.error();
+    return heightsOf(*picture, range);
+}
+
 }  // namespace
+
+meso::HeightMap heightsOf(const FloatPicture& picture, double range) {
+    const auto [least, most] = std::ranges::minmax(picture.values);
+    const double step = most > least ? 65535 / (double(most) - least) : 0;
+    meso::HeightMap map{picture.size, range, {}};
+    map.texels.reserve(picture.values.size());
+    for (int y = picture.size.y; y-- > 0;)
+        for (int x = 0; x < picture.size.x; ++x)
+            map.texels.push_back(uint16_t(std::lround((double(picture.values[size_t(y) * size_t(picture.size.x) + size_t(x)]) - least) * step)));
+    return map;
+}
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {
     const auto fail = [&](ErrorCode code, std::string message) { return Error{.code = code, .message = std::move(message), .file = path.string()}; };
@@ -61,10 +98,15 @@ Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, doubl
     if (!file) return systemError(path, "cannot open", errno);
     png_byte signature[8] = {};
     const size_t got = std::fread(signature, 1, 8, file.get());
-    if (got >= 4 && signature[0] == 0x76 && signature[1] == 0x2f && signature[2] == 0x31 && signature[3] == 0x01)
-        return fail(ErrorCode::Unsupported, "is an EXR picture, which is not read; save it as a PNG of 16 bits");
-    if (got < 8 || png_sig_cmp(signature, 0, 8) != 0) return fail(ErrorCode::InvalidInput, got == 0 ? "the file is empty" : "is not a PNG picture");
     std::rewind(file.get());
+    if (isExr(std::as_bytes(std::span(signature, got)))) {
+        auto map = exrHeights(file.get(), range);
+        if (map) return map;
+        Error error = map.error();
+        error.file = path.string();
+        return error;
+    }
+    if (got < 8 || png_sig_cmp(signature, 0, 8) != 0) return fail(ErrorCode::InvalidInput, got == 0 ? "the file is empty" : "is neither a PNG nor an EXR picture");
 
     PngReader reader;
     reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader.failure, failed, warned);

@@ -1,11 +1,14 @@
 #include "viewer/meso_scene.h"
 
 #include <algorithm>
+#include <map>
+#include <memory>
 
 #include <fmt/format.h>
 
 #include "mesostructure/solids.h"
 #include "viewer/base_mesh.h"
+#include "viewer/tile_texture.h"
 
 namespace vcp {
 
@@ -25,6 +28,12 @@ Result<std::shared_ptr<const MesoArrays>> arraysOf(const Asset& asset, const Met
     return std::make_shared<const MesoArrays>(*std::move(arrays));
 }
 
+Result<std::shared_ptr<const Appearance>> farOf(const Asset& asset, double heightScale) {
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    return std::make_shared<const Appearance>(appearanceOf(**shape, heightScale));
+}
+
 bool isFile(const MesoSurfaceDescription& d) {
     const auto names = baseSurfaceNames();
     return std::ranges::find(names, d.base) == names.end() && d.base.find('.') != std::string::npos;
@@ -36,6 +45,28 @@ Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
     for (glm::dvec3& p : base->positions) p = d.place + d.scale * (isFile(d) ? p : turnedUp(p, d.up));
     return base;
 }
+
+using Texture = std::shared_ptr<const MesoTexture>;
+
+/// Pictures that several surfaces name are read once.
+class Textures {
+public:
+    Result<Texture> colours(const std::string& file) { return read(file, colours_, readColourTexture); }
+    Result<Texture> normals(const std::string& file) { return read(file, normals_, readNormalTexture); }
+
+private:
+    using Known = std::map<std::string, Texture>;
+    template <class Read>
+    static Result<Texture> read(const std::string& file, Known& known, Read readTexture) {
+        if (file.empty()) return Texture();
+        Texture& texture = known[file];
+        if (texture) return texture;
+        auto made = readTexture(file);
+        if (!made) return made.error();
+        return texture = std::make_shared<const MesoTexture>(*std::move(made));
+    }
+    Known colours_, normals_;
+};
 
 void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::string>& warnings) {
     const auto say = [&](uint64_t count, const char* what) {
@@ -72,6 +103,8 @@ Result<Asset> openMesoAsset(const std::string& name) {
 
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
     MesoScene scene;
+    Textures textures;
+    std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
     for (const MesoSurfaceDescription& d : descriptions) {
         const auto asset = openMesoAsset(d.asset);
         if (!asset) return asset.error();
@@ -93,7 +126,20 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         warn(d, *shell, scene.warnings);
         scene.bounds = scene.bounds.joined({shell->low, shell->high});
         MesoSurface surface;
+        auto colours = textures.colours(d.colourTexture), normals = textures.normals(d.normalTexture);
+        for (const auto* texture : {&colours, &normals})
+            if (!*texture) return texture->error();
+        surface.colours = *std::move(colours), surface.normals = *std::move(normals);
         surface.lift = shadowLift(**arrays, edge);
+        if (d.withFar) {
+            auto& far = appearances[{d.asset, d.heightScale}];
+            if (!far) {
+                auto made = farOf(*asset, d.heightScale);
+                if (!made) return made.error();
+                far = *std::move(made);
+            }
+            surface.far = far;
+        }
         surface.arrays = *std::move(arrays), surface.shell = *std::move(shell), surface.colour = d.colour, surface.withBase = d.withBase;
         scene.surfaces.push_back(std::move(surface));
     }

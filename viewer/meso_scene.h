@@ -25,7 +25,9 @@ struct MesoSurfaceDescription {
     double scale = 1;            ///< of the base, mesh files too
     UpAxis up = UpAxis::Z;       ///< which way the base's z points; mesh files stay as they are
     glm::vec3 colour{0.8f};      ///< encoded
+    std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/tile_texture.h); empty: none
     bool withBase = true;
+    bool withFar = true;         ///< far away it is not marched (MesoLook::errorPixels)
 };
 
 /// A direction or place in a world where z is up, in one where y may be.

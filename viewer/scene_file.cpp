@@ -213,7 +213,7 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "method", "base"});
+        onlyKeys(json, at, {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "texture", "normal_texture", "method", "base"});
         if (!json.contains("asset")) wrong(at, "\"asset\" is missing");
         else made.asset = named(json["asset"], at + "/asset", [](const std::string& name) { return name.ends_with(".meso"); });
         // A base that is none by name is a mesh.
@@ -226,6 +226,9 @@ private:
         if (json.contains("scale")) made.scale = scale(json["scale"], at + "/scale");
         if (json.contains("up")) made.up = upAxis(json["up"], at + "/up");
         if (json.contains("colour")) made.colour = colour(json["colour"], at + "/colour");
+        const auto isPicture = [](const std::string&) { return true; };
+        if (json.contains("texture")) made.colourTexture = named(json["texture"], at + "/texture", isPicture);
+        if (json.contains("normal_texture")) made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
         if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
         return made;

@@ -24,6 +24,11 @@ draw grazing beads --tiles 2 --shadows --light=0.3,-1,0.25 --size 360x180 --view
 
 "$build/vcp" render "$images/../scenes/beads_gallery.json" -o "$images/scene_beads.png" --size 480x240 --shadows --progress none
 
+# Beads on a dog of 40 000 triangles.
+"$build/make_scan" --shape dog --triangles 40k -o "$scratch/dog.obj"
+cp "$images/../scenes/beads_dog.json" "$scratch"
+"$build/vcp" render "$scratch/beads_dog.json" -o "$images/scene_dog.png" --size 480x400 --shadows --progress none
+
 # Iterations of five methods on the same rays.
 draw heat hemispheres --tiles 2 --method relief-binary,dm,ddm,ddm-quadric,boxes --heat --size 200x110 --view 30,12,1.5
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
 constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-constexpr VkDescriptorType kBindings[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage};
+constexpr VkDescriptorType kBindings[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kTexels};
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
 }  // namespace
@@ -75,17 +75,26 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     return made;
 }
 
-Result<MesoTexels> MesoResources::vectors(std::span<const glm::vec4> texels) {
-    if (texels.size() > device_.limits().maxTexelBufferElements)
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} texels of rays or of a shell; this device reads {} at most", texels.size(), device_.limits().maxTexelBufferElements)};
+Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format, const char* what) {
+    const uint64_t count = bytes.size() / texelBytes;
+    if (count > device_.limits().maxTexelBufferElements)
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} texels of {}; this device reads {} at most", count, what, device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    auto buffer = upload(std::as_bytes(texels));
+    auto buffer = upload(bytes);
     if (!buffer) return buffer.error();
     made.buffer = std::move(*buffer);
-    auto view = device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_SFLOAT, texels.size_bytes());
+    auto view = device_.createTexelView(made.buffer, format, bytes.size());
     if (!view) return view.error();
     made.view = std::move(*view);
     return made;
+}
+
+Result<MesoTexels> MesoResources::vectors(std::span<const glm::vec4> vectors) {
+    return texels(std::as_bytes(vectors), sizeof(glm::vec4), VK_FORMAT_R32G32B32A32_SFLOAT, "rays or of a shell");
+}
+
+Result<MesoTexels> MesoResources::halfs(std::span<const uint64_t> halfs) {
+    return texels(std::as_bytes(halfs), sizeof(uint64_t), VK_FORMAT_R16G16B16A16_SFLOAT, "textures");
 }
 
 Result<Buffer> MesoResources::storage(uint64_t bytes) const {
@@ -95,7 +104,7 @@ Result<Buffer> MesoResources::storage(uint64_t bytes) const {
 }
 
 Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
-    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 3}, {kStorage, 3}};
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 4}, {kStorage, 3}};
     VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool.maxSets = 1;
     pool.poolSizeCount = std::size(sizes);
@@ -109,8 +118,9 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
     allocation.pSetLayouts = &setLayout_;
     VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &owner.set);
 
-    const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE, bound.words->view.handle(), bound.words->quads.handle(), bound.input->view.handle()};
-    const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr, nullptr, nullptr, bound.hits, bound.picture, bound.counters};
+    const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE, bound.words->view.handle(), bound.words->quads.handle(), bound.input->view.handle(),
+                                                VK_NULL_HANDLE, VK_NULL_HANDLE, VK_NULL_HANDLE, (bound.look != nullptr ? bound.look : bound.input)->view.handle()};
+    const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr, nullptr, nullptr, bound.hits, bound.picture, bound.counters, nullptr};
     VkDescriptorBufferInfo infos[kBindingCount] = {};
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {

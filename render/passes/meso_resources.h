@@ -8,6 +8,7 @@
 //  4        results, or hits              rays, surface           surface, shade, readback
 //  5        picture                       copies, shade           readback
 //  6        counters                      surface                 readback
+//  7        appearance, textures          CPU (upload)            surface
 #pragma once
 
 #include <map>
@@ -62,13 +63,15 @@ public:
 
     /// Errors: Device (no memory); Limit (more texels than the device reads).
     Result<MesoTexels> words(std::span<const uint32_t> words);
-    Result<MesoTexels> vectors(std::span<const glm::vec4> texels);
+    Result<MesoTexels> vectors(std::span<const glm::vec4> vectors);
+    Result<MesoTexels> halfs(std::span<const uint64_t> halfs);  ///< four to a texel
     Result<Buffer> storage(uint64_t bytes) const;
 
     struct Bound {
         const Buffer* constants;
         const MesoTexels *words, *input;
         const Buffer *hits, *picture, *counters;
+        const MesoTexels* look = nullptr;  ///< null: the shaders read none
     };
     /// Errors: Device.
     Result<MesoSet> makeSet(const Bound& bound) const;
@@ -82,6 +85,7 @@ private:
     explicit MesoResources(Device& device) : device_(device) {}
     Result<void> createLayout();
     Result<Buffer> upload(std::span<const std::byte> bytes);
+    Result<MesoTexels> texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format, const char* what);
 
     Device& device_;
     VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;

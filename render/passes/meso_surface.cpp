@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/packing.hpp>
 
 #include "render/meso_shade_spirv.h"
 #include "render/meso_surface_spirv.h"
@@ -16,6 +18,23 @@ namespace {
 constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
 
 glm::vec4 toVec4(glm::dvec3 v, double w = 0) { return {glm::vec3(v), float(w)}; }
+
+/// What is seen from far, then the textures, one after the other.
+std::vector<uint64_t> lookOf(const MesoSurface& surface, frame::MesoView& view) {
+    std::vector<uint64_t> texels;
+    if (surface.far)
+        for (const glm::vec4& texel : surface.far->texels) texels.push_back(glm::packHalf4x16(texel));
+    const auto add = [&](const MesoTexture* texture, glm::uvec4& where) {
+        if (texture == nullptr) return;
+        where = {uint32_t(texels.size()), texture->size.x, texture->size.y, texture->levels};
+        texels.insert(texels.end(), texture->texels.begin(), texture->texels.end());
+    };
+    add(surface.colours.get(), view.colours);
+    add(surface.normals.get(), view.normals);
+    return texels;
+}
+
+static_assert(frame::kMesoFarViews == meso::Appearance::kViews && frame::kMesoFarTexels == meso::Appearance::kTexels);
 
 }  // namespace
 
@@ -30,6 +49,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
     surfaces_.clear();
     ++version_;
     std::map<const MesoArrays*, std::shared_ptr<MesoTexels>> uploaded;
+    std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, std::shared_ptr<MesoTexels>> looks;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
         Placed made;
@@ -41,6 +61,17 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
             words = std::make_shared<MesoTexels>(std::move(*texels));
         }
         made.words = words;
+        const std::vector<uint64_t> texels = lookOf(surface, made.view);
+        auto& look = looks[{surface.far.get(), surface.colours.get(), surface.normals.get()}];
+        if (!look && !texels.empty()) {
+            auto uploadedLook = resources_.halfs(texels);
+            if (!uploadedLook) return uploadedLook.error();
+            look = std::make_shared<MesoTexels>(std::move(*uploadedLook));
+        }
+        made.look = look;
+        // What rays come through must be marched.
+        made.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
+        made.view.far.y = made.isFarDrawn ? float(surface.far->height) : 0.0f;
         auto shell = resources_.vectors(surface.shell.texels);
         if (!shell) return shell.error();
         made.shell = std::move(*shell);
@@ -60,7 +91,10 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
 uint64_t MesoSurfacePass::assetBytes() const {
     std::map<const MesoTexels*, uint64_t> bytes;
     uint64_t sum = 0;
-    for (const Placed& surface : surfaces_) bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
+    for (const Placed& surface : surfaces_) {
+        bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
+        if (surface.look) bytes[surface.look.get()] = surface.look->buffer.bytes();
+    }
     for (const auto& [texels, count] : bytes) sum += count;
     return sum;
 }
@@ -75,7 +109,7 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
             *buffer = std::move(*made);
         }
         for (const Placed& surface : surfaces_) {
-            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits, &picture, &target.counters});
+            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits, &picture, &target.counters, surface.look.get()});
             if (!set) return set.error();
             target.sets.push_back(*std::move(set));
         }
@@ -84,11 +118,14 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
     for (Placed& surface : surfaces_) {
         std::vector<uint32_t> constants(surface.arrays->constants.begin(), surface.arrays->constants.end());
         constants.push_back(0);
+        constants.push_back((surface.view.colours.w > 0 ? frame::kMesoColours : 0) | (surface.view.normals.w > 0 ? frame::kMesoNormals : 0));
+        constants.push_back(surface.isFarDrawn ? 1 : 0);
         auto cast = resources_.pipeline(kMesoSurfaceSpirv, constants);
         if (!cast) return cast.error();
         surface.cast = *cast;
         if (!shadows) continue;
-        constants.back() = 1;
+        // Shadows have no textures.
+        constants[4] = 1, constants[5] = 0;
         auto shadow = resources_.pipeline(kMesoSurfaceSpirv, constants);
         if (!shadow) return shadow.error();
         surface.shadow = *shadow;
@@ -115,6 +152,7 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize si
     }
     c.view.picture.x = size.width, c.view.picture.y = size.height;
     c.view.light = toVec4(look.light, surface.view.light.w);
+    c.view.far = {float(look.errorPixels), surface.view.far.y, look.shadows ? 1.0f : 0.0f, 0.0f};
     c.view.up = toVec4(look.up, double(look.shading));
     return c;
 }

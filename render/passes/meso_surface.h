@@ -11,8 +11,10 @@
 #include <span>
 #include <vector>
 
+#include "mesostructure/appearance.h"
 #include "mesostructure/shell.h"
 #include "render/camera.h"
+#include "render/meso_texture.h"
 #include "render/passes/frame_resources.h"
 #include "render/passes/meso_resources.h"
 #include "render/renderer.h"
@@ -26,6 +28,12 @@ struct MesoSurface {
     glm::vec3 colour{0.8f};   ///< encoded, as the screen has it
     bool withBase = true;     ///< the base is drawn where rays come through to it
     double lift = 0;          ///< world units by which shadow rays start above a hit
+    /// Over the tile, at the hit's place in it; surfaces may share them. Colours are light, in place of `colour`.
+    std::shared_ptr<const MesoTexture> colours;
+    /// Unit vectors, x and y along the tile, z out of what the texture lies on, which is the mesostructure: they bend its shading
+    /// normals.
+    std::shared_ptr<const MesoTexture> normals;
+    std::shared_ptr<const meso::Appearance> far;  ///< what is seen of it from far; null: it is marched from everywhere
 };
 
 /// A good lift: some texels or a part of a cell. `tileEdge` in world units.
@@ -45,6 +53,7 @@ struct MesoLook {
     glm::dvec3 up{0, 0, 1};            ///< of the sky, unit
     bool shadows = false;
     MesoShading shading = MesoShading::Lit;
+    double errorPixels = 0.5;          ///< surfaces that stray less from their mean height are not marched (MesoSurface::far); 0: all are
 };
 
 /// What one view's pictures of the surfaces are drawn into.
@@ -69,17 +78,18 @@ public:
     void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths);
 
     [[nodiscard]] uint64_t version() const { return version_; }
-    /// Of assets and shells.
+    /// Of assets, shells and textures.
     [[nodiscard]] uint64_t assetBytes() const;
 
 private:
     struct Placed {
         std::shared_ptr<const MesoArrays> arrays;
-        std::shared_ptr<MesoTexels> words;
+        std::shared_ptr<MesoTexels> words, look;  ///< look: null without textures
         MesoTexels shell;
         Buffer constants;
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the camera
+        bool isFarDrawn = false;
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE;
     };
     MesoConstants constantsOf(const Placed& surface, PictureSize size, const MesoLook& look) const;

@@ -15,7 +15,8 @@ layout(set = 0, binding = 2) uniform utextureBuffer quadTexels;
 layout(set = 0, binding = 3) uniform textureBuffer inputTexels;  // rays, or the shell
 layout(set = 0, binding = 4, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 5, std430) buffer PictureBlock { uint picturePixels[]; };
-layout(set = 0, binding = 6, std430) buffer CounterBlock { uint counters[]; };  // unresolved rays; (1: not used yet); pixels that anything is hit in
+layout(set = 0, binding = 6, std430) buffer CounterBlock { uint counters[]; };  // unresolved rays; hits from far; pixels that anything is hit in
+layout(set = 0, binding = 7) uniform textureBuffer lookTexels;  // what is seen from far, textures
 
 uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }
 uint fetchByte(uint array, uint i) { return bitfieldExtract(fetchWord(array + (i >> 2)), int(i & 3u) * 8, 8); }

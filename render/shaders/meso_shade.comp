@@ -29,7 +29,7 @@ void main() {
     vec3 n = unpackHitNormal(code);
     vec4 colour = unpackUnorm4x8(hits[2u * plane + index]);
     float sun = max(dot(n, view.light.xyz), 0.0) * colour.w, sky = 0.5 + 0.5 * dot(n, view.up.xyz);
-    vec3 lit = colour.xyz * pow(0.72 * sun + 0.10 + 0.18 * sky, 1.0 / 2.2);
+    vec3 lit = colour.xyz * pow(kMesoSun * sun + kMesoAmbient + kMesoSky * sky, 1.0 / 2.2);
     vec3 result = shown == kMesoShowNormals ? n * 0.5 + 0.5 : shown == kMesoShowUnlit ? colour.xyz : lit;
     picturePixels[index] = packUnorm4x8(vec4(result, 1.0));
 }

@@ -6,26 +6,37 @@
 #include "render/shaders/meso_march.glsl"
 
 layout(constant_id = 4) const uint kShadow = 0u;  // 1: from the hits towards the light
+layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours, kMesoNormals
+layout(constant_id = 6) const uint kFromFar = 0u;  // 1: slabs that are less high than a part of a pixel are not marched
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
+#include "render/shaders/meso_texture.glsl"
+#include "render/shaders/meso_far.glsl"
 
 const float kNoHit = 1e30;
 // Pieces are met a little wider than they are, in weights of their corners, so that no rounding opens a gap between two; what is
-// met twice is the same surface. Ten times what single precision loses over a picture.
-const float kPieceSlack = 2e-5;
+// met twice is the same surface. By at least kPieceSlack, ten times what single precision loses over a picture of some thousand
+// pieces, and by kRounding of the products that a weight is the sum of: small pieces far from the origin lose more.
+const float kPieceSlack = 2e-5, kRounding = 4e-7;
 const uint kBaseFace = 16u;  // Shell::kBase
 // Nodes and pieces that a ray looks at, and iterations in all its pieces: then it is unresolved, with what it found. A ray along a base of
 // five million triangles, 1600 quads across, passes a tenth of that.
 const uint kMostVisits = 65536u;
+const float kLeastSlope = 1.0 / 16.0;  // of a ray to the slab: beyond, textures are not blurred further
 
 struct ShellHit {
     float t;        // along the ray; kNoHit
     vec3 normal;    // not unit
     uint iterations;
     bool unresolved;
+    int piece;      // its texel
+    bool far;       // not marched: normal and light are of the appearance
 };
+
+// World units of a pixel's width along its ray: x + y * t.
+vec2 pixelWidth;
 
 // A normal where the method gives none: of the nearest data, or of the voxel's face.
 vec3 fallbackNormal(vec3 p, vec3 d) {
@@ -65,7 +76,8 @@ bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, out Passag
     b.yzw = vec3(dot(r0, d), dot(r1, d), dot(r2, d));
     a.x = 1.0 - a.y - a.z - a.w;
     b.x = -b.y - b.z - b.w;
-    a += kPieceSlack;
+    vec3 size = abs(o) + abs(corner.xyz), lost = kRounding * vec3(dot(abs(r0), size), dot(abs(r1), size), dot(abs(r2), size));
+    a += max(vec4(lost.x + lost.y + lost.z, lost), kPieceSlack);
     // From the eye on: the piece may reach out of the box whose wall `o` is on.
     passage = Passage(at, -start, tMax - start, -1, false);
     for (int i = 0; i < 4; i++) {
@@ -87,8 +99,7 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
     uint bits = uint(corner.w);
     // The weight of the corner above, whose row of R r2 is, grows away from the base.
     if (entered == 3 && (bits & kBaseFace) != 0u && view.picture.w != 0u) {
-        best.t = start + passage.enter;
-        best.normal = -r2.xyz;
+        best = ShellHit(start + passage.enter, -r2.xyz, best.iterations, best.unresolved, at, false);
         return;
     }
     bool fromCut = entered >= 0 && (bits & (1u << uint(entered))) != 0u;
@@ -105,28 +116,28 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
         // A ray that comes from another piece was outside there, or had its hit there.
         ray.isOutside = entered >= 0;
         vec3 cut = entered == 0 ? r0.xyz + r1.xyz + r2.xyz : entered == 1 ? -r0.xyz : entered == 2 ? -r1.xyz : -r2.xyz;
-        if (fromCut && isSolidAt(ray.o)) {
-            best.t = start + passage.enter;
-            best.normal = cut;
+        bool far = kFromFar != 0u && isFar(t0, t1, t2, pixelWidth.x + pixelWidth.y * (start + passage.enter));
+        if (fromCut && (far ? ray.o.z < view.far.y : isSolidAt(ray.o))) {
+            best = ShellHit(start + passage.enter, cut, best.iterations, best.unresolved, at, false);
             return;
         }
-        MesoResult found = marchMeso(ray);
+        MesoResult found;
+        if (far) found = meetMean(ray);
+        else found = marchMeso(ray);
         best.iterations += found.iterations;
         best.unresolved = best.unresolved || found.state == kMesoUnresolved;
         float t = start + passage.enter + found.t / scale;
         if (found.state == kMesoHit && t < best.t) {
-            best.t = t;
             vec3 n = found.normal != vec3(0.0) ? found.normal : fallbackNormal(ray.o + found.t * ray.d, ray.d);
             // On a ridge, where rounding may choose the side that is turned away.
             if (ray.d.z < 0.0 && dot(n, ray.d) > 0.1 * length(n)) n = vec3(0.0, 0.0, 1.0);
-            best.normal = t0 * n.x + t1 * n.y + t2 * n.z;
-            if (fromCut && found.t == 0.0) best.normal = cut;
+            n = t0 * n.x + t1 * n.y + t2 * n.z;
+            best = ShellHit(t, fromCut && found.t == 0.0 ? cut : n, best.iterations, best.unresolved, at, far);
             return;
         }
     }
     if (passage.toBase && view.picture.w != 0u) {
-        best.t = start + passage.leave;
-        best.normal = r2.xyz;
+        best = ShellHit(start + passage.leave, r2.xyz, best.iterations, best.unresolved, at, false);
     }
 }
 
@@ -139,7 +150,7 @@ float boxEntry(uint node, vec3 o, vec3 inverse, float leave, out vec4 low, out v
 }
 
 ShellHit castShell(vec3 eye, vec3 d, float tMax) {
-    ShellHit best = ShellHit(tMax, vec3(0.0), 0u, false);
+    ShellHit best = ShellHit(tMax, vec3(0.0), 0u, false, 0, false);
     vec3 inverse = 1.0 / mix(d, vec3(1e-18), lessThan(abs(d), vec3(1e-18)));
     vec4 low, high;
     float start = boxEntry(0u, eye, inverse, tMax, low, high);
@@ -185,20 +196,41 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     return best;
 }
 
+// The colour at a hit, encoded, and the part of the light that comes; bends its normal. `width`: of a pixel there, world units.
+vec4 lookAt(ShellHit hit, vec3 p, vec3 d, float width, inout vec3 n) {
+    vec4 look = vec4(view.colour.xyz, 1.0);
+    if (kTextures == 0u && !hit.far) return look;
+    vec4 corner = texelFetch(inputTexels, hit.piece), q0 = texelFetch(inputTexels, hit.piece + 1), q1 = texelFetch(inputTexels, hit.piece + 2);
+    mat3 gradients = mat3(texelFetch(inputTexels, hit.piece + 4).xyz, texelFetch(inputTexels, hit.piece + 5).xyz, texelFetch(inputTexels, hit.piece + 6).xyz);
+    vec2 at = vec2(q0.w, q1.w) + ((p - corner.xyz) * gradients).xy;
+    // Along the slab, whatever stands on it.
+    float slope = abs(dot(normalize(gradients[2]), d)), footprint = width * max(length(gradients[0]), length(gradients[1])) / max(slope, kLeastSlope);
+    if (hit.far) {
+        look.w = farLight(tileFrame(gradients), d, n);
+    } else if ((kTextures & kMesoNormals) != 0u) {
+        mat3 frame = tileFrame(gradients);
+        n = normalize(frame * bentNormal(n * frame, sampleTexture(view.normals, at, footprint).xyz));
+    }
+    if ((kTextures & kMesoColours) != 0u) look.xyz = encodedColour(sampleTexture(view.colours, at, footprint).xyz);
+    return look;
+}
+
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(pixel, view.picture.xy))) return;
     vec2 at = vec2(pixel) + 0.5;
     uint index = pixel.y * view.picture.x + pixel.x, plane = view.picture.x * view.picture.y;
     vec3 eye = view.eye.xyz + at.x * view.eyeX.xyz + at.y * view.eyeY.xyz;
-    vec3 d = normalize(view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz);
+    vec3 towards = view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz, d = normalize(towards);
     float depth = uintBitsToFloat(hits[index]);
+    pixelWidth = vec2(length(view.eyeX.xyz), length(view.forwardX.xyz) / length(towards));
     if (kShadow != 0u) {
         uint colour = hits[2u * plane + index];
         // Only what is mesostructure, and not yet in the dark.
         if (hits[plane + index] == 0u || colour >> 24 == 0u) return;
         vec3 n = unpackHitNormal(hits[plane + index]);
         if (dot(n, view.light.xyz) <= 0.0) return;
+        pixelWidth = vec2(pixelWidth.x + pixelWidth.y * depth, 0.0);
         vec3 from = eye + depth * d + view.light.w * n;
         ShellHit hit = castShell(from, view.light.xyz, kNoHit);
         if (hit.unresolved) atomicAdd(counters[0], 1u);
@@ -209,10 +241,12 @@ void main() {
     hits[3u * plane + index] += hit.iterations;
     if (hit.unresolved) atomicAdd(counters[0], 1u);
     if (!(hit.t < depth)) return;
+    if (hit.far) atomicAdd(counters[1], 1u);
     vec3 n = normalize(hit.normal);
+    vec4 look = lookAt(hit, eye + hit.t * d, d, pixelWidth.x + pixelWidth.y * hit.t, n);
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;
     hits[index] = floatBitsToUint(hit.t);
     // 0 says that a pixel has no mesostructure.
     hits[plane + index] = max(packHitNormal(normalize(n)), 1u);
-    hits[2u * plane + index] = packUnorm4x8(vec4(view.colour.xyz, 1.0));
+    hits[2u * plane + index] = packUnorm4x8(look);
 }

@@ -11,6 +11,13 @@ const uint kMesoOccupancy = 0u, kMesoDistances = 1u, kMesoCompressed = 2u, kMeso
 const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u;                          // kSurface
 const uint kMesoUnrefined = 0u, kMesoBinary = 1u, kMesoSecant = 2u, kMesoAsPrinted = 3u, kMesoIllinois = 4u;  // kRefinement
 
+const uint kMesoColours = 1u, kMesoNormals = 2u;  // of kTextures, which is their sum
+
+const uint kMesoFarViews = 8u, kMesoFarTexels = 6u;  // as meso::Appearance has them
+
+// Parts of the light: of the sun by n . l, of the sky by how far n points up, of everywhere.
+const float kMesoSun = 0.72f, kMesoSky = 0.18f, kMesoAmbient = 0.10f;
+
 const uint kMesoHit = 0u, kMesoMiss = 1u, kMesoUnresolved = 2u;
 
 struct MesoRecord {
@@ -39,6 +46,8 @@ struct MesoView {
     vec4 light;                      // unit, towards the light; w: world units by which shadow rays start above a hit
     vec4 colour;                     // of what the surface is made; w: 1: shadows
     vec4 up;                         // unit; w: what the picture shows
+    uvec4 colours, normals;          // textures: first texel, width, height, levels
+    vec4 far;                        // pixels that a surface may stray from its mean height and not be marched; that height, tile units; 1: light with shadows
 };
 
 const uint kMesoPlanes = 4u;

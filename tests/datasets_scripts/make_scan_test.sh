@@ -26,6 +26,15 @@ cmp file.ply pipe.ply || fail "a pipe gives other bytes than a file"
 head -c 400 file.ply | grep -aq '^element face 30000$' || fail "the header does not say 30000 faces"
 "$make_scan" --help | grep -q -- --triangles || fail "--help"
 
+"$make_scan" --shape dog --triangles 20000 -o dog.obj
+"$make_scan" --shape dog --triangles 20000 -o - | cmp - dog.obj || fail "a dog through a pipe is another one"
+faces=$(grep -c '^f ' dog.obj)
+[ "$faces" -gt 18000 ] && [ "$faces" -lt 22000 ] || fail "a dog of $faces triangles"
+[ "$(grep -c '^vt ' dog.obj)" -eq $((3 * faces)) ] || fail "a dog without all texture coordinates"
+
+refuses 2 "statue or dog" --shape cat -o x.obj
+refuses 2 "of the statue" --shape dog --seed 3 -o x.obj
+refuses 2 "at most 200000" --shape dog --triangles 1M -o x.obj
 refuses 2 "-o FILE is missing" --triangles 10000
 refuses 2 "10000 to 1000000000" --triangles 9999 -o x.ply
 refuses 2 "10000 to 1000000000" --triangles 1000000001 -o x.ply

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include "datasets_scripts/dog.h"
 #include "datasets_scripts/procedural_noise.h"
 
 namespace vcp::scan {
@@ -196,6 +197,40 @@ TEST(ProceduralNoise, IsContinuousAcrossCells) {
         const uint64_t h = hash(uint64_t(i));
         const glm::dvec3 p(std::floor(10 * signedUnit(h)), 10 * signedUnit(h, 21), 10 * signedUnit(h, 42));
         EXPECT_NEAR(noise(p - glm::dvec3(1e-9, 0, 0)), noise(p + glm::dvec3(1e-9, 0, 0)), 1e-7) << "seed " << i;
+    }
+}
+
+TEST(Dog, IsClosedAndMapped) {
+    for (const uint64_t wanted : {10'000, 40'000}) {
+        const DogMesh mesh = dog(wanted);
+        EXPECT_NEAR(double(mesh.triangles.size()), double(wanted), 0.1 * double(wanted));
+        ASSERT_EQ(mesh.uvs.size(), mesh.triangles.size());
+        std::map<std::pair<uint32_t, uint32_t>, int> edges;
+        double volume = 0, area = 0, mapped = 0;
+        size_t stretched = 0;
+        for (size_t i = 0; i < mesh.triangles.size(); ++i) {
+            const auto& t = mesh.triangles[i];
+            const auto& uv = mesh.uvs[i];
+            const glm::dvec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
+            volume += glm::dot(a, glm::cross(b, c)) / 6;
+            const double here = glm::length(glm::cross(b - a, c - a)) / 2;
+            const glm::dvec2 x = uv[1] - uv[0], y = uv[2] - uv[0];
+            // A unit is a tenth of a metre.
+            const double there = std::abs(x.x * y.y - x.y * y.x) / 2 / 100;
+            area += here, mapped += there;
+            stretched += there > 4 * here || there < here / 4;
+            for (size_t k = 0; k < 3; ++k) ++edges[{t[k], t[(k + 1) % 3]}];
+        }
+        size_t shared = 0;
+        for (const auto& [edge, count] : edges) {
+            const auto back = edges.find({edge.second, edge.first});
+            ASSERT_TRUE(back != edges.end() && back->second == count) << "a border";
+            shared += count > 1;
+        }
+        EXPECT_LT(shared, 20u) << "where two sides pass through one cell";
+        EXPECT_NEAR(volume, 0.17, 0.05) << "counter-clockwise from outside";
+        EXPECT_NEAR(mapped / area, 1, 0.25);
+        EXPECT_LT(stretched, mesh.triangles.size() / 50);
     }
 }
 

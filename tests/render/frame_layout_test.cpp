@@ -59,7 +59,8 @@ TEST(FrameLayout, Mesostructure) {
                                                offsetof(MesoRecord, cones), offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale), offsetof(MesoRecord, levels),
                                                offsetof(MesoRecord, borders)}));
     EXPECT_EQ(offsets.at("MesoView"), words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward), offsetof(MesoView, forwardX),
-                                             offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up)}));
+                                             offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up),
+                                             offsetof(MesoView, colours), offsetof(MesoView, normals), offsetof(MesoView, far)}));
 }
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }

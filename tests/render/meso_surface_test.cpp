@@ -316,5 +316,215 @@ TEST_F(MesoSurfaces, OnePipelineAMethod) {
     EXPECT_EQ(draw({pyramid}, fromAbove()).pipelines, one + 1);
 }
 
+/// The picture's light at a pixel, from 0 to 1, as shade and texture encode it.
+double lightAt(const Picture& picture, size_t pixel, int channel = 1) { return std::pow(picture.rgba[4 * pixel + size_t(channel)] / 255.0, 2.2); }
+
+TEST_F(MesoSurfaces, TexturesLieOverTheTile) {
+    // Columns are red, rows green: texel (i, j) of the tile's lower row first.
+    std::vector<glm::vec4> texels;
+    for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i) texels.emplace_back(float(i) / 3, float(j) / 3, 0.5f, 1);
+    MesoSurface surface = surfaceOf(plateau(), "boxes", "quad", 0.5);
+    surface.colour = glm::vec3(1);
+    draw({surface}, fromAbove());
+    const Picture white = *renderer_->readPicture();
+    surface.colours = std::make_shared<const MesoTexture>(makeMesoTexture({4, 4}, texels));
+    EXPECT_EQ(surface.colours->levels, 3u);
+    EXPECT_EQ(surface.colours->texels.size(), 16u + 4 + 1);
+    // 128 pixels over two tiles: a texel is 16 pixels wide.
+    FrameRequest request = fromAbove();
+    request.camera.orthographicHeight = 1.5;
+    const double half = 0.5 * 1.5 / kEdge;
+    request.camera.eye = {-half, half, 5};
+    draw({surface}, request);
+    const Picture textured = *renderer_->readPicture();
+    const double lit = white.rgba[4 * (kEdge / 2 * kEdge + kEdge / 2)];
+    const auto encoded = [](double light) { return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055; };
+    for (int j = -2; j < 2; ++j)
+        for (int i = -2; i < 2; ++i) {
+            // World (i, j) / 4 is texel (i, j) modulo 4, and the middle of a pixel.
+            const auto x = uint32_t(kEdge / 2 + 16 * i), y = uint32_t(int(kEdge / 2) - 16 * j);
+            const size_t pixel = size_t{y} * kEdge + x;
+            const double red = (i + 4) % 4 / 3.0, green = (j + 4) % 4 / 3.0;
+            EXPECT_NEAR(textured.rgba[4 * pixel], lit * encoded(red), 3) << i << ", " << j;
+            EXPECT_NEAR(textured.rgba[4 * pixel + 1], lit * encoded(green), 3) << i << ", " << j;
+            EXPECT_NEAR(textured.rgba[4 * pixel + 2], lit * encoded(0.5), 2);
+        }
+}
+
+TEST_F(MesoSurfaces, TexturesAreAveragedAsLight) {
+    std::vector<glm::vec4> texels;
+    for (int i = 0; i < 64 * 64; ++i) texels.emplace_back(float((i + i / 64) % 2));
+    MesoSurface surface = surfaceOf(plateau(), "boxes", "quad", 0.05, 32);
+    surface.colour = glm::vec3(1);
+    draw({surface}, fromAbove());
+    const Picture white = *renderer_->readPicture();
+    surface.colours = std::make_shared<const MesoTexture>(makeMesoTexture({64, 64}, texels));
+    draw({surface}, fromAbove());
+    const Picture textured = *renderer_->readPicture();
+    const auto depths = *renderer_->readDepth();
+    size_t seen = 0;
+    for (size_t i = 0; i < depths.size(); ++i) {
+        if (!std::isfinite(depths[i])) continue;
+        ++seen;
+        // Half the light is 188 of 255; half of what is stored would be 128.
+        EXPECT_NEAR(textured.rgba[4 * i], white.rgba[4 * i] * 188 / 255.0, 2) << i;
+    }
+    EXPECT_GT(seen, kEdge * kEdge / 3);
+}
+
+TEST_F(MesoSurfaces, NormalTexturesBendWhatIsThere) {
+    const float bend = 0.4f;
+    const auto texture = [](glm::vec3 n) { return std::make_shared<const MesoTexture>(makeMesoTexture({2, 2}, std::vector<glm::vec4>(4, glm::vec4(n, 0)))); };
+    const auto normalsOf = [&](std::string_view base, const std::shared_ptr<const MesoTexture>& normals) {
+        MesoSurface surface = surfaceOf(plateau(), "pyramid", base, 0.1, 3);
+        surface.normals = normals;
+        draw({surface}, fromAbove());
+        return *renderer_->readNormals();
+    };
+    const auto alongX = normalsOf("quad", texture({std::sin(bend), 0, std::cos(bend)})), alongY = normalsOf("quad", texture({0, std::sin(bend), std::cos(bend)}));
+    for (const auto& n : alongX)
+        if (n != glm::vec3(0)) {
+            ASSERT_LT(glm::length(n - glm::vec3(std::sin(bend), 0, std::cos(bend))), 0.01f);
+        }
+    for (const auto& n : alongY)
+        if (n != glm::vec3(0)) {
+            ASSERT_LT(glm::length(n - glm::vec3(0, std::sin(bend), std::cos(bend))), 0.01f);
+        }
+    const auto plain = normalsOf("sphere", nullptr), flat = normalsOf("sphere", texture({0, 0, 1})), bent = normalsOf("sphere", texture({std::sin(bend), 0, std::cos(bend)}));
+    size_t seen = 0;
+    for (size_t i = 0; i < plain.size(); ++i) {
+        if (plain[i].z < 0.7f) continue;
+        ++seen;
+        ASSERT_GT(glm::dot(plain[i], flat[i]), 0.9999f);
+        ASSERT_NEAR(glm::dot(plain[i], bent[i]), std::cos(bend), 0.03f);
+    }
+    EXPECT_GT(seen, kEdge * kEdge / 8);
+}
+
+/// About z, by an angle whose sine and cosine are no short numbers.
+glm::dvec3 turned(glm::dvec3 p) { return {0.8253356 * p.x - 0.5646425 * p.y, 0.5646425 * p.x + 0.8253356 * p.y, p.z}; }
+
+/// A strip along turned x, 2 units long, of 2048 by 8 squares, all of them small and most far from its middle.
+BaseSurface denseStrip() {
+    constexpr uint32_t kColumns = 2048, kRows = 8;
+    BaseSurface strip;
+    for (uint32_t j = 0; j <= kRows; ++j)
+        for (uint32_t i = 0; i <= kColumns; ++i) strip.positions.push_back(turned({(double(i) - kColumns / 2.0) / 1024, (double(j) - kRows / 2.0) / 1024, 0}));
+    const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
+        strip.triangles.push_back({a, b, c});
+        const auto map = [&](uint32_t k) { return glm::dvec2(k % (kColumns + 1), k / (kColumns + 1)) / 16.0; };
+        strip.uvs.push_back({map(a), map(b), map(c)});
+    };
+    for (uint32_t j = 0; j < kRows; ++j)
+        for (uint32_t i = 0; i < kColumns; ++i) {
+            const uint32_t at = j * (kColumns + 1) + i;
+            add(at, at + 1, at + kColumns + 2), add(at, at + kColumns + 2, at + kColumns + 1);
+        }
+    return strip;
+}
+
+TEST_F(MesoSurfaces, DenseBasesHaveNoGapsAlongTheirWalls) {
+    MesoSurface surface = surfaceOf(plateau(), "boxes", "quad", 0.5);
+    surface.shell = *buildShell(denseStrip(), 0.0007, plateau().extent);
+    surface.withBase = false;
+    FrameRequest request = fromAbove();
+    // Pixels are two squares wide, and their rays run in the walls between squares, slantwise.
+    request.width = 1000, request.height = 3;
+    request.camera.orthographicHeight = 6.0 / 1024;
+    for (const double slant : {0.0, 0.3, 0.7, -1.1}) {
+        SCOPED_TRACE(slant);
+        const glm::dvec3 forward = turned(glm::normalize(glm::dvec3(0, slant, -1)));
+        request.camera.forward = forward, request.camera.eye = -2.0 * forward, request.camera.up = turned({0, 1, 0});
+        draw({surface}, request);
+        size_t missed = 0;
+        const auto depths = *renderer_->readDepth();
+        for (const float depth : depths) missed += !std::isfinite(depth);
+        EXPECT_EQ(missed, 0u);
+    }
+}
+
+/// Squares of 8 x 8 pixels become one: means of light, of one channel.
+std::vector<double> smaller(const Picture& picture) {
+    std::vector<double> means(size_t{kEdge} * kEdge);
+    for (uint32_t y = 0; y < 8 * kEdge; ++y)
+        for (uint32_t x = 0; x < 8 * kEdge; ++x) means[y / 8 * kEdge + x / 8] += lightAt(picture, size_t{y} * 8 * kEdge + x) / 64;
+    return means;
+}
+
+TEST_F(MesoSurfaces, FromFarTheMeanLightIsSeenWithoutMarching) {
+    for (const char* name : {"hemispheres", "fbm", "beads"})
+        for (const double elevation : {80.0, 20.0})
+            for (const bool shadows : {false, true}) {
+                SCOPED_TRACE(testing::Message() << name << ", " << elevation << (shadows ? ", shadows" : ""));
+                Asset asset;
+                asset.name = name;
+                if (std::string_view(name) == "beads") asset.solid = name, asset.extent = meso::test::solid(name)->extent();
+                else asset = heightAsset(name, *makeHeightField(name, 64, 1));
+                // A tile is narrower than a pixel by no simple part, and the slab less high than half of one.
+                const double edge = 0.83 * 3.0 / kEdge, tall = std::min(1.0, 0.4 / asset.extent.z);
+                MesoSurface surface = surfaceOf(asset, "boxes", "quad", tall * edge * asset.extent.z, 2 / edge);
+                const auto shape = shapeOf(asset);
+                surface.far = std::make_shared<const Appearance>(appearanceOf(**shape, tall));
+                FrameRequest request = fromAbove();
+                const double rise = elevation * M_PI / 180;
+                request.camera.forward = {0, std::cos(rise), -std::sin(rise)}, request.camera.eye = -5.0 * request.camera.forward;
+                request.shading.lightFollowsCamera = false, request.shading.lightDirection = {0.5f, -0.4f, 0.6f}, request.shading.shadows = shadows;
+                request.errorPixels = 0;
+                request.width = request.height = 8 * kEdge;
+                EXPECT_EQ(draw({surface}, request).farHits, 0u);
+                const std::vector<double> truth = smaller(*renderer_->readPicture());
+                request.width = request.height = kEdge;
+                draw({surface}, request);
+                const Picture marched = *renderer_->readPicture();
+                request.errorPixels = 0.5;
+                const FrameStats stats = draw({surface}, request);
+                const Picture far = *renderer_->readPicture();
+                const auto depths = *renderer_->readDepth();
+                const auto iterations = *renderer_->readIterations();
+                double ofMarched = 0, ofFar = 0;
+                size_t seen = 0;
+                for (uint32_t y = 1; y + 1 < kEdge; ++y)
+                    for (uint32_t x = 1; x + 1 < kEdge; ++x) {
+                        // Borders show cuts, and are a matter of where pixels lie.
+                        const size_t i = size_t{y} * kEdge + x;
+                        bool isInside = true;
+                        for (const int step : {-1, 1}) isInside = isInside && std::isfinite(depths[i + size_t(step)]) && std::isfinite(depths[i + size_t(step * int(kEdge))]);
+                        if (!isInside) continue;
+                        ++seen;
+                        ofMarched += std::abs(lightAt(marched, i) - truth[i]), ofFar += std::abs(lightAt(far, i) - truth[i]);
+                    }
+                EXPECT_GT(seen, 800u);
+                EXPECT_GE(stats.farHits, seen);
+                EXPECT_EQ(std::accumulate(iterations.begin(), iterations.end(), uint64_t{0}), 0u);
+                EXPECT_LT(ofFar, 0.5 * ofMarched);
+            }
+}
+
+TEST_F(MesoSurfaces, NearbyAllIsMarched) {
+    MesoSurface surface = surfaceOf(heightAsset("fbm", *makeHeightField("fbm", 64, 1)), "boxes", "torus", 0.1);
+    FrameRequest request = fromAbove();
+    request.shading.shadows = true;
+    draw({surface}, request);
+    const Picture before = *renderer_->readPicture();
+    const auto depths = *renderer_->readDepth();
+    surface.far = std::make_shared<const Appearance>(appearanceOf(*meso::test::heights(*plateau().heights), 1, 16));
+    EXPECT_EQ(draw({surface}, request).farHits, 0u);
+    EXPECT_EQ(*renderer_->readPicture(), before);
+    EXPECT_EQ(*renderer_->readDepth(), depths);
+}
+
+TEST_F(MesoSurfaces, WhatRaysComeThroughIsMarchedFromFar) {
+    Asset asset;
+    asset.name = asset.solid = "ball";
+    asset.extent = meso::test::solid("ball")->extent();
+    MesoSurface surface = surfaceOf(asset, "boxes", "quad", 0.01, 64);
+    surface.far = std::make_shared<const Appearance>(appearanceOf(*meso::test::solid("ball"), 0.5, 64));
+    surface.withBase = false;
+    EXPECT_EQ(draw({surface}, fromAbove()).farHits, 0u);
+    surface.withBase = true;
+    EXPECT_GT(draw({surface}, fromAbove()).farHits, kEdge * kEdge / 3);
+}
+
 }  // namespace
 }  // namespace vcp

@@ -1,6 +1,7 @@
 // vcp meso and vcp bench meso from the outside.
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <set>
@@ -122,6 +123,48 @@ TEST_F(MesoCommands, TheScenesOfTheDocumentsAreDrawn) {
     }
 }
 
+TEST_F(MesoCommands, TheDogOfTheDocumentsIsDrawn) {
+    const auto makeScan = std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan";
+    ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 10000 -o " + path("dog.obj")).c_str()), 0);
+    std::filesystem::copy_file(VCP_SOURCE_DIR "/docs/scenes/beads_dog.json", path("beads_dog.json"));
+    const Ran ran = run("render " + path("beads_dog.json") + " -o " + path("a.png") + " --size 96x64 --progress none --depth " + path("a.pfm"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    EXPECT_GT(hitsOf(path("a.pfm")).first, 1500u);
+}
+
+TEST_F(MesoCommands, TexturesArePictures) {
+    writeRamp("ramp.png", false);
+    const auto draw = [&](const std::string& options) {
+        const Ran ran = run("meso render edge --method pyramid --size 64x48 --validation --json -o " + path("a.png") + options);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        const auto picture = readPng(path("a.png"));
+        EXPECT_TRUE(picture);
+        return picture ? picture->rgba : std::vector<uint8_t>();
+    };
+    const auto plain = draw(""), textured = draw(" --texture " + path("ramp.png")), bent = draw(" --normal-texture " + path("ramp.png"));
+    EXPECT_NE(plain, textured);
+    EXPECT_NE(plain, bent);
+    std::ofstream(path("scene.json")) << R"({"mesostructure": [{"asset": "edge", "method": "pyramid", "texture": "ramp.png", "normal_texture": "ramp.png"}],
+        "camera": {"position": [0.5, 1, 1.2], "target": [0, 0, 0]}})";
+    const Ran scene = run("render " + path("scene.json") + " -o " + path("b.png") + " --size 64x48 --progress none");
+    EXPECT_EQ(scene.status, 0) << scene.err;
+    std::ofstream(path("text.png")) << "not a picture";
+    for (const std::string file : {"none.png", "text.png"}) {
+        const Ran ran = run("meso render edge --method pyramid --texture " + path(file) + " -o " + path("x.png"));
+        EXPECT_EQ(ran.status, 1);
+        EXPECT_NE(ran.err.find(file), std::string::npos) << ran.err;
+        EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+    }
+}
+
+TEST_F(MesoCommands, FarSurfacesAreNotMarched) {
+    const std::string arguments = "meso render hemispheres --tiles 40 --height 0.5 --size 64x48 --view 30,35,0.5 --validation --json -o " + path("a.png");
+    const Json far = Json::parse(run(arguments).out)["panels"][0], marched = Json::parse(run(arguments + " --error-pixels 0").out)["panels"][0];
+    EXPECT_GT(far["far_hits"], far["hit_pixels"].get<int>() / 2);
+    EXPECT_EQ(marched["far_hits"], 0);
+    EXPECT_LT(far["iterations_mean"], 0.5 * marched["iterations_mean"].get<double>());
+}
+
 TEST_F(MesoCommands, SaysWhatIsWrong) {
     std::ofstream(path("empty.png")) << "";
     std::ofstream(path("text.png")) << "not a picture";
@@ -132,7 +175,7 @@ TEST_F(MesoCommands, SaysWhatIsWrong) {
         std::string arguments;
         int status;
         std::string says;
-    } cases[] = {{"meso build " + path("empty.png"), 1, "empty"},       {"meso build " + path("text.png"), 1, "not a PNG"},
+    } cases[] = {{"meso build " + path("empty.png"), 1, "empty"},       {"meso build " + path("text.png"), 1, "neither a PNG"},
                  {"meso build " + path("cut.png"), 1, "damaged"},       {"meso build " + path("a.exr"), 1, "EXR"},
                  {"meso build " + path("none.png"), 1, "none.png"},     {"meso build nothing", 2, "no procedural one"},
                  {"meso build fbm --texels 60 --grid 7", 2, "divide"},  {"meso build beads --cones 0x1", 2, "--cones"},

@@ -59,6 +59,8 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"up\": \"x\"}]"), 4, "\"up\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"tiles\": 0}]"), 4, "\"tiles\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"colour\": [1, 2, 1]}]"), 4, "from 0 to 1"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"texture\": 7}]"), 4, "\"texture\""},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"normal_texture\": \"\"}]"), 4, "\"normal_texture\""},
         {beside("\"lights\": [{}, {}]"), 3, "more are not supported"},
         {beside("\"lights\": [{}]"), 3, "direction"},
         {beside("\"caps\": 1"), 3, "true or false"},

@@ -1,0 +1,191 @@
+// Heights from EXR pictures, whole and hostile. PNG is tested through the program (meso_commands_test.cpp).
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "test_folder.h"
+#include "viewer/height_image.h"
+
+namespace vcp {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+/// An uncompressed EXR of scan lines as its specification has it; a channel is a name and a value for each texel, floats.
+class ExrFile {
+public:
+    ExrFile(int left, int top, int width, int height) : window_{left, top, left + width - 1, top + height - 1} {}
+
+    ExrFile& channel(std::string name, std::vector<float> values, bool isHalf = false) {
+        channels_.push_back({std::move(name), std::move(values), isHalf});
+        return *this;
+    }
+    [[nodiscard]] Bytes bytes() const {
+        Bytes out;
+        put<uint32_t>(out, 20000630), put<uint32_t>(out, 2);
+        Bytes list;
+        for (const Channel& c : channels_) {
+            text(list, c.name);
+            for (const int32_t value : {c.isHalf ? 1 : 2, 0, 1, 1}) put(list, value);
+        }
+        list.push_back({});
+        attribute(out, "channels", "chlist", list);
+        attribute(out, "compression", "compression", Bytes(1));
+        Bytes box;
+        for (const int32_t value : window_) put(box, value);
+        attribute(out, "dataWindow", "box2i", box), attribute(out, "displayWindow", "box2i", box);
+        attribute(out, "lineOrder", "lineOrder", Bytes(1));
+        attribute(out, "pixelAspectRatio", "float", real(1));
+        Bytes centre = real(0);
+        centre.resize(8);
+        attribute(out, "screenWindowCenter", "v2f", centre), attribute(out, "screenWindowWidth", "float", real(1));
+        out.push_back({});
+        const int width = window_[2] - window_[0] + 1, height = window_[3] - window_[1] + 1;
+        uint64_t line = 8;
+        for (const Channel& c : channels_) line += uint64_t(width) * (c.isHalf ? 2 : 4);
+        const uint64_t first = out.size() + 8 * uint64_t(height);
+        for (int y = 0; y < height; ++y) put<uint64_t>(out, first + line * uint64_t(y));
+        for (int y = 0; y < height; ++y) {
+            put<int32_t>(out, window_[1] + y), put<uint32_t>(out, uint32_t(line - 8));
+            for (const Channel& c : channels_)
+                for (int x = 0; x < width; ++x) {
+                    const float value = c.values[size_t(y * width + x)];
+                    if (c.isHalf) put<uint16_t>(out, halfOf(value));
+                    else put(out, value);
+                }
+        }
+        return out;
+    }
+
+private:
+    struct Channel {
+        std::string name;
+        std::vector<float> values;
+        bool isHalf;
+    };
+    template <class T>
+    static void put(Bytes& out, T value) {
+        const auto* from = reinterpret_cast<const std::byte*>(&value);
+        for (size_t i = 0; i < sizeof value; ++i) out.push_back(from[i]);
+    }
+    static void text(Bytes& out, const std::string& text) {
+        for (const char c : text) out.push_back(std::byte(c));
+        out.push_back({});
+    }
+    static Bytes real(float value) {
+        Bytes bytes;
+        put(bytes, value);
+        return bytes;
+    }
+    static void attribute(Bytes& out, const std::string& name, const std::string& type, const Bytes& value) {
+        text(out, name), text(out, type);
+        put<uint32_t>(out, uint32_t(value.size()));
+        for (const std::byte byte : value) out.push_back(byte);
+    }
+    /// Of values that a half holds.
+    static uint16_t halfOf(float value) {
+        uint32_t bits = 0;
+        std::memcpy(&bits, &value, sizeof bits);
+        const uint32_t sign = bits >> 16 & 0x8000;
+        if ((bits & 0x7fffffff) == 0) return uint16_t(sign);
+        return uint16_t(sign | ((bits >> 23 & 0xff) - 112) << 10 | (bits >> 13 & 0x3ff));
+    }
+
+    std::array<int32_t, 4> window_;
+    std::vector<Channel> channels_;
+};
+
+class Exr : public testing::Test {
+protected:
+    Exr() : folder_("vcp_exr_test") {}
+    void SetUp() override {
+        if (!readsExr()) GTEST_SKIP() << "built without OpenEXR";
+    }
+    Result<meso::HeightMap> read(const Bytes& bytes, double range = 0.5) const {
+        const std::string path = (folder_ / "a.exr").string();
+        std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+        return readHeightImage(path, range);
+    }
+    TestFolder folder_;
+};
+
+TEST_F(Exr, FloatsBecomeHeightsBetweenTheirLeastAndGreatest) {
+    // Rows from the top, a data window away from the origin, values below 0 and above 1.
+    const auto map = read(ExrFile(-7, 12, 3, 2).channel("Y", {-2, 0, 2, 6, 1, -2}).bytes());
+    ASSERT_TRUE(map) << map.error().line();
+    EXPECT_EQ(map->size, glm::ivec2(3, 2));
+    EXPECT_EQ(map->range, 0.5);
+    const double wanted[2][3] = {{8, 3, 0}, {0, 2, 4}};  // from the lower row, over the least
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < 3; ++x) EXPECT_NEAR(map->height(x, y), wanted[y][x] / 8 * 0.5, 0.5 / 65535) << x << ", " << y;
+}
+
+TEST_F(Exr, ChannelsAreChosenByName) {
+    const std::vector<float> ramp = {0, 1, 2, 3}, back = {3, 2, 1, 0}, other = {5, 0, 0, 5};
+    const auto texels = [&](ExrFile file) {
+        const auto map = read(file.bytes());
+        EXPECT_TRUE(map) << map.error().line();
+        return map ? map->texels : std::vector<uint16_t>();
+    };
+    const std::vector<uint16_t> rising = {0, 21845, 43690, 65535};
+    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("height", ramp)), rising) << "the only one";
+    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("R", ramp, true)), rising) << "half";
+    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("A", other).channel("Y", ramp)), rising) << "Y before others";
+    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("A", other).channel("B", ramp).channel("G", ramp).channel("R", ramp, true)), rising) << "the mean";
+    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("G", back).channel("R", ramp)), std::vector<uint16_t>(4, 0)) << "the mean is flat, and flat is the bottom";
+    const auto none = read(ExrFile(0, 0, 4, 1).channel("U", ramp).channel("V", ramp).bytes());
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().code, ErrorCode::Unsupported) << none.error().line();
+}
+
+TEST_F(Exr, RefusesWhatIsNoNumber) {
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
+        const auto map = read(ExrFile(0, 0, 2, 2).channel("Y", {0, 1, bad, 3}).bytes());
+        ASSERT_FALSE(map);
+        EXPECT_EQ(map.error().code, ErrorCode::InvalidInput);
+        EXPECT_EQ(map.error().element, "texel 0, 1") << map.error().line();
+        EXPECT_NE(map.error().line().find("a.exr"), std::string::npos);
+    }
+}
+
+TEST_F(Exr, SizesAreCheckedBeforeTexels) {
+    // The header alone, so that only its words can be what is wrong.
+    const auto refused = [&](int width, int height, ErrorCode code) {
+        Bytes bytes = ExrFile(0, 0, 1, 1).channel("Y", {1}).bytes();
+        const std::string name = "dataWindow";
+        const auto at = std::search(bytes.begin(), bytes.end(), name.begin(), name.end(), [](std::byte a, char b) { return a == std::byte(b); });
+        const int32_t window[4] = {0, 0, width - 1, height - 1};
+        std::memcpy(&*at + name.size() + 1 + sizeof "box2i" + 4, window, sizeof window);
+        const auto map = read(bytes);
+        ASSERT_FALSE(map) << width << " x " << height;
+        EXPECT_EQ(map.error().code, code) << map.error().line();
+    };
+    refused(meso::kMaxGridEdge + 1, 1, ErrorCode::Limit);
+    refused(1, std::numeric_limits<int>::max(), ErrorCode::Limit);
+    refused(0, 1, ErrorCode::InvalidInput);
+    refused(std::numeric_limits<int>::min() + 2, 1, ErrorCode::InvalidInput);
+    refused(4096, 4096, ErrorCode::InvalidInput);  // texels that are not there
+}
+
+TEST_F(Exr, HostileBytesAreOneLine) {
+    const Bytes whole = ExrFile(3, 4, 5, 3).channel("Y", std::vector<float>(15, 2)).bytes();
+    ASSERT_TRUE(decodeExr(whole, 64));
+    for (size_t size = 0; size < whole.size(); ++size) {
+        const auto cut = decodeExr(std::span(whole).first(size), 64);
+        ASSERT_FALSE(cut) << size << " of " << whole.size() << " bytes";
+        EXPECT_EQ(cut.error().line().find('\n'), std::string::npos);
+    }
+    for (size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+        Bytes bytes = whole;
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+        const auto flipped = decodeExr(bytes, 64);
+        if (!flipped) EXPECT_EQ(flipped.error().line().find('\n'), std::string::npos) << bit;
+        else EXPECT_EQ(flipped->values.size(), size_t(flipped->size.x) * size_t(flipped->size.y)) << bit;
+    }
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,208 @@
+#include "viewer/exr_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#ifdef VCP_HAVE_OPENEXR
+#include <Iex.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#endif
+
+namespace vcp {
+
+namespace {
+
+constexpr std::array<uint8_t, 4> kMagic = {0x76, 0x2f, 0x31, 0x01};
+
+Error wrong(ErrorCode code, std::string message) { return {.code = code, .message = std::move(message)}; }
+
+#ifdef VCP_HAVE_OPENEXR
+
+constexpr uint32_t kDeep = 0x800, kSeveralParts = 0x1000;
+constexpr size_t kMostAttributes = 4096, kMostChannelBytes = 1024, kLeastChannelBytes = 18;
+constexpr uint64_t kMostTileBytes = uint64_t{1} << 29;
+
+Error damaged(std::string detail) {
+    detail = detail.substr(0, 200);
+    for (char& c : detail)
+        if (c < ' ' || c > '~') c = ' ';
+    return wrong(ErrorCode::InvalidInput, "the EXR is damaged: " + detail);
+}
+
+/// What a header says, read before the library allocates by it.
+class HeaderWalk {
+public:
+    explicit HeaderWalk(std::span<const std::byte> file) : file_(file) {}
+
+    Result<glm::ivec2> sizeOf(int mostEdge) {
+        uint32_t version = 0;
+        at_ = kMagic.size();
+        if (!take(&version, sizeof version)) return cut();
+        if ((version & (kDeep | kSeveralParts)) != 0) return wrong(ErrorCode::Unsupported, "is an EXR of several parts or of deep texels; save it as a plain one");
+        for (size_t count = 0; count < kMostAttributes; ++count) {
+            const auto name = word();
+            if (!name) return cut();
+            if (name->empty()) return checked(mostEdge);
+            const auto type = word();
+            uint32_t bytes = 0;
+            if (!type || !take(&bytes, sizeof bytes) || bytes > file_.size() - at_) return cut();
+            VCP_TRY(attribute(*name, *type, file_.subspan(at_, bytes)));
+            at_ += bytes;
+        }
+        return damaged("too many attributes");
+    }
+
+private:
+    static Error cut() { return damaged("it ends within its header"); }
+
+    bool take(void* to, size_t bytes) {
+        if (bytes > file_.size() - at_) return false;
+        std::memcpy(to, file_.data() + at_, bytes);
+        at_ += bytes;
+        return true;
+    }
+    /// Up to a zero byte; names have 255 letters at most.
+    std::optional<std::string_view> word() {
+        const auto rest = file_.subspan(at_, std::min<size_t>(256, file_.size() - at_));
+        const auto end = std::find(rest.begin(), rest.end(), std::byte{0});
+        if (end == rest.end()) return std::nullopt;
+        at_ += size_t(end - rest.begin()) + 1;
+        return std::string_view(reinterpret_cast<const char*>(rest.data()), size_t(end - rest.begin()));
+    }
+    Result<void> attribute(std::string_view name, std::string_view type, std::span<const std::byte> value) {
+        if (name == "dataWindow" && type == "box2i" && value.size() == sizeof window_) {
+            std::memcpy(window_.data(), value.data(), sizeof window_);
+            hasWindow_ = true;
+        } else if (name == "tiles" && type == "tiledesc" && value.size() == 9) {
+            std::memcpy(tile_.data(), value.data(), sizeof tile_);
+            hasTiles_ = true;
+        } else if (name == "channels") {
+            if (value.size() > kMostChannelBytes) return wrong(ErrorCode::Limit, "an EXR of too many channels for a height map; save one");
+            channels_ = value.size() / kLeastChannelBytes;
+        }
+        return {};
+    }
+    Result<glm::ivec2> checked(int mostEdge) const {
+        if (!hasWindow_) return damaged("no data window");
+        const int64_t width = int64_t{window_[2]} - window_[0] + 1, height = int64_t{window_[3]} - window_[1] + 1;
+        if (width < 1 || height < 1) return damaged("a data window without texels");
+        if (width > mostEdge || height > mostEdge) return wrong(ErrorCode::Limit, fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, mostEdge));
+        if (hasTiles_) VCP_TRY(checkTiles(uint64_t(width), uint64_t(height)));
+        return glm::ivec2(int(width), int(height));
+    }
+
+    /// One tile of all channels is held; each tile has eight bytes in a table.
+    Result<void> checkTiles(uint64_t width, uint64_t height) const {
+        const uint64_t x = tile_[0], y = tile_[1];
+        if (x < 1 || y < 1) return damaged("tiles without texels");
+        if (x * y > kMostTileBytes / sizeof(float) / std::max<uint64_t>(channels_, 1)) return wrong(ErrorCode::Limit, fmt::format("an EXR of tiles of {} x {} texels", x, y));
+        if ((width + x - 1) / x * ((height + y - 1) / y) > file_.size() / sizeof(uint64_t)) return damaged("it has fewer bytes than tiles");
+        return {};
+    }
+
+    std::span<const std::byte> file_;
+    size_t at_ = 0;
+    std::array<int32_t, 4> window_{};
+    std::array<uint32_t, 2> tile_{};
+    uint64_t channels_ = 0;
+    bool hasWindow_ = false, hasTiles_ = false;
+};
+
+class MemoryStream : public Imf::IStream {
+public:
+    explicit MemoryStream(std::span<const std::byte> bytes) : Imf::IStream(""), bytes_(bytes) {}
+
+    bool read(char to[], int count) override {
+        if (count < 0 || at_ > bytes_.size() || size_t(count) > bytes_.size() - at_) throw Iex::InputExc("it ends too early");
+        std::memcpy(to, bytes_.data() + at_, size_t(count));
+        at_ += size_t(count);
+        return at_ < bytes_.size();
+    }
+    uint64_t tellg() override { return at_; }
+    void seekg(uint64_t to) override { at_ = to; }
+
+private:
+    std::span<const std::byte> bytes_;
+    uint64_t at_ = 0;
+};
+
+/// The channels whose mean is the height; empty: none that says so.
+std::vector<std::string> channelsOf(const Imf::ChannelList& list) {
+    if (list.findChannel("Y") != nullptr) return {"Y"};
+    std::vector<std::string> found;
+    for (const char* name : {"R", "G", "B"})
+        if (list.findChannel(name) != nullptr) found.emplace_back(name);
+    if (!found.empty()) return found;
+    for (auto i = list.begin(); i != list.end(); ++i) found.emplace_back(i.name());
+    return found.size() == 1 ? found : std::vector<std::string>{};
+}
+
+/// Throws what the library throws.
+Result<FloatPicture> decoded(std::span<const std::byte> file, glm::ivec2 size) {
+    MemoryStream stream(file);
+    Imf::InputFile input(stream, 0);
+    const Imf::ChannelList& list = input.header().channels();
+    const auto channels = channelsOf(list);
+    if (channels.empty()) return wrong(ErrorCode::Unsupported, "has no channel Y, R, G or B, and not just one");
+    const Imath::Box2i window = input.header().dataWindow();
+    FloatPicture picture{size, std::vector<float>(size_t(size.x) * size_t(size.y))};
+    std::vector<float> plane(picture.values.size());
+    const size_t texel = sizeof(float), row = texel * size_t(size.x);
+    for (const std::string& name : channels) {
+        const Imf::Channel& channel = *list.findChannel(name);
+        if (channel.xSampling != 1 || channel.ySampling != 1) return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
+        Imf::FrameBuffer frame;
+        frame.insert(name, Imf::Slice::Make(Imf::FLOAT, plane.data(), window, texel, row));
+        input.setFrameBuffer(frame);
+        input.readPixels(window.min.y, window.max.y);
+        for (size_t i = 0; i < plane.size(); ++i) {
+            if (!std::isfinite(plane[i]))
+                return Error{.code = ErrorCode::InvalidInput, .message = "is no finite number", .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
+            picture.values[i] += plane[i] / float(channels.size());
+        }
+    }
+    return picture;
+}
+
+#endif
+
+}  // namespace
+
+bool isExr(std::span<const std::byte> file) { return file.size() >= kMagic.size() && std::memcmp(file.data(), kMagic.data(), kMagic.size()) == 0; }
+
+#ifdef VCP_HAVE_OPENEXR
+
+bool readsExr() { return true; }
+
+Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge) {
+    if (!isExr(file)) return wrong(ErrorCode::InvalidInput, "is not an EXR");
+    const auto size = HeaderWalk(file).sizeOf(mostEdge);
+    if (!size) return size.error();
+    try {
+        return decoded(file, *size);
+    } catch (const std::exception& failure) {
+        return damaged(failure.what());
+    }
+}
+
+#else
+
+bool readsExr() { return false; }
+
+Result<FloatPicture> decodeExr(std::span<const std::byte>, int) { return wrong(ErrorCode::Unsupported, "is an EXR picture, and this program was built without OpenEXR; save it as a PNG of 16 bits"); }
+
+#endif
+
+}  // namespace vcp

@@ -1,0 +1,33 @@
+// EXR pictures of one value a texel: what height maps of floats come in.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "octree/result.h"
+
+namespace vcp {
+
+struct FloatPicture {
+    glm::ivec2 size{0};
+    std::vector<float> values;  ///< row by row from the top, finite
+};
+
+/// Whether this program was built with OpenEXR.
+bool readsExr();
+
+/// Whether the bytes begin as an EXR does.
+bool isExr(std::span<const std::byte> file);
+
+/// Decodes the data window of an EXR of one part, scan lines or tiles (of which the finest level), any compression: channel Y,
+/// else the mean of those of R, G and B that there are, else the only channel, of any type. The bytes may be hostile:
+/// sizes are checked before anything is allocated. Errors, without file: InvalidInput (damaged, truncated, NaN or
+/// infinity), Limit (above `mostEdge` texels along an edge), Unsupported (deep, several parts, other channels, or a
+/// program built without OpenEXR).
+Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge);
+
+}  // namespace vcp
