@@ -28,38 +28,33 @@ CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
     const auto f = [&](Real u) { return ((c3 * u + c2) * u + c1) * u + c0; };
     if (c0 > 0) outside = true;
     else if (outside) return {true, 0, false};
-    // Ends of the monotone pieces: 0, roots of the derivative, 1.
-    Real ends[4] = {0, 1, 1, 1};
-    int pieces = 1;
+    // Monotone between 0, the roots of the derivative in [0, 1], and 1.
+    Real r0 = 1, r1 = 1;
     const Real a = 3 * c3, b = 2 * c2, disc = b * b - 4 * a * c1;
     if (disc > 0) {
         const Real q = Real(-0.5) * (b + (b >= 0 ? std::sqrt(disc) : -std::sqrt(disc)));
-        Real r0 = a != 0 ? q / a : Real(-1), r1 = q != 0 ? c1 / q : Real(-1);
-        if (r0 > r1) std::swap(r0, r1);
-        for (const Real r : {r0, r1})
-            if (r > 0 && r < 1) ends[pieces++] = r;
-        ends[pieces] = 1;
+        const Real ra = a != 0 ? q / a : Real(1), rb = q != 0 ? c1 / q : Real(1);
+        r0 = std::clamp(std::min(ra, rb), Real(0), Real(1)), r1 = std::clamp(std::max(ra, rb), Real(0), Real(1));
     }
-    for (int i = 0; i < pieces; ++i) {
-        Real low = ends[i], high = ends[i + 1];
-        Real fLow = i == 0 ? c0 : f(low), fHigh = f(high);
-        if (outside && fHigh <= 0) {
-            // Monotone and bracketed: Newton, or a bisection where that leaves the bracket.
-            Real u = low + (high - low) * (fLow / (fLow - fHigh));
-            for (int k = 0; k < 24; ++k) {
-                if (!(u > low && u < high)) u = Real(0.5) * (low + high);
-                const Real value = f(u);
-                if (value > 0) low = u;
-                else high = u;
-                const Real step = value / ((Real(3) * c3 * u + Real(2) * c2) * u + c1);
-                if (std::abs(step) <= Real(2) * std::numeric_limits<Real>::epsilon() * u) break;
-                u -= step;
-            }
-            return {true, u >= low && u <= high ? u : high, false};
-        }
-        outside = fHigh > 0;
+    const Real f0 = f(r0), f1 = f(r1), f2 = f(Real(1));
+    Real low = 0, high = r0, fLow = c0, fHigh = f0;
+    if (!(outside && f0 <= 0)) {
+        if (f0 > 0 && f1 <= 0) low = r0, high = r1, fLow = f0, fHigh = f1;
+        else if (f1 > 0 && f2 <= 0) low = r1, high = 1, fLow = f1, fHigh = f2;
+        else return {false, 0, f2 > 0};
     }
-    return {false, 0, outside};
+    // Newton, or a bisection where that leaves the bracket.
+    Real u = low + (high - low) * (fLow / (fLow - fHigh));
+    for (int k = 0; k < 24; ++k) {
+        if (!(u > low && u < high)) u = Real(0.5) * (low + high);
+        const Real value = f(u);
+        if (value > 0) low = u;
+        else high = u;
+        const Real step = value / ((Real(3) * c3 * u + Real(2) * c2) * u + c1);
+        if (std::abs(step) <= Real(2) * std::numeric_limits<Real>::epsilon() * u) break;
+        u -= step;
+    }
+    return {true, u >= low && u <= high ? u : high, false};
 }
 
 /// Heights at the corners of the cell [0, 1]^2; z in any unit. f = z - height.

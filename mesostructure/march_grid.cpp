@@ -15,6 +15,7 @@ struct Space {
     bool occupied = false;
     ivec3 further{0};
     float length = 0;
+    uint32_t marks = 0;  ///< of an occupied cell, as markSmallCells; 0: none
 };
 
 struct SkipNothing {
@@ -64,7 +65,8 @@ struct SkipBoxes {
     Space at(int octant, ivec3 cell, uint32_t& fetches) const {
         ++fetches;
         const uint16_t box = boxes.boxes[size_t(octant) * boxes.grid.count() + boxes.grid.index(cell)];
-        return {(box & 0x8000) != 0, ivec3(box & 31, box >> 5 & 31, box >> 10 & 31)};
+        if ((box & 0x8000) != 0) return {.occupied = true, .marks = box & 0x7fffu};
+        return {false, ivec3(box & 31, box >> 5 & 31, box >> 10 & 31)};
     }
 };
 
@@ -79,6 +81,7 @@ struct Piece {
     const GridWalk& walk;
     const TileGrid& grid;
     float from, to;
+    uint32_t marks;  ///< as Space::marks
 };
 
 struct CellSurface {
@@ -119,9 +122,10 @@ struct PatchSurface {
     }
 };
 
-/// The small cells of finer data within a cell of the grid, from wall to wall. `Axes`: 2 or 3.
+/// The small cells of finer data within a cell of the grid, from wall to wall; where `marks` say so, only those that the surface passes.
+/// `Axes`: 2 or 3.
 template <int Axes, class Solve>
-bool eachSmallCell(const Piece& piece, ivec3 ratio, Side& side, MarchResult& result, const Solve& solve) {
+bool eachSmallCell(const Piece& piece, ivec3 ratio, uint32_t marks, Side& side, MarchResult& result, const Solve& solve) {
     const vec3 scale(ratio);
     // From the piece's start, where numbers are small.
     const vec3 o = (piece.walk.at(piece.from) - vec3(piece.walk.cell)) * scale, d = piece.walk.d * scale;
@@ -136,13 +140,15 @@ bool eachSmallCell(const Piece& piece, ivec3 ratio, Side& side, MarchResult& res
             if (wall < end) end = wall, axisOut = axis;
         }
         end = std::max(s, std::min(end, span));
-        ++result.surfaceTests;
-        const CellHit<float> found = solve(at, o - vec3(at), d, s, end, side.outside);
-        if (found.hit) {
-            result.t = piece.from + found.t;
-            return true;
+        if (marks == 0 || (marks >> (at.x + 2 * at.y + 4 * at.z) & 1) != 0) {
+            ++result.surfaceTests;
+            const CellHit<float> found = solve(at, o - vec3(at), d, s, end, side.outside);
+            if (found.hit) {
+                result.t = piece.from + found.t;
+                return true;
+            }
+            side.outside = found.outside;
         }
-        side.outside = found.outside;
         if (axisOut < 0 || end >= span) return false;
         at[axisOut] += piece.walk.sign[axisOut];
         if (at[axisOut] < 0 || at[axisOut] >= ratio[axisOut]) return false;
@@ -159,7 +165,7 @@ struct HeightSurface {
     [[nodiscard]] bool meet(const Piece& piece, Side& side, MarchResult& result) const {
         const ivec3 first = piece.walk.cell * ratio;
         const float unit = float(map.range / 65535), cellZ = float(piece.grid.cell.z), bottom = float(piece.walk.cell.z) * cellZ;
-        return eachSmallCell<2>(piece, ratio, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) {
+        return eachSmallCell<2>(piece, ratio, 0, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) {
             ++result.fetches;
             const int x = first.x + at.x, y = first.y + at.y;
             const auto height = [&](int i, int j) { return float(map.texel(x + i, y + j)) * unit - bottom; };
@@ -183,7 +189,8 @@ struct FieldSurface {
     [[nodiscard]] uint64_t bytes() const { return field.bytes(); }
     [[nodiscard]] bool meet(const Piece& piece, Side& side, MarchResult& result) const {
         const ivec3 first = piece.walk.cell * ratio;
-        return eachSmallCell<3>(piece, ratio, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) -> CellHit<float> {
+        const uint32_t marks = ratio == ivec3(2) && (piece.marks & OctantBoxes::kSmallCells) != 0 ? piece.marks : 0;
+        return eachSmallCell<3>(piece, ratio, marks, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) -> CellHit<float> {
             result.fetches += 2;
             TrilinearCell<float> cell;
             for (int corner = 0; corner < 8; ++corner) cell.value[corner] = float(field.step(first + at + ivec3(corner & 1, corner >> 1 & 1, corner >> 2)));
@@ -218,7 +225,7 @@ public:
             const float exit = walk.exit(space.further, axisOut);
             if (space.occupied) {
                 const float entry = walk.entry(), end = std::max(entry, std::min(exit, walk.tMax));
-                if (surface_.meet({walk, grid, entry, end}, side, result)) {
+                if (surface_.meet({walk, grid, entry, end, space.marks}, side, result)) {
                     result.state = MarchState::Hit;
                     return result;
                 }

@@ -97,6 +97,7 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
     VCP_TRY(addCells(method, asset, shape, cells, isExact));
     const bool isOwn = asset.occupancy && asset.occupancy->grid.cells == cells;
     if (name == "boxes") method.boxes = std::make_unique<OctantBoxes>(isOwn && asset.boxes ? *asset.boxes : buildOctantBoxes(*method.occupancy));
+    if (method.boxes && method.field) markSmallCells(*method.field, *method.boxes);
     if (isExact) return method;
     const Cones cones = name == "dm" ? Cones{1, 1} : options.cones;
     if (isOwn && asset.distances && asset.distances->cones.azimuth == cones.azimuth && asset.distances->cones.elevation == cones.elevation)

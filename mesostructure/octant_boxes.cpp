@@ -79,4 +79,20 @@ OctantBoxes buildOctantBoxes(const Occupancy& occupancy) {
     return result;
 }
 
+void markSmallCells(const SampledField& field, OctantBoxes& boxes) {
+    const TileGrid& grid = boxes.grid;
+    const bool fits = field.grid.cells == 2 * grid.cells;
+    for (size_t i = 0; i < grid.count(); ++i) {
+        if ((boxes.boxes[i] & 0x8000) == 0) continue;
+        uint16_t box = uint16_t(0x8000 | (fits ? OctantBoxes::kSmallCells : 0));
+        for (int small = 0; fits && small < 8; ++small) {
+            const glm::ivec3 at = 2 * grid.at(i) + glm::ivec3(small & 1, small >> 1 & 1, small >> 2);
+            int inside = 0;
+            for (int corner = 0; corner < 8; ++corner) inside += field.step(at + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)) <= 0;
+            if (inside != 0 && inside != 8) box = uint16_t(box | 1 << small);
+        }
+        for (int octant = 0; octant < 8; ++octant) boxes.boxes[size_t(octant) * grid.count() + i] = box;
+    }
+}
+
 }  // namespace vcp::meso

@@ -120,7 +120,7 @@ std::vector<Entry> entries() {
     for (const int cells : {32, 128}) all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
     for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
     for (const int cells : {16, 32, 64}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
-    for (const int cells : {16, 32, 64, 128, 256}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
     all.push_back({"grid 64", true, {.name = "cells", .cells = 64}});
     return all;
 }

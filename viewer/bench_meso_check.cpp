@@ -76,7 +76,7 @@ glm::dvec3 directionFrom(std::mt19937_64& random) {
 
 Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Shape& shape, double texel, uint64_t rays) {
     const glm::dvec3 extent = shape.extent();
-    const glm::ivec3 cells(kCells, std::max(1, int(std::lround(kCells * extent.y))), std::max(1, int(std::ceil(extent.z * kCells))));
+    const glm::ivec3 cells(kCells, std::max(1, int(std::lround(kCells * extent.y))), std::max(4, int(std::ceil(extent.z * kCells))));
     const auto occupancy = occupy(shape, cells);
     if (!occupancy) return occupancy.error();
     const auto maps = mapsOf(*occupancy, shape);

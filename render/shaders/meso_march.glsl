@@ -5,11 +5,13 @@
 #include "render/shaders/meso_solve.glsl"
 
 const uint kOccupied = 255u;
+const uint kSmallCells = 0x4000u;  // OctantBoxes::kSmallCells
 
 struct Space {
     bool occupied;
     ivec3 further;
     float reach;
+    uint marks;  // of an occupied cell, which small cells the surface passes (meso::markSmallCells); 0: none
 };
 
 // coneOf (mesostructure/distance_map.h): signs and products, which no device may round further off than it says there.
@@ -33,7 +35,7 @@ Space lookUp(uint cone, ivec3 cell, inout uint fetches) {
         uvec4 level = meso.levels[i];
         uint step = fetchByte(level.x, cone * level.y + entry);
         fetches++;
-        if (step != kOccupied) return Space(false, ivec3(0), float(step) * meso.extent.w);
+        if (step != kOccupied) return Space(false, ivec3(0), float(step) * meso.extent.w, 0u);
         if (i + 1 == meso.cones.z) break;
         uvec4 below = meso.levels[i + 1];
         int edge = int(level.z >> 16), factor = int(below.z & 0xffffu);
@@ -41,7 +43,7 @@ Space lookUp(uint cone, ivec3 cell, inout uint fetches) {
         entry = fetchWord(level.w + entry) * uint(factor * factor * factor) + uint(local.x + factor * (local.y + factor * local.z));
         fetches++;
     }
-    return Space(true, ivec3(0), 0.0);
+    return Space(true, ivec3(0), 0.0, 0u);
 }
 
 Space spaceAt(int direction, ivec3 cell, inout uint fetches) {
@@ -50,10 +52,11 @@ Space spaceAt(int direction, ivec3 cell, inout uint fetches) {
     uint slot = uint(direction) * uint(meso.cells.w) + gridIndex(cell, meso.cells.xy);
     if (kSkip == kMesoBoxes) {
         int box = int(fetchShort(meso.at.x, slot));
-        return Space((box & 0x8000) != 0, ivec3(box & 31, (box >> 5) & 31, (box >> 10) & 31), 0.0);
+        if ((box & 0x8000) != 0) return Space(true, ivec3(0), 0.0, uint(box & 0x7fff));
+        return Space(false, ivec3(box & 31, (box >> 5) & 31, (box >> 10) & 31), 0.0, 0u);
     }
     uint step = fetchByte(meso.at.x, slot);
-    return kSkip == kMesoDistances ? Space(step == kOccupied, ivec3(0), float(step) * meso.extent.w) : Space(step != 0u, ivec3(0), 0.0);
+    return kSkip == kMesoDistances ? Space(step == kOccupied, ivec3(0), float(step) * meso.extent.w, 0u) : Space(step != 0u, ivec3(0), 0.0, 0u);
 }
 
 struct Side {
@@ -150,38 +153,75 @@ CellHit solveField(Walk w, ivec3 at, vec3 o, vec3 d, float from, float to, bool 
     return found;
 }
 
-// The small cells of finer data within a cell of the grid, from wall to wall.
-bool meetSmallCells(Walk w, float from, float to, inout Side side, inout MesoResult result) {
-    ivec3 ratio = kSurface == kMesoHeights ? ivec3(meso.ratio.xy, 1) : meso.ratio.xyz;
+// The texels of a height map within a cell of the grid, from wall to wall.
+bool meetHeights(Walk w, float from, float to, inout Side side, inout MesoResult result) {
+    ivec3 ratio = ivec3(meso.ratio.xy, 1);
     vec3 scale = vec3(ratio), o = (walkAt(w, from) - vec3(w.cell)) * scale, d = w.d * scale;
     float span = to - from, s = 0.0;
     ivec3 at = clamp(ivec3(floor(o)), ivec3(0), ratio - 1);
-    bvec3 still = equal(w.sign, ivec3(0));
-    if (kSurface == kMesoHeights) still.z = true;
-    // At most the cells that a line crosses.
-    for (int i = 0; i < ratio.x + ratio.y + ratio.z; i++) {
+    bvec3 still = bvec3(equal(w.sign.xy, ivec2(0)), true);
+    // At most the texels that a line crosses.
+    for (int i = 0; i < ratio.x + ratio.y; i++) {
         vec3 walls = mix((vec3(at + ivec3(greaterThan(w.sign, ivec3(0)))) - o) / d, vec3(kFar), still);
-        float first = min(walls.x, min(walls.y, walls.z)), end = max(s, min(first, span));
+        float first = min(walls.x, walls.y), end = max(s, min(first, span));
         result.tests++;
-        CellHit found;
-        if (kSurface == kMesoHeights) found = solveHeights(w, at, o - vec3(at), d, s, end, side.outside, result);
-        else found = solveField(w, at, o - vec3(at), d, s, end, side.outside, result);
+        CellHit found = solveHeights(w, at, o - vec3(at), d, s, end, side.outside, result);
         if (found.hit) {
             result.t = from + found.t;
             return true;
         }
         side.outside = found.outside;
         if (first >= kFar || end >= span) return false;
-        at += w.sign * ivec3(equal(ivec3(first == walls.x ? 0 : first == walls.y ? 1 : 2), ivec3(0, 1, 2)));
+        at += w.sign * ivec3(equal(ivec3(first == walls.x ? 0 : 1), ivec3(0, 1, 2)));
         if (any(lessThan(at, ivec3(0))) || any(greaterThanEqual(at, ratio))) return false;
         s = end;
     }
     return false;
 }
 
-bool meetSurface(Walk w, float from, float to, inout Side side, inout MesoResult result) {
+// The small cells of a field within a cell of the grid, from wall to wall; where marks say so, only those that the surface passes.
+bool meetField(Walk w, float from, float to, uint marks, inout Side side, inout MesoResult result) {
+    ivec3 ratio = meso.ratio.xyz;
+    if (ratio != ivec3(2) || (marks & kSmallCells) == 0u) marks = 0u;
+    vec3 scale = vec3(ratio), o = (walkAt(w, from) - vec3(w.cell)) * scale, d = w.d * scale;
+    float span = to - from, s = 0.0;
+    ivec3 at = clamp(ivec3(floor(o)), ivec3(0), ratio - 1), forwards = ivec3(greaterThan(w.sign, ivec3(0)));
+    bvec3 still = equal(w.sign, ivec3(0));
+    // At most the cells that a line crosses.
+    int left = ratio.x + ratio.y + ratio.z;
+    while (left > 0) {
+        float end;
+        bool passes = false;
+        ivec3 small;
+        // As in marchGrid, all look, then all solve.
+        while (!passes && left > 0) {
+            vec3 walls = mix((vec3(at + forwards) - o) / d, vec3(kFar), still);
+            float first = min(walls.x, min(walls.y, walls.z));
+            end = max(s, min(first, span));
+            passes = marks == 0u || ((marks >> uint(at.x + 2 * at.y + 4 * at.z)) & 1u) != 0u;
+            small = at;
+            at += w.sign * ivec3(equal(ivec3(first == walls.x ? 0 : first == walls.y ? 1 : 2), ivec3(0, 1, 2)));
+            left--;
+            if (first >= kFar || end >= span || any(lessThan(at, ivec3(0))) || any(greaterThanEqual(at, ratio))) left = 0;
+            if (!passes) s = end;
+        }
+        if (!passes) return false;
+        result.tests++;
+        CellHit found = solveField(w, small, o - vec3(small), d, s, end, side.outside, result);
+        if (found.hit) {
+            result.t = from + found.t;
+            return true;
+        }
+        side.outside = found.outside;
+        s = end;
+    }
+    return false;
+}
+
+bool meetSurface(Walk w, float from, float to, uint marks, inout Side side, inout MesoResult result) {
     if (kSurface == kMesoPatches) return meetPatches(w, from, to, result);
-    if (kSurface != kMesoCell) return meetSmallCells(w, from, to, side, result);
+    if (kSurface == kMesoHeights) return meetHeights(w, from, to, side, result);
+    if (kSurface == kMesoField) return meetField(w, from, to, marks, side, result);
     if (side.inRun && !w.startsAtTop) return false;
     result.t = from;
     return true;
@@ -196,6 +236,7 @@ void marchGrid(MesoRay ray, inout MesoResult result) {
         bool found = false;
         float exit = kFar;
         int axisOut = -1;
+        uint marks = 0u;
         while (!found && w.cell.z >= 0 && w.cell.z < meso.cells.z && w.t <= w.tMax) {
             if (result.iterations++ == kMostIterations) {
                 result.state = kMesoUnresolved;
@@ -204,6 +245,7 @@ void marchGrid(MesoRay ray, inout MesoResult result) {
             Space space = spaceAt(direction, w.cell, result.fetches);
             exit = walkExit(w, space.further, axisOut);
             found = space.occupied;
+            marks = space.marks;
             if (found) break;
             side.inRun = false;
             if (space.reach > 0.0 && w.t + space.reach > exit) walkJump(w, w.t + space.reach);
@@ -212,7 +254,7 @@ void marchGrid(MesoRay ray, inout MesoResult result) {
         }
         if (!found) break;
         float entry = walkEntry(w), end = max(entry, min(exit, w.tMax));
-        if (meetSurface(w, entry, end, side, result)) {
+        if (meetSurface(w, entry, end, marks, side, result)) {
             result.state = kMesoHit;
             return;
         }

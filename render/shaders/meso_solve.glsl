@@ -10,36 +10,29 @@ struct CellHit {
 CellHit firstFall(float c0, float c1, float c2, float c3, bool outside) {
     if (c0 > 0.0) outside = true;
     else if (outside) return CellHit(true, 0.0, false);
-    float ends[4] = float[4](0.0, 1.0, 1.0, 1.0);
-    int pieces = 1;
-    float a = 3.0 * c3, b = 2.0 * c2, disc = b * b - 4.0 * a * c1;
+    float r0 = 1.0, r1 = 1.0, a = 3.0 * c3, b = 2.0 * c2, disc = b * b - 4.0 * a * c1;
     if (disc > 0.0) {
         float q = -0.5 * (b + (b >= 0.0 ? sqrt(disc) : -sqrt(disc)));
-        float ra = a != 0.0 ? q / a : -1.0, rb = q != 0.0 ? c1 / q : -1.0;
-        float r0 = min(ra, rb), r1 = max(ra, rb);
-        if (r0 > 0.0 && r0 < 1.0) ends[pieces++] = r0;
-        if (r1 > 0.0 && r1 < 1.0) ends[pieces++] = r1;
-        ends[pieces] = 1.0;
+        float ra = a != 0.0 ? q / a : 1.0, rb = q != 0.0 ? c1 / q : 1.0;
+        r0 = clamp(min(ra, rb), 0.0, 1.0);
+        r1 = clamp(max(ra, rb), 0.0, 1.0);
     }
-    for (int i = 0; i < pieces; i++) {
-        float low = ends[i], high = ends[i + 1];
-        float fLow = ((c3 * low + c2) * low + c1) * low + c0, fHigh = ((c3 * high + c2) * high + c1) * high + c0;
-        if (outside && fHigh <= 0.0) {
-            float u = low + (high - low) * (fLow / (fLow - fHigh));
-            for (int k = 0; k < 24; k++) {
-                if (!(u > low && u < high)) u = 0.5 * (low + high);
-                float value = ((c3 * u + c2) * u + c1) * u + c0;
-                if (value > 0.0) low = u;
-                else high = u;
-                float step = value / ((3.0 * c3 * u + 2.0 * c2) * u + c1);
-                if (abs(step) <= 2.4e-7 * u) break;
-                u -= step;
-            }
-            return CellHit(true, u >= low && u <= high ? u : high, false);
-        }
-        outside = fHigh > 0.0;
+    float f0 = ((c3 * r0 + c2) * r0 + c1) * r0 + c0, f1 = ((c3 * r1 + c2) * r1 + c1) * r1 + c0, f2 = ((c3 + c2) + c1) + c0;
+    bool inFirst = outside && f0 <= 0.0, inSecond = f0 > 0.0 && f1 <= 0.0;
+    if (!inFirst && !inSecond && !(f1 > 0.0 && f2 <= 0.0)) return CellHit(false, 0.0, f2 > 0.0);
+    float low = inFirst ? 0.0 : inSecond ? r0 : r1, high = inFirst ? r0 : inSecond ? r1 : 1.0;
+    float fLow = inFirst ? c0 : inSecond ? f0 : f1, fHigh = inFirst ? f0 : inSecond ? f1 : f2;
+    float u = low + (high - low) * (fLow / (fLow - fHigh));
+    for (int k = 0; k < 24; k++) {
+        if (!(u > low && u < high)) u = 0.5 * (low + high);
+        float value = ((c3 * u + c2) * u + c1) * u + c0;
+        if (value > 0.0) low = u;
+        else high = u;
+        float step = value / ((3.0 * c3 * u + 2.0 * c2) * u + c1);
+        if (abs(step) <= 2.4e-7 * u) break;
+        u -= step;
     }
-    return CellHit(false, 0.0, outside);
+    return CellHit(true, u >= low && u <= high ? u : high, false);
 }
 
 // h: heights at the corners (0,0), (1,0), (0,1), (1,1). Between ta <= tb.
