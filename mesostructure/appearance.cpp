@@ -138,6 +138,7 @@ double lightOf(const Appearance& appearance, glm::uvec2 view, glm::dvec3 light, 
     const Harmonics at = harmonicsOf(light);
     double sum = 0;
     for (size_t i = 0; i < 9; ++i) sum += double(appearance.texels[first + i / 4][int(i % 4)]) * at[i];
+    if (withShadows) sum = std::min(sum, std::max(light.z, 0.0) / viewOf(view.x, view.y).z);
     return std::max(sum, 0.0);
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -41,10 +42,33 @@ Error damaged(std::string detail) {
     return wrong(ErrorCode::InvalidInput, "the EXR is damaged: " + detail);
 }
 
-/// What a header says, read before the library allocates by it.
+/// The attributes that the library needs, and their bytes; those of "channels" vary.
+struct Known {
+    std::string_view name, type;
+    size_t bytes;
+};
+constexpr Known kKnown[] = {{"channels", "chlist", 0},          {"compression", "compression", 1}, {"dataWindow", "box2i", 16},        {"displayWindow", "box2i", 16},    {"lineOrder", "lineOrder", 1},
+                            {"pixelAspectRatio", "float", 4}, {"screenWindowCenter", "v2f", 8},  {"screenWindowWidth", "float", 4}, {"tiles", "tiledesc", 9}};
+
+/// Whether names with 16 bytes each, and one empty name, fill it.
+bool isChannelList(std::span<const std::byte> list) {
+    while (!list.empty()) {
+        const auto end = std::find(list.begin(), list.end(), std::byte{0});
+        if (end == list.begin()) return list.size() == 1;
+        const auto name = size_t(end - list.begin());
+        if (list.size() < name + 1 + 16) return false;
+        list = list.subspan(name + 1 + 16);
+    }
+    return false;
+}
+
+/// What a header says, read before the library allocates by it. Attributes that the library does not need get a type that it does not know, so
+/// that it passes over as many bytes as they say.
 class HeaderWalk {
 public:
     explicit HeaderWalk(std::span<const std::byte> file) : file_(file) {}
+
+    [[nodiscard]] const std::vector<std::byte>& header() const { return header_; }
 
     Result<glm::ivec2> sizeOf(int mostEdge) {
         uint32_t version = 0;
@@ -55,10 +79,13 @@ public:
             const auto name = word();
             if (!name) return cut();
             if (name->empty()) return checked(mostEdge);
+            const size_t typeAt = at_;
             const auto type = word();
             uint32_t bytes = 0;
             if (!type || !take(&bytes, sizeof bytes) || bytes > file_.size() - at_) return cut();
-            VCP_TRY(attribute(*name, *type, file_.subspan(at_, bytes)));
+            const auto known = std::ranges::find_if(kKnown, [&](const Known& k) { return k.name == *name && k.type == *type; });
+            if (known == std::end(kKnown)) masked_.push_back({typeAt, type->size()});
+            else VCP_TRY(attribute(*known, file_.subspan(at_, bytes)));
             at_ += bytes;
         }
         return damaged("too many attributes");
@@ -81,25 +108,29 @@ private:
         at_ += size_t(end - rest.begin()) + 1;
         return std::string_view(reinterpret_cast<const char*>(rest.data()), size_t(end - rest.begin()));
     }
-    Result<void> attribute(std::string_view name, std::string_view type, std::span<const std::byte> value) {
-        if (name == "dataWindow" && type == "box2i" && value.size() == sizeof window_) {
+    Result<void> attribute(const Known& known, std::span<const std::byte> value) {
+        if (known.bytes > 0 && value.size() != known.bytes) return damaged(fmt::format("its {} has another size", known.name));
+        if (known.name == "dataWindow") {
             std::memcpy(window_.data(), value.data(), sizeof window_);
             hasWindow_ = true;
-        } else if (name == "tiles" && type == "tiledesc" && value.size() == 9) {
+        } else if (known.name == "tiles") {
             std::memcpy(tile_.data(), value.data(), sizeof tile_);
             hasTiles_ = true;
-        } else if (name == "channels") {
+        } else if (known.name == "channels") {
+            if (!isChannelList(value)) return damaged("its list of channels");
             if (value.size() > kMostChannelBytes) return wrong(ErrorCode::Limit, "an EXR of too many channels for a height map; save one");
             channels_ = value.size() / kLeastChannelBytes;
         }
         return {};
     }
-    Result<glm::ivec2> checked(int mostEdge) const {
+    Result<glm::ivec2> checked(int mostEdge) {
         if (!hasWindow_) return damaged("no data window");
         const int64_t width = int64_t{window_[2]} - window_[0] + 1, height = int64_t{window_[3]} - window_[1] + 1;
         if (width < 1 || height < 1) return damaged("a data window without texels");
         if (width > mostEdge || height > mostEdge) return wrong(ErrorCode::Limit, fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, mostEdge));
         if (hasTiles_) VCP_TRY(checkTiles(uint64_t(width), uint64_t(height)));
+        header_.assign(file_.begin(), file_.begin() + std::ptrdiff_t(at_));
+        for (const auto& [first, count] : masked_) std::fill_n(header_.begin() + std::ptrdiff_t(first), count, std::byte{'?'});
         return glm::ivec2(int(width), int(height));
     }
 
@@ -113,6 +144,8 @@ private:
     }
 
     std::span<const std::byte> file_;
+    std::vector<std::byte> header_;
+    std::vector<std::pair<size_t, size_t>> masked_;  ///< types: first byte, bytes
     size_t at_ = 0;
     std::array<int32_t, 4> window_{};
     std::array<uint32_t, 2> tile_{};
@@ -120,13 +153,15 @@ private:
     bool hasWindow_ = false, hasTiles_ = false;
 };
 
+/// A file, and what stands for its beginning.
 class MemoryStream : public Imf::IStream {
 public:
-    explicit MemoryStream(std::span<const std::byte> bytes) : Imf::IStream(""), bytes_(bytes) {}
+    MemoryStream(std::span<const std::byte> bytes, std::span<const std::byte> header) : Imf::IStream(""), bytes_(bytes), header_(header) {}
 
     bool read(char to[], int count) override {
         if (count < 0 || at_ > bytes_.size() || size_t(count) > bytes_.size() - at_) throw Iex::InputExc("it ends too early");
         std::memcpy(to, bytes_.data() + at_, size_t(count));
+        if (at_ < header_.size()) std::memcpy(to, header_.data() + at_, std::min(size_t(count), header_.size() - size_t(at_)));
         at_ += size_t(count);
         return at_ < bytes_.size();
     }
@@ -134,7 +169,7 @@ public:
     void seekg(uint64_t to) override { at_ = to; }
 
 private:
-    std::span<const std::byte> bytes_;
+    std::span<const std::byte> bytes_, header_;
     uint64_t at_ = 0;
 };
 
@@ -150,8 +185,8 @@ std::vector<std::string> channelsOf(const Imf::ChannelList& list) {
 }
 
 /// Throws what the library throws.
-Result<FloatPicture> decoded(std::span<const std::byte> file, glm::ivec2 size) {
-    MemoryStream stream(file);
+Result<FloatPicture> decoded(std::span<const std::byte> file, std::span<const std::byte> header, glm::ivec2 size) {
+    MemoryStream stream(file, header);
     Imf::InputFile input(stream, 0);
     const Imf::ChannelList& list = input.header().channels();
     const auto channels = channelsOf(list);
@@ -188,10 +223,11 @@ bool readsExr() { return true; }
 
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge) {
     if (!isExr(file)) return wrong(ErrorCode::InvalidInput, "is not an EXR");
-    const auto size = HeaderWalk(file).sizeOf(mostEdge);
+    HeaderWalk walk(file);
+    const auto size = walk.sizeOf(mostEdge);
     if (!size) return size.error();
     try {
-        return decoded(file, *size);
+        return decoded(file, walk.header(), *size);
     } catch (const std::exception& failure) {
         return damaged(failure.what());
     }

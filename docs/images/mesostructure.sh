@@ -24,6 +24,10 @@ draw grazing beads --tiles 2 --shadows --light=0.3,-1,0.25 --size 360x180 --view
 
 "$build/vcp" render "$images/../scenes/beads_gallery.json" -o "$images/scene_beads.png" --size 480x240 --shadows --progress none
 
+# One marched ray a pixel, and the mean light of the tiles.
+draw far_marched hemispheres --surface torus --tiles 80 --height 0.6 --shadows --error-pixels 0 --size 360x220 --view 30,35,1.2
+draw far hemispheres --surface torus --tiles 80 --height 0.6 --shadows --size 360x220 --view 30,35,1.2
+
 # Beads on a dog of 40 000 triangles.
 "$build/make_scan" --shape dog --triangles 40k -o "$scratch/dog.obj"
 cp "$images/../scenes/beads_dog.json" "$scratch"

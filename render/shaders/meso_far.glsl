@@ -47,6 +47,8 @@ float farLight(mat3 frame, vec3 d, inout vec3 n) {
     // Spherical harmonics of l, in the order of the coefficients.
     float light = v.a.x * 0.282095 + 0.488603 * dot(v.a.yzw, l) + 1.092548 * dot(v.b.xyz, vec3(l.x * l.y, l.y * l.z, l.x * l.z)) + 0.315392 * v.b.w * (3.0 * l.z * l.z - 1.0) +
                   0.546274 * v.c.x * (l.x * l.x - l.y * l.y);
+    // No more light is seen than falls on the slab: what three bands miss where it is low would glow.
+    if (view.far.z > 0.0) light = min(light, max(l.z, 0.0) / max(-dot(d, frame[2]), 1e-3));
     // A unit normal sees more of the sky than many that differ.
     vec3 mean = frame * v.c.yzw;
     n = normalize(mean);

@@ -49,6 +49,7 @@ TEST(Appearance, ShowsTheSideThatIsSeen) {
     EXPECT_NEAR(lightOf(steep, {7, 7}, {1, 0, 0}, false), 2 / std::sqrt(5.0), 0.08);
     // Light from the left, nearly level, leaves the right sides dark and reaches only the tops of the left ones.
     const glm::dvec3 low = glm::normalize(glm::dvec3(-1, 0, 0.1));
+    EXPECT_EQ(lightOf(roof, {3, 4}, {-1, 0, 0}, true), 0);
     EXPECT_LT(lightOf(roof, {3, 4}, low, true), 0.5 * lightOf(roof, {3, 4}, low, false));
 }
 

@@ -23,9 +23,14 @@ public:
         channels_.push_back({std::move(name), std::move(values), isHalf});
         return *this;
     }
+    ExrFile& with(std::string name, std::string type, size_t size) {
+        further_.push_back({std::move(name), std::move(type), size});
+        return *this;
+    }
     [[nodiscard]] Bytes bytes() const {
         Bytes out;
         put<uint32_t>(out, 20000630), put<uint32_t>(out, 2);
+        for (const Further& f : further_) attribute(out, f.name, f.type, Bytes(f.size, std::byte{0x7f}));
         Bytes list;
         for (const Channel& c : channels_) {
             text(list, c.name);
@@ -66,6 +71,10 @@ private:
         std::vector<float> values;
         bool isHalf;
     };
+    struct Further {
+        std::string name, type;
+        size_t size;
+    };
     template <class T>
     static void put(Bytes& out, T value) {
         const auto* from = reinterpret_cast<const std::byte*>(&value);
@@ -96,6 +105,7 @@ private:
 
     std::array<int32_t, 4> window_;
     std::vector<Channel> channels_;
+    std::vector<Further> further_;
 };
 
 class Exr : public testing::Test {
@@ -168,6 +178,18 @@ TEST_F(Exr, SizesAreCheckedBeforeTexels) {
     refused(0, 1, ErrorCode::InvalidInput);
     refused(std::numeric_limits<int>::min() + 2, 1, ErrorCode::InvalidInput);
     refused(4096, 4096, ErrorCode::InvalidInput);  // texels that are not there
+}
+
+TEST_F(Exr, OtherAttributesArePassedOver) {
+    // Of sizes that their types do not have, which a reader by type would take for what follows.
+    for (const auto& [type, size] : {std::pair("string", size_t{40}), std::pair("int", size_t{0}), std::pair("m44f", size_t{3}), std::pair("stringvector", size_t{12}),
+                                     std::pair("preview", size_t{8}), std::pair("of mine", size_t{5})}) {
+        const auto map = read(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("other", type, size).bytes());
+        ASSERT_TRUE(map) << type << ": " << map.error().line();
+        EXPECT_EQ(map->texels, (std::vector<uint16_t>{0, 65535}));
+    }
+    EXPECT_FALSE(read(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("dataWindow", "box2i", 12).bytes()));
+    EXPECT_FALSE(read(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("dataWindow", "int", 4).bytes()));
 }
 
 TEST_F(Exr, HostileBytesAreOneLine) {
