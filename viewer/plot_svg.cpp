@@ -15,8 +15,8 @@ namespace {
 constexpr double kWidth = 720, kHeight = 440, kLeft = 76, kRight = 170, kTop = 40, kBottom = 56;
 
 // Okabe and Ito's palette, which colour-blind people can tell apart.
-constexpr std::array<std::string_view, 9> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
-                                                      "#56b4e9", "#000000", "#7b3fa0", "#8c6d31"};
+constexpr std::array<std::string_view, 10> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
+                                                      "#56b4e9", "#000000", "#7b3fa0", "#8c6d31", "#a01010"};
 
 std::string escaped(std::string_view text) {
     std::string safe;

@@ -1,4 +1,5 @@
 // vcp meso and vcp bench meso from the outside.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -213,8 +214,25 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
         methods.insert(row["method"]);
     }
     EXPECT_EQ(methods.size(), 3u);
-    for (const Json& check : report["checks"])
+    // Of needle's rays and beads' by eight maps each.
+    EXPECT_EQ(report["checks"].size(), 16u);
+    for (const Json& check : report["checks"]) {
         EXPECT_TRUE(check["map"] == "4x1 paper" || check["oversteps"] == 0) << check;
+        EXPECT_EQ(check["rays"], 100) << check;
+    }
+    for (const Json& best : report["headline"]) {
+        double wrong = 0;
+        int views = 0;
+        for (const Json& row : report["rows"]) {
+            if (row["asset"] != best["asset"] || row["method"] != best["method"] || row["knob"] != best["fetches_knob"]) continue;
+            for (const char* part : {"missed", "false", "wrong_feature", "unresolved"}) wrong += row[part].get<double>();
+            EXPECT_LE(row["p95_texels"], 0.25);
+            ++views;
+        }
+        EXPECT_EQ(views, 2);
+        EXPECT_LE(wrong / views, 1e-3);
+    }
+    EXPECT_TRUE(std::ranges::any_of(report["headline"], [](const Json& best) { return best["asset"] == "needle" && best["method"] == "boxes"; })) << report["headline"];
     for (const char* file : {"bench_meso.json", "bench_meso.csv", "bench_meso.md", "bench_meso_beads_p95_time.svg"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
     EXPECT_EQ(run("bench meso beads --methods nothing").status, 2);
     EXPECT_EQ(run("bench meso nothing").status, 2);
@@ -316,6 +334,8 @@ TEST_F(MesoCommands, BenchOnADeviceFindsWhatTheProcessorFinds) {
         EXPECT_EQ(a[i]["device"], "cpu");
         EXPECT_NE(b[i]["device"], "cpu");
         EXPECT_GT(b[i]["ns_per_ray"], 0);
+        // The peer is what times are divided by.
+        for (const Json& row : {a[i], b[i]}) EXPECT_TRUE(row["method"] != "dm" || row["ratio_to_peer"] == 1) << row;
         EXPECT_NEAR(a[i]["hit"].get<double>(), b[i]["hit"].get<double>(), 0.01);
         EXPECT_NEAR(a[i]["fetches_mean"].get<double>(), b[i]["fetches_mean"].get<double>(), 0.02 * a[i]["fetches_mean"].get<double>());
     }
