@@ -1,6 +1,7 @@
 #!/bin/bash
 # The pictures of docs/window.md, from a statue that make_scan makes, in a window under Xvfb that xdotool drives.
-# Usage: make_screenshots.sh VCP MAKE_SCAN. Writes images/window-*.jpg beside itself. Takes some minutes without a GPU.
+# Usage: make_screenshots.sh VCP MAKE_SCAN. Writes images/window-*.jpg beside itself. Takes some minutes without a GPU; on an idle
+# machine, since the status line shows how long frames take.
 set -euo pipefail
 vcp=$(realpath "$1") makeScan=$(realpath "$2") images=$(dirname "$(realpath "$0")")/images
 folder=$(mktemp -d)
@@ -42,13 +43,19 @@ closes() { kill -9 "$viewer"; wait "$viewer" 2>/dev/null || true; }
 at() { xdotool mousemove --window "$window" "$@"; }
 key() { local k; for k; do xdotool key --window "$window" "$k"; sleep 0.3; done; }
 busy() { awk '{ print $14 + $15 }' "/proc/$viewer/stat"; }
-# takes NAME: the picture, once the window has been at rest for two seconds.
-takes() {
+# rests: waits until the window has been at rest for two seconds.
+rests() {
     local before
     for _ in $(seq 60); do
         before=$(busy); sleep 2
-        [ $(($(busy) - before)) -le 5 ] && break
+        [ $(($(busy) - before)) -le 5 ] && return
     done
+}
+# takes NAME: the picture, settled and drawn once more: the status line says what a frame takes, not what it took to compile.
+takes() {
+    rests
+    key l l
+    rests
     import -silent -window "$window" now.png
     convert now.png -quality 88 "$images/window-$1.jpg"
 }
@@ -62,8 +69,8 @@ for _ in $(seq 6); do at 490 150 click 4; sleep 0.5; done
 at 5 300
 takes close
 key r d
-sleep 1
-for point in "455 250" "490 300" "470 420"; do at $point click 1; sleep 5; done
+for point in "455 250" "490 300" "470 420"; do rests; at $point click 1; done
+rests
 key Tab
 at 5 300
 takes measuring

@@ -114,8 +114,12 @@ differs flown help
 key F1 Tab
 differs help panel
 xdotool mousemove --window $window 320 240
+# What is fitted keeps clear of the panel: its left side is where the background was.
+key 1
+is_beside_panel() { is_at_rest beside && [ "$(convert beside.png -format '%[fx:abs(p{80,230}.r-p{2,230}.r)>0.05]' info:)" = 1 ]; }
+waits_for "what is fitted is not beside the panel" is_beside_panel
 key Tab 1
-differs panel front
+differs beside front
 # What is saved is what is shown; the scale bar is not.
 key ctrl+s
 is_saved() { [ -s picture-1.png ]; }
