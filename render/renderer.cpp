@@ -252,7 +252,10 @@ Result<void> Renderer::openDatasets(std::vector<PlacedDataset> datasets) {
     options.order = o.order;
     options.loader.withColour = o.colour;
     const auto loaders = static_cast<uint32_t>(std::max<size_t>(datasets.size(), 1));
-    options.loader.threads = std::max(o.loaderThreads / loaders, 1u);
+    uint32_t threads = o.loaderThreads;
+    if (threads == 0)
+        for (const PlacedDataset& each : datasets) threads = std::max(threads, each.loaderThreads);
+    options.loader.threads = std::max(threads / loaders, 1u);
     options.loader.allThreads = loaders * options.loader.threads;
     options.uploadBytes = o.uploadBytes / std::max<size_t>(datasets.size(), 1);
     options.loader.heldBytes = o.ramBytes / std::max<size_t>(datasets.size(), 1);

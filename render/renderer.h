@@ -106,7 +106,7 @@ struct RendererOptions {
     bool colour = true;             ///< false: colour pages are neither read nor allocated
     bool validation = false;        ///< validation layers, core and synchronization; see validationMessages
     PageAccess access = PageAccess::Auto;
-    uint32_t loaderThreads = 2;
+    uint32_t loaderThreads = 0;           ///< shared out among the datasets, one each at least; 0: what their sources need
     uint64_t ramBytes = 256ull << 20;     ///< of pages on their way to the pool, and of stored ones kept to be read again; never exceeded
     LoadOrder order = LoadOrder::Feedback;  ///< of pages; others are for comparison
     uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
@@ -238,6 +238,7 @@ struct PlacedDataset {
     std::shared_ptr<const Dataset> dataset;
     std::shared_ptr<const PageSource> source;  ///< of this one alone
     Similarity placement;
+    uint32_t loaderThreads = 2;                ///< that keep its source busy
 };
 
 /// A page in the pool, for a picture of what is there.

@@ -241,7 +241,6 @@ Result<int> runRender(const RenderMeso& command) {
     }
     RendererOptions options;
     options.device = command.device, options.validation = command.validation;
-    options.loaderThreads = std::max(options.loaderThreads, behind.loaderThreads());
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(behind.placed()));

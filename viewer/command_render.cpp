@@ -218,9 +218,7 @@ Result<int> run(const RenderCommand& command) {
     if (!camera) return camera.error();
     const auto cameras = camerasOf(command, *camera, bounds);
     if (!cameras) return cameras.error();
-    RendererOptions options = command.render.rendererOptions();
-    options.loaderThreads = open->loaderThreads();
-    auto renderer = Renderer::create(options);
+    auto renderer = Renderer::create(command.render.rendererOptions());
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(open->placed(), open->surfaces.surfaces));
 

@@ -15,14 +15,8 @@ Box OpenedScene::bounds() const {
 
 std::vector<PlacedDataset> OpenedScene::placed() const {
     std::vector<PlacedDataset> datasets;
-    for (const Part& part : parts) datasets.push_back({part.open.dataset, part.open.source, part.placement});
+    for (const Part& part : parts) datasets.push_back({part.open.dataset, part.open.source, part.placement, part.open.loaderThreads()});
     return datasets;
-}
-
-uint32_t OpenedScene::loaderThreads() const {
-    uint32_t most = 0;
-    for (const Part& part : parts) most = std::max(most, part.open.loaderThreads());
-    return most;
 }
 
 Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std::function<Result<OpenDataset>(const std::string& file)>& open) {

@@ -23,7 +23,6 @@ struct OpenedScene {
     /// Of all datasets where they are placed, and of the surfaces.
     [[nodiscard]] Box bounds() const;
     [[nodiscard]] std::vector<PlacedDataset> placed() const;
-    [[nodiscard]] uint32_t loaderThreads() const;
 };
 
 /// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for the scene in

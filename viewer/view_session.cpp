@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "streaming/http_reader.h"
 #include "viewer/camera_path.h"
 
 namespace vcp {
@@ -19,7 +18,6 @@ namespace {
 constexpr double kOpeningPollSeconds = 0.1;
 constexpr double kPickPollSeconds = 0.01;
 
-constexpr uint32_t kRemoteLoaderThreads = 8;
 constexpr int kMostExports = 10000;
 constexpr uint32_t kSavedTile = 512;  // small: the window goes on between tiles
 
@@ -53,7 +51,6 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
     viewerOptions.renderer = options.render.rendererOptions();
     // Any shading may be chosen later.
     viewerOptions.renderer.colour = true;
-    if (std::any_of(options.inputs.begin(), options.inputs.end(), isHttpUrl)) viewerOptions.renderer.loaderThreads = kRemoteLoaderThreads;
     viewerOptions.renderer.surface = std::move(surface);
     viewerOptions.errorPixels = options.render.errorPixels;
     viewerOptions.shading = options.render.shadingChosen();

@@ -23,7 +23,7 @@
 namespace vcp {
 
 struct SessionOptions {
-    std::vector<std::string> inputs;  ///< what it may open first, for the renderer's threads
+    std::vector<std::string> inputs;  ///< what the window opens first
     BuildSettings build;
     RenderSettings render;
     UserSettings user;

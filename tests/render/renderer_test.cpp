@@ -3,10 +3,14 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <atomic>
+#include <condition_variable>
 #include <set>
 #include <cmath>
 #include <map>
+#include <mutex>
 #include <numeric>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -265,6 +269,53 @@ TEST_F(RendererTest, OnlyFramesThatMissPagesAskRaysWhatToRead) {
     EXPECT_EQ(asking->feedbackPasses, 1u);
     EXPECT_EQ(asking->pipelines, 4u);
     for (int i = 0; i < 3; ++i) EXPECT_EQ(draw(close).feedbackPasses, 1u);
+}
+
+/// Holds all reads but the first page's, and counts them.
+class HoldingSource final : public PageSource {
+public:
+    explicit HoldingSource(std::shared_ptr<const PageSource> source) : source_(std::move(source)) {}
+    Result<PageBytes> read(uint64_t page, bool withColour) const override {
+        if (page == 0) return source_->read(page, withColour);
+        std::unique_lock lock(mutex_);
+        ++held;
+        freed_.wait(lock, [&] { return isFree_; });
+        return Error{.code = ErrorCode::Cancelled, .message = "closed"};
+    }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override { return source_->bytesToRead(page, withColour); }
+    void interrupt() const override {
+        const std::lock_guard lock(mutex_);
+        isFree_ = true;
+        freed_.notify_all();
+    }
+    mutable std::atomic<uint32_t> held = 0;
+
+private:
+    std::shared_ptr<const PageSource> source_;
+    mutable std::mutex mutex_;
+    mutable std::condition_variable freed_;
+    mutable bool isFree_ = false;
+};
+
+TEST_F(RendererTest, AsManyThreadsReadAsTheSourceNeeds) {
+    const Scene scene = test::sphereScene(3);
+    FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 4.0 / 3));
+    request.errorPixels = 0.001;
+    // As it says; shared with another; as the options say, whatever it says.
+    for (const auto& [datasets, asked, threads] : {std::tuple(1u, 0u, 5u), std::tuple(2u, 0u, 2u), std::tuple(1u, 3u, 3u)}) {
+        start({.loaderThreads = asked});
+        const auto source = std::make_shared<HoldingSource>(scene.source);
+        std::vector<PlacedDataset> all{{scene.dataset, source, {}, 5}};
+        if (datasets > 1) all.push_back({scene.dataset, scene.source, {}, 2});
+        ASSERT_TRUE(renderer_->open(all));
+        for (int i = 0; i < 2000 && source->held < threads; ++i) {
+            ASSERT_TRUE(renderer_->update(request));
+            renderer_->waitForPage(std::chrono::milliseconds(5));
+        }
+        for (int i = 0; i < 10; ++i) renderer_->waitForPage(std::chrono::milliseconds(5));
+        EXPECT_EQ(source->held, threads);
+        renderer_->close();
+    }
 }
 
 /// Pages of a sphere around `centre` in the order they were read; one page an update, each update drawn.

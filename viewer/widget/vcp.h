@@ -107,7 +107,7 @@ typedef struct vcp_context_options {
     const vcp_host_device* host_device; /* NULL: the context makes a device of its own */
     uint64_t gpu_bytes;        /* budget of the pages on the device, never exceeded; 0: 512 MiB */
     uint64_t ram_bytes;        /* budget of pages being read or kept to be read again, never exceeded; 0: 256 MiB */
-    uint32_t loader_threads;   /* 0: 2; from a server more help: 8 */
+    uint32_t loader_threads;   /* 0: 2, for what is on a server 8 */
     uint32_t without_colour;   /* 1: colours are neither read nor kept */
     const vcp_callbacks* callbacks; /* NULL: none; copied */
     char* error_text;          /* NULL, or where it is written why there is no context */
