@@ -303,7 +303,9 @@ TEST_F(RendererTest, AsManyThreadsReadAsTheSourceNeeds) {
     request.errorPixels = 0.001;
     // As it says; shared with another; as the options say, whatever it says.
     for (const auto& [datasets, asked, threads] : {std::tuple(1u, 0u, 5u), std::tuple(2u, 0u, 2u), std::tuple(1u, 3u, 3u)}) {
-        start({.loaderThreads = asked});
+        RendererOptions options;
+        options.loaderThreads = asked;
+        start(options);
         const auto source = std::make_shared<HoldingSource>(scene.source);
         std::vector<PlacedDataset> all{{scene.dataset, source, {}, 5}};
         if (datasets > 1) all.push_back({scene.dataset, scene.source, {}, 2});

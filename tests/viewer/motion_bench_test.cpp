@@ -45,7 +45,7 @@ TEST(MotionBench, SlowFramesAreSmaller) {
     const auto report = measureMotion({placed}, {{-1, -1, -1}, {1, 1, 1}}, options);
     ASSERT_TRUE(report) << report.error().line();
     ASSERT_GT(report->frameMs.size(), 0u);
-    EXPECT_GT(report->byReduction.count(4), 0u);
+    EXPECT_GT(report->byReduction.count(8), 0u);
     EXPECT_TRUE(report->fullSizeAfterMs) << "full size never came back";
     options.cancel = [] { return true; };
     EXPECT_EQ(measureMotion({placed}, {{-1, -1, -1}, {1, 1, 1}}, options).error().code, ErrorCode::Cancelled);

@@ -501,8 +501,8 @@ TEST_F(ViewerTest, LowerResolutionWhileMovingThenFull) {
     viewer_->press(MouseButton::Left, {160, 120});
     viewer_->move({165, 120});
     ASSERT_TRUE(turn(0.01));
-    EXPECT_EQ(viewer_->status().reduction, 4);
-    EXPECT_EQ(viewer_->renderer().readPicture()->width, 80u);
+    EXPECT_EQ(viewer_->status().reduction, 8);
+    EXPECT_EQ(viewer_->renderer().readPicture()->width, 40u);
     EXPECT_LE(next_.waitSeconds, 0.5) << "comes back by itself for the full picture";
     EXPECT_TRUE(viewer_->pointAt({160, 120})) << "picking works in the smaller picture";
     ASSERT_TRUE(turn(0.5));
