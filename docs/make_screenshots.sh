@@ -22,7 +22,7 @@ awk 'BEGIN { R=192; S=384; pi=atan2(0,-1)
         print 3, o+r*S+u, o+r*S+v, o+(r+1)*S+u; print 3, o+r*S+v, o+(r+1)*S+v, o+(r+1)*S+u } }' >ball.ply
 "$vcp" build ball.ply -o ball.vcp --progress none >/dev/null
 exec 3>display
-Xvfb -displayfd 3 -screen 0 1024x768x24 >/dev/null 2>&1 &
+Xvfb -noreset -displayfd 3 -screen 0 1024x768x24 >/dev/null 2>&1 &
 xvfb=$!
 for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
 export DISPLAY=:$(cat display)
