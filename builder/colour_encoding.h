@@ -15,6 +15,16 @@ inline double srgbToLinear(double value) {
     return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
+/// srgbToLinear of what 8 bits store.
+inline const std::array<double, 256>& lightOfByte() {
+    static const std::array<double, 256> table = [] {
+        std::array<double, 256> t{};
+        for (size_t i = 0; i < t.size(); ++i) t[i] = srgbToLinear(static_cast<double>(i) / 255);
+        return t;
+    }();
+    return table;
+}
+
 inline double linearToSrgb(double light) {
     return light <= 0.0031308 ? light * 12.92 : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }

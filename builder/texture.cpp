@@ -12,15 +12,6 @@ namespace {
 
 using Light = std::array<double, 4>;
 
-const std::array<double, 256>& lightOfByte() {
-    static const std::array<double, 256> table = [] {
-        std::array<double, 256> t{};
-        for (size_t i = 0; i < t.size(); ++i) t[i] = srgbToLinear(static_cast<double>(i) / 255);
-        return t;
-    }();
-    return table;
-}
-
 // Adds a texel's light, weighted by its alpha.
 void add(Light& sum, Rgba8 texel, double weight) {
     const auto& table = lightOfByte();

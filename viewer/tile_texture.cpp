@@ -1,7 +1,5 @@
 #include "viewer/tile_texture.h"
 
-#include <array>
-
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
@@ -31,9 +29,10 @@ Result<MesoTexture> readTexture(const std::filesystem::path& path, ToVector toVe
 }  // namespace
 
 Result<MesoTexture> readColourTexture(const std::filesystem::path& path) {
-    std::array<float, 256> light{};
-    for (size_t i = 0; i < light.size(); ++i) light[i] = float(srgbToLinear(double(i) / 255));
-    return readTexture(path, [&](Rgba8 texel) { return glm::vec4(light[size_t(byteOf(texel, 0))], light[size_t(byteOf(texel, 1))], light[size_t(byteOf(texel, 2))], 1); });
+    return readTexture(path, [&table = lightOfByte()](Rgba8 texel) {
+        const auto light = [&](int channel) { return float(table[size_t(byteOf(texel, channel))]); };
+        return glm::vec4(light(0), light(1), light(2), 1);
+    });
 }
 
 Result<MesoTexture> readNormalTexture(const std::filesystem::path& path) {
