@@ -6,25 +6,13 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
-#include "test_folder.h"
+#include "built_ball.h"
 
 namespace vcp {
 namespace {
 
-class FinestPickTest : public testing::Test {
+class FinestPickTest : public BuiltBall {
 protected:
-    static void SetUpTestSuite() {
-        folder_ = std::make_unique<TestFolder>("vcp_finest_pick_test");
-        writeBall(*folder_ / "ball.ply", 60, 120);
-        BuildOptions options;
-        options.inputs = {*folder_ / "ball.ply"};
-        options.output = *folder_ / "ball.vcp";
-        const auto report = buildOctree(options);
-        ASSERT_TRUE(report) << report.error().line();
-    }
-    static void TearDownTestSuite() { folder_.reset(); }
-
     void SetUp() override {
         auto reader = openFile(*folder_ / "ball.vcp");
         ASSERT_TRUE(reader);
@@ -32,11 +20,9 @@ protected:
         pick_ = std::make_unique<FinestPick>(*reader, dataset_);
     }
 
-    static std::unique_ptr<TestFolder> folder_;
     Dataset dataset_;
     std::unique_ptr<FinestPick> pick_;
 };
-std::unique_ptr<TestFolder> FinestPickTest::folder_;
 
 TEST_F(FinestPickTest, AgreesWithTheCasterOfAllFinestPages) {
     PageCache all = PageCache::open(*folder_ / "ball.vcp").value();

@@ -8,26 +8,14 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
-#include "test_folder.h"
+#include "built_ball.h"
 #include "viewer/orbit_camera.h"
 
 namespace vcp {
 namespace {
 
-class TiledPictureTest : public testing::Test {
+class TiledPictureTest : public BuiltBall {
 protected:
-    static void SetUpTestSuite() {
-        folder_ = std::make_unique<TestFolder>("vcp_tiled_picture_test");
-        writeBall(*folder_ / "ball.ply", 60, 120);
-        BuildOptions options;
-        options.inputs = {*folder_ / "ball.ply"};
-        options.output = *folder_ / "ball.vcp";
-        const auto report = buildOctree(options);
-        ASSERT_TRUE(report) << report.error().line();
-    }
-    static void TearDownTestSuite() { folder_.reset(); }
-
     void SetUp() override {
         if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
         RendererOptions options;
@@ -93,10 +81,8 @@ protected:
         return 4.0 * static_cast<double>(count) / static_cast<double>(a.rgba.size());
     }
 
-    static std::unique_ptr<TestFolder> folder_;
     std::unique_ptr<Renderer> renderer_;
 };
-std::unique_ptr<TestFolder> TiledPictureTest::folder_;
 
 // Rays of a tile are those of the whole but for rounding: a silhouette's pixel may flip.
 TEST_F(TiledPictureTest, TilesMakeThePictureThatIsDrawnAtOnce) {

@@ -8,9 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
+#include "built_ball.h"
 #include "render/picture.h"
-#include "test_folder.h"
 
 namespace vcp {
 namespace {
@@ -20,19 +19,8 @@ namespace fs = std::filesystem;
 constexpr PictureChoice kSmall{.size = {64, 48}};
 constexpr PictureChoice kTwoTiles{.size = {600, 32}};
 
-class ViewSessionTest : public testing::Test {
+class ViewSessionTest : public BuiltBall {
 protected:
-    static void SetUpTestSuite() {
-        folder_ = std::make_unique<TestFolder>("vcp_view_session_test");
-        writeBall(*folder_ / "ball.ply", 60, 120);
-        BuildOptions options;
-        options.inputs = {*folder_ / "ball.ply"};
-        options.output = *folder_ / "ball.vcp";
-        const auto report = buildOctree(options);
-        ASSERT_TRUE(report) << report.error().line();
-    }
-    static void TearDownTestSuite() { folder_.reset(); }
-
     /// A working folder of the test's own, and the ball in a session.
     void SetUp() override {
         if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
@@ -87,12 +75,10 @@ protected:
     }
     static Picture picture(const fs::path& path) { return readPng(path).value(); }
 
-    static std::unique_ptr<TestFolder> folder_;
     fs::path before_;
     std::unique_ptr<ViewSession> session_;
     double now_ = 0;
 };
-std::unique_ptr<TestFolder> ViewSessionTest::folder_;
 
 TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
     session_->savePicture(kSmall);

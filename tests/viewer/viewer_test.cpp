@@ -9,27 +9,15 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
-#include "test_folder.h"
+#include "built_ball.h"
 
 namespace vcp {
 namespace {
 
 constexpr glm::ivec2 kSize(320, 240);
 
-class ViewerTest : public testing::Test {
+class ViewerTest : public BuiltBall {
 protected:
-    static void SetUpTestSuite() {
-        folder_ = std::make_unique<TestFolder>("vcp_viewer_test");
-        writeBall(*folder_ / "ball.ply", 60, 120);
-        BuildOptions options;
-        options.inputs = {*folder_ / "ball.ply"};
-        options.output = *folder_ / "ball.vcp";
-        const auto report = buildOctree(options);
-        ASSERT_TRUE(report) << report.error().line();
-    }
-    static void TearDownTestSuite() { folder_.reset(); }
-
     void SetUp() override {
         if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
     }
@@ -80,12 +68,10 @@ protected:
 
     [[nodiscard]] glm::dvec2 pixelOf(glm::dvec3 point) const { return viewer_->camera().pixelOf(point, kSize).value(); }
 
-    static std::unique_ptr<TestFolder> folder_;
     std::unique_ptr<Viewer> viewer_;
     NextStep next_;
     double now_ = 0;
 };
-std::unique_ptr<TestFolder> ViewerTest::folder_;
 
 TEST_F(ViewerTest, DrawsOnlyWhenSomethingChanged) {
     openViewer();
