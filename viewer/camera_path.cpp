@@ -3,20 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <numbers>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
+#include "viewer/text_file.h"
+
 namespace vcp {
 
 namespace {
 
 constexpr size_t kMostCameras = 10000;
-constexpr std::uintmax_t kLargestFile = 64 << 20;
+constexpr size_t kLargestFile = 64 << 20;
 constexpr int kDeepest = 4;  // a camera's coordinates are nested 3 deep
 
 /// Of four keys in a row, for a time from 0 to 1 between the middle two.
@@ -103,12 +103,9 @@ Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const st
 }
 
 Result<std::vector<OrbitCamera>> readCameras(const std::filesystem::path& path) {
-    std::error_code failed;
-    std::ifstream file(path, std::ios::binary);
-    if (!file || std::filesystem::is_directory(path, failed)) return Error{ErrorCode::Io, "cannot be opened; a path is a JSON array of cameras", path.string()};
-    if (std::filesystem::file_size(path, failed) > kLargestFile && !failed) return Error{ErrorCode::Limit, "too large for a path of cameras", path.string()};
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    return camerasFromJson(text, path.string());
+    const auto text = readText(path, kLargestFile, "a path of cameras", "cannot be opened; a path is a JSON array of cameras");
+    if (!text) return text.error();
+    return camerasFromJson(*text, path.string());
 }
 
 }  // namespace vcp

@@ -1,9 +1,10 @@
 #include "viewer/orbit_camera.h"
 
+#include "viewer/text_file.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <numbers>
 #include <sstream>
 
@@ -340,18 +341,13 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
 }
 
 Result<OrbitCamera> readCamera(const std::filesystem::path& path) {
-    constexpr std::streamsize kLimit = 1 << 20;
+    constexpr size_t kLimit = 1 << 20;
     std::error_code failed;
     if (std::filesystem::is_directory(path, failed))
         return Error{ErrorCode::Io, "is a folder, not a camera file", path.string()};
-    std::ifstream file(path, std::ios::binary);
-    if (!file) return Error{ErrorCode::Io, "cannot be opened; views are " + viewNames() + " or a JSON file", path.string()};
-    std::string text(kLimit + 1, '\0');
-    file.read(text.data(), kLimit + 1);
-    if (file.bad()) return Error{ErrorCode::Io, "cannot be read", path.string()};
-    if (file.gcount() > kLimit) return Error{ErrorCode::Limit, "too large for a camera file", path.string()};
-    text.resize(static_cast<size_t>(file.gcount()));
-    return cameraFromJson(text, path.string());
+    const auto text = readText(path, kLimit, "a camera file", "cannot be opened; views are " + viewNames() + " or a JSON file");
+    if (!text) return text.error();
+    return cameraFromJson(*text, path.string());
 }
 
 }  // namespace vcp

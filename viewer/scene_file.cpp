@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <numbers>
 
@@ -13,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "streaming/http_reader.h"
+#include "viewer/text_file.h"
 
 namespace vcp {
 
@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::streamsize kLargestFile = 1 << 20;
+constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
 constexpr int kDeepest = 16;
 // What a scene may have of them: nothing else has a line of its own.
@@ -384,15 +384,9 @@ Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, 
 }
 
 Result<SceneFile> readScene(const std::filesystem::path& path) {
-    std::error_code failed;
-    std::ifstream file(path, std::ios::binary);
-    if (!file || std::filesystem::is_directory(path, failed)) return Error{ErrorCode::Io, "cannot be opened", path.string()};
-    std::string text(static_cast<size_t>(kLargestFile) + 1, '\0');
-    file.read(text.data(), kLargestFile + 1);
-    if (file.bad()) return Error{ErrorCode::Io, "cannot be read", path.string()};
-    if (file.gcount() > kLargestFile) return Error{ErrorCode::Limit, "too large for a scene file", path.string()};
-    text.resize(static_cast<size_t>(file.gcount()));
-    return sceneFromJson(text, path.string(), path.parent_path());
+    const auto text = readText(path, kLargestFile, "a scene file");
+    if (!text) return text.error();
+    return sceneFromJson(*text, path.string(), path.parent_path());
 }
 
 }  // namespace vcp
