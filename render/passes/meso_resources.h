@@ -6,8 +6,8 @@
 //           and as fours
 //  3        rays, or the shell            CPU (upload)            rays, surface
 //  4        results, or hits              rays, surface           surface, shade, readback
-//  5        picture                       copies, shade           readback
-//  6        counters                      surface                 readback
+//  5        picture, of the frame         shade pass, shade       readback, present
+//  6        counters                      surface, shade          readback
 //  7        appearance, textures          CPU (upload)            surface
 #pragma once
 
