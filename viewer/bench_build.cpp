@@ -14,6 +14,7 @@
 #include "viewer/bench_rays.h"
 #include "viewer/bench_tracer.h"
 #include "viewer/child_process.h"
+#include "viewer/quantile.h"
 
 namespace vcp {
 
@@ -102,8 +103,8 @@ Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject,
         row.errorCells = built.errorTarget / built.cell;
         row.certifiedCells = built.certifiedErrorMax / built.cell;
     }
-    row.seconds = medianOf(seconds);
-    row.cpuSeconds = medianOf(cpuSeconds);
+    row.seconds = quantile(seconds, 0.5);
+    row.cpuSeconds = quantile(cpuSeconds, 0.5);
     row.trianglesPerSecond = static_cast<double>(row.triangles) / row.seconds;
     return {};
 }
@@ -135,7 +136,7 @@ Result<std::string> judge(const BenchBuildOptions& options, const fs::path& mode
         if (!time) return time.error();
         embreeSeconds.push_back(*time);
     }
-    std::string value = bytesOf(embreeSeconds.empty() ? 0.0 : medianOf(embreeSeconds));
+    std::string value = bytesOf(quantile(embreeSeconds, 0.5));
     if (files.empty()) return value;
     if (!progress("sorting the mesh", 0.4)) return cancelled();
     const MeshBvh bvh(*mesh);

@@ -9,6 +9,7 @@
 
 #include "viewer/bench_tracer.h"
 #include "viewer/peers/parallel_rows.h"
+#include "viewer/quantile.h"
 
 #ifdef VCP_HAVE_EMBREE
 #include <embree3/rtcore.h>
@@ -165,7 +166,7 @@ public:
             if (repetition > 0) seconds.push_back(secondsSince(start));
         }
         TracedPicture picture;
-        picture.seconds = medianOf(seconds);
+        picture.seconds = quantile(seconds, 0.5);
         picture.hits.resize(hits.size());
         for (size_t i = 0; i < hits.size(); ++i) {
             if (!std::isfinite(hits[i].t)) continue;

@@ -14,6 +14,7 @@
 #include "mesostructure/method.h"
 #include "render/meso_marcher.h"
 #include "viewer/meso_scene.h"
+#include "viewer/quantile.h"
 
 namespace vcp {
 

@@ -118,8 +118,6 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const mes
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths, double texel);
 /// The mean work, its bins and divergence into the row.
 void countWork(const std::vector<meso::MarchResult>& results, BenchMesoRow& row);
-/// The value that this part of the sorted values does not exceed; 0 of none.
-double quantile(std::vector<double> values, double part);
 
 /// Tables 1 and 2 and the secant's claim, of the rows that there are.
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);

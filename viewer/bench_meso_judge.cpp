@@ -6,17 +6,11 @@
 #include <glm/geometric.hpp>
 
 #include "viewer/bench_meso.h"
+#include "viewer/quantile.h"
 
 namespace vcp {
 
 using namespace meso;
-
-double quantile(std::vector<double> values, double part) {
-    if (values.empty()) return 0;
-    const auto at = values.begin() + std::ptrdiff_t(std::min(values.size() - 1, size_t(part * double(values.size()))));
-    std::ranges::nth_element(values, at);
-    return *at;
-}
 
 MesoJudged judgeMeso(const std::vector<MarchResult>& results, const std::vector<TruthHit>& truths, double texel) {
     MesoJudged judged;

@@ -12,6 +12,7 @@
 #include "render/renderer.h"
 #include "streaming/page_source.h"
 #include "viewer/peers/parallel_rows.h"
+#include "viewer/quantile.h"
 
 namespace vcp {
 
@@ -89,7 +90,7 @@ public:
             if (!frame) return frame.error();
             if (repetition > 0) seconds.push_back(frame->msFrame * 1e-3);
         }
-        picture.seconds = medianOf(seconds);
+        picture.seconds = quantile(seconds, 0.5);
         VCP_TRY(readHits(camera, size, settled->errorPixels, picture));
         VCP_TRY(countWork(request, picture));
         return picture;
@@ -181,13 +182,6 @@ Result<std::unique_ptr<RayTracer>> makePaperGpuTracer(std::shared_ptr<const Data
                               {.name = fmt::format("eps {:g}", march.epsilon),
                                .march = march,
                                .certifiedError = std::numeric_limits<double>::infinity()});
-}
-
-double medianOf(std::vector<double> seconds) {
-    if (seconds.empty()) return 0;
-    const auto middle = seconds.begin() + static_cast<std::ptrdiff_t>(seconds.size() / 2);
-    std::nth_element(seconds.begin(), middle, seconds.end());
-    return *middle;
 }
 
 }  // namespace vcp

@@ -55,7 +55,4 @@ Result<std::unique_ptr<RayTracer>> makeEmbreeTracer(const IndexedMesh& mesh, boo
 /// Seconds that Embree takes to build its tree. Errors: as above.
 Result<double> timeEmbreeBuild(const IndexedMesh& mesh, unsigned threads);
 
-/// Middle of the repetitions' times.
-double medianOf(std::vector<double> seconds);
-
 }  // namespace vcp

@@ -18,6 +18,7 @@
 #include "viewer/meso_scene.h"
 #include "viewer/dataset_opening.h"
 #include "viewer/option_values.h"
+#include "viewer/quantile.h"
 #include "viewer/render_settings.h"
 
 namespace vcp {
@@ -170,8 +171,7 @@ Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, i
         stats = *drawn;
         if (i > 0) times.push_back(stats.msFrame);
     }
-    std::ranges::sort(times);
-    if (!times.empty()) stats.msFrame = times[times.size() / 2];
+    if (!times.empty()) stats.msFrame = quantile(times, 0.5);
     return stats;
 }
 
@@ -232,13 +232,13 @@ Result<int> runRender(const RenderMeso& command) {
     if (!descriptions) return descriptions.error();
     // What is wrong is said before anything is made.
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
-    const InterruptScope catching;
     OpenedScene behind;
     if (!command.scan.empty()) {
         auto opened = openScene({command.scan}, BuildSettings{}, SourceSettings{}, ProgressStyle::None);
         if (!opened) return opened.error();
         behind = *std::move(opened);
     }
+    const InterruptScope catching;
     RendererOptions options;
     options.device = command.device, options.validation = command.validation;
     auto renderer = Renderer::create(options);

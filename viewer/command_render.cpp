@@ -15,6 +15,7 @@
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
 #include "viewer/picture_sequence.h"
+#include "viewer/quantile.h"
 #include "viewer/render_settings.h"
 
 namespace vcp {
@@ -59,10 +60,7 @@ struct Drawing {
 
     /// Of the timed frames; of the first when none was timed.
     [[nodiscard]] double medianMs() const {
-        if (frameMs.empty()) return firstFrameMs;
-        std::vector<double> sorted = frameMs;
-        std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-        return sorted[sorted.size() / 2];
+        return frameMs.empty() ? firstFrameMs : quantile(frameMs, 0.5);
     }
     [[nodiscard]] double raysPerSecond() const { return static_cast<double>(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
 };

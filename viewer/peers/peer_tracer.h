@@ -6,6 +6,7 @@
 #include "viewer/bench_tracer.h"
 #include "viewer/peers/octree_walk.h"
 #include "viewer/peers/parallel_rows.h"
+#include "viewer/quantile.h"
 
 namespace vcp {
 
@@ -35,7 +36,7 @@ public:
                 seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
         }
         TracedPicture picture;
-        picture.seconds = medianOf(seconds);
+        picture.seconds = quantile(seconds, 0.5);
         picture.hits.resize(hits.size());
         std::vector<RaysWork> works(size.y);
         forEachRow(size.y, threads_, [&](int y) {
