@@ -21,6 +21,7 @@
 #include "builder/level_plan.h"
 #include "builder/memory_plan.h"
 #include "builder/progress_meter.h"
+#include "octree/output_file.h"
 
 namespace vcp {
 
@@ -68,7 +69,8 @@ private:
 
     Result<void> stages() {
         // A wrong output is found before an hour's work, not after it.
-        if (auto probe = VcpWriter::create(options_.output, 1); !probe) return probe.error();
+        VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
+        VCP_TRY(checkTempFolder());
         VCP_TRY(openJournal());
         const std::string stage = done_.value("stage", "");
         if (stage.empty()) VCP_TRY(read());
@@ -93,6 +95,20 @@ private:
     }
 
     Error cancelled() const { return {.code = ErrorCode::Cancelled, .message = "cancelled", .file = options_.output.string()}; }
+
+    /// What the output may replace: nothing that is read.
+    [[nodiscard]] OutputRules rules() const {
+        OutputRules rules{.overwrite = options_.overwrite, .inputs = options_.inputs};
+        return rules;
+    }
+
+    /// Temporary files are removed by their names, so that no input may lie among them.
+    [[nodiscard]] Result<void> checkTempFolder() const {
+        for (const auto& input : options_.inputs)
+            if (isSameFile(input.parent_path().empty() ? "." : input.parent_path(), space_.folder()))
+                return Error{.code = ErrorCode::Usage, .message = "lies in the folder of this build's temporary files; move it, or choose another output", .file = input.string()};
+        return {};
+    }
 
     // The journal
 
@@ -165,6 +181,7 @@ private:
         }, report_.warnings);
         if (!measures) return measures.error();
         measures_ = *measures;
+        VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         releaseMemory();
         VCP_TRY(checkFreeSpace());
         // Images are not kept: what has them is dealt before it is safe.
@@ -331,7 +348,7 @@ private:
 
     Result<void> write() {
         FileHeader header = headerOf(measures_, plan_.frame, plan_.errorTarget, hasColour());
-        auto bytes = assembleDataset(files_.spools, header, options_.output, [this](double part) { return progress("writing", 1 - kWritingShare + kWritingShare * part); });
+        auto bytes = assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) { return progress("writing", 1 - kWritingShare + kWritingShare * part); });
         if (!bytes) return bytes.error();
         report_.fileBytes = *bytes;
         report_.triangles = header.triangles;

@@ -88,11 +88,12 @@ FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double
     return header;
 }
 
-Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output, const std::function<bool(double)>& progress) {
+Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output, const OutputRules& rules,
+                                 const std::function<bool(double)>& progress) {
     addPassages(levels);
     linkChildren(levels);
     describeLevels(levels, header);
-    auto writer = VcpWriter::create(output, header.pages);
+    auto writer = VcpWriter::create(output, header.pages, rules);
     if (!writer) return writer.error();
     uint64_t done = 0;
     for (const PageSpool& level : levels)

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@
 
 #include "datasets_scripts/dog.h"
 #include "datasets_scripts/scan_mesh.h"
+#include "octree/durable_file.h"
+#include "octree/output_file.h"
 
 namespace {
 
@@ -103,52 +106,39 @@ Error ioError(const std::string& file, const std::string& what) {
     return {ErrorCode::Io, what + ": " + std::strerror(errno), file};
 }
 
-/// A file that appears under its name only when it is whole; or a pipe or device, written directly.
+/// A file that appears under its name only when it is whole; or standard output, a pipe or a device, written directly.
 class Output {
 public:
-    static Result<Output> open(const std::string& path) {
+    static Result<Output> open(const std::string& path, OutputKind kind) {
         Output output;
         output.path_ = path;
+        struct stat status {};
+        const bool isThere = ::stat(path.c_str(), &status) == 0;
         if (path == "-") {
             output.descriptor_ = STDOUT_FILENO;
-            return output;
+        } else if (isThere && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)) {
+            output.descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+            if (output.descriptor_ < 0) return ioError(path, "cannot be written");
+        } else {
+            auto file = OutputFile::create(path, kind);
+            if (!file) return file.error();
+            output.file_ = std::make_unique<OutputFile>(*std::move(file));
         }
-        struct stat status {};
-        const bool special = ::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode);
-        output.written_ = special ? path : path + ".partial";
-        output.descriptor_ =
-            ::open(output.written_.c_str(), O_WRONLY | O_CLOEXEC | (special ? 0 : O_CREAT | O_TRUNC), 0666);
-        if (output.descriptor_ < 0) return ioError(path, "cannot be written");
         return output;
     }
 
-    Result<void> write(std::span<const std::byte> bytes) const {
-        while (!bytes.empty()) {
-            const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
-            if (count < 0 && errno == EINTR) continue;
-            if (count < 0) return ioError(path_, "write failed");
-            bytes = bytes.subspan(size_t(count));
-        }
-        return {};
-    }
+    Result<void> write(std::span<const std::byte> bytes) const { return file_ ? file_->append(bytes) : appendAll(descriptor_, bytes, path_); }
 
     /// Gives the file its name.
     Result<void> finish() const {
-        if (partial() && ::fsync(descriptor_) != 0) return ioError(path_, "fsync failed");
+        if (file_) return file_->commit();
         if (::close(descriptor_) != 0) return ioError(path_, "close failed");
-        if (partial() && std::rename(written_.c_str(), path_.c_str()) != 0)
-            return ioError(path_, "cannot be put in place");
         return {};
     }
 
-    void discard() const {
-        if (partial()) std::remove(written_.c_str());
-    }
-
 private:
-    [[nodiscard]] bool partial() const { return !written_.empty() && written_ != path_; }
-
-    std::string path_, written_;
+    std::string path_;
+    std::unique_ptr<OutputFile> file_;
     int descriptor_ = -1;
 };
 
@@ -166,12 +156,14 @@ Result<void> writeStatue(const Arguments& arguments, const Output& output) {
 }
 
 Result<void> run(const Arguments& arguments) {
-    auto output = Output::open(arguments.out);
+    const OutputKind kind = arguments.isDog ? OutputKind::Obj : OutputKind::Ply;
+    if (const auto named = outputKindOf(arguments.out); named && *named != kind)
+        return Error{ErrorCode::Usage, std::string("what is written is ") + (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") + ", or be - for a pipe"};
+    auto output = Output::open(arguments.out, kind);
     if (!output) return output.error();
     auto result = arguments.isDog ? writeObj(dog(arguments.scan.triangles), [&](std::string_view text) { return output->write(std::as_bytes(std::span(text))); })
                                   : writeStatue(arguments, *output);
     if (result) result = output->finish();
-    if (!result) output->discard();
     return result;
 }
 

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -280,7 +279,7 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
     return {};
 }
 
-Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset) {
+Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset, const OutputRules& rules) {
     const auto chunks = chunksOf(asset);
     AssetHeader header;
     header.chunks = uint32_t(chunks.size());
@@ -300,31 +299,15 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
     commit.fileBytes = header.fileBytes, commit.headerHash = header.hash;
     commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(AssetCommit, hash)));
 
-    if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) return Error{.code = ErrorCode::Io, .message = "is a folder; give a file name", .file = path.string()};
-    std::filesystem::path partial = path;
-    partial += ".partial";
-    const int file = ::open(partial.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (file < 0) return systemError(path, "cannot write here", errno);
-    if (lockName(file, partial) != NameLock::Taken) {
-        ::close(file);
-        return Error{.code = ErrorCode::Io, .message = "another build is writing this file", .file = path.string()};
-    }
-    const auto write = [&]() -> Result<void> {
-        if (::ftruncate(file, 0) != 0 || ::ftruncate(file, static_cast<off_t>(header.fileBytes)) != 0) return systemError(path, "cannot write here", errno);
-        VCP_TRY(writeAll(file, sizeof header, std::as_bytes(std::span(table)), path));
-        for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(writeAll(file, table[i].offset, chunks[i].second, path));
-        VCP_TRY(writeAll(file, 0, std::as_bytes(std::span(&header, 1)), path));
-        if (::fsync(file) != 0) return systemError(path, "cannot make the file durable", errno);
-        VCP_TRY(writeAll(file, end, std::as_bytes(std::span(&commit, 1)), path));
-        if (::fsync(file) != 0) return systemError(path, "cannot make the file durable", errno);
-        if (::rename(partial.c_str(), path.c_str()) != 0) return systemError(path, "cannot rename the finished file", errno);
-        return {};
-    };
-    const auto written = write();
-    if (!written) ::unlink(partial.c_str());
-    ::close(file);
-    if (!written) return written.error();
-    VCP_TRY(syncFolder(path.parent_path()));
+    auto file = OutputFile::create(path, OutputKind::Asset, rules);
+    if (!file) return file.error();
+    if (::ftruncate(file->descriptor(), static_cast<off_t>(header.fileBytes)) != 0) return systemError(path, "cannot write here", errno);
+    VCP_TRY(file->write(sizeof header, std::as_bytes(std::span(table))));
+    for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(file->write(table[i].offset, chunks[i].second));
+    VCP_TRY(file->sync());
+    VCP_TRY(file->write(0, std::as_bytes(std::span(&header, 1))));
+    VCP_TRY(file->write(end, std::as_bytes(std::span(&commit, 1))));
+    VCP_TRY(file->commit());
     return header.fileBytes;
 }
 

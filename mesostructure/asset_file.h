@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "mesostructure/march.h"
+#include "octree/output_file.h"
 
 namespace vcp::meso {
 
@@ -105,7 +106,7 @@ glm::ivec3 gridFor(const Asset& asset, glm::ivec3 asked);
 Result<void> buildAsset(Asset& asset, const AssetOptions& options);
 
 /// Returns the file's bytes. Errors: Io.
-Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset);
+Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset, const OutputRules& rules = {});
 /// Errors: Io; InvalidInput, Unsupported with file, element and byte.
 Result<Asset> readAsset(const std::filesystem::path& path);
 /// The same from bytes that may be hostile; `name` is that of the file in errors.

@@ -1,9 +1,10 @@
-// Writes a .vcp file: OUT.vcp.partial, then fsync, rename, fsync of the folder. OUT.vcp is whole or absent.
+// Writes a .vcp file by way of OUT.vcp.partial (octree/output_file.h): OUT.vcp is whole or absent.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 
+#include "octree/output_file.h"
 #include "octree/result.h"
 #include "octree/vcp_file.h"
 
@@ -24,8 +25,7 @@ StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std
 class VcpWriter {
 public:
     /// `pages` is the final number of pages: it fixes the directory's size. Errors: Io.
-    static Result<std::unique_ptr<VcpWriter>> create(const std::filesystem::path& output, uint64_t pages);
-    ~VcpWriter();
+    static Result<std::unique_ptr<VcpWriter>> create(const std::filesystem::path& output, uint64_t pages, const OutputRules& rules = {});
     VcpWriter(const VcpWriter&) = delete;
     VcpWriter& operator=(const VcpWriter&) = delete;
 
@@ -38,13 +38,11 @@ public:
     Result<uint64_t> commit(FileHeader header);
 
 private:
-    VcpWriter() = default;
-    Result<void> write(uint64_t offset, std::span<const std::byte> bytes);
+    VcpWriter(OutputFile file, uint64_t pages);
 
-    std::filesystem::path output_, partial_;
-    int file_ = -1;
-    uint64_t end_ = 0;
-    uint64_t pages_ = 0;
+    OutputFile file_;
+    uint64_t end_;
+    uint64_t pages_;
     std::vector<PageEntry> entries_;
 };
 

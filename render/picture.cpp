@@ -38,26 +38,19 @@ png_image imageOf(const Picture& picture) {
 
 }  // namespace
 
-Result<void> writePng(const Picture& picture, const std::filesystem::path& path) {
+Result<void> writePng(const Picture& picture, const std::filesystem::path& path, const OutputRules& rules) {
     const std::string name = path.string();
     if (picture.width == 0 || picture.height == 0 || uint64_t{picture.width} * picture.height > kMaxPixels ||
         picture.rgba.size() != uint64_t{4} * picture.width * picture.height)
         return Error{.code = ErrorCode::Usage, .message = "the picture's size and its pixels disagree", .file = name};
-    const std::filesystem::path partial = name + ".partial";
-    File file(std::fopen(partial.c_str(), "wb"));
+    auto output = OutputFile::create(path, OutputKind::Png, rules);
+    if (!output) return output.error();
+    File file(::fdopen(::dup(output->descriptor()), "wb"));
     if (!file) return ioError(path, "cannot write");
     png_image image = imageOf(picture);
-    bool whole = png_image_write_to_stdio(&image, file.get(), 0, picture.rgba.data(), 0, nullptr) != 0;
-    std::string problem = whole ? "" : pngError(image);
-    if (whole && (std::fflush(file.get()) != 0 || fsync(fileno(file.get())) != 0)) {
-        whole = false;
-        problem = std::string("cannot write: ") + std::strerror(errno);
-    }
-    file.reset();
-    if (whole && std::rename(partial.c_str(), path.c_str()) == 0) return {};
-    if (whole) problem = std::string("cannot rename the finished file: ") + std::strerror(errno);
-    std::remove(partial.c_str());
-    return Error{.code = ErrorCode::Io, .message = problem, .file = name};
+    if (png_image_write_to_stdio(&image, file.get(), 0, picture.rgba.data(), 0, nullptr) == 0) return Error{.code = ErrorCode::Io, .message = pngError(image), .file = name};
+    if (std::fflush(file.get()) != 0) return ioError(path, "cannot write");
+    return output->commit();
 }
 
 Result<Picture> readPng(const std::filesystem::path& path) {

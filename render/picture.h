@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "octree/output_file.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -17,9 +18,9 @@ struct Picture {
     bool operator==(const Picture&) const = default;
 };
 
-/// Writes `path` through a temporary name beside it: the file is either whole or absent.
+/// Writes `path` as an OutputFile does: whole or not at all; "-" is standard output.
 /// Errors: Io, with the path; Usage, where the sizes disagree.
-Result<void> writePng(const Picture& picture, const std::filesystem::path& path);
+Result<void> writePng(const Picture& picture, const std::filesystem::path& path, const OutputRules& rules = {});
 
 /// Reads an 8-bit RGBA PNG of at most 2^28 pixels. The file may be hostile. Errors: Io, InvalidInput.
 Result<Picture> readPng(const std::filesystem::path& path);

@@ -1,11 +1,14 @@
 #include "viewer/analytic_models.h"
 
 #include <cmath>
-#include <fstream>
 #include <numbers>
+#include <span>
+#include <string>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+
+#include "octree/output_file.h"
 
 namespace vcp {
 
@@ -77,19 +80,16 @@ IndexedMesh plate() {
 std::vector<AnalyticModel> analyticModels() { return {{"sphere", sphere()}, {"torus", torus()}, {"plate", plate()}}; }
 
 Result<void> writePly(const IndexedMesh& mesh, const std::filesystem::path& path) {
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
-    file << fmt::format(
+    std::string file = fmt::format(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\n"
         "property double z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
         mesh.positions.size(), mesh.triangles.size());
-    for (const glm::dvec3& p : mesh.positions) file.write(reinterpret_cast<const char*>(&p), sizeof(p));
+    for (const glm::dvec3& p : mesh.positions) file.append(reinterpret_cast<const char*>(&p), sizeof(p));
     for (const auto& triangle : mesh.triangles) {
-        file.put(3);
-        file.write(reinterpret_cast<const char*>(triangle.data()), sizeof(triangle));
+        file += '\3';
+        file.append(reinterpret_cast<const char*>(triangle.data()), sizeof(triangle));
     }
-    file.close();
-    if (!file) return Error{.code = ErrorCode::Io, .message = "cannot be written", .file = path.string()};
-    return {};
+    return writeFile(path, OutputKind::Ply, std::as_bytes(std::span(file)));
 }
 
 }  // namespace vcp

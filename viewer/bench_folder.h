@@ -1,4 +1,4 @@
-// Where a benchmark keeps what it builds.
+// Where a benchmark keeps what it builds: in a folder of its own, so that nothing of the same name is replaced.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@
 
 namespace vcp {
 
-/// A folder for what is built: the caller's, or, where that is empty, one that goes with this object.
+/// A folder for what is built: `built` in the caller's, or, where that is empty, one that goes with this object.
 class BenchFolder {
 public:
     explicit BenchFolder(const std::filesystem::path& wanted)
-        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : wanted), temporary_(wanted.empty()) {}
+        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : wanted / "built"), temporary_(wanted.empty()) {}
     ~BenchFolder() {
         std::error_code ignored;
         if (temporary_) std::filesystem::remove_all(path_, ignored);

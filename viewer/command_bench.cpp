@@ -1,6 +1,5 @@
 // vcp bench: run time against error, beside a peer measured in the same run.
 #include <algorithm>
-#include <fstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -35,6 +34,7 @@ struct BenchCommand {
     int repetitions = 0;  // 0: the bench's own default
     unsigned threads = 0;
     std::string cell;
+    bool overwrite = false;
     ReportOptions report;
 
     [[nodiscard]] std::vector<std::filesystem::path> modelPaths() const { return {models.begin(), models.end()}; }
@@ -75,15 +75,6 @@ struct MesoCommand {
     BenchCommand bench;
 };
 
-Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
-    file << text;
-    if (!text.ends_with('\n')) file << '\n';
-    file.close();
-    if (!file) return Error{ErrorCode::Io, "cannot be written", path.string()};
-    return {};
-}
-
 Result<void> makeFolder(const std::string& folder) {
     std::error_code failed;
     if (!folder.empty()) std::filesystem::create_directories(folder, failed);
@@ -95,10 +86,11 @@ Result<void> makeFolder(const std::string& folder) {
 Result<int> publish(const BenchCommand& command, const std::string& name, const BenchTexts& texts) {
     if (!command.out.empty()) {
         const std::filesystem::path folder = command.out;
-        VCP_TRY(writeText(folder / (name + ".json"), texts.json));
-        VCP_TRY(writeText(folder / (name + ".csv"), texts.csv));
-        VCP_TRY(writeText(folder / (name + ".md"), texts.markdown));
-        for (const auto& [plot, svg] : texts.plots) VCP_TRY(writeText(folder / (plot + ".svg"), svg));
+        const OutputRules rules{.overwrite = command.overwrite, .inputs = command.modelPaths()};
+        VCP_TRY(writeFile(folder / (name + ".json"), OutputKind::JsonText, texts.json, rules));
+        VCP_TRY(writeFile(folder / (name + ".csv"), OutputKind::Text, texts.csv, rules));
+        VCP_TRY(writeFile(folder / (name + ".md"), OutputKind::Text, texts.markdown, rules));
+        for (const auto& [plot, svg] : texts.plots) VCP_TRY(writeFile(folder / (plot + ".svg"), OutputKind::Svg, svg, rules));
     }
     VCP_TRY(printLine(command.report.json ? texts.json : texts.markdown));
     return 0;
@@ -222,6 +214,7 @@ Result<int> runMeso(const MesoCommand& command) {
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
     app.add_option("MODEL", command.models, models)->type_name("");
     app.add_option("--out", command.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
+    addOverwriteOption(app, command.overwrite);
     app.add_option("--repetitions", command.repetitions, "Runs whose median is reported")->type_name("N")->check(CLI::Range(1, 1000));
     app.add_option("--cell", command.cell, "Edge of the finest cells, world units [chosen from the mesh]")
         ->type_name("LENGTH")
@@ -315,6 +308,7 @@ RunCommand addBenchStream(CLI::App& bench) {
         ->check(CLI::Range(0.01, 1000.0));
     app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
     app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
+    addOverwriteOption(*app, command->bench.overwrite);
     addSourceSettings(*app, command->source);
     addProgressOption(*app, command->bench.report);
     addJsonOption(*app, command->bench.report);
@@ -340,6 +334,7 @@ RunCommand addBenchMeso(CLI::App& bench) {
     app->add_option("--check-rays", options.checkRays, "Rays of the test that no distance passes the surface; 0: not made")->type_name("N")->capture_default_str()->check(
         CLI::Range(0, 1'000'000'000));
     app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots")->type_name("DIR");
+    addOverwriteOption(*app, command->bench.overwrite);
     addProgressOption(*app, command->bench.report);
     addJsonOption(*app, command->bench.report);
     return [command] { return runMeso(*command); };

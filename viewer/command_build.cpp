@@ -21,6 +21,7 @@ struct BuildCommand {
     std::string output;
     bool resume = false;
     bool dryRun = false;
+    bool overwrite = false;
     double checkpointSeconds = BuildOptions().checkpointSeconds;
     std::string method = "certified";
     PaperOptions paper;
@@ -126,6 +127,7 @@ Result<int> run(const BuildCommand& command) {
     if (command.output.empty() && !command.dryRun) return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
     options.output = command.output.empty() ? "." : command.output;
     options.resume = command.resume;
+    options.overwrite = command.overwrite;
     options.checkpointSeconds = command.checkpointSeconds;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     const InterruptScope catching;
@@ -150,7 +152,8 @@ Command addBuild(CLI::App& vcp) {
     auto command = std::make_shared<BuildCommand>();
     CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
     app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder stands for those in it, - for standard input")->type_name("")->required();
-    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp");
+    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
+    addOverwriteOption(*app, command->overwrite);
     addBuildSettings(*app, command->settings);
     app->add_option("--method", command->method, "certified, or paper: the octree of Demir and Westermann 2015, for comparison (in memory, no colour, nothing certified)")
         ->type_name("certified|paper")

@@ -25,7 +25,7 @@ struct BuildMeso {
     int texels = 256, samples = 2;
     uint32_t seed = 1;
     double cap = 0.25;
-    bool noBoxes = false, noPatches = false;
+    bool noBoxes = false, noPatches = false, overwrite = false;
     ReportOptions report;
 };
 
@@ -154,6 +154,8 @@ Result<int> runBuild(const BuildMeso& command) {
     const auto start = std::chrono::steady_clock::now();
     auto options = optionsOf(command);
     if (!options) return options.error();
+    const OutputRules rules{.overwrite = command.overwrite, .inputs = {command.source}};
+    VCP_TRY(checkOutput(command.out, OutputKind::Asset, rules));
     Asset asset;
     VCP_TRY(readSource(command, asset));
     const auto named = [&](Error error) {
@@ -167,7 +169,7 @@ Result<int> runBuild(const BuildMeso& command) {
     if (!cells) return cells.error();
     options->cells = *cells;
     if (const auto built = buildAsset(asset, *options); !built) return named(built.error());
-    const auto bytes = writeAsset(command.out, asset);
+    const auto bytes = writeAsset(command.out, asset, rules);
     if (!bytes) return bytes.error();
     Json json = toJson(command.out, *bytes, asset);
     json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -193,7 +195,8 @@ RunCommand addMesoBuild(CLI::App& meso) {
                     fmt::format("A PNG or EXR of heights, a closed mesh, or one of {}; {}", fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")))
         ->type_name("")
         ->required();
-    app->add_option("-o,--output", command->out, "The asset to write")->type_name("FILE")->required();
+    app->add_option("-o,--output", command->out, "The asset to write")->type_name("OUT.meso")->required()->check([](const std::string& name) { return extensionProblem(name, ".meso", false); });
+    addOverwriteOption(*app, command->overwrite);
     app->add_option("--height", command->height, "Height of a PNG's white, of an EXR's greatest value over its least, in tile edges [0.1, or the procedural one's own]")->type_name("H")->check(CLI::Range(1e-4, 16.0));
     app->add_option("--texels", command->texels, "Texels an edge of a procedural height field")->type_name("N")->capture_default_str()->check(CLI::Range(8, kMaxGridEdge));
     app->add_option("--seed", command->seed, "Of procedural ones")->type_name("N")->capture_default_str();

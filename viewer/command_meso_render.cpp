@@ -32,7 +32,7 @@ struct RenderMeso {
     std::vector<double> tiles, heights, scales;
     MesoSurfaceDescription description;
     std::string out, size = "960x640", view = "30,35", camera, light, up = "z", scan, device, depth, cones = "4x1";
-    bool shadows = false, heat = false, noBase = false, validation = false;
+    bool overwrite = false, shadows = false, heat = false, noBase = false, validation = false;
     double errorPixels = 0.5;
     int frames = 0;
     ReportOptions report;
@@ -175,7 +175,7 @@ Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, i
     return stats;
 }
 
-Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const RenderMeso& command, const std::string& method) {
+Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const RenderMeso& command, const OutputRules& rules, const std::string& method) {
     const auto stats = drawFrames(renderer, request, command.frames);
     if (!stats) return stats.error();
     auto picture = renderer.readPicture();
@@ -183,7 +183,7 @@ Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const R
     if (!command.depth.empty()) {
         const auto depth = renderer.readDepth();
         if (!depth) return depth.error();
-        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth));
+        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth, rules));
     }
     const auto iterations = renderer.readIterations();
     if (!iterations) return iterations.error();
@@ -226,11 +226,20 @@ Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels, 
     return 0;
 }
 
+/// What the picture may replace: nothing that is read.
+OutputRules rulesOf(const RenderMeso& command, const std::vector<MesoSurfaceDescription>& descriptions) {
+    OutputRules rules{.overwrite = command.overwrite, .inputs = filesOf(SceneFile{.datasets = {{command.scan, {}}}, .surfaces = descriptions})};
+    rules.inputs.emplace_back(command.camera);
+    return rules;
+}
+
 Result<int> runRender(const RenderMeso& command) {
     if (command.methods.size() > 1 && !command.depth.empty()) return wrong("--depth is of one method");
     auto descriptions = descriptionsOf(command);
     if (!descriptions) return descriptions.error();
     // What is wrong is said before anything is made.
+    const OutputRules rules = rulesOf(command, *descriptions);
+    VCP_TRY(checkOutput(command.out, OutputKind::Png, rules));
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
     OpenedScene behind;
     if (!command.scan.empty()) {
@@ -256,11 +265,11 @@ Result<int> runRender(const RenderMeso& command) {
         std::vector<MesoSurface> surfaces = behind.surfaces.surfaces;
         std::ranges::move(scene->surfaces, std::back_inserter(surfaces));
         VCP_TRY((*renderer)->setSurfaces(surfaces));
-        auto panel = drawPanel(**renderer, *request, command, method);
+        auto panel = drawPanel(**renderer, *request, command, rules, method);
         if (!panel) return panel.error();
         panels.push_back(*std::move(panel));
     }
-    VCP_TRY(writePng(besideEachOther(panels), command.out));
+    VCP_TRY(writePng(besideEachOther(panels), command.out, rules));
     return report(command, panels, warnings, (*renderer)->device());
 }
 
@@ -271,7 +280,8 @@ RunCommand addMesoRender(CLI::App& meso) {
     MesoSurfaceDescription& d = command->description;
     CLI::App* app = meso.add_subcommand("render", "A picture of assets on surfaces");
     app->add_option("ASSET", command->assets, "Procedural ones by name, or assets (.meso)")->type_name("")->required();
-    app->add_option("-o,--output", command->out, "The PNG to write")->type_name("FILE")->required();
+    app->add_option("-o,--output", command->out, "The PNG to write")->type_name("FILE")->required()->check([](const std::string& name) { return extensionProblem(name, ".png", false); });
+    addOverwriteOption(*app, command->overwrite);
     app->add_option("--surface", command->surfaces, fmt::format("{}, or a mesh with texture coordinates; for all assets, or each [quad]", fmt::join(meso::baseSurfaceNames(), ", ")))
         ->type_name("BASE")
         ->allow_extra_args(false);

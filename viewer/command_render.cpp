@@ -33,6 +33,7 @@ struct RenderCommand {
     std::string output;
     std::string size = "1920x1200";
     std::string depth, normals;
+    bool overwrite = false;
     int frames = 0;  // 0: not given
     bool settle = true;
     uint32_t tile = 0;  // 0: not given
@@ -92,20 +93,20 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
     return drawing;
 }
 
-Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command) {
+Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command, const OutputRules& rules) {
     if (!command.depth.empty()) {
         const auto depth = renderer.readDepth();
         if (!depth) return depth.error();
-        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth));
+        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth, rules));
     }
     if (!command.normals.empty()) {
         const auto normals = renderer.readNormals();
         if (!normals) return normals.error();
-        VCP_TRY(writeNormals(*normals, request.width, request.height, command.normals));
+        VCP_TRY(writeNormals(*normals, request.width, request.height, command.normals, rules));
     }
     const auto picture = renderer.readPicture();
     if (!picture) return picture.error();
-    return writePng(*picture, command.output);
+    return writePng(*picture, command.output, rules);
 }
 
 Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
@@ -181,13 +182,14 @@ Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& d
 }
 
 /// Pictures in tiles and sequences, with progress; what is finished when it is cancelled stays.
-Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras, const RenderCommand& command) {
+Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras, const RenderCommand& command, const OutputRules& rules) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     PictureSequence sequence(renderer, {.request = request,
                                         .cameras = cameras,
                                         .files = {command.output, command.depth, command.normals},
                                         .isNumbered = command.isSequence(),
                                         .tile = command.tile > 0 ? command.tile : kTile,
+                                        .rules = rules,
                                         .problem = {}});
     for (bool isDone = false; !isDone;) {
         const auto step = sequence.step();
@@ -201,10 +203,38 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
     const TiledPictureStats& total = sequence.stats();
     if (command.report.json) return printJson(toJson(total, cameras.size(), renderer.device(), request));
     const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(), numbered(command.output, cameras.size()).string()) : command.output;
-    return printLine(fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles, formatSeconds(1e-3 * total.ms)));
+    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles, formatSeconds(1e-3 * total.ms)));
+}
+
+/// Options of the output that do not go together.
+Result<void> checkOptions(const RenderCommand& command) {
+    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    if (command.output == kStandardOutput && command.isSequence()) return usage("several pictures cannot go to standard output; give a file name");
+    if (command.output == kStandardOutput && command.report.json) return usage("--json and -o - both want standard output");
+    const std::filesystem::path output = command.output, depth = command.depth, normals = command.normals;
+    if (depth == output || normals == output || (!command.depth.empty() && depth == normals)) return usage("picture, --depth and --normals must be different files");
+    return {};
+}
+
+/// What the files may replace: nothing that is read, and not each other.
+OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
+    OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
+    for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
+    for (const std::string& name : {command.path, command.render.camera, command.render.source.caFile})
+        if (!name.empty()) rules.inputs.emplace_back(name);
+    return rules;
+}
+
+/// Finds what would be refused before anything is built or drawn.
+Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules, size_t pictures) {
+    for (const std::string& name : {command.output, command.depth, command.normals})
+        for (size_t i = 1; !name.empty() && i <= pictures; ++i) VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name), *outputKindOf(name == kStandardOutput ? "-.png" : name), rules));
+    return {};
 }
 
 Result<int> run(const RenderCommand& command) {
+    VCP_TRY(checkOptions(command));
+    VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     const glm::ivec2 size = parseSize(command.size).value();
     const auto open = openScene(command.inputs, command.build, command.render.source, command.report.progressStyle());
     if (!open) return open.error();
@@ -216,6 +246,8 @@ Result<int> run(const RenderCommand& command) {
     if (!camera) return camera.error();
     const auto cameras = camerasOf(command, *camera, bounds);
     if (!cameras) return cameras.error();
+    const OutputRules rules = rulesOf(command, open->filesRead);
+    VCP_TRY(checkOutputs(command, rules, cameras->size()));
     auto renderer = Renderer::create(command.render.rendererOptions());
     if (!renderer) return renderer.error();
     VCP_TRY((*renderer)->open(open->placed(), open->surfaces.surfaces));
@@ -240,18 +272,18 @@ Result<int> run(const RenderCommand& command) {
     request.march = command.render.march;
     const InterruptScope catching;
     if (command.isTiled(request)) {
-        VCP_TRY(makeTiled(**renderer, request, *cameras, command));
+        VCP_TRY(makeTiled(**renderer, request, *cameras, command, rules));
         return 0;
     }
     const auto drawing = draw(**renderer, request, command);
     if (!drawing) return drawing.error();
-    VCP_TRY(writeFiles(**renderer, request, command));
+    VCP_TRY(writeFiles(**renderer, request, command, rules));
     if (drawing->stats.unresolvedRays > 0)
         fmt::print(stderr, "warning: {} rays of mesostructure were given up: too many pieces of a base, or of its map, along them\n", drawing->stats.unresolvedRays);
     if (command.report.json)
         VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
     else
-        VCP_TRY(printLine(summary(command, *drawing, (*renderer)->device())));
+        VCP_TRY(printLineAbout(command.output, summary(command, *drawing, (*renderer)->device())));
     return 0;
 }
 
@@ -271,7 +303,8 @@ Command addRender(CLI::App& vcp) {
     app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
         ->type_name("")
         ->required();
-    app->add_option("-o,--output", command->output, "The PNG file to write")->type_name("OUT.png")->required();
+    app->add_option("-o,--output", command->output, "The PNG file to write; - for standard output")->type_name("OUT.png")->required()->check([](const std::string& name) { return extensionProblem(name, ".png", true); });
+    addOverwriteOption(*app, command->overwrite);
     app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check(checkSize);
     addRenderSettings(*app, command->render);
     app->add_flag("--transparent", command->transparent, "No background: alpha 0 where nothing is hit");

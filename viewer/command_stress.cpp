@@ -1,7 +1,6 @@
 // vcp stress: streaming under budgets, faults and camera paths; a report.
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -30,17 +29,10 @@ struct StressCommand {
     int views = 1;
     double errorPixels = 0.5;
     double motionSeconds = 0;  // 0: not given
+    bool overwrite = false;
     SourceSettings source;
     ReportOptions report;
 };
-
-Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
-    file << text << '\n';
-    file.close();
-    if (!file) return Error{ErrorCode::Io, "cannot be written", path.string()};
-    return {};
-}
 
 Result<void> writeReport(const StressCommand& command, const StressReport& report) {
     if (command.out.empty()) return {};
@@ -48,9 +40,10 @@ Result<void> writeReport(const StressCommand& command, const StressReport& repor
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
     if (failed) return Error{ErrorCode::Io, "the folder cannot be made: " + failed.message(), command.out};
-    VCP_TRY(writeText(folder / "stress.json", stressJson(report)));
-    VCP_TRY(writeText(folder / "stress.md", stressMarkdown(report)));
-    for (const auto& [name, svg] : stressPlots(report)) VCP_TRY(writeText(folder / (name + ".svg"), svg));
+    const OutputRules rules{.overwrite = command.overwrite, .inputs = {command.file, command.path}};
+    VCP_TRY(writeFile(folder / "stress.json", OutputKind::JsonText, stressJson(report), rules));
+    VCP_TRY(writeFile(folder / "stress.md", OutputKind::Text, stressMarkdown(report), rules));
+    for (const auto& [name, svg] : stressPlots(report)) VCP_TRY(writeFile(folder / (name + ".svg"), OutputKind::Svg, svg, rules));
     return {};
 }
 
@@ -151,6 +144,7 @@ Command addStress(CLI::App& vcp) {
         ->check(CLI::Range(0.1, 3600.0));
     app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
     app->add_option("--out", command->out, "Folder for the report as JSON and Markdown, and for its plots")->type_name("DIR")->excludes(motion);
+    addOverwriteOption(*app, command->overwrite);
     addSourceSettings(*app, command->source);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);

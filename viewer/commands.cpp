@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "octree/output_file.h"
+
 namespace vcp {
 
 void addJsonOption(CLI::App& app, ReportOptions& options) {
@@ -16,6 +18,22 @@ void addProgressOption(CLI::App& app, ReportOptions& options) {
         ->check([](const std::string& name) {
             return progressStyleNamed(name) ? std::string() : "must be bar, plain, json or none, not \"" + name + "\"";
         });
+}
+
+void addOverwriteOption(CLI::App& app, bool& overwrite) {
+    app.add_flag("--overwrite", overwrite, "Replace also an output that is of another kind or write-protected; never an input");
+}
+
+std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe) {
+    const auto wanted = outputKindOf("x" + extension);
+    if (outputKindOf(name) == wanted || (mayBePipe && name == kStandardOutput)) return {};
+    return "must end in " + extension + (mayBePipe ? ", or be - for standard output" : "") + ", not \"" + name + "\"";
+}
+
+Result<void> printLineAbout(const std::string& output, const std::string& text) {
+    if (output != kStandardOutput) return printLine(text);
+    std::fprintf(stderr, "%s\n", text.c_str());
+    return {};
 }
 
 Result<void> printLine(const std::string& text) {

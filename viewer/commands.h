@@ -37,6 +37,9 @@ Command addBench(CLI::App& vcp);
 Command addDevices(CLI::App& vcp);
 Command addMeso(CLI::App& vcp);
 
+/// Standard output as the name of an output.
+inline constexpr const char* kStandardOutput = "-";
+
 /// Options that many commands have.
 struct ReportOptions {
     bool json = false;
@@ -49,8 +52,16 @@ struct ReportOptions {
 void addJsonOption(CLI::App& app, ReportOptions& options);
 void addProgressOption(CLI::App& app, ReportOptions& options);
 
+/// --overwrite: also what is there and is of another kind, or write-protected, is replaced.
+void addOverwriteOption(CLI::App& app, bool& overwrite);
+
+/// Empty where `name` ends in `extension`, or is "-" and `mayBePipe`; else what to write instead.
+std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe);
+
 /// Writes to stdout with a newline behind. Errors: Io (stdout is closed or full).
 Result<void> printLine(const std::string& text);
+/// The same for what is said of an output: on stderr when the output itself goes to stdout.
+Result<void> printLineAbout(const std::string& output, const std::string& text);
 Result<void> printJson(const Json& json);
 
 }  // namespace vcp

@@ -32,12 +32,16 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     }
     const auto count = static_cast<double>(file.datasets.size());
     double opened = 0;
-    return openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
+    std::vector<std::filesystem::path> filesRead = filesOf(file);
+    filesRead.insert(filesRead.end(), inputs.begin(), inputs.end());
+    auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
         if (progress && !progress({.stage = "opening", .fraction = opened++ / count})) return Error{ErrorCode::Cancelled, "cancelled"};
         const auto path = datasetFor({each}, build, progress);
         if (!path) return path.error();
         return openDataset(path->string(), source);
     });
+    if (scene) scene->filesRead = std::move(filesRead);
+    return scene;
 }
 
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress) {

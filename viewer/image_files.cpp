@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
 #include <csetjmp>
-#include <cstdio>
 #include <cstring>
 #include <vector>
 
@@ -19,25 +17,6 @@ namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little, "PFM is written as the floats lie in memory");
 
 namespace {
-
-Result<void> writeWhole(std::span<const uint8_t> bytes, const fs::path& path) {
-    const fs::path partial = path.string() + ".partial";
-    const auto failed = [&](int error) {
-        std::error_code ignored;
-        fs::remove(partial, ignored);
-        return Error{ErrorCode::Io, std::string("cannot be written: ") + std::strerror(error), path.string()};
-    };
-    std::FILE* file = std::fopen(partial.c_str(), "wb");
-    if (!file) return failed(errno);
-    const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-    const int writeError = errno;
-    if (std::fclose(file) != 0) return failed(errno);
-    if (!written) return failed(writeError);
-    std::error_code renamed;
-    fs::rename(partial, path, renamed);
-    if (renamed) return failed(renamed.value());
-    return {};
-}
 
 std::vector<uint8_t> encodePfm(const float* values, uint32_t channels, uint32_t width, uint32_t height) {
     const std::string head = fmt::format("{}\n{} {}\n-1.0\n", channels == 1 ? "Pf" : "PF", width, height);
@@ -96,9 +75,9 @@ std::vector<uint8_t> normalRows(std::span<const glm::vec3> normals) {
     return rows;
 }
 
-Result<void> writePngBytes(const std::vector<uint8_t>& bytes, const fs::path& path) {
+Result<void> writePlane(const std::vector<uint8_t>& bytes, OutputKind kind, const fs::path& path, const OutputRules& rules) {
     if (bytes.empty()) return Error{ErrorCode::Limit, "not enough memory to compress the picture", path.string()};
-    return writeWhole(bytes, path);
+    return writeFile(path, kind, std::as_bytes(std::span(bytes)), rules);
 }
 
 Error unknownKind(const fs::path& path) {
@@ -107,7 +86,10 @@ Error unknownKind(const fs::path& path) {
 
 }  // namespace
 
-bool isImagePlanePath(const fs::path& path) { return path.extension() == ".pfm" || path.extension() == ".png"; }
+bool isImagePlanePath(const fs::path& path) {
+    const auto kind = outputKindOf(path);
+    return kind == OutputKind::Pfm || kind == OutputKind::Png;
+}
 
 DepthRange depthRange(std::span<const float> depth) {
     DepthRange range{INFINITY, 0};
@@ -119,17 +101,17 @@ DepthRange depthRange(std::span<const float> depth) {
     return std::isfinite(range.nearest) ? range : DepthRange{};
 }
 
-Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height, const fs::path& path) {
-    if (path.extension() == ".pfm") return writeWhole(encodePfm(depth.data(), 1, width, height), path);
-    if (path.extension() != ".png") return unknownKind(path);
-    return writePngBytes(encodePng(greyRows(depth), 16, PNG_COLOR_TYPE_GRAY, width, height), path);
+Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height, const fs::path& path, const OutputRules& rules) {
+    if (!isImagePlanePath(path)) return unknownKind(path);
+    const OutputKind kind = *outputKindOf(path);
+    return writePlane(kind == OutputKind::Pfm ? encodePfm(depth.data(), 1, width, height) : encodePng(greyRows(depth), 16, PNG_COLOR_TYPE_GRAY, width, height), kind, path, rules);
 }
 
-Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height, const fs::path& path) {
+Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height, const fs::path& path, const OutputRules& rules) {
     static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
-    if (path.extension() == ".pfm") return writeWhole(encodePfm(&normals.data()->x, 3, width, height), path);
-    if (path.extension() != ".png") return unknownKind(path);
-    return writePngBytes(encodePng(normalRows(normals), 8, PNG_COLOR_TYPE_RGB, width, height), path);
+    if (!isImagePlanePath(path)) return unknownKind(path);
+    const OutputKind kind = *outputKindOf(path);
+    return writePlane(kind == OutputKind::Pfm ? encodePfm(&normals.data()->x, 3, width, height) : encodePng(normalRows(normals), 8, PNG_COLOR_TYPE_RGB, width, height), kind, path, rules);
 }
 
 }  // namespace vcp

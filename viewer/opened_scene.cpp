@@ -20,7 +20,8 @@ std::vector<PlacedDataset> OpenedScene::placed() const {
 }
 
 Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std::function<Result<OpenDataset>(const std::string& file)>& open) {
-    OpenedScene scene{{}, {}, std::move(file)};
+    OpenedScene scene;
+    scene.file = std::move(file);
     for (const SceneDataset& each : scene.file.datasets) {
         auto opened = open(each.file);
         if (!opened) return opened.error();

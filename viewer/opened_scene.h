@@ -19,6 +19,7 @@ struct OpenedScene {
     std::vector<Part> parts;  ///< at least one, or a surface
     MesoScene surfaces;       ///< made of those of the file
     SceneFile file;           ///< light, camera and sections of a scene file; empty without one
+    std::vector<std::filesystem::path> filesRead;  ///< which no output may replace; addresses stand among them
 
     /// Of all datasets where they are placed, and of the surfaces.
     [[nodiscard]] Box bounds() const;

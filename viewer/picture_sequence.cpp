@@ -29,7 +29,7 @@ Result<bool> PictureSequence::step() {
 Result<void> PictureSequence::begin() {
     FrameRequest request = o_.request;
     request.camera = o_.cameras[finished_];
-    auto png = PngRows::create(fileOf(o_.files.picture), request.width, request.height);
+    auto png = PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules);
     if (!png) return png.error();
     png_ = *std::move(png);
     const TiledPictureOptions options{.tile = o_.tile, .depth = !o_.files.depth.empty(), .normals = !o_.files.normals.empty(), .problem = o_.problem};
@@ -45,8 +45,8 @@ Result<void> PictureSequence::take(const PictureBand& band) {
 
 Result<void> PictureSequence::finish() {
     const auto [width, height] = std::pair(o_.request.width, o_.request.height);
-    if (!o_.files.depth.empty()) VCP_TRY(writeDepth(depth_, width, height, fileOf(o_.files.depth)));
-    if (!o_.files.normals.empty()) VCP_TRY(writeNormals(normals_, width, height, fileOf(o_.files.normals)));
+    if (!o_.files.depth.empty()) VCP_TRY(writeDepth(depth_, width, height, fileOf(o_.files.depth), o_.rules));
+    if (!o_.files.normals.empty()) VCP_TRY(writeNormals(normals_, width, height, fileOf(o_.files.normals), o_.rules));
     VCP_TRY(png_->finish());
     const TiledPictureStats& drawn = picture_->stats();
     stats_.tiles += drawn.tiles;

@@ -27,6 +27,7 @@ struct PictureSequenceOptions {
     PictureFiles files;
     bool isNumbered = false;      ///< turn.png stands for turn-0001.png and so on
     uint32_t tile = 2048;         ///< edge in pixels, at least 16
+    OutputRules rules = {};       ///< what the files may replace
     /// As TiledPicture's.
     std::function<void(const Error& problem)> problem;
 };

@@ -16,14 +16,16 @@ constexpr uint32_t kLargest = 1 << 20;
 }  // namespace
 
 struct PngRows::Encoder {
-    std::filesystem::path path, partial;
+    explicit Encoder(OutputFile given) : output(std::move(given)) {}
+
+    OutputFile output;
     uint32_t width = 0, height = 0, rows = 0;
     std::FILE* file = nullptr;
     png_structp png = nullptr;
     png_infop info = nullptr;
     std::string complaint;
 
-    [[nodiscard]] Error error(ErrorCode code, const std::string& what) const { return {.code = code, .message = what, .file = path.string()}; }
+    [[nodiscard]] Error error(ErrorCode code, const std::string& what) const { return {.code = code, .message = what, .file = output.path().string()}; }
     [[nodiscard]] Error ioError() const {
         return error(ErrorCode::Io, complaint.empty() ? std::string("cannot write: ") + std::strerror(errno) : "PNG: " + complaint);
     }
@@ -57,21 +59,19 @@ PngRows::PngRows(std::unique_ptr<Encoder> encoder) : encoder_(std::move(encoder)
 PngRows::~PngRows() {
     Encoder& e = *encoder_;
     if (e.png) png_destroy_write_struct(&e.png, &e.info);
-    if (e.file) {
-        std::fclose(e.file);
-        std::remove(e.partial.c_str());
-    }
+    if (e.file) std::fclose(e.file);
 }
 
-Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& path, uint32_t width, uint32_t height) {
-    std::unique_ptr<PngRows> rows(new PngRows(std::make_unique<Encoder>()));
+Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& path, uint32_t width, uint32_t height, const OutputRules& rules) {
+    if (width < 1 || height < 1 || width > kLargest || height > kLargest)
+        return Error{.code = ErrorCode::Usage, .message = "a picture has 1 to 2^20 pixels a side", .file = path.string()};
+    auto output = OutputFile::create(path, OutputKind::Png, rules);
+    if (!output) return output.error();
+    std::unique_ptr<PngRows> rows(new PngRows(std::make_unique<Encoder>(*std::move(output))));
     Encoder& e = *rows->encoder_;
-    e.path = path;
-    e.partial = path.string() + ".partial";
     e.width = width;
     e.height = height;
-    if (width < 1 || height < 1 || width > kLargest || height > kLargest) return e.error(ErrorCode::Usage, "a picture has 1 to 2^20 pixels a side");
-    e.file = std::fopen(e.partial.c_str(), "wb");
+    e.file = ::fdopen(::dup(e.output.descriptor()), "wb");
     if (!e.file) return e.ioError();
     e.png = png_create_write_struct(
         PNG_LIBPNG_VER_STRING, &e,
@@ -98,10 +98,8 @@ Result<void> PngRows::add(std::span<const uint8_t> rgba) {
 Result<void> PngRows::finish() {
     Encoder& e = *encoder_;
     if (e.rows != e.height) return e.error(ErrorCode::Usage, "rows of the picture are missing");
-    if (!e.end() || std::fflush(e.file) != 0 || fsync(fileno(e.file)) != 0) return e.ioError();
-    if (std::rename(e.partial.c_str(), e.path.c_str()) != 0) return e.ioError();
-    std::fclose(std::exchange(e.file, nullptr));
-    return {};
+    if (!e.end() || std::fflush(e.file) != 0) return e.ioError();
+    return e.output.commit();
 }
 
 }  // namespace vcp

@@ -7,15 +7,16 @@
 #include <memory>
 #include <span>
 
+#include "octree/output_file.h"
 #include "octree/result.h"
 
 namespace vcp {
 
-/// One thread. The file appears with finish(), whole; without it, nothing is left.
+/// One thread. The file appears with finish(), whole; without it, nothing is left (octree/output_file.h).
 class PngRows {
 public:
     /// 8-bit RGBA, `width` and `height` from 1 to 2^20. Errors: Io, Usage.
-    static Result<std::unique_ptr<PngRows>> create(const std::filesystem::path& path, uint32_t width, uint32_t height);
+    static Result<std::unique_ptr<PngRows>> create(const std::filesystem::path& path, uint32_t width, uint32_t height, const OutputRules& rules = {});
     ~PngRows();
     PngRows(const PngRows&) = delete;
     PngRows& operator=(const PngRows&) = delete;

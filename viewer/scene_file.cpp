@@ -366,6 +366,15 @@ Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
     return placement;
 }
 
+std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {
+    std::vector<std::filesystem::path> files;
+    for (const SceneDataset& dataset : scene.datasets) files.emplace_back(dataset.file);
+    for (const MesoSurfaceDescription& surface : scene.surfaces)
+        for (const std::string& name : {surface.asset, surface.base, surface.colourTexture, surface.normalTexture})
+            if (!name.empty()) files.emplace_back(name);
+    return files;
+}
+
 bool isSceneName(const std::string& name) { return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json"; }
 
 Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {

@@ -40,6 +40,9 @@ struct SceneFile {
 /// At most so many datasets in one scene.
 constexpr size_t kMostSceneDatasets = 256;
 
+/// The files that a scene names: datasets and meshes but for addresses, assets, bases and textures.
+std::vector<std::filesystem::path> filesOf(const SceneFile& scene);
+
 /// similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9. Errors: Usage.
 Result<Similarity> scenePlacement(std::span<const double, 16> rows);
 

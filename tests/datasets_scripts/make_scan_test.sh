@@ -42,17 +42,20 @@ refuses 2 "10000 to 1000000000" --triangles 1e5 -o x.ply
 refuses 2 "--seed wants" --seed -1 -o x.ply
 refuses 2 "wants a value" -o
 refuses 2 "unknown option '--colors'" --colors -o x.ply
-refuses 1 "missing/x.ply: cannot be written" -o missing/x.ply
+refuses 1 "missing/x.ply: cannot write here" -o missing/x.ply
+refuses 2 "must end in .ply" -o x.vcp
+echo "a user's own" >notes.ply
+refuses 1 "notes.ply: is there and is not a PLY mesh" -o notes.ply
 refuses 1 "No space left" -o /dev/full
 [ -e /dev/full ] || fail "/dev/full was removed"
 
 # A file size limit stands in for a full disk; the old file must survive.
-echo old >kept.ply
+printf "ply\nold\n" >kept.ply
 status=0
 (trap '' XFSZ; ulimit -f 100; exec "$make_scan" --triangles 100000 -o kept.ply) 2>err.txt || status=$?
 [ "$status" -eq 1 ] || fail "full disk: exit status $status"
 grep -q "kept.ply: write failed" err.txt || fail "full disk: $(cat err.txt)"
-[ "$(cat kept.ply)" = old ] || fail "full disk: the old file was touched"
+[ "$(tail -n 1 kept.ply)" = old ] || fail "full disk: the old file was touched"
 [ ! -e kept.ply.partial ] || fail "full disk: kept.ply.partial was left"
 
 # A reader that goes away is an error, not a signal.

@@ -12,6 +12,7 @@
 
 #include "builder/ingest.h"
 #include "builder/mesh_stream.h"
+#include "octree/output_file.h"
 #include "octree/vcp_writer.h"
 
 namespace vcp {
@@ -123,10 +124,12 @@ private:
     const BuildOptions& options_;
 };
 
-Result<uint64_t> write(const std::filesystem::path& output, const PaperDataset& made) {
+OutputRules rulesOf(const BuildOptions& options) { return {.overwrite = options.overwrite, .inputs = options.inputs}; }
+
+Result<uint64_t> write(const BuildOptions& options, const PaperDataset& made) {
     const auto page = made.source->read(0, false);
     if (!page) return page.error();
-    auto writer = VcpWriter::create(output, 1);
+    auto writer = VcpWriter::create(options.output, 1, rulesOf(options));
     if (!writer) return writer.error();
     VCP_TRY((*writer)->append(made.dataset->pages[0], compressPage(page->geometryBytes(), {})));
     return (*writer)->commit(made.dataset->header);
@@ -153,6 +156,7 @@ Result<PaperDataset> paperDataset(const PaperCaster& octree, const IndexedMesh& 
 }
 
 Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper) {
+    VCP_TRY(checkOutput(options.output, OutputKind::Dataset, rulesOf(options)));
     const auto began = std::chrono::steady_clock::now();
     const Stages stages(options);
     VCP_TRY(stages.at("reading", 0));
@@ -172,7 +176,7 @@ Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptio
     VCP_TRY(stages.at("writing", 0.9, measures.triangles));
     const auto dataset = paperDataset(*octree, *mesh);
     if (!dataset) return dataset.error();
-    const auto bytes = write(options.output, *dataset);
+    const auto bytes = write(options, *dataset);
     if (!bytes) return bytes.error();
     BuildReport report;
     report.triangles = measures.triangles;

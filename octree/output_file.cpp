@@ -1,0 +1,259 @@
+#include "octree/output_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "octree/durable_file.h"
+
+namespace vcp {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr size_t kStartBytes = 512;
+constexpr int kMostPartials = 99, kMostLinks = 40;
+
+struct KindName {
+    OutputKind kind;
+    const char* extension;
+    const char* words;
+};
+constexpr KindName kKinds[] = {
+    {OutputKind::Dataset, ".vcp", "a dataset"}, {OutputKind::Asset, ".meso", "a mesostructure asset"},
+    {OutputKind::Png, ".png", "a PNG"},         {OutputKind::Pfm, ".pfm", "a PFM"},
+    {OutputKind::JsonText, ".json", "JSON"},        {OutputKind::Svg, ".svg", "an SVG"},
+    {OutputKind::Text, ".csv", "text"},         {OutputKind::Text, ".md", "text"},
+    {OutputKind::Ply, ".ply", "a PLY mesh"},    {OutputKind::Obj, ".obj", "an OBJ mesh"},
+};
+
+const char* wordsFor(OutputKind kind) {
+    return std::find_if(std::begin(kKinds), std::end(kKinds), [&](const KindName& each) { return each.kind == kind; })->words;
+}
+
+/// Datasets and assets: their header is written last, so that a mark can stand in its place until then.
+bool isMarked(OutputKind kind) { return kind == OutputKind::Dataset || kind == OutputKind::Asset; }
+
+Error ioError(const fs::path& file, std::string message) { return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()}; }
+
+/// The first bytes of a file that is open.
+std::vector<std::byte> startOf(int descriptor) {
+    std::vector<std::byte> start(kStartBytes);
+    size_t got = 0;
+    while (got < start.size()) {
+        const ssize_t n = ::pread(descriptor, start.data() + got, start.size() - got, static_cast<off_t>(got));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) break;
+        got += static_cast<size_t>(n);
+    }
+    start.resize(got);
+    return start;
+}
+
+/// What a chain of links ends at, whether that is there or not. Errors: Io (a circle).
+Result<fs::path> followed(const fs::path& path) {
+    fs::path at = path;
+    for (int links = 0; links < kMostLinks; ++links) {
+        std::error_code failed;
+        if (!fs::is_symlink(fs::symlink_status(at, failed))) return at;
+        const fs::path next = fs::read_symlink(at, failed);
+        if (failed) return ioError(path, "cannot follow the link: " + failed.message());
+        at = next.is_absolute() ? next : at.parent_path() / next;
+    }
+    return ioError(path, "is a link that leads nowhere");
+}
+
+const char* wordsFor(mode_t mode) {
+    return S_ISDIR(mode) ? "a folder" : S_ISCHR(mode) || S_ISBLK(mode) ? "a device" : S_ISFIFO(mode) ? "a pipe" : S_ISSOCK(mode) ? "a socket" : "no regular file";
+}
+
+/// Whether what lies at `target` may be replaced.
+Result<void> checkReplaced(const fs::path& output, const fs::path& target, OutputKind kind, const OutputRules& rules) {
+    struct stat there {};
+    if (::lstat(target.c_str(), &there) != 0) return errno == ENOENT ? Result<void>() : systemError(output, "cannot write here", errno);
+    if (S_ISDIR(there.st_mode)) return ioError(output, "is a folder; give a file name");
+    if (!S_ISREG(there.st_mode)) return ioError(output, fmt::format("is {}, which is not replaced; give a file name, or - for standard output", wordsFor(there.st_mode)));
+    for (const fs::path& input : rules.inputs) {
+        struct stat read {};
+        if (::stat(input.c_str(), &read) == 0 && read.st_dev == there.st_dev && read.st_ino == there.st_ino)
+            return ioError(output, input == output ? std::string("is an input, which is never written over; give another name")
+                                                   : fmt::format("is the file {}, which is read; give another name", input.string()));
+    }
+    if (rules.overwrite || there.st_size == 0) return {};
+    if ((there.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0) return ioError(output, "is write-protected; give another name, or ask for overwriting");
+    const int file = ::open(target.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0) return systemError(output, "is there, and cannot be looked into", errno);
+    const std::vector<std::byte> start = startOf(file);
+    ::close(file);
+    if (beginsLike(kind, start)) return {};
+    return ioError(output, fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
+}
+
+/// Removes what an interrupted writer left under that name. Errors: Io (another writer is at it).
+Result<bool> removeLeftover(const fs::path& output, const fs::path& partial) {
+    const int file = ::open(partial.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0) return false;
+    struct stat there {};
+    const bool isOurs = ::fstat(file, &there) == 0 && S_ISREG(there.st_mode) && there.st_nlink == 1;
+    const std::vector<std::byte> start = isOurs ? startOf(file) : std::vector<std::byte>();
+    const bool isLeft = start.size() >= kPartialMark.size() && std::memcmp(start.data(), kPartialMark.data(), kPartialMark.size()) == 0;
+    const NameLock lock = isLeft ? lockName(file, partial) : NameLock::Gone;
+    if (lock == NameLock::Taken) ::unlink(partial.c_str());
+    ::close(file);
+    if (lock == NameLock::Held) return ioError(output, "another build is writing this file");
+    return lock == NameLock::Taken;
+}
+
+struct Partial {
+    fs::path name;
+    int file;
+};
+
+/// A new file beside `target`, held by this process.
+Result<Partial> createPartial(const fs::path& output, const fs::path& target, bool isMarked) {
+    for (int number = 1; number <= kMostPartials; ++number) {
+        fs::path name = target;
+        name += number == 1 ? ".partial" : fmt::format(".partial.{}", number);
+        if (isMarked) {
+            const auto removed = removeLeftover(output, name);
+            if (!removed) return removed.error();
+        }
+        const int file = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+        if (file < 0 && errno == EEXIST) continue;
+        if (file < 0) return systemError(output, "cannot write here", errno);
+        if (lockName(file, name) == NameLock::Taken) return Partial{std::move(name), file};
+        ::close(file);
+        return ioError(output, "another build is writing this file");
+    }
+    fs::path first = target;
+    first += ".partial";
+    return ioError(first, fmt::format("is there, and {} more beside it; remove those that are not needed", kMostPartials - 1));
+}
+
+}  // namespace
+
+std::optional<OutputKind> outputKindOf(const fs::path& path) {
+    std::string extension = path.extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char letter) { return std::tolower(letter); });
+    for (const KindName& each : kKinds)
+        if (extension == each.extension) return each.kind;
+    return std::nullopt;
+}
+
+bool beginsLike(OutputKind kind, std::span<const std::byte> start) {
+    const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
+    const auto firstOf = [&](std::string_view any) {
+        const size_t at = text.find_first_not_of(" \t\r\n");
+        return at == std::string_view::npos || any.find(text[at]) != std::string_view::npos;
+    };
+    switch (kind) {
+        case OutputKind::Dataset: return text.starts_with("VCP\r\n\x1a\n");
+        case OutputKind::Asset: return text.starts_with("VCPmeso\n");
+        case OutputKind::Png: return text.starts_with("\x89PNG\r\n\x1a\n");
+        case OutputKind::Pfm: return text.starts_with("Pf\n") || text.starts_with("PF\n");
+        case OutputKind::JsonText: return firstOf("{[");
+        case OutputKind::Svg: return text.starts_with("<svg") || text.starts_with("<?xml");
+        case OutputKind::Text: return text.find('\0') == std::string_view::npos && !text.starts_with("ply");
+        case OutputKind::Ply: return text.starts_with("ply\n") || text.starts_with("ply\r");
+        case OutputKind::Obj: return text.find('\0') == std::string_view::npos && firstOf("#vofgsum");
+    }
+    return false;
+}
+
+bool isSameFile(const fs::path& a, const fs::path& b) {
+    struct stat first {}, second {};
+    return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev && first.st_ino == second.st_ino;
+}
+
+Result<void> checkOutput(const fs::path& output, OutputKind kind, const OutputRules& rules) {
+    if (output == "-" && !isMarked(kind)) return {};
+    const auto file = OutputFile::create(output, kind, rules);
+    return file ? Result<void>() : file.error();
+}
+
+Result<OutputFile> OutputFile::create(const fs::path& output, OutputKind kind, const OutputRules& rules) {
+    OutputFile made(output, kind, rules);
+    if (output == "-") {
+        if (isMarked(kind)) return ioError("standard output", fmt::format("cannot take {}, which is not written front to back; give a file name", wordsFor(kind)));
+        made.file_ = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+        if (made.file_ < 0) return systemError("standard output", "cannot be written", errno);
+        return made;
+    }
+    auto target = followed(output);
+    if (!target) return target.error();
+    made.target_ = *std::move(target);
+    VCP_TRY(checkReplaced(output, made.target_, kind, rules));
+    auto partial = createPartial(output, made.target_, isMarked(kind));
+    if (!partial) return partial.error();
+    made.partial_ = std::move(partial->name);
+    made.file_ = partial->file;
+    if (isMarked(kind)) VCP_TRY(made.write(0, std::as_bytes(std::span(kPartialMark))));
+    return made;
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : output_(std::move(other.output_)), target_(std::move(other.target_)), partial_(std::exchange(other.partial_, {})), kind_(other.kind_), rules_(std::move(other.rules_)),
+      file_(std::exchange(other.file_, -1)) {}
+
+OutputFile::~OutputFile() { close(); }
+
+void OutputFile::close() {
+    if (file_ >= 0) ::close(file_);
+    file_ = -1;
+    if (!partial_.empty()) ::unlink(partial_.c_str());
+    partial_.clear();
+}
+
+Result<void> OutputFile::write(uint64_t offset, std::span<const std::byte> bytes) { return writeAll(file_, offset, bytes, output_); }
+
+Result<void> OutputFile::append(std::span<const std::byte> bytes) { return appendAll(file_, bytes, output_); }
+
+Result<void> OutputFile::sync() {
+    if (!partial_.empty() && ::fsync(file_) != 0) return systemError(output_, "cannot make the file durable", errno);
+    return {};
+}
+
+Result<void> OutputFile::commit() {
+    VCP_TRY(sync());
+    if (partial_.empty()) {
+        close();
+        return {};
+    }
+    VCP_TRY(checkReplaced(output_, target_, kind_, rules_));
+    // A file that is replaced keeps its permissions.
+    struct stat there {};
+    if (::stat(target_.c_str(), &there) == 0) (void)::fchmod(file_, there.st_mode & 0777);
+    if (::rename(partial_.c_str(), target_.c_str()) != 0) return systemError(output_, "cannot rename the finished file", errno);
+    partial_.clear();
+    close();
+    if (auto synced = syncFolder(target_.parent_path()); !synced) {
+        Error late = synced.error();
+        late.message += "; " + output_.string() + " is complete, but a power failure may undo its name";
+        return late;
+    }
+    return {};
+}
+
+Result<void> writeFile(const fs::path& output, OutputKind kind, std::span<const std::byte> bytes, const OutputRules& rules) {
+    auto file = OutputFile::create(output, kind, rules);
+    if (!file) return file.error();
+    VCP_TRY(file->append(bytes));
+    return file->commit();
+}
+
+Result<void> writeFile(const fs::path& output, OutputKind kind, std::string_view text, const OutputRules& rules) {
+    std::string lines(text);
+    if (!lines.ends_with('\n')) lines += '\n';
+    return writeFile(output, kind, std::as_bytes(std::span(lines)), rules);
+}
+
+}  // namespace vcp
