@@ -41,6 +41,7 @@ protected:
         BuildOptions o;
         o.inputs = {folder_ / "ball.ply"};
         o.output = output();
+        o.cell = 0.03;  // three levels
         o.threads = 2;
         o.checkpointSeconds = 0;
         return o;
