@@ -41,24 +41,32 @@ public:
     Result<BuildReport> run() {
         auto built = caught();
         if (built) {
-            space_.remove();
+            space_.folder().remove();
             finishReport();
             return report_;
         }
         Error error = built.error();
         const bool mayPass = error.code == ErrorCode::Cancelled || error.code == ErrorCode::Io, needsMore = error.code == ErrorCode::Limit && files_.current;
-        const bool worthKeeping = (journal_.active() || isResumed_) && (mayPass || needsMore);
-        if (!worthKeeping) {
-            if (error.code != ErrorCode::Usage) space_.remove();
+        const bool hasWork = journal_.active() || isResumed_;
+        if (hasWork && isOfTempFiles(error)) {
+            // A disk that is mended may give back what was written after all.
+            error.message += fmt::format(" (until then what there is stays in {})", space_.folder().path().string());
+        } else if (!hasWork || !(mayPass || needsMore)) {
+            if (error.code != ErrorCode::Usage) space_.folder().remove();
             if (error.code == ErrorCode::Cancelled) error.message = "cancelled; nothing was written";
         } else {
-            error.message += fmt::format("; the same command with --resume{} goes on from here, or delete {}", needsMore ? " and the memory" : "", space_.folder().string());
+            error.message += fmt::format("; the same command with --resume{} goes on from here, or delete {}", needsMore ? " and the memory" : "", space_.folder().path().string());
         }
         if (error.file.empty()) error.file = options_.output.string();
         return error;
     }
 
 private:
+    /// Whether the error is that a temporary file is damaged.
+    bool isOfTempFiles(const Error& error) const {
+        return error.code == ErrorCode::InvalidInput && std::filesystem::path(error.file).parent_path() == space_.folder().path();
+    }
+
     Result<void> caught() {
         try {
             return stages();
@@ -72,7 +80,7 @@ private:
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         VCP_TRY(checkTempFolder());
         VCP_TRY(openJournal());
-        const std::string stage = done_.value("stage", "");
+        const std::string& stage = done_.stage;
         if (stage.empty()) VCP_TRY(read());
         else VCP_TRY(resumeMeasures());
         auto frame = chooseFrame(options_, measures_);
@@ -113,21 +121,24 @@ private:
     // The journal
 
     Result<void> openJournal() {
-        std::error_code ignored;
-        if (!std::filesystem::exists(space_.folder(), ignored)) return {};
-        VCP_TRY(space_.lock());
+        TempFolder& folder = space_.folder();
+        if (!folder.exists()) return {};
+        VCP_TRY(folder.take());
         if (options_.resume) {
-            auto done = Journal::read(space_.folder());
+            const auto journal = Journal::read(folder);
+            if (!journal) return journal.error();
+            // Whatever it says, there is work of before.
+            isResumed_ = !journal->is_null();
+            auto done = recordedFrom(*journal, folder.path() / kJournalName);
             if (!done) return done.error();
-            if (done->is_object()) done_ = *done;
+            done_ = std::move(*done);
         }
-        if (done_.empty()) {
-            space_.clear();
+        if (!isResumed_) {
+            folder.clear();
             return {};
         }
-        if (done_.value("build", "") != buildFingerprint(options_))
-            return Error{.code = ErrorCode::Usage, .message = "the unfinished build here is of other inputs or options; without --resume it is started again", .file = space_.folder().string()};
-        isResumed_ = true;
+        if (done_.build != buildFingerprint(options_))
+            return Error{.code = ErrorCode::Usage, .message = "the unfinished build here is of other inputs or options; without --resume it is started again", .file = folder.path().string()};
         return {};
     }
 
@@ -135,7 +146,7 @@ private:
     /// `always`: even if the last time was a moment ago.
     Result<void> checkpoint(const char* stage, size_t bin, bool always = false) {
         if (!always && meter_.seconds() - lastCheckpoint_ < options_.checkpointSeconds) return {};
-        VCP_TRY(space_.lock());
+        VCP_TRY(space_.folder().take());
         auto fields = files_.sync();
         if (!fields) return fields.error();
         fields->update({{"stage", stage}, {"pass", pass_}, {"bin", bin}});
@@ -150,8 +161,8 @@ private:
     }
 
     Result<void> resumeMeasures() {
-        measures_ = measuresFrom(done_.at("measures"));
-        if (done_.value("stage", "") != "read") return {};
+        measures_ = done_.measures;
+        if (done_.stage != "read") return {};
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
         VCP_TRY(files_.reopen(done_, space_));
         return reactivate();
@@ -162,12 +173,14 @@ private:
 
     Result<void> resumeBins() {
         setUpLevels();
-        plan_.finest = PagePartition(done_.at("partition").get<std::vector<uint64_t>>());
+        plan_.finest = PagePartition(done_.partition);
         partitionRecorded_ = true;
-        pass_ = done_.at("pass").get<int>();
-        firstBin_ = done_.at("bin").get<size_t>();
+        pass_ = done_.pass;
+        firstBin_ = done_.bin;
         if (pass_ >= 0) openPass();
         VCP_TRY(files_.reopen(done_, space_));
+        if (pass_ >= 0 && firstBin_ >= plan_.partitionOf(plan_.levelOf(pass_)).bins())
+            return Error{.code = ErrorCode::InvalidInput, .message = "names a bin that there is not; build again without --resume", .file = (space_.folder().path() / kJournalName).string()};
         return reactivate();
     }
 
@@ -198,7 +211,7 @@ private:
                          .file = at.string()};
         };
         const uint64_t temp = expectedTempBytes(measures_.triangles, memory_.tempBytes), there = space_.diskBytes();
-        VCP_TRY(check(space_.folder(), temp > there ? temp - there : 0, " with --temp"));
+        VCP_TRY(check(space_.folder().path(), temp > there ? temp - there : 0, " with --temp"));
         return check(options_.output, expectedFileBytes(measures_.triangles), "");
     }
 
@@ -378,7 +391,7 @@ private:
     ProgressMeter meter_;
     TempSpace space_;
     Journal journal_;
-    nlohmann::json done_ = nlohmann::json::object();  ///< what an interrupted build recorded
+    Recorded done_;  ///< by an interrupted build
     bool isResumed_ = false, partitionRecorded_ = false;
     double lastCheckpoint_ = 0;  ///< seconds
     std::optional<tbb::global_control> more_;

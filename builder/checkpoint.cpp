@@ -1,8 +1,8 @@
 #include "builder/checkpoint.h"
 
+#include <algorithm>
+#include <functional>
 #include <system_error>
-#include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <xxhash.h>
@@ -14,10 +14,109 @@ namespace {
 using nlohmann::json;
 
 // What the temporary files look like; a build does not go on where one of another version was.
-constexpr int kTempVersion = 1;
+constexpr int kTempVersion = 2;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
-glm::dvec3 vectorFrom(const json& j) { return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()}; }
+
+/// Reads the journal's fields. A field that is missing or wrong is remembered, and read as zero.
+class Fields {
+public:
+    explicit Fields(const json& object) : object_(object) {}
+
+    [[nodiscard]] bool areWhole() const { return areWhole_; }
+    void require(bool holds) { areWhole_ &= holds; }
+
+    const json& at(const char* name) {
+        static const json kNone;
+        const auto found = object_.find(name);
+        require(found != object_.end());
+        return found != object_.end() ? *found : kNone;
+    }
+    std::string text(const char* name) { return textOf(at(name)); }
+    bool truth(const char* name) {
+        const json& j = at(name);
+        require(j.is_boolean());
+        return j.is_boolean() && j.get<bool>();
+    }
+    double number(const char* name) { return numberOf(at(name)); }
+    uint64_t count(const char* name) { return countOf(at(name)); }
+    glm::dvec3 vector(const char* name) {
+        const json& j = list(name);
+        require(j.size() == 3);
+        return j.size() == 3 ? glm::dvec3(numberOf(j[0]), numberOf(j[1]), numberOf(j[2])) : glm::dvec3(0);
+    }
+    const json& list(const char* name) {
+        static const json kEmpty = json::array();
+        const json& j = at(name);
+        require(j.is_array());
+        return j.is_array() ? j : kEmpty;
+    }
+    const json& object(const char* name) {
+        static const json kEmpty = json::object();
+        const json& j = at(name);
+        require(j.is_object());
+        return j.is_object() ? j : kEmpty;
+    }
+
+    std::string textOf(const json& j) {
+        require(j.is_string());
+        return j.is_string() ? j.get<std::string>() : std::string();
+    }
+    double numberOf(const json& j) {
+        require(j.is_number());
+        return j.is_number() ? j.get<double>() : 0;
+    }
+    uint64_t countOf(const json& j) {
+        require(j.is_number_unsigned());
+        return j.is_number_unsigned() ? j.get<uint64_t>() : 0;
+    }
+
+private:
+    const json& object_;
+    bool areWhole_ = true;
+};
+
+SoupMeasures measuresFrom(Fields& all) {
+    Fields from(all.object("measures"));
+    SoupMeasures m;
+    m.boundsMin = from.vector("min");
+    m.boundsMax = from.vector("max");
+    m.area = from.number("area");
+    m.triangles = from.count("triangles");
+    m.degenerateTriangles = from.count("degenerate");
+    m.vertices = from.count("vertices");
+    m.hasVertexColours = from.truth("vertex colours");
+    m.hasMaterials = from.truth("materials");
+    const glm::dvec3 extent = m.boundsMax - m.boundsMin;
+    from.require(std::min({extent.x, extent.y, extent.z}) >= 0 && m.area > 0 && m.triangles > m.degenerateTriangles);
+    all.require(from.areWhole());
+    return m;
+}
+
+Recorded::Files filesFrom(Fields& all) {
+    Recorded::Files files;
+    for (const auto& [name, bytes] : all.object("files").items()) files.bins[name] = all.countOf(bytes);
+    for (const json& pages : all.list("spools")) {
+        const bool isPair = pages.is_array() && pages.size() == 2;
+        all.require(isPair);
+        if (isPair) files.spools.emplace_back(all.countOf(pages[0]), all.countOf(pages[1]));
+    }
+    return files;
+}
+
+/// What only the stage "levels" has.
+void readLevels(Fields& all, Recorded& recorded) {
+    for (const json& first : all.list("partition")) recorded.partition.push_back(all.countOf(first));
+    const auto& bins = recorded.partition;
+    all.require(!bins.empty() && bins[0] == 0 && std::is_sorted(bins.begin(), bins.end(), std::less_equal<>()));
+    const json& pass = all.at("pass");
+    const int levels = static_cast<int>(std::min<size_t>(recorded.files.spools.size(), kMaxLevels));
+    const bool isPass = pass.is_number_integer() && pass >= -1 && pass <= levels;
+    all.require(isPass);
+    recorded.pass = isPass ? pass.get<int>() : 0;
+    recorded.bin = all.count("bin");
+    all.require(recorded.bin < bins.size());
+}
 
 /// Those bins that there are, by the names that the journal gives them.
 std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
@@ -46,17 +145,21 @@ json jsonOf(const SoupMeasures& m) {
     return {{"min", jsonOf(m.boundsMin)}, {"max", jsonOf(m.boundsMax)}, {"area", m.area}, {"triangles", m.triangles}, {"degenerate", m.degenerateTriangles}, {"vertices", m.vertices}, {"vertex colours", m.hasVertexColours}, {"materials", m.hasMaterials}};
 }
 
-SoupMeasures measuresFrom(const json& j) {
-    SoupMeasures m;
-    m.boundsMin = vectorFrom(j.at("min"));
-    m.boundsMax = vectorFrom(j.at("max"));
-    m.area = j.at("area").get<double>();
-    m.triangles = j.at("triangles").get<uint64_t>();
-    m.degenerateTriangles = j.at("degenerate").get<uint64_t>();
-    m.vertices = j.at("vertices").get<uint64_t>();
-    m.hasVertexColours = j.at("vertex colours").get<bool>();
-    m.hasMaterials = j.at("materials").get<bool>();
-    return m;
+Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& file) {
+    Recorded recorded;
+    if (journal.is_null()) return recorded;
+    Fields all(journal);
+    recorded.stage = all.text("stage");
+    recorded.build = all.text("build");
+    all.require(recorded.stage == "read" || recorded.stage == "levels");
+    recorded.measures = measuresFrom(all);
+    recorded.files = filesFrom(all);
+    if (recorded.stage == "levels") readLevels(all, recorded);
+    if (all.areWhole()) return recorded;
+    return Error{
+        .code = ErrorCode::InvalidInput,
+        .message = "some of what it should say is missing or wrong; check the disk, then build again without --resume",
+        .file = file.string()};
 }
 
 Result<json> WorkFiles::sync() {
@@ -72,21 +175,34 @@ Result<json> WorkFiles::sync() {
     return json{{"files", files}, {"spools", pages}};
 }
 
-Result<void> WorkFiles::reopen(const json& recorded, TempSpace& space) {
+Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
+    const auto unlike = [&](const char* what) {
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = fmt::format("{}; build again without --resume", what),
+                     .file = (space.folder().path() / kJournalName).string()};
+    };
+    // The next level's bins are made with the first bin of a pass.
+    const bool isBegun = recorded.bin > 0;
     std::vector<std::string> kept{kJournalName};
     std::vector<std::pair<RawBins*, uint64_t>> bins;
-    for (const auto& [name, raw] : binsOf(*this))
-        if (const uint64_t bytes = recorded.at("files").value(name, uint64_t{0}); bytes > 0) {
-            bins.emplace_back(raw, bytes);
-            kept.push_back(raw->fileName());
-        }
-    for (const PageSpool& spool : spools) kept.insert(kept.end(), {spool.pagesFile(), spool.directoryFile()});
-    space.clear(kept);
-    for (const auto& [raw, bytes] : bins) VCP_TRY(raw->reopen(bytes));
-    for (size_t i = 0; i < spools.size(); ++i) {
-        const json& pages = recorded.at("spools").at(i);
-        if (const uint64_t bytes = pages.at(0).get<uint64_t>(); bytes > 0) VCP_TRY(spools[i].reopen(bytes, pages.at(1).get<uint64_t>()));
+    for (const auto& [name, raw] : binsOf(*this)) {
+        const auto found = recorded.files.bins.find(name);
+        const bool isNeeded =
+            isBegun || (raw != (next ? &next->raw() : nullptr) && raw != (waiting ? &waiting->raw() : nullptr));
+        if (found == recorded.files.bins.end() && isNeeded) return unlike("does not say how long all files were");
+        if (found == recorded.files.bins.end() || found->second == 0) continue;
+        bins.emplace_back(raw, found->second);
+        kept.push_back(raw->fileName());
     }
+    if (recorded.files.spools.size() != spools.size()) return unlike("is of another number of levels");
+    for (size_t i = 0; i < spools.size(); ++i)
+        if (recorded.files.spools[i].first > 0)
+            kept.insert(kept.end(), {spools[i].pagesFile(), spools[i].directoryFile()});
+    space.folder().clear(kept);
+    for (const auto& [raw, bytes] : bins) VCP_TRY(raw->reopen(bytes));
+    for (size_t i = 0; i < spools.size(); ++i)
+        if (const auto& [bytes, entries] = recorded.files.spools[i]; bytes > 0)
+            VCP_TRY(spools[i].reopen(bytes, entries));
     return {};
 }
 

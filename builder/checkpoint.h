@@ -1,9 +1,14 @@
 // What a build can go on from: the files that pass between its stages, and what the journal says about them.
 #pragma once
 
+#include <cstdint>
 #include <deque>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -19,7 +24,27 @@ namespace vcp {
 std::string buildFingerprint(const BuildOptions& options);
 
 nlohmann::json jsonOf(const SoupMeasures& measures);
-SoupMeasures measuresFrom(const nlohmann::json& json);
+
+/// What the journal's lines say together.
+struct Recorded {
+    /// How long the files of bins were, and each level's pages: bytes and entries.
+    struct Files {
+        std::map<std::string, uint64_t> bins;
+        std::vector<std::pair<uint64_t, uint64_t>> spools;
+    };
+
+    std::string stage;  ///< "": nothing is recorded; "read", "levels"
+    std::string build;  ///< fingerprint
+    SoupMeasures measures;
+    Files files;
+    std::vector<uint64_t> partition;  ///< with "levels": where the finest level's bins begin
+    int pass = 0;
+    size_t bin = 0;
+};
+
+/// `journal`: null when there is none. What is said is complete, of the right types and possible in itself, whoever
+/// wrote it. Errors: InvalidInput, naming `file`.
+Result<Recorded> recordedFrom(const nlohmann::json& journal, const std::filesystem::path& file);
 
 /// The files of a build at one moment; those that are not needed are null. One thread.
 struct WorkFiles {
@@ -31,8 +56,9 @@ struct WorkFiles {
     /// Makes all of them durable. Returns the fields to record. Errors: Io.
     Result<nlohmann::json> sync();
     /// Takes over what was recorded, cut to it, where the files were made as they were then. What else an
-    /// interrupted build left in `space` is removed. Errors: Io; InvalidInput (a file is shorter than recorded).
-    Result<void> reopen(const nlohmann::json& recorded, TempSpace& space);
+    /// interrupted build left in `space` is removed. Errors: Io; InvalidInput (a file is not recorded, shorter than
+    /// recorded, or damaged).
+    Result<void> reopen(const Recorded& recorded, TempSpace& space);
 };
 
 }  // namespace vcp

@@ -1,4 +1,7 @@
 // The finished pages of all levels, on temporary files until the output's directory is known.
+//
+// An entry has the hashes of its page's bytes, made before these are written; each entry is followed by a hash of its
+// own.
 #pragma once
 
 #include <deque>
@@ -17,8 +20,9 @@ public:
     /// Pages come in Morton order. One thread.
     Result<void> append(PageEntry entry, const StoredPage& page);
     Result<void> sync();
-    /// What an interrupted build had: so many bytes and entries.
+    /// What an interrupted build had: so many bytes and entries. Errors: Io; InvalidInput (damaged).
     Result<void> reopen(uint64_t bytes, uint64_t entries);
+    /// A page, as it was appended. Errors: Io; InvalidInput (damaged).
     Result<StoredPage> read(const PageEntry& entry) const;
     void remove();
 
@@ -29,6 +33,9 @@ public:
     [[nodiscard]] const std::string& directoryFile() const { return directory_.name(); }
 
 private:
+    [[nodiscard]] uint64_t hashOf(const PageEntry& entry, uint64_t number) const;
+
+    uint32_t level_;
     TempFile pages_, directory_;
     std::vector<PageEntry> entries_;
 };

@@ -4,11 +4,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <system_error>
 #include <utility>
+
+#include <xxhash.h>
 
 namespace vcp {
 namespace {
@@ -116,6 +119,7 @@ Result<void> Spool::moveToFile() {
 }
 
 Result<void> Spool::write(std::string_view bytes) {
+    hash(bytes);
     while (!bytes.empty()) {
         const ssize_t put = ::write(file_, bytes.data(), bytes.size());
         if (put < 0 && errno == EINTR) continue;
@@ -129,9 +133,44 @@ Result<void> Spool::write(std::string_view bytes) {
     return {};
 }
 
+/// Notes what the file is to give back.
+void Spool::hash(std::string_view bytes) {
+    while (!bytes.empty()) {
+        const size_t n = std::min<size_t>(bytes.size(), kPieceBytes - last_.size());
+        last_ += bytes.substr(0, n);
+        bytes.remove_prefix(n);
+        if (last_.size() < kPieceBytes) continue;
+        hashes_.push_back(XXH3_64bits(last_.data(), last_.size()));
+        last_.clear();
+    }
+}
+
+/// Reads a whole piece into piece_.
+Result<void> Spool::load(uint64_t piece) {
+    if (piece == pieceNumber_) return {};
+    pieceNumber_ = ~uint64_t{0};
+    piece_.resize(kPieceBytes);
+    VCP_TRY(readFully(file_, piece * kPieceBytes, piece_.data(), kPieceBytes));
+    if (XXH3_64bits(piece_.data(), kPieceBytes) != hashes_[piece])
+        return Error{.code = ErrorCode::InvalidInput, .message = "what was kept of it in a temporary file came back damaged; check the disk of " + folder_.string()};
+    pieceNumber_ = piece;
+    return {};
+}
+
 Result<void> Spool::read(uint64_t offset, char* to, size_t count) {
-    if (file_ >= 0) return readFully(file_, offset, to, count);
-    if (count > 0) std::memcpy(to, memory_.data() + offset, count);
+    if (file_ < 0) {
+        if (count > 0) std::memcpy(to, memory_.data() + offset, count);
+        return {};
+    }
+    while (count > 0) {
+        const uint64_t piece = offset / kPieceBytes;
+        const size_t at = offset % kPieceBytes, n = std::min<size_t>(count, kPieceBytes - at);
+        if (piece < hashes_.size()) VCP_TRY(load(piece));
+        std::memcpy(to, (piece < hashes_.size() ? piece_ : last_).data() + at, n);
+        offset += n;
+        to += n;
+        count -= n;
+    }
     return {};
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "octree/result.h"
 
@@ -29,6 +30,7 @@ std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes);
 
 /// Bytes appended one after another, then read anywhere: in memory up to `memoryBytes`, beyond that in a file
 /// without a name in `folder` (empty: the system's folder for temporary files), which vanishes with the process.
+/// The file's bytes are checked when they are read, piece by piece, against hashes of what was appended.
 class Spool final : public RandomBytes {
 public:
     explicit Spool(std::filesystem::path folder, size_t memoryBytes = 1024 * 1024)
@@ -41,17 +43,26 @@ public:
     Result<void> append(std::string_view bytes);
 
     [[nodiscard]] uint64_t size() const override { return size_; }
+    /// Errors as above, and InvalidInput: the file's bytes are not those that were appended.
     Result<void> read(uint64_t offset, char* to, size_t count) override;
 
 private:
+    static constexpr uint64_t kPieceBytes = 64 * 1024;
+
     Result<void> moveToFile();
     Result<void> write(std::string_view bytes);
+    void hash(std::string_view bytes);
+    Result<void> load(uint64_t piece);
 
     std::filesystem::path folder_;
     size_t memoryBytes_;
     std::string memory_;
     int file_ = -1;
     uint64_t size_ = 0;
+    std::vector<uint64_t> hashes_;  ///< of the file's whole pieces
+    std::string last_;              ///< the bytes after them, which the file has too
+    std::string piece_;             ///< the piece that was read last
+    uint64_t pieceNumber_ = ~uint64_t{0};
 };
 
 }  // namespace vcp

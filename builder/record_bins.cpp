@@ -16,13 +16,13 @@ struct BlockHeader {
     uint32_t bin = 0;
     uint32_t records = 0;
     uint32_t storedBytes = 0;
-    uint64_t hash = 0;  ///< of the above and of what follows
+    uint64_t payloadHash = 0;  ///< of what follows
+    uint64_t hash = 0;         ///< of the above: the index is made of headers alone
 
-    static constexpr uint32_t kMagic = 0x4b4c4256;
-    [[nodiscard]] uint64_t hashWith(std::span<const std::byte> payload) const {
-        return XXH3_64bits_withSeed(payload.data(), payload.size(), XXH3_64bits(this, offsetof(BlockHeader, hash)));
-    }
+    static constexpr uint32_t kMagic = 0x4c4c4256;
+    [[nodiscard]] uint64_t hashOfHeader() const { return XXH3_64bits(this, offsetof(BlockHeader, hash)); }
 };
+static_assert(sizeof(BlockHeader) == 32);
 
 constexpr size_t kMaxBlockRecords = 4096, kMinBlockRecords = 64;
 constexpr uint32_t kMaxBins = 1u << 24;
@@ -58,10 +58,6 @@ void fromPlanes(const std::byte* planes, size_t count, size_t recordBytes, std::
             std::memcpy(records + i * recordBytes + w * 4, &before, 4);
         }
     }
-}
-
-Error damaged(const std::filesystem::path& file) {
-    return {.code = ErrorCode::InvalidInput, .message = "temporary data came back damaged; check the disk, then build again without --resume", .file = file.string()};
 }
 
 }  // namespace
@@ -105,7 +101,8 @@ Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& recor
     header.bin = static_cast<uint32_t>(bin);
     header.records = static_cast<uint32_t>(count);
     header.storedBytes = static_cast<uint32_t>(stored);  // cannot fail with a buffer of compressBound
-    header.hash = header.hashWith(std::span(coded).subspan(sizeof header, stored));
+    header.payloadHash = XXH3_64bits(coded.data() + sizeof header, stored);
+    header.hash = header.hashOfHeader();
     std::memcpy(coded.data(), &header, sizeof header);
     const auto offset = file_.append(std::span(coded).first(sizeof header + stored));
     if (!offset) return offset.error();
@@ -135,9 +132,11 @@ Result<void> RawBins::reopen(uint64_t bytes) {
     VCP_TRY(file_.reopen(bytes));
     for (uint64_t at = 0; at < bytes;) {
         BlockHeader header;
-        if (bytes - at < sizeof header) return damaged(file_.path());
+        if (bytes - at < sizeof header) return damagedTempFile(file_.path(), at);
         VCP_TRY(file_.read(at, std::as_writable_bytes(std::span(&header, 1))));
-        if (header.magic != BlockHeader::kMagic || header.bin > kMaxBins || header.records > kMaxBlockRecords || header.storedBytes > bytes - at - sizeof header) return damaged(file_.path());
+        if (header.hash != header.hashOfHeader() || header.magic != BlockHeader::kMagic || header.bin > kMaxBins ||
+            header.records > kMaxBlockRecords || header.storedBytes > bytes - at - sizeof header)
+            return damagedTempFile(file_.path(), at);
         if (header.bin >= blocks_.size()) {
             open_.resize(header.bin + 1);
             blocks_.resize(header.bin + 1);
@@ -165,8 +164,11 @@ Result<void> RawBins::read(const Block& block, std::byte* out) const {
     BlockHeader header;
     std::memcpy(&header, coded.data(), sizeof header);
     const std::span<const std::byte> payload = std::span<const std::byte>(coded).subspan(sizeof header);
-    if (header.records != block.records || header.storedBytes != block.storedBytes || header.hash != header.hashWith(payload)) return damaged(file_.path());
-    if (ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size()) return damaged(file_.path());
+    const bool isIntact = header.records == block.records && header.storedBytes == block.storedBytes &&
+                          header.hash == header.hashOfHeader() &&
+                          header.payloadHash == XXH3_64bits(payload.data(), payload.size());
+    if (!isIntact || ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size())
+        return damagedTempFile(file_.path(), block.offset);
     fromPlanes(planes.data(), block.records, recordBytes_, out);
     return {};
 }

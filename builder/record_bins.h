@@ -2,7 +2,7 @@
 //
 // Each bin fills a block; a full block is coded (words as differences to the record before, byte planes, zstd
 // at its fastest) and appended with a header that names its bin, so that the index can be made again from the
-// file after an interruption. Blocks carry a hash: a temporary disk that lies is noticed.
+// file after an interruption. Headers and blocks carry hashes: a temporary disk that lies is noticed.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ public:
     Result<void> flush(size_t bin);
     /// flush, and durably.
     Result<void> sync();
-    /// The index again, from a file cut to `bytes`.
+    /// The index again, from a file cut to `bytes`. Errors: Io; InvalidInput (damaged).
     Result<void> reopen(uint64_t bytes);
     void remove();
 

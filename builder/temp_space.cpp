@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
-#include <system_error>
 #include <unistd.h>
 
 #include "octree/durable_file.h"
@@ -16,55 +14,6 @@ namespace {
 Error tempError(const std::filesystem::path& file, const char* what, int code) { return systemError(file, what, code, kWhenTempIsFull); }
 
 }  // namespace
-
-Result<void> TempSpace::lock() {
-    const std::scoped_lock guard(lockMutex_);
-    return lock_ >= 0 ? Result<void>() : take();
-}
-
-Result<void> TempSpace::take() {
-    for (;;) {
-        std::error_code failed;
-        std::filesystem::create_directories(folder_, failed);
-        if (failed) return tempError(folder_, "cannot make the temporary folder", failed.value());
-        const int fd = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-        if (fd < 0) return tempError(folder_, "cannot open the temporary folder", errno);
-        const NameLock lock = lockName(fd, folder_);
-        if (lock == NameLock::Taken) {
-            lock_ = fd;
-            return syncFolder(folder_.parent_path());
-        }
-        ::close(fd);
-        // Gone: a build that ended has removed the folder.
-        if (lock == NameLock::Held) return Error{.code = ErrorCode::Io, .message = "another build of this output is running; wait for it or choose another output", .file = folder_.string()};
-    }
-}
-
-void TempSpace::clear(const std::vector<std::string>& kept) {
-    if (lock_ < 0) return;
-    std::error_code ignored;
-    const auto isKept = [&](const std::string& name) { return std::find(kept.begin(), kept.end(), name) != kept.end(); };
-    // The journal first: it must not outlive what it speaks of.
-    if (!isKept(kJournalName)) std::filesystem::remove(folder_ / kJournalName, ignored);
-    std::vector<std::filesystem::path> files;
-    for (std::filesystem::directory_iterator at(folder_, ignored), end; !ignored && at != end; at.increment(ignored))
-        if (at->path().extension() == ".spill" && !isKept(at->path().filename().string())) files.push_back(at->path());
-    for (const auto& file : files) std::filesystem::remove(file, ignored);
-}
-
-void TempSpace::remove() {
-    clear();
-    const std::scoped_lock guard(lockMutex_);
-    if (lock_ < 0) return;
-    std::error_code ignored;
-    std::filesystem::remove(folder_, ignored);  // only when empty
-    ::close(lock_);
-    lock_ = -1;
-}
-
-TempSpace::~TempSpace() {
-    if (lock_ >= 0) ::close(lock_);
-}
 
 void TempSpace::addDisk(int64_t bytes) {
     const uint64_t now = disk_ += static_cast<uint64_t>(bytes);
@@ -121,9 +70,10 @@ Result<uint64_t> TempFile::append(std::span<const std::byte> bytes) {
 
 Result<void> TempFile::flush() {
     if (file_ < 0) {
-        VCP_TRY(space_.lock());
-        file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-        if (file_ < 0) return tempError(path(), "cannot be created", errno);
+        VCP_TRY(space_.folder().take());
+        const auto file = space_.folder().create(name_);
+        if (!file) return file.error();
+        file_ = *file;
     }
     uint64_t left = end_ - flushed_;
     for (const auto& piece : tail_) {
@@ -164,15 +114,16 @@ Result<void> TempFile::sync() {
     const std::scoped_lock lock(mutex_);
     VCP_TRY(flush());
     if (::fdatasync(file_) != 0) return tempError(path(), "cannot be made durable", errno);
-    if (!isNamed_) VCP_TRY(syncFolder(space_.folder()));
+    if (!isNamed_) VCP_TRY(space_.folder().sync());
     isNamed_ = true;
     return {};
 }
 
 Result<void> TempFile::reopen(uint64_t bytes) {
-    file_ = ::open(path().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (file_ < 0) return tempError(path(), "cannot be opened", errno);
-    const off_t size = ::lseek(file_, 0, SEEK_END);
+    const auto file = space_.folder().open(name_);
+    if (!file) return file.error();
+    file_ = *file;
+    const off_t size = file_ < 0 ? -1 : ::lseek(file_, 0, SEEK_END);
     if (size < 0 || static_cast<uint64_t>(size) < bytes)
         return Error{.code = ErrorCode::InvalidInput, .message = "is shorter than the journal says; build again without --resume", .file = path().string()};
     if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
@@ -186,7 +137,7 @@ void TempFile::remove() {
     dropTail();
     if (file_ >= 0) {
         ::close(file_);
-        ::unlink(path().c_str());
+        space_.folder().unlink(name_);
         space_.addDisk(-static_cast<int64_t>(flushed_));
     }
     file_ = -1;

@@ -19,6 +19,7 @@ constexpr uint64_t kWaitingBufferBytes = 4 << 20;
 
 VertexJoin::VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit)
     : space_(space), emit_(std::move(emit)), chunkVertices_(std::max(vertexBytes / sizeof(Vertex), kMinChunkVertices)), later_(space, "vertices.spill"),
+      hash_(XXH3_createState(), XXH3_freeState),
       waiting_(space, "waiting", kExpectedChunks, kWaitingBufferBytes) {}
 
 Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
@@ -34,9 +35,32 @@ Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
         }
     }
     vertices_ += chunk.positions.size();
-    if (rest.empty()) return {};
-    const auto at = later_.append(std::as_bytes(std::span(rest)));
-    if (!at) return at.error();
+    return append(rest);
+}
+
+/// Appends to the chunks on the disk, each with a hash of what it was before it went there.
+Result<void> VertexJoin::append(std::span<const Vertex> vertices) {
+    while (!vertices.empty()) {
+        const uint64_t inChunk = later_.size() / sizeof(Vertex) % chunkVertices_;
+        if (inChunk == 0) XXH3_64bits_reset(hash_.get());
+        const auto part = std::as_bytes(vertices.first(std::min<uint64_t>(vertices.size(), chunkVertices_ - inChunk)));
+        XXH3_64bits_update(hash_.get(), part.data(), part.size());
+        const auto at = later_.append(part);
+        if (!at) return at.error();
+        vertices = vertices.subspan(part.size() / sizeof(Vertex));
+        if (later_.size() / sizeof(Vertex) % chunkVertices_ == 0) hashes_.push_back(XXH3_64bits_digest(hash_.get()));
+    }
+    return {};
+}
+
+/// Makes a chunk after the first the one in memory.
+Result<void> VertexJoin::load(uint64_t chunk) {
+    residentFirst_ = chunk * chunkVertices_;
+    resident_.resize(std::min(chunkVertices_, vertices_ - residentFirst_));
+    const uint64_t offset = (residentFirst_ - chunkVertices_) * sizeof(Vertex);
+    VCP_TRY(later_.read(offset, std::as_writable_bytes(std::span(resident_))));
+    if (XXH3_64bits(resident_.data(), resident_.size() * sizeof(Vertex)) != hashes_[chunk - 1])
+        return damagedTempFile(later_.path(), offset);
     return {};
 }
 
@@ -94,12 +118,9 @@ Result<void> VertexJoin::finish(const std::string& file) {
     };
     VCP_TRY(waiting_.raw().flush());
     if (anyBeyond()) return missing();
+    if (later_.size() / sizeof(Vertex) % chunkVertices_ != 0) hashes_.push_back(XXH3_64bits_digest(hash_.get()));
     for (uint64_t chunk = 0; chunk < chunks; ++chunk) {
-        if (chunk > 0) {
-            residentFirst_ = chunk * chunkVertices_;
-            resident_.resize(std::min(chunkVertices_, vertices_ - residentFirst_));
-            VCP_TRY(later_.read((residentFirst_ - chunkVertices_) * sizeof(Vertex), std::as_writable_bytes(std::span(resident_))));
-        }
+        if (chunk > 0) VCP_TRY(load(chunk));
         const uint64_t before = waiting_.count(chunk);
         VCP_TRY(process(chunk));
         VCP_TRY(waiting_.raw().flush());

@@ -11,6 +11,8 @@
 #include <memory>
 #include <vector>
 
+#include <xxhash.h>
+
 #include "builder/mesh_stream.h"
 #include "builder/record_bins.h"
 #include "builder/soup.h"
@@ -45,8 +47,11 @@ private:
         uint64_t reserved = 0;
     };
     static constexpr uint64_t kDone = ~uint64_t{0};
+    using ChunkHash = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
 
     Result<void> takeVertices(const MeshChunk& chunk);
+    Result<void> append(std::span<const Vertex> vertices);
+    Result<void> load(uint64_t chunk);
     Result<void> resolve(Waiting& waiting);
     Result<void> process(uint64_t chunk);
 
@@ -57,7 +62,9 @@ private:
     uint64_t residentFirst_ = 0;
     uint64_t vertices_ = 0;
     bool hasColour_ = false;
-    TempFile later_;  ///< the vertices from chunk 1 on
+    TempFile later_;                ///< the vertices from chunk 1 on
+    std::vector<uint64_t> hashes_;  ///< of those chunks that are whole, then of the last one
+    ChunkHash hash_;                ///< of the chunk that is being appended
     RecordBins<Waiting> waiting_;
 };
 

@@ -1,6 +1,6 @@
 /* A library to preload: lets the N-th call that writes fail.
  *
- * Counted are write, pwrite, fsync, fdatasync, rename, ftruncate, mkdir and open with O_CREAT, but not on the
+ * Counted are write, pwrite, fsync, fdatasync, rename, ftruncate, mkdir, open and openat with O_CREAT, but not on the
  * standard streams. FAIL_AT: the number of the call, from 1. FAIL_ERRNO: what it fails with. FAIL_ON: if set,
  * all calls after it fail, too, as on a full disk. FAIL_MARK: a file that is made when a call has failed.
  * FAIL_SHORT: instead, every write is interrupted once, and then takes only a part of its bytes.
@@ -81,3 +81,15 @@ int mkdir(const char* path, mode_t mode) { return fails() ? -1 : REAL(mkdir)(pat
     }
 OPEN(open)
 OPEN(open64)
+
+#define OPENAT(name)                                                 \
+    int name(int folder, const char* path, int flags, ...) {         \
+        va_list rest;                                                \
+        va_start(rest, flags);                                       \
+        const mode_t mode = flags & O_CREAT ? va_arg(rest, mode_t) : 0; \
+        va_end(rest);                                                \
+        if (flags & O_CREAT && fails()) return -1;                   \
+        return REAL(name)(folder, path, flags, mode);                \
+    }
+OPENAT(openat)
+OPENAT(openat64)

@@ -17,15 +17,17 @@ using nlohmann::json;
 
 class JournalFile : public ::testing::Test {
 protected:
-    fs::path path() const { return folder_ / kJournalName; }
+    void SetUp() override { ASSERT_TRUE(temp_.take().ok()); }
+    fs::path path() const { return temp_.path() / kJournalName; }
     json read() const {
-        const auto fields = Journal::read(folder_.path());
+        const auto fields = Journal::read(temp_);
         EXPECT_TRUE(fields.ok());
         return *fields;
     }
     void write(const std::string& text) const { std::ofstream(path(), std::ios::binary) << text; }
 
     TestFolder folder_{"vcp_journal_test"};
+    TempFolder temp_{folder_ / "out.vcp.build"};
 };
 
 TEST_F(JournalFile, NoneIsNull) { EXPECT_TRUE(read().is_null()); }
@@ -33,9 +35,9 @@ TEST_F(JournalFile, NoneIsNull) { EXPECT_TRUE(read().is_null()); }
 TEST_F(JournalFile, LaterLinesOverride) {
     Journal journal;
     EXPECT_FALSE(journal.active());
-    ASSERT_TRUE(journal.record(folder_.path(), {{"stage", "read"}, {"bytes", 5}, {"files", {{"a", 1}, {"b", 2}}}}).ok());
+    ASSERT_TRUE(journal.record(temp_, {{"stage", "read"}, {"bytes", 5}, {"files", {{"a", 1}, {"b", 2}}}}).ok());
     EXPECT_TRUE(journal.active());
-    ASSERT_TRUE(journal.record(folder_.path(), {{"stage", "levels"}, {"files", {{"c", 3}}}}).ok());
+    ASSERT_TRUE(journal.record(temp_, {{"stage", "levels"}, {"files", {{"c", 3}}}}).ok());
     EXPECT_EQ(read(), json({{"stage", "levels"}, {"bytes", 5}, {"files", {{"c", 3}}}}));
 }
 
@@ -43,7 +45,7 @@ TEST_F(JournalFile, DoublesSurvive) {
     const double values[] = {0.1, 1.0 / 3, 1e-300, 4.9e-324, 483920.123456789012, -0.0};
     Journal journal;
     for (const double value : values) {
-        ASSERT_TRUE(journal.record(folder_.path(), {{"value", value}}).ok());
+        ASSERT_TRUE(journal.record(temp_, {{"value", value}}).ok());
         EXPECT_EQ(read().at("value").get<double>(), value);
     }
 }
@@ -53,7 +55,7 @@ TEST_F(JournalFile, EveryTruncationLeavesWholeLines) {
     {
         Journal journal;
         for (int i = 0; i < 4; ++i) {
-            ASSERT_TRUE(journal.record(folder_.path(), {{"step", i}, {"text", std::string(20, 'x')}}).ok());
+            ASSERT_TRUE(journal.record(temp_, {{"step", i}, {"text", std::string(20, 'x')}}).ok());
             ends.push_back(contentOf(path()).size());
         }
     }
@@ -69,7 +71,7 @@ TEST_F(JournalFile, EveryTruncationLeavesWholeLines) {
         }
         // Another build goes on in the same file.
         Journal next;
-        ASSERT_TRUE(next.record(folder_.path(), {{"step", 77}}).ok());
+        ASSERT_TRUE(next.record(temp_, {{"step", 77}}).ok());
         EXPECT_EQ(read().at("step"), 77) << size;
     }
 }
@@ -77,12 +79,12 @@ TEST_F(JournalFile, EveryTruncationLeavesWholeLines) {
 TEST_F(JournalFile, DamagedLinesAreAbsent) {
     {
         Journal journal;
-        ASSERT_TRUE(journal.record(folder_.path(), {{"step", 1}}).ok());
+        ASSERT_TRUE(journal.record(temp_, {{"step", 1}}).ok());
     }
     const size_t first = contentOf(path()).size();
     {
         Journal journal;
-        ASSERT_TRUE(journal.record(folder_.path(), {{"step", 2}}).ok());
+        ASSERT_TRUE(journal.record(temp_, {{"step", 2}}).ok());
     }
     const std::string whole = contentOf(path());
     for (size_t at = first; at + 1 < whole.size(); ++at)
@@ -97,12 +99,25 @@ TEST_F(JournalFile, DamagedLinesAreAbsent) {
     EXPECT_EQ(read().at("step"), 2);
 }
 
-TEST_F(JournalFile, FoldersThatAreNotThere) {
+TEST_F(JournalFile, LinksAreNotFollowed) {
+    std::ofstream(folder_ / "diary") << "dear diary";
+    const auto expectRefused = [&](const Result<void>& result, const char* how) {
+        ASSERT_FALSE(result.ok()) << how;
+        EXPECT_EQ(result.error().code, ErrorCode::Io);
+        EXPECT_NE(result.error().line().find("journal: is not a file that a build made"), std::string::npos) << result.error().line();
+        EXPECT_EQ(contentOf(folder_ / "diary"), "dear diary") << how;
+        const auto fields = Journal::read(temp_);
+        EXPECT_FALSE(fields.ok()) << how;
+    };
     Journal journal;
-    const auto result = journal.record(folder_ / "none", {{"step", 1}});
-    ASSERT_FALSE(result.ok());
-    EXPECT_EQ(result.error().code, ErrorCode::Io);
-    EXPECT_NE(result.error().line().find("none/journal"), std::string::npos) << result.error().line();
+    fs::create_symlink(folder_ / "diary", path());
+    expectRefused(journal.record(temp_, {{"step", 1}}), "symbolic link");
+    fs::remove(path());
+    fs::create_hard_link(folder_ / "diary", path());
+    expectRefused(journal.record(temp_, {{"step", 1}}), "hard link");
+    fs::remove(path());
+    fs::create_directory(path());
+    expectRefused(journal.record(temp_, {{"step", 1}}), "folder");
     EXPECT_FALSE(journal.active());
 }
 

@@ -38,6 +38,40 @@ TEST(Spool, ReadsBackInMemoryAndFromItsFile) {
     EXPECT_EQ(failed.error().file, (folder / "missing").string());
 }
 
+TEST(Spool, DamageIsNoticed) {
+    TestFolder folder("vcp_spool");
+    std::mt19937 random(2);
+    std::string all(200'000, '\0');
+    for (char& c : all) c = static_cast<char>(random());
+    for (const size_t damaged : {size_t{0}, size_t{65'535}, size_t{65'536}, size_t{131'071}}) {
+        Spool spool(folder.path(), 1000);
+        for (size_t at = 0; at < all.size(); at += 777) ASSERT_TRUE(spool.append(std::string_view(all).substr(at, 777)).ok());
+        // Its file has no name, but the descriptor has one.
+        for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+            std::error_code ignored;
+            const auto target = std::filesystem::read_symlink(entry.path(), ignored).string();
+            if (target.find((folder / "vcp_spool_").string()) == std::string::npos) continue;
+            std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
+            file.seekp(static_cast<std::streamoff>(damaged));
+            file.put(static_cast<char>(all[damaged] ^ 16));
+        }
+        size_t refused = 0;
+        std::string part(1000, '\0');
+        for (size_t at = 0; at < all.size(); at += part.size()) {
+            const auto read = spool.read(at, part.data(), part.size());
+            if (read) {
+                ASSERT_EQ(part, all.substr(at, part.size())) << at;
+                continue;
+            }
+            ++refused;
+            EXPECT_EQ(read.error().code, ErrorCode::InvalidInput);
+            EXPECT_NE(read.error().message.find("came back damaged"), std::string::npos) << read.error().line();
+        }
+        EXPECT_GT(refused, 60u) << damaged;
+        EXPECT_LT(refused, 70u) << damaged;
+    }
+}
+
 TEST(UvArray, GivesWhatWasAppendedBeyondItsMemory) {
     TestFolder folder("vcp_uv");
     UvArray array(folder.path(), 3);

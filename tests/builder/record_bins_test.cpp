@@ -91,7 +91,7 @@ TEST_F(Bins, WhatGoesInComesOut) {
             EXPECT_EQ(fs::exists(folder_ / "temp"), memory == 0);
             bins.raw().remove();
             EXPECT_EQ(bins.raw().total(), 0u);
-            space.remove();
+            space.folder().remove();
         }
 }
 
@@ -137,6 +137,7 @@ TEST_F(Bins, GoOnAfterAnInterruption) {
         ASSERT_TRUE(bins.raw().sync().ok());
     }
     TempSpace space(folder_ / "temp", 0);
+    ASSERT_TRUE(space.folder().take().ok());
     // Other memory, other blocks.
     RecordBins<Record> bins(space, "bins", 6, 1 << 22);
     ASSERT_TRUE(bins.raw().reopen(recorded).ok());
@@ -174,13 +175,38 @@ TEST_F(Bins, EveryDamageIsNoticed) {
         damaged[at] = static_cast<char>(damaged[at] ^ 1 << random() % 8);
         std::ofstream(file, std::ios::binary) << damaged;
         TempSpace space(folder_ / "temp", 0);
+        ASSERT_TRUE(space.folder().take().ok());
         RecordBins<Record> bins(space, "bins", 3, 1 << 14);
         Result<void> result = bins.raw().reopen(intact.size());
         for (size_t bin = 0; bin < bins.raw().bins() && result; ++bin)
             if (const auto loaded = bins.load(bin); !loaded) result = loaded.error();
         ASSERT_FALSE(result.ok()) << "byte " << at << " of " << intact.size();
         EXPECT_EQ(result.error().code, ErrorCode::InvalidInput);
-        EXPECT_NE(result.error().line().find("bins.spill: temporary data came back damaged"), std::string::npos) << result.error().line();
+        EXPECT_NE(result.error().line().find("bins.spill: byte "), std::string::npos) << result.error().line();
+        EXPECT_NE(result.error().line().find("temporary data came back damaged"), std::string::npos) << result.error().line();
+    }
+}
+
+TEST_F(Bins, TheIndexIsOfIntactHeadersOnly) {
+    // A block that claims to be of a bin that is done would be lost without a word.
+    const fs::path file = folder_ / "temp/bins.spill";
+    {
+        TempSpace space(folder_ / "temp", 0);
+        RecordBins<Record> bins(space, "bins", 3, 1 << 14);
+        fill(bins, 3, 100, 1);
+        ASSERT_TRUE(bins.raw().sync().ok());
+    }
+    const std::string intact = contentOf(file);
+    for (size_t bit = 0; bit < 32 * 8; ++bit) {
+        std::string damaged = intact;
+        damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ 1 << bit % 8);
+        std::ofstream(file, std::ios::binary) << damaged;
+        TempSpace space(folder_ / "temp", 0);
+        ASSERT_TRUE(space.folder().take().ok());
+        RecordBins<Record> bins(space, "bins", 3, 1 << 14);
+        const auto reopened = bins.raw().reopen(intact.size());
+        ASSERT_FALSE(reopened.ok()) << "bit " << bit;
+        EXPECT_NE(reopened.error().line().find("byte 0: temporary data came back damaged"), std::string::npos) << reopened.error().line();
     }
 }
 

@@ -42,7 +42,7 @@ protected:
 
 TEST_F(Temp, LittleStaysInMemory) {
     TempSpace space(place(), 4 << 20);
-    TempFile file(space, "a.spill");
+    TempFile file(space, "pages1.spill");
     const Bytes bytes = randomBytes(3 << 20, 1);
     ASSERT_TRUE(file.append(bytes).ok());
     expectHolds(file, bytes);
@@ -53,7 +53,7 @@ TEST_F(Temp, LittleStaysInMemory) {
 TEST_F(Temp, MuchGoesToTheDisk) {
     for (uint64_t seed = 0; seed < 5; ++seed) {
         TempSpace space(place(), 1 << 20);
-        TempFile a(space, "a.spill"), b(space, "b.spill");
+        TempFile a(space, "pages1.spill"), b(space, "pages2.spill");
         Bytes inA, inB;
         std::mt19937_64 random(seed);
         while (inA.size() + inB.size() < 8 << 20) {
@@ -73,24 +73,24 @@ TEST_F(Temp, MuchGoesToTheDisk) {
         expectHolds(a, inA);
         expectHolds(b, inB);
         EXPECT_GT(space.diskBytes(), 5u << 20);
-        EXPECT_EQ(space.diskBytes(), fs::file_size(place() / "a.spill") + fs::file_size(place() / "b.spill"));
+        EXPECT_EQ(space.diskBytes(), fs::file_size(place() / "pages1.spill") + fs::file_size(place() / "pages2.spill"));
         const uint64_t peak = space.peakDiskBytes();
         a.remove();
         b.remove();
         EXPECT_EQ(space.diskBytes(), 0u);
         EXPECT_EQ(space.peakDiskBytes(), peak);
-        EXPECT_FALSE(fs::exists(place() / "a.spill"));
+        EXPECT_FALSE(fs::exists(place() / "pages1.spill"));
         // It may be used again.
         ASSERT_TRUE(a.append(inB).ok());
         expectHolds(a, inB);
-        space.remove();
+        space.folder().remove();
         EXPECT_FALSE(fs::exists(place()));
     }
 }
 
 TEST_F(Temp, ReadersBesideTheWriter) {
     TempSpace space(place(), 1 << 20);
-    TempFile file(space, "a.spill");
+    TempFile file(space, "pages1.spill");
     const Bytes bytes = randomBytes(6 << 20, 9);
     std::atomic<bool> wrong = false;
     std::vector<std::thread> readers;
@@ -115,18 +115,18 @@ TEST_F(Temp, TakenOverAndCut) {
     const Bytes bytes = randomBytes(700000, 4);
     {
         TempSpace space(place(), 1 << 30);
-        TempFile file(space, "a.spill");
+        TempFile file(space, "pages1.spill");
         ASSERT_TRUE(file.append(bytes).ok());
         EXPECT_FALSE(fs::exists(place()));
         ASSERT_TRUE(file.sync().ok());
-        EXPECT_EQ(fs::file_size(place() / "a.spill"), bytes.size());
+        EXPECT_EQ(fs::file_size(place() / "pages1.spill"), bytes.size());
         // More, that is never made durable.
         ASSERT_TRUE(file.append(bytes).ok());
     }
     for (const size_t kept : {size_t{600000}, size_t{1}, size_t{0}}) {
         TempSpace space(place(), 1 << 30);
-        ASSERT_TRUE(space.lock().ok());
-        TempFile file(space, "a.spill");
+        ASSERT_TRUE(space.folder().take().ok());
+        TempFile file(space, "pages1.spill");
         ASSERT_TRUE(file.reopen(kept).ok());
         Bytes want(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(kept));
         expectHolds(file, want);
@@ -138,7 +138,8 @@ TEST_F(Temp, TakenOverAndCut) {
         expectHolds(file, want);
     }
     TempSpace space(place(), 1 << 30);
-    TempFile shorter(space, "a.spill"), missing(space, "b.spill");
+    ASSERT_TRUE(space.folder().take().ok());
+    TempFile shorter(space, "pages1.spill"), missing(space, "pages2.spill");
     for (TempFile* file : {&shorter, &missing}) {
         const auto result = file->reopen(800000);
         ASSERT_FALSE(result.ok());
@@ -147,51 +148,33 @@ TEST_F(Temp, TakenOverAndCut) {
     }
 }
 
-TEST_F(Temp, RemovesItsOwnFilesOnly) {
-    fs::create_directories(place());
-    for (const char* name : {"a.spill", "b.spill", "journal", "diary.txt"}) std::ofstream(place() / name) << "text";
-    TempSpace space(place(), 0);
-    // Not held: not touched.
-    space.remove();
-    EXPECT_TRUE(fs::exists(place() / "a.spill"));
-    ASSERT_TRUE(space.lock().ok());
-    space.clear({kJournalName, "b.spill"});
-    EXPECT_FALSE(fs::exists(place() / "a.spill"));
-    EXPECT_TRUE(fs::exists(place() / "b.spill"));
-    EXPECT_TRUE(fs::exists(place() / "journal"));
-    space.remove();
-    EXPECT_FALSE(fs::exists(place() / "b.spill"));
-    EXPECT_FALSE(fs::exists(place() / "journal"));
-    EXPECT_TRUE(fs::exists(place() / "diary.txt"));
-}
-
 TEST_F(Temp, OneBuildAtATime) {
     TempSpace first(place(), 0);
-    ASSERT_TRUE(first.lock().ok());
-    ASSERT_TRUE(first.lock().ok()) << "it has it already";
+    ASSERT_TRUE(first.folder().take().ok());
+    ASSERT_TRUE(first.folder().take().ok()) << "it has it already";
     {
         TempSpace second(place(), 0);
-        const auto refused = second.lock();
+        const auto refused = second.folder().take();
         ASSERT_FALSE(refused.ok());
         EXPECT_EQ(refused.error().code, ErrorCode::Io);
         EXPECT_NE(refused.error().line().find("another build"), std::string::npos) << refused.error().line();
         // Nor by writing there.
-        TempFile file(second, "a.spill");
+        TempFile file(second, "pages1.spill");
         EXPECT_FALSE(file.append(randomBytes(10, 1)).ok());
-        second.remove();
+        second.folder().remove();
         EXPECT_TRUE(fs::exists(place()));
     }
-    first.remove();
+    first.folder().remove();
     EXPECT_FALSE(fs::exists(place()));
     TempSpace third(place(), 0);
-    EXPECT_TRUE(third.lock().ok());
-    EXPECT_TRUE(first.lock().ok() == false);
+    EXPECT_TRUE(third.folder().take().ok());
+    EXPECT_TRUE(first.folder().take().ok() == false);
 }
 
 TEST_F(Temp, PlacesThatCannotBe) {
     std::ofstream(folder_ / "file") << "x";
     TempSpace space(folder_ / "file" / "temp", 0);
-    TempFile file(space, "a.spill");
+    TempFile file(space, "pages1.spill");
     const auto result = file.append(randomBytes(10, 1));
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::Io);

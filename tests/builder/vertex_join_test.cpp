@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -70,6 +71,7 @@ protected:
     enum class Order { VerticesFirst, TrianglesFirst, InTurns };
 
     Result<std::vector<World>> join(const Indexed& mesh, Order order, uint64_t vertexBytes, uint64_t seed, bool withColour = true, bool withUv = true) {
+        std::filesystem::remove_all(folder_ / "temp");  // what one that failed left
         TempSpace space(folder_ / "temp", vertexBytes > 1 << 22 ? 1 << 30 : 0);
         std::vector<World> joined;
         VertexJoin join(space, vertexBytes, [&](const World& t) {
@@ -99,7 +101,7 @@ protected:
         VCP_TRY(join.finish("mesh.ply"));
         EXPECT_EQ(join.vertices(), mesh.positions.size());
         EXPECT_EQ(space.diskBytes(), 0u) << "what was joined is given back";
-        space.remove();
+        space.folder().remove();
         std::sort(joined.begin(), joined.end(), less);
         return joined;
     }
@@ -152,6 +154,30 @@ TEST_F(Join, VerticesThatNeverCame) {
                 EXPECT_NE(joined.error().line().find("a vertex that the file does not have"), std::string::npos) << joined.error().line();
                 EXPECT_NE(joined.error().line().find("mesh.ply"), std::string::npos) << joined.error().line();
             }
+}
+
+TEST_F(Join, VerticesThatComeBackDamaged) {
+    const Indexed mesh = randomMesh(3 * kLeastResident + 100, 10, kLeastResident, 1);
+    for (const uint64_t vertex : {uint64_t{0}, uint64_t{kLeastResident}, uint64_t{2 * kLeastResident + 99}}) {
+        TempSpace space(folder_ / "temp", 0);
+        VertexJoin join(space, 0, [](const World&) { return Result<void>(); });
+        MeshChunk chunk;
+        chunk.positions = mesh.positions;
+        chunk.triangles.push_back({0, 1, 3 * kLeastResident + 99});
+        ASSERT_TRUE(join.add(chunk, 0).ok());
+        std::fstream file(folder_ / "temp" / "vertices.spill", std::ios::in | std::ios::out | std::ios::binary);
+        file.seekg(static_cast<std::streamoff>(vertex * 32 + 3));
+        const int byte = file.get();
+        file.seekp(static_cast<std::streamoff>(vertex * 32 + 3));
+        file.put(static_cast<char>(byte ^ 4));
+        file.close();
+        const auto joined = join.finish("mesh.ply");
+        ASSERT_FALSE(joined.ok()) << vertex;
+        EXPECT_EQ(joined.error().code, ErrorCode::InvalidInput);
+        EXPECT_NE(joined.error().line().find("vertices.spill: byte "), std::string::npos) << joined.error().line();
+        EXPECT_NE(joined.error().line().find("came back damaged"), std::string::npos) << joined.error().line();
+        space.folder().remove();
+    }
 }
 
 TEST_F(Join, ErrorsOfTheSinkComeThrough) {
