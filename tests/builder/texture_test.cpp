@@ -11,6 +11,7 @@
 
 #include "builder/colour_encoding.h"
 #include "builder/png_chunks.h"
+#include "tests/builder/peak_memory.h"
 #include "tests/builder/png_files.h"
 #include "tests/viewer/test_folder.h"
 
@@ -135,8 +136,10 @@ TEST(Image, TextOfAPngIsNotInflated) {
     for (size_t kept = 0; kept < plain.size(); ++kept)
         EXPECT_EQ(withoutText(plain.substr(0, kept)), plain.substr(0, kept)) << kept;
 
+    const long before = test::peakMiB();
     const auto read = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + profile));
     ASSERT_TRUE(read.ok()) << read.error().line();
+    EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
     EXPECT_EQ(read->texels, decodeImage(plain)->texels);
     // Its gamma still counts: 0x40 as light is 0x89 as a colour.
     const auto linear = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + gamma));
