@@ -31,7 +31,8 @@ public:
           folder_(folder),
           options_(options),
           document_(std::move(document)),
-          buffers_(document_, name_, std::move(folder), std::move(binary)) {}
+          buffers_(document_, name_, std::move(folder), std::move(binary),
+                   {.tempFolder = options.tempFolder, .decoderBytes = options.decoderBytes}) {}
 
     Result<void> begin(std::string format, uint64_t fileBytes) {
         info_.format = std::move(format);
@@ -138,8 +139,11 @@ private:
                 warnings_.push_back(where + ": embedded images of more than 256 MiB are left out");
                 return source;
             }
+            const std::string element = fmt::format("image {}", number);
+            // A buffer that is shorter than it says is found out before anything is allocated.
+            VCP_TRY(buffers_.read(*image.view, 0, nullptr, 0, element));
             std::string data(size, '\0');
-            VCP_TRY(buffers_.read(*image.view, 0, data.data(), data.size(), fmt::format("image {}", number)));
+            VCP_TRY(buffers_.read(*image.view, 0, data.data(), data.size(), element));
             source.bytes = std::make_shared<const std::string>(std::move(data));
         } else if (!image.data.empty()) {
             source.bytes = std::make_shared<const std::string>(std::move(image.data));

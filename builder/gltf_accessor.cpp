@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "builder/data_uri.h"
+#include "builder/gltf_meshopt.h"
 
 namespace vcp {
 namespace {
@@ -41,8 +42,14 @@ double component(GltfComponent type, const char* p, bool normalized) {
 }  // namespace
 
 GltfBuffers::GltfBuffers(GltfDocument& document, std::string file, std::filesystem::path folder,
-                         std::unique_ptr<RandomBytes> binary)
-    : document_(document), file_(std::move(file)), folder_(std::move(folder)), open_(document.buffers.size()) {
+                         std::unique_ptr<RandomBytes> binary, Room room)
+    : document_(document),
+      file_(std::move(file)),
+      folder_(std::move(folder)),
+      room_(std::move(room)),
+      open_(document.buffers.size()),
+      decoded_(room_.tempFolder),
+      places_(document.views.size()) {
     // Only the first buffer may be the chunk.
     if (!open_.empty() && document.buffers[0].uri.empty()) open_[0] = std::move(binary);
 }
@@ -76,11 +83,48 @@ Result<RandomBytes*> GltfBuffers::open(uint32_t number) {
     return opened.get();
 }
 
+Result<uint64_t> GltfBuffers::placeOfDecoded(uint32_t number) {
+    auto& place = places_[number];
+    if (place) return *place;
+    const GltfMeshopt& from = *document_.views[number].compressed;
+    const auto named = [&](Error error) {
+        if (error.file.empty()) error.file = file_;
+        error.element = fmt::format("bufferView {}", number);
+        return error;
+    };
+    const uint64_t needed = from.bytes + from.count * from.stride;
+    if (needed > room_.decoderBytes)
+        return named({.code = ErrorCode::Limit,
+                      .message = fmt::format("decoding it takes {} MiB, more than the {} MiB that are allowed; save it "
+                                             "without meshopt compression, or in smaller meshes",
+                                             needed >> 20, room_.decoderBytes >> 20)});
+    // A buffer that is shorter than it says is found out before anything is allocated.
+    auto buffer = open(from.buffer);
+    if (!buffer) return buffer.error();
+    std::string bytes(from.bytes, '\0');
+    if (const auto done = (*buffer)->read(from.offset, bytes.data(), bytes.size()); !done) return named(done.error());
+    const auto values = decodeMeshopt(from, bytes);
+    if (!values) return named(values.error());
+    const uint64_t at = decoded_.size();
+    VCP_TRY(decoded_.append(*values));
+    place = at;
+    return at;
+}
+
 Result<void> GltfBuffers::read(uint32_t view, uint64_t offset, char* to, size_t count, const std::string& element) {
     const GltfView& v = document_.views[view];
-    auto bytes = open(v.buffer);
-    if (!bytes) return bytes.error();
-    auto done = (*bytes)->read(v.offset + offset, to, count);
+    RandomBytes* from = &decoded_;
+    if (v.compressed) {
+        const auto place = placeOfDecoded(view);
+        if (!place) return place.error();
+        offset += *place;
+    } else {
+        const auto bytes = open(v.buffer);
+        if (!bytes) return bytes.error();
+        from = *bytes;
+        offset += v.offset;
+    }
+    auto done = from->read(offset, to, count);
     if (done) return {};
     Error error = done.error();
     error.file = file_;

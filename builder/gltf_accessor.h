@@ -11,25 +11,37 @@
 
 namespace vcp {
 
-/// Buffers are opened when they are first used, and stay open.
+/// Buffers are opened when they are first used, and stay open. So are views that meshopt compressed: each is decoded as
+/// a whole when it is first used, and kept in a Spool of all.
 class GltfBuffers {
 public:
+    /// Where decoded views are put, and how much memory decoding one may take.
+    struct Room {
+        std::filesystem::path tempFolder;  ///< empty: the system's
+        uint64_t decoderBytes = uint64_t{1} << 30;
+    };
+
     /// `document` must outlive this; the data of its data URIs are moved from it. `folder` holds external buffers
     /// (empty: there is none, as for standard input); `binary` is the second chunk of a GLB, or null.
     GltfBuffers(GltfDocument& document, std::string file, std::filesystem::path folder,
-                std::unique_ptr<RandomBytes> binary);
+                std::unique_ptr<RandomBytes> binary, Room room);
 
     /// Reads bytes of a view; precondition: they lie in it. `element` is for errors: InvalidInput (a buffer names no
-    /// file below the folder, or is shorter than declared), Io, each with the buffer's file.
+    /// file below the folder, or is shorter than declared; meshopt data are damaged), Limit (their memory), Io, each
+    /// with the buffer's file.
     Result<void> read(uint32_t view, uint64_t offset, char* to, size_t count, const std::string& element);
 
 private:
     Result<RandomBytes*> open(uint32_t buffer);
+    Result<uint64_t> placeOfDecoded(uint32_t view);
 
     GltfDocument& document_;
     std::string file_;
     std::filesystem::path folder_;
+    Room room_;
     std::vector<std::unique_ptr<RandomBytes>> open_;
+    Spool decoded_;
+    std::vector<std::optional<uint64_t>> places_;  // in it, of each view
 };
 
 class GltfAccessorReader {

@@ -12,6 +12,7 @@
 #include "builder/colour_encoding.h"
 #include "builder/data_uri.h"
 #include "builder/gltf_materials.h"
+#include "builder/gltf_meshopt.h"
 #include "builder/json_fields.h"
 #include "builder/json_text.h"
 
@@ -44,8 +45,9 @@ std::optional<GltfComponent> componentOf(uint64_t number) {
 
 // Extensions without which the surface is still the same.
 bool changesNoSurface(std::string_view extension) {
-    static constexpr std::array<std::string_view, 7> kRead{
-        "KHR_draco_mesh_compression", "KHR_mesh_quantization",   "EXT_mesh_gpu_instancing", "CESIUM_RTC",
+    static constexpr std::array<std::string_view, 9> kRead{
+        "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression",
+        "KHR_mesh_quantization",      "EXT_mesh_gpu_instancing", "CESIUM_RTC",
         "EXT_mesh_features",          "EXT_structural_metadata", "KHR_node_visibility"};
     static constexpr std::array<std::string_view, 7> kLooks{
         "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "EXT_lights_", "KHR_xmp", "KHR_animation_"};
@@ -63,6 +65,9 @@ public:
         const JsonFields top(json_, file, check_);
         top.each("buffers", "buffer", where_, [&](const JsonFields& f) { readBuffer(f); });
         top.each("bufferViews", "bufferView", where_, [&](const JsonFields& f) { readView(f); });
+        if (!meshoptIsInProportion(document_))
+            return source_.error(ErrorCode::Limit, "bufferViews", std::nullopt,
+                                 "are decoded by meshopt to more than 64 times their buffers");
         top.each("accessors", "accessor", where_, [&](const JsonFields& f) { readAccessor(f); });
         readGltfMaterials(json_, document_, check_);
         top.each("meshes", "mesh", where_, [&](const JsonFields& f) { readMesh(f); });
@@ -134,6 +139,7 @@ private:
             return f.fail(fmt::format("bytes {} to {} lie outside buffer {} of {} bytes", view.offset,
                                       view.offset + view.bytes, view.buffer, room));
         if (view.stride > 252) return f.fail("its byteStride is larger than 252");
+        readGltfMeshopt(f, where_, check_, document_.buffers, view);
         document_.views.push_back(view);
     }
 

@@ -33,11 +33,26 @@ struct GltfBuffer {
     uint64_t bytes = 0;
 };
 
+/// EXT_meshopt_compression: the bytes of a buffer that a view is decoded from, and into what.
+struct GltfMeshopt {
+    enum class Mode : uint8_t { Attributes, Triangles, Indices };
+    enum class Filter : uint8_t { None, Octahedral, Quaternion, Exponential };
+
+    uint32_t buffer = 0;
+    uint64_t offset = 0;
+    uint64_t bytes = 0;
+    uint64_t count = 0;
+    uint64_t stride = 0;
+    Mode mode = Mode::Attributes;
+    Filter filter = Filter::None;
+};
+
 struct GltfView {
     uint32_t buffer = 0;
     uint64_t offset = 0;
     uint64_t bytes = 0;
-    uint64_t stride = 0;  ///< 0: elements follow each other
+    uint64_t stride = 0;                    ///< 0: elements follow each other
+    std::optional<GltfMeshopt> compressed;  ///< then `buffer` need not exist
 };
 
 struct GltfSparse {

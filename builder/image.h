@@ -22,8 +22,10 @@ struct ImageLimits {
     uint64_t fileBytes = uint64_t{256} << 20;
 };
 
-/// Decodes PNG (any type, 16 bits cut to 8) or JPEG (grey, RGB; baseline and progressive). Errors: InvalidInput
-/// (damaged, truncated), Unsupported (another format, CMYK), Limit; without file.
+/// Decodes PNG (any type, 16 bits cut to 8) or JPEG (grey, RGB; baseline and progressive). Sizes are checked before
+/// texels are allocated, against the limits and against what as many bytes can hold. Errors: InvalidInput (damaged,
+/// truncated), Unsupported (another format, CMYK), Limit (also a JPEG of more than 100 scans, and a progressive one of
+/// more than 256 MiB); without file.
 Result<Image> decodeImage(std::string_view file, const ImageLimits& limits = {});
 
 /// Reads the file that `source` names, or decodes its bytes. Errors: as decodeImage(), and Io; with the file's name.

@@ -88,7 +88,7 @@ struct MeshOpenOptions {
     /// Where what must be read more than once is put (texture coordinates of a large OBJ, a piped GLB), as a
     /// file without a name. Empty: the system's folder for such files.
     std::filesystem::path tempFolder = {};
-    uint64_t decoderBytes = uint64_t{1} << 30;  ///< limit on the memory of the process that decodes Draco
+    uint64_t decoderBytes = uint64_t{1} << 30;  ///< limit on the memory that decodes Draco and meshopt
 };
 
 /// "ply", "obj", ...: what MeshOpenOptions::format may say.

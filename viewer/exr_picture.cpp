@@ -32,8 +32,16 @@ Error wrong(ErrorCode code, std::string message) { return {.code = code, .messag
 #ifdef VCP_HAVE_OPENEXR
 
 constexpr uint32_t kDeep = 0x800, kSeveralParts = 0x1000;
-constexpr size_t kMostAttributes = 4096, kMostChannelBytes = 1024, kLeastChannelBytes = 18;
-constexpr uint64_t kMostTileBytes = uint64_t{1} << 29;
+constexpr size_t kMostAttributes = 4096, kMostChannels = 64;
+/// The library holds a chunk of all channels, and a row of tiles: they have at most this, or so many times the picture.
+constexpr uint64_t kBufferBytes = uint64_t{64} << 20, kBufferPictures = 4;
+/// A chunk has its place in a table, and names its lines and its size.
+constexpr uint64_t kLeastChunkBytes = 16;
+/// How many bytes of texels a byte of the file may stand for: deflate's most is 1032, of two bytes out of four. Flat DWA has more.
+constexpr uint64_t kMostExpansion = 4096, kMostDwaExpansion = 65536;
+constexpr uint8_t kDwaa = 8;
+/// Of every compression by its number.
+constexpr std::array<uint32_t, 10> kLinesOfChunk = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 
 Error damaged(std::string detail) {
     detail = detail.substr(0, 200);
@@ -50,16 +58,16 @@ struct Known {
 constexpr Known kKnown[] = {{"channels", "chlist", 0},          {"compression", "compression", 1}, {"dataWindow", "box2i", 16},        {"displayWindow", "box2i", 16},    {"lineOrder", "lineOrder", 1},
                             {"pixelAspectRatio", "float", 4}, {"screenWindowCenter", "v2f", 8},  {"screenWindowWidth", "float", 4}, {"tiles", "tiledesc", 9}};
 
-/// Whether names with 16 bytes each, and one empty name, fill it.
-bool isChannelList(std::span<const std::byte> list) {
-    while (!list.empty()) {
+/// The number of names, with 16 bytes each, before an empty one; nothing where that is not all that there is.
+std::optional<size_t> countChannels(std::span<const std::byte> list) {
+    for (size_t count = 0; !list.empty(); ++count) {
         const auto end = std::find(list.begin(), list.end(), std::byte{0});
-        if (end == list.begin()) return list.size() == 1;
         const auto name = size_t(end - list.begin());
-        if (list.size() < name + 1 + 16) return false;
+        if (name == 0 && list.size() == 1) return count;
+        if (name == 0 || list.size() < name + 1 + 16) return std::nullopt;
         list = list.subspan(name + 1 + 16);
     }
-    return false;
+    return std::nullopt;
 }
 
 /// What a header says, read before the library allocates by it. Attributes that the library does not need get a type that it does not know, so
@@ -109,6 +117,9 @@ private:
         return std::string_view(reinterpret_cast<const char*>(rest.data()), size_t(end - rest.begin()));
     }
     Result<void> attribute(const Known& known, std::span<const std::byte> value) {
+        // The library joins lists of channels, and takes the last of what comes twice.
+        if (std::ranges::find(seen_, known.name) != seen_.end()) return damaged(fmt::format("it has {} twice", known.name));
+        seen_.push_back(known.name);
         if (known.bytes > 0 && value.size() != known.bytes) return damaged(fmt::format("its {} has another size", known.name));
         if (known.name == "dataWindow") {
             std::memcpy(window_.data(), value.data(), sizeof window_);
@@ -116,10 +127,13 @@ private:
         } else if (known.name == "tiles") {
             std::memcpy(tile_.data(), value.data(), sizeof tile_);
             hasTiles_ = true;
+        } else if (known.name == "compression") {
+            compression_ = uint8_t(value[0]);
         } else if (known.name == "channels") {
-            if (!isChannelList(value)) return damaged("its list of channels");
-            if (value.size() > kMostChannelBytes) return wrong(ErrorCode::Limit, "an EXR of too many channels for a height map; save one");
-            channels_ = value.size() / kLeastChannelBytes;
+            const auto count = countChannels(value);
+            if (!count) return damaged("its list of channels");
+            if (*count > kMostChannels) return wrong(ErrorCode::Limit, fmt::format("an EXR of {} channels; a height map needs one", *count));
+            texelBytes_ = sizeof(float) * std::max<size_t>(*count, 1);
         }
         return {};
     }
@@ -128,18 +142,32 @@ private:
         const int64_t width = int64_t{window_[2]} - window_[0] + 1, height = int64_t{window_[3]} - window_[1] + 1;
         if (width < 1 || height < 1) return damaged("a data window without texels");
         if (width > mostEdge || height > mostEdge) return wrong(ErrorCode::Limit, fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, mostEdge));
-        if (hasTiles_) VCP_TRY(checkTiles(uint64_t(width), uint64_t(height)));
+        VCP_TRY(hasTiles_ ? checkTiles(uint64_t(width), uint64_t(height)) : checkLines(uint64_t(width), uint64_t(height)));
+        const uint64_t expansion = compression_ >= kDwaa ? kMostDwaExpansion : kMostExpansion;
+        if (uint64_t(width * height) * texelBytes_ / expansion > file_.size()) return damaged(fmt::format("{} bytes cannot hold {} x {} texels", file_.size(), width, height));
         header_.assign(file_.begin(), file_.begin() + std::ptrdiff_t(at_));
         for (const auto& [first, count] : masked_) std::fill_n(header_.begin() + std::ptrdiff_t(first), count, std::byte{'?'});
         return glm::ivec2(int(width), int(height));
     }
 
-    /// One tile of all channels is held; each tile has eight bytes in a table.
     Result<void> checkTiles(uint64_t width, uint64_t height) const {
+        constexpr uint32_t kMostTileEdge = 65536;
         const uint64_t x = tile_[0], y = tile_[1];
         if (x < 1 || y < 1) return damaged("tiles without texels");
-        if (x * y > kMostTileBytes / sizeof(float) / std::max<uint64_t>(channels_, 1)) return wrong(ErrorCode::Limit, fmt::format("an EXR of tiles of {} x {} texels", x, y));
-        if ((width + x - 1) / x * ((height + y - 1) / y) > file_.size() / sizeof(uint64_t)) return damaged("it has fewer bytes than tiles");
+        const uint64_t across = (width + x - 1) / x, down = (height + y - 1) / y;
+        if (x > kMostTileEdge || y > kMostTileEdge || !fits(across * x * y, width * height))
+            return wrong(ErrorCode::Limit, fmt::format("an EXR of {} x {} texels in tiles of {} x {}; save it with smaller tiles, or in lines", width, height, x, y));
+        return checkChunks(across * down);
+    }
+    Result<void> checkLines(uint64_t width, uint64_t height) const {
+        const uint64_t lines = compression_ < kLinesOfChunk.size() ? kLinesOfChunk[compression_] : kLinesOfChunk.back();
+        if (!fits(width * lines, width * height))
+            return wrong(ErrorCode::Limit, fmt::format("an EXR of {} x {} texels of {} bytes, {} lines together; save it with fewer channels", width, height, texelBytes_, lines));
+        return checkChunks((height + lines - 1) / lines);
+    }
+    [[nodiscard]] bool fits(uint64_t bufferTexels, uint64_t texels) const { return bufferTexels * texelBytes_ <= std::max(kBufferBytes, kBufferPictures * texels * texelBytes_); }
+    Result<void> checkChunks(uint64_t chunks) const {
+        if (chunks > file_.size() / kLeastChunkBytes) return damaged(fmt::format("{} bytes cannot hold {} blocks of texels", file_.size(), chunks));
         return {};
     }
 
@@ -149,7 +177,9 @@ private:
     size_t at_ = 0;
     std::array<int32_t, 4> window_{};
     std::array<uint32_t, 2> tile_{};
-    uint64_t channels_ = 0;
+    std::vector<std::string_view> seen_;
+    uint64_t texelBytes_ = sizeof(float);  ///< of all channels, as floats
+    uint8_t compression_ = 0;
     bool hasWindow_ = false, hasTiles_ = false;
 };
 

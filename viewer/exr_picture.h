@@ -23,11 +23,13 @@ bool readsExr();
 /// Whether the bytes begin as an EXR does.
 bool isExr(std::span<const std::byte> file);
 
-/// Decodes the data window of an EXR of one part, scan lines or tiles (of which the finest level), any compression: channel Y,
-/// else the mean of those of R, G and B that there are, else the only channel, of any type. The bytes may be hostile:
-/// sizes are checked before anything is allocated. Errors, without file: InvalidInput (damaged, truncated, NaN or
-/// infinity), Limit (above `mostEdge` texels along an edge), Unsupported (deep, several parts, other channels, or a
-/// program built without OpenEXR).
+/// Decodes the data window of an EXR of one part, scan lines or tiles (of which the finest level), any compression:
+/// channel Y, else the mean of those of R, G and B that there are, else the only channel, of any type. The bytes may be
+/// hostile: sizes, tiles and channels are checked against each other and against the file before anything is allocated,
+/// so that decoding takes 64 MiB, or a few times the picture, which the file must be long enough to hold. Errors,
+/// without file: InvalidInput (damaged, truncated, NaN or infinity), Limit (above `mostEdge` texels along an edge;
+/// tiles or channels out of proportion), Unsupported (deep, several parts, other channels, or a program built without
+/// OpenEXR).
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge);
 
 }  // namespace vcp

@@ -10,6 +10,9 @@
 #include <png.h>
 
 #include "builder/colour_encoding.h"
+#include "builder/png_chunks.h"
+#include "tests/builder/peak_memory.h"
+#include "tests/builder/png_files.h"
 #include "tests/viewer/test_folder.h"
 
 namespace vcp {
@@ -38,7 +41,7 @@ std::string pngOf(const Image& image) {
     return file;
 }
 
-std::string jpegOf(const Image& image, bool progressive) {
+std::string jpegOf(const Image& image, bool progressive, const std::vector<jpeg_scan_info>& scans = {}) {
     jpeg_compress_struct jpeg{};
     jpeg_error_mgr errors{};
     jpeg.err = jpeg_std_error(&errors);
@@ -53,6 +56,10 @@ std::string jpegOf(const Image& image, bool progressive) {
     jpeg_set_defaults(&jpeg);
     jpeg_set_quality(&jpeg, 95, TRUE);
     if (progressive) jpeg_simple_progression(&jpeg);
+    if (!scans.empty()) {
+        jpeg.scan_info = scans.data();
+        jpeg.num_scans = static_cast<int>(scans.size());
+    }
     jpeg_start_compress(&jpeg, TRUE);
     while (jpeg.next_scanline < jpeg.image_height) {
         auto* row = const_cast<JSAMPROW>(
@@ -112,6 +119,84 @@ TEST(Image, LimitsHoldBeforeTexelsAreAllocated) {
     EXPECT_EQ(decodeImage(file, {.edge = 100, .bytes = 3999, .fileBytes = 1 << 20}).error().code, ErrorCode::Limit);
     EXPECT_TRUE(decodeImage(file, {.edge = 100, .bytes = 4000, .fileBytes = 1 << 20}).ok());
     EXPECT_EQ(decodeImage("GIF89a").error().code, ErrorCode::Unsupported);
+}
+
+TEST(Image, TextOfAPngIsNotInflated) {
+    const std::string row("\0\x10\x20\x30\x40\x50\x60", 7);  // two texels of RGB
+    const std::string plain = test::pngFile(2, 1, 8, 2, row);
+    const std::string gamma = test::pngChunk("gAMA", test::bigEndian(100000));
+    const std::string bombs = test::textBombs(100), profile = test::pngChunk("iCCP", "a");
+    EXPECT_LT(bombs.size(), 1u << 20);
+    EXPECT_EQ(withoutText(test::pngFile(2, 1, 8, 2, row, bombs + gamma + gamma)),
+              test::pngFile(2, 1, 8, 2, row, gamma));
+    EXPECT_EQ(withoutText(plain), plain);
+    const std::string unknown = test::pngFile(2, 1, 8, 2, row, test::pngChunk("ABCD", "critical"));
+    EXPECT_EQ(withoutText(unknown), unknown);
+    EXPECT_FALSE(decodeImage(unknown).ok());
+    for (size_t kept = 0; kept < plain.size(); ++kept)
+        EXPECT_EQ(withoutText(plain.substr(0, kept)), plain.substr(0, kept)) << kept;
+
+    const long before = test::peakMiB();
+    const auto read = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + profile));
+    ASSERT_TRUE(read.ok()) << read.error().line();
+    EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
+    EXPECT_EQ(read->texels, decodeImage(plain)->texels);
+    // Its gamma still counts: 0x40 as light is 0x89 as a colour.
+    const auto linear = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + gamma));
+    ASSERT_TRUE(linear.ok()) << linear.error().line();
+    EXPECT_NEAR(linear->texels[1] & 0xFF, 0x89, 1);
+}
+
+TEST(Image, SizesAreCheckedAgainstTheBytesThatAreThere) {
+    const auto refused = [](const std::string& file, ErrorCode code, const char* part) {
+        const auto image = decodeImage(file);
+        ASSERT_FALSE(image.ok()) << part;
+        EXPECT_EQ(image.error().code, code) << image.error().line();
+        EXPECT_NE(image.error().line().find(part), std::string::npos) << image.error().line();
+    };
+    for (const bool isInterlaced : {false, true})
+        for (const auto& [bits, type] : {std::pair(1, 3), std::pair(8, 0), std::pair(16, 6)})
+            refused(test::pngFile(8000, 8000, bits, type, "few", "", isInterlaced), ErrorCode::InvalidInput,
+                    "cannot hold 8000 by 8000");
+    refused(test::pngFile(0x7FFFFFFF, 1, 8, 0, "few"), ErrorCode::InvalidInput, "cannot hold");
+    refused(test::pngFile(8, 8, 8, 5, "few"), ErrorCode::InvalidInput, "no header");
+    std::string file = jpegOf(noise(64, 64, 6), false);
+    const size_t frame = file.find("\xFF\xC0");
+    ASSERT_NE(frame, std::string::npos);
+    file.replace(frame + 5, 4, std::string("\x20\0\x20\0", 4));
+    refused(file, ErrorCode::InvalidInput, "cannot hold 8192 by 8192");
+    // What deflate makes smallest is not refused.
+    EXPECT_TRUE(decodeImage(test::pngFile(4000, 4000, 8, 0, std::string(4001 * 4000, '\0'))).ok());
+    const auto blank = decodeImage(jpegOf({2048, 2048, std::vector<Rgba8>(2048 * 2048, kWhite)}, true));
+    EXPECT_TRUE(blank.ok()) << blank.error().line();
+}
+
+// Each scan is the whole picture again.
+TEST(Image, AJpegOfManyScansIsRefused) {
+    // A scan for each coefficient of each channel, as the rules have it.
+    std::vector<jpeg_scan_info> scans{
+        {.comps_in_scan = 3, .component_index = {0, 1, 2}, .Ss = 0, .Se = 0, .Ah = 0, .Al = 0}};
+    for (int channel = 0; channel < 3; ++channel)
+        for (int i = 1; i < 64; ++i)
+            scans.push_back({.comps_in_scan = 1, .component_index = {channel}, .Ss = i, .Se = i, .Ah = 0, .Al = 0});
+    const Image picture = noise(16, 16, 7);
+    ASSERT_GT(scans.size(), 150u);
+    const auto image = decodeImage(jpegOf(picture, true, scans));
+    ASSERT_FALSE(image.ok());
+    EXPECT_EQ(image.error().code, ErrorCode::Limit) << image.error().line();
+    EXPECT_NE(image.error().line().find("more than 100 scans"), std::string::npos) << image.error().line();
+}
+
+TEST(Image, AProgressiveJpegBeyondItsMemoryIsALimit) {
+    std::string file = jpegOf(noise(64, 64, 8), true);
+    const size_t frame = file.find("\xFF\xC2");
+    ASSERT_NE(frame, std::string::npos);
+    file.replace(frame + 5, 4, std::string("\x2A\0\x2A\0", 4));  // 10752 by 10752
+    file.resize(1 << 20);
+    const auto image = decodeImage(file);
+    ASSERT_FALSE(image.ok());
+    EXPECT_EQ(image.error().code, ErrorCode::Limit) << image.error().line();
+    EXPECT_NE(image.error().line().find("256 MiB"), std::string::npos) << image.error().line();
 }
 
 TEST(Texture, SamplesTexelCentresExactly) {

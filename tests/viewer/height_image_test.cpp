@@ -1,12 +1,15 @@
-// Heights from EXR pictures, whole and hostile. PNG is tested through the program (meso_commands_test.cpp).
+// Heights from EXR and PNG pictures, whole and hostile. PNG is tested through the program, too (meso_commands_test.cpp).
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <limits>
 
 #include <gtest/gtest.h>
 
 #include "test_folder.h"
+#include "tests/builder/peak_memory.h"
+#include "tests/builder/png_files.h"
 #include "viewer/height_image.h"
 
 namespace vcp {
@@ -180,6 +183,69 @@ TEST_F(Exr, SizesAreCheckedBeforeTexels) {
     refused(4096, 4096, ErrorCode::InvalidInput);  // texels that are not there
 }
 
+/// Where the value of an attribute begins.
+size_t valueAt(const Bytes& bytes, const std::string& name, const std::string& type) {
+    const std::string words = name + '\0' + type + '\0';
+    const auto at = std::search(bytes.begin(), bytes.end(), words.begin(), words.end(), [](std::byte a, char b) { return a == std::byte(b); });
+    return size_t(at - bytes.begin()) + words.size() + 4;
+}
+
+Bytes seed(const char* name) {
+    std::ifstream file(std::string(VCP_SOURCE_DIR) + "/tests/fuzz/seeds/fuzz_heights/" + name, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    Bytes bytes(text.size());
+    std::memcpy(bytes.data(), text.data(), text.size());
+    return bytes;
+}
+
+void expectRefused(const Bytes& bytes, ErrorCode code, const char* part) {
+    const auto picture = decodeExr(bytes, meso::kMaxGridEdge);
+    ASSERT_FALSE(picture) << part;
+    EXPECT_EQ(picture.error().code, code) << picture.error().line();
+    EXPECT_NE(picture.error().message.find(part), std::string::npos) << picture.error().line();
+}
+
+TEST_F(Exr, TilesOutOfProportionAreRefused) {
+    const Bytes tiled = seed("tiles.exr");
+    const auto whole = decodeExr(tiled, 64);
+    ASSERT_TRUE(whole) << whole.error().line();
+    // A hundred million lines, for 4 x 3 texels.
+    expectRefused(seed("tall_tiles.exr"), ErrorCode::Limit, "in tiles of 1 x 100663296");
+    const size_t at = valueAt(tiled, "tiles", "tiledesc");
+    const auto with = [&](uint32_t x, uint32_t y) {
+        Bytes bytes = tiled;
+        std::memcpy(bytes.data() + at, &x, sizeof x), std::memcpy(bytes.data() + at + sizeof x, &y, sizeof y);
+        return bytes;
+    };
+    for (const auto& [x, y] : {std::pair(65537u, 1u), std::pair(1u, 65537u), std::pair(~0u, ~0u), std::pair(1u << 31, 2u), std::pair(65536u, 65536u), std::pair(8192u, 8192u)})
+        expectRefused(with(x, y), ErrorCode::Limit, "in tiles of");
+    expectRefused(with(0, 4), ErrorCode::InvalidInput, "tiles without texels");
+}
+
+TEST_F(Exr, LinesAndChannelsOutOfProportionAreRefused) {
+    // DWAB takes 256 lines together, of all channels: 256 MiB for a picture of one line.
+    ExrFile wide(0, 0, 4096, 1);
+    for (int i = 0; i < 64; ++i) wide.channel(std::string(1, char('0' + i)), std::vector<float>(4096));
+    Bytes bytes = wide.bytes();
+    bytes[valueAt(bytes, "compression", "compression")] = std::byte{9};
+    expectRefused(bytes, ErrorCode::Limit, "256 lines together");
+    ExrFile many(0, 0, 2, 1);
+    for (int i = 0; i < 65; ++i) many.channel(std::string(1, char('0' + i)), {1, 2});
+    expectRefused(many.bytes(), ErrorCode::Limit, "65 channels");
+    // What the library would join, or take the last of.
+    expectRefused(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("compression", "compression", 1).bytes(), ErrorCode::InvalidInput, "twice");
+}
+
+TEST_F(Exr, APictureIsNotLargerThanItsBytesCanHold) {
+    for (const int compression : {0, 3, 9}) {
+        Bytes bytes = ExrFile(0, 0, 1, 1).channel("Y", {1}).bytes();
+        const int32_t window[4] = {0, 0, 4095, compression == 9 ? 4095 : 255};
+        std::memcpy(bytes.data() + valueAt(bytes, "dataWindow", "box2i"), window, sizeof window);
+        bytes[valueAt(bytes, "compression", "compression")] = std::byte(compression);
+        expectRefused(bytes, ErrorCode::InvalidInput, "cannot hold");
+    }
+}
+
 TEST_F(Exr, OtherAttributesArePassedOver) {
     // Of sizes that their types do not have, which a reader by type would take for what follows.
     for (const auto& [type, size] : {std::pair("string", size_t{40}), std::pair("int", size_t{0}), std::pair("m44f", size_t{3}), std::pair("stringvector", size_t{12}),
@@ -207,6 +273,43 @@ TEST_F(Exr, HostileBytesAreOneLine) {
         if (!flipped) EXPECT_EQ(flipped.error().line().find('\n'), std::string::npos) << bit;
         else EXPECT_EQ(flipped->values.size(), size_t(flipped->size.x) * size_t(flipped->size.y)) << bit;
     }
+}
+
+Result<meso::HeightMap> heightsOfPng(const std::string& file) { return decodeHeights(std::as_bytes(std::span(file)), 1); }
+
+TEST(PngHeights, EveryDepthInterlacedAndPalette) {
+    const std::string four("\0\x1b", 2);  // of 2 bits: 0, 1, 2, 3
+    const std::string eight("\0\x00\x55\xaa\xff", 5), sixteen("\0\x00\x00\x55\x55\xaa\xaa\xff\xff", 9);
+    const std::string palette = test::pngChunk("PLTE", std::string("\0\0\0\x55\x55\x55\xaa\xaa\xaa\xff\xff\xff", 12));
+    const std::vector<uint16_t> rising = {0, 0x5555, 0xaaaa, 0xffff};
+    for (const std::string& file : {test::pngFile(4, 1, 2, 0, four), test::pngFile(4, 1, 8, 0, eight), test::pngFile(4, 1, 16, 0, sixteen),
+                                    test::pngFile(4, 1, 2, 3, four, palette), test::pngFile(4, 1, 2, 3, four, palette + test::pngChunk("tRNS", "\x10"))}) {
+        const auto map = heightsOfPng(file);
+        ASSERT_TRUE(map) << map.error().line();
+        EXPECT_EQ(map->texels, rising);
+        for (size_t size = 0; size < file.size() - 12; ++size) EXPECT_FALSE(heightsOfPng(file.substr(0, size))) << size;
+    }
+    // Adam7 of 4 x 1: the first texel, the third, the second and the fourth; each pass has its filter byte.
+    const auto passes = heightsOfPng(test::pngFile(4, 1, 8, 0, std::string("\0\x00\0\xaa\0\x55\xff", 7), "", true));
+    ASSERT_TRUE(passes) << passes.error().line();
+    EXPECT_EQ(passes->texels, rising);
+}
+
+TEST(PngHeights, TextIsNotInflatedAndSizesAreChecked) {
+    const std::string bombs = test::pngFile(2, 1, 8, 0, std::string("\0\1\2", 3), test::textBombs(100));
+    const long before = test::peakMiB();
+    const auto map = heightsOfPng(bombs);
+    ASSERT_TRUE(map) << map.error().line();
+    EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
+    EXPECT_EQ(map->texels, (std::vector<uint16_t>{257, 514}));
+    const auto refused = [](const std::string& file, ErrorCode code, const char* part) {
+        const auto heights = heightsOfPng(file);
+        ASSERT_FALSE(heights) << part;
+        EXPECT_EQ(heights.error().code, code) << heights.error().line();
+        EXPECT_NE(heights.error().message.find(part), std::string::npos) << heights.error().line();
+    };
+    refused(test::pngFile(4096, 4096, 16, 0, "few"), ErrorCode::InvalidInput, "cannot hold 4096 by 4096");
+    refused(test::pngFile(4097, 1, 1, 0, std::string(514, '\0')), ErrorCode::Limit, "4097 x 1 texels");
 }
 
 }  // namespace
