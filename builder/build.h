@@ -27,8 +27,8 @@ namespace vcp {
 enum class ColourChoice { Auto, Vertex, Texture, None };
 
 struct BuildProgress {
-    const char* stage = "";  ///< "reading", "sorting", "level 5 of 6", "writing"
-    double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing
+    std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
+    double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing; 1: done
     uint64_t triangles = 0;  ///< read so far
     uint64_t tempBytes = 0;  ///< on the temporary disk now
     double seconds = 0;
@@ -47,7 +47,8 @@ struct BuildOptions {
     bool resume = false;         ///< go on where an interrupted build of the same output was
     double checkpointSeconds = 5;  ///< what is done is made durable at most so often
     ColourChoice colour = ColourChoice::Auto;
-    /// Called from one thread at a time, about ten times a second; false cancels. May be empty.
+    /// Called from one thread at a time, about ten times a second and whenever a stage begins; false cancels, and then it is
+    /// not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;
 };
 
