@@ -163,7 +163,7 @@ private:
         auto measures = readInputs(options_, space_, memory_.vertexBytes, *files_.soup, [this](double fraction, uint64_t triangles) {
             measures_.triangles = triangles;
             return progress("reading", kReadingShare * fraction);
-        }, report_.warnings);
+        }, report_.warnings, report_.sideFiles);
         if (!measures) return measures.error();
         measures_ = *measures;
         releaseMemory();

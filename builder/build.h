@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "builder/side_file.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -74,6 +75,7 @@ struct BuildFigures {
 
 struct BuildReport : BuildFigures {
     std::vector<std::string> warnings;  ///< what was left out of the inputs, one line each
+    std::vector<SideFile> sideFiles;    ///< that the inputs name, each once; of a build that was resumed they may not be known
 };
 
 /// Where a build keeps its temporary files.
