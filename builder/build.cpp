@@ -187,11 +187,12 @@ private:
     // Reading and dealing
 
     Result<void> read() {
+        if (!progress("reading", 0)) return cancelled();
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
         auto measures = readInputs(options_, space_, memory_.vertexBytes, *files_.soup, [this](double fraction, uint64_t triangles) {
             measures_.triangles = triangles;
             return progress("reading", kReadingShare * fraction);
-        }, report_.warnings);
+        }, report_.warnings, report_.sideFiles);
         if (!measures) return measures.error();
         measures_ = *measures;
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));

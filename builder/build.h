@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "builder/side_file.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -27,8 +28,8 @@ namespace vcp {
 enum class ColourChoice { Auto, Vertex, Texture, None };
 
 struct BuildProgress {
-    const char* stage = "";  ///< "reading", "sorting", "level 5 of 6", "writing"
-    double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing
+    std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
+    double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing; 1: done
     uint64_t triangles = 0;  ///< read so far
     uint64_t tempBytes = 0;  ///< on the temporary disk now
     double seconds = 0;
@@ -48,7 +49,8 @@ struct BuildOptions {
     bool resume = false;         ///< go on where an interrupted build of the same output was
     double checkpointSeconds = 5;  ///< what is done is made durable at most so often
     ColourChoice colour = ColourChoice::Auto;
-    /// Called from one thread at a time, about ten times a second; false cancels. May be empty.
+    /// Called from one thread at a time, about ten times a second and whenever a stage begins; false cancels, and then it is
+    /// not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;
 };
 
@@ -74,6 +76,7 @@ struct BuildFigures {
 
 struct BuildReport : BuildFigures {
     std::vector<std::string> warnings;  ///< what was left out of the inputs, one line each
+    std::vector<SideFile> sideFiles;    ///< that the inputs name, each once; of a build that was resumed they may not be known
 };
 
 /// Where a build keeps its temporary files.

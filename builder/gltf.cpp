@@ -52,6 +52,7 @@ public:
     [[nodiscard]] const MeshInfo& info() const override { return info_; }
     [[nodiscard]] std::span<const Material> materials() const override { return materials_; }
     [[nodiscard]] std::span<const std::string> warnings() const override { return warnings_; }
+    [[nodiscard]] std::span<const SideFile> sideFiles() const override { return buffers_.sideFiles; }
     [[nodiscard]] uint64_t bytesRead() const override {
         const double share =
             static_cast<double>(placement_) / static_cast<double>(std::max<size_t>(placements_.size(), 1));
@@ -149,6 +150,7 @@ private:
             source.bytes = std::make_shared<const std::string>(std::move(image.data));
         } else if (!image.uri.empty()) {
             const auto path = folder_.empty() ? std::nullopt : fileBelow(folder_, image.uri);
+            if (path) buffers_.sideFiles.emplace_back(*path);
             std::error_code ignored;
             if (!path)
                 warnings_.push_back(where + ": its URI names no file in the folder of the glTF file; it is left out");

@@ -72,6 +72,7 @@ Result<RandomBytes*> GltfBuffers::open(uint32_t number) {
         if (!path)
             return wrong(folder_.empty() ? "lies in another file, but standard input has no folder; use a GLB"
                                          : "its URI names no file in the folder of the glTF file");
+        sideFiles.emplace_back(*path);
         auto bytes = openRandomBytes(*path);
         if (!bytes) return wrong(fmt::format("its file {}: {}", path->string(), bytes.error().message));
         opened = *std::move(bytes);

@@ -8,6 +8,7 @@
 
 #include "builder/gltf_document.h"
 #include "builder/random_bytes.h"
+#include "builder/side_file.h"
 
 namespace vcp {
 
@@ -30,6 +31,9 @@ public:
     /// file below the folder, or is shorter than declared; meshopt data are damaged), Limit (their memory), Io, each
     /// with the buffer's file.
     Result<void> read(uint32_t view, uint64_t offset, char* to, size_t count, const std::string& element);
+
+    /// Of the glTF file: those of buffers are added as they are opened.
+    std::vector<SideFile> sideFiles;
 
 private:
     Result<RandomBytes*> open(uint32_t buffer);

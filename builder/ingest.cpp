@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
@@ -107,9 +108,11 @@ private:
 }  // namespace
 
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double, uint64_t)>& progress, std::vector<std::string>& warnings) {
+                                const std::function<bool(double, uint64_t)>& progress, std::vector<std::string>& warnings,
+                                std::vector<SideFile>& sideFiles) {
     uint64_t totalBytes = 0, doneBytes = 0, vertices = 0;
     bool hasVertexColours = false;
+    std::set<std::filesystem::path> named;
     for (const auto& path : options.inputs) {
         std::error_code ignored;
         if (const auto size = std::filesystem::file_size(path, ignored); !ignored) totalBytes += size;
@@ -135,6 +138,8 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
         doneBytes += (*stream)->bytesRead();
         soup.materials.insert(soup.materials.end(), (*stream)->materials().begin(), (*stream)->materials().end());
         warnings.insert(warnings.end(), (*stream)->warnings().begin(), (*stream)->warnings().end());
+        for (const SideFile& each : (*stream)->sideFiles())
+            if (named.insert(each.path).second) sideFiles.push_back(each);
         VCP_TRY(join.finish(path.string()));
         vertices += join.vertices();
     }

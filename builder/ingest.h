@@ -45,9 +45,10 @@ struct Soup {
 
 /// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is
 /// given the fraction read; false cancels. Triangles without area are counted and left out. `warnings`: what the
-/// readers left out.
+/// readers left out. `sideFiles`: what the inputs name, each once.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double fraction, uint64_t triangles)>& progress, std::vector<std::string>& warnings);
+                                const std::function<bool(double fraction, uint64_t triangles)>& progress, std::vector<std::string>& warnings,
+                                std::vector<SideFile>& sideFiles);
 
 /// How the inputs are opened.
 MeshOpenOptions meshOptionsOf(const BuildOptions& options);

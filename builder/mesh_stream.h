@@ -23,6 +23,7 @@
 #include <glm/vec3.hpp>
 
 #include "builder/material.h"
+#include "builder/side_file.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -78,6 +79,9 @@ public:
 
     /// What was left out, one line each (a material file that is missing); complete at the end of the mesh.
     [[nodiscard]] virtual std::span<const std::string> warnings() const { return {}; }
+
+    /// Files beside the mesh that it names, perhaps more than once; complete at the end of the mesh.
+    [[nodiscard]] virtual std::span<const SideFile> sideFiles() const { return {}; }
 };
 
 struct MeshOpenOptions {

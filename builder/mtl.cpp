@@ -57,10 +57,11 @@ private:
 class MtlReader {
 public:
     MtlReader(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
-              std::vector<std::string>& warnings)
-        : path_(path), materials_(materials), warnings_(warnings) {}
+              std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles)
+        : path_(path), materials_(materials), warnings_(warnings), sideFiles_(sideFiles) {}
 
     void read() {
+        sideFiles_.emplace_back(path_);
         // A named pipe would wait for its writer.
         std::error_code ignored;
         if (!std::filesystem::is_regular_file(path_, ignored)) return warn("no such file; its colours are left out");
@@ -102,6 +103,7 @@ private:
         const std::string name = words.rest();
         if (name.empty()) return;
         const auto path = nameBelow(path_.parent_path(), name);
+        if (path) sideFiles_.emplace_back(*path);
         std::error_code ignored;
         if (!path)
             warn(fmt::format("the image {} lies outside its folder; it is left out", shown(name)));
@@ -141,15 +143,16 @@ private:
     std::filesystem::path path_;
     std::vector<MtlMaterial>& materials_;
     std::vector<std::string>& warnings_;
+    std::vector<SideFile>& sideFiles_;
     MtlMaterial current_;
     bool open_ = false;
 };
 
 }  // namespace
 
-void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
-             std::vector<std::string>& warnings) {
-    MtlReader(path, materials, warnings).read();
+void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings,
+             std::vector<SideFile>& sideFiles) {
+    MtlReader(path, materials, warnings, sideFiles).read();
 }
 
 }  // namespace vcp

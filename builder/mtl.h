@@ -12,6 +12,7 @@
 #include <glm/vec2.hpp>
 
 #include "builder/material.h"
+#include "builder/side_file.h"
 
 namespace vcp {
 
@@ -22,8 +23,8 @@ struct MtlMaterial {
 };
 
 /// Appends the materials of a file. Limits: 16 MiB, 65536 materials. Never fails: what cannot be read is a warning,
-/// one line that names the file.
-void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
-             std::vector<std::string>& warnings);
+/// one line that names the file. `sideFiles` gets the file and the images that it names.
+void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings,
+             std::vector<SideFile>& sideFiles);
 
 }  // namespace vcp

@@ -68,6 +68,7 @@ public:
 
     [[nodiscard]] std::span<const Material> materials() const override { return materials_.materials(); }
     [[nodiscard]] std::span<const std::string> warnings() const override { return materials_.warnings(); }
+    [[nodiscard]] std::span<const SideFile> sideFiles() const override { return materials_.sideFiles(); }
 
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();

@@ -37,13 +37,14 @@ void ObjMaterials::addLibrary(std::string_view names) {
     const auto add = [&](std::string_view name) {
         const auto path = nameBelow(folder_, std::string(name));
         if (path)
-            readMtl(*path, read_, warnings_);
+            readMtl(*path, read_, warnings_, sideFiles_);
         else
             warnings_.push_back(
                 fmt::format("{}: the material file {} lies outside its folder; it is left out", file_, shown(name)));
     };
     // One name with spaces, or several names.
     const auto whole = nameBelow(folder_, std::string(names));
+    if (whole) sideFiles_.emplace_back(*whole);
     std::error_code ignored;
     if (names.find_first_of(" \t") == std::string_view::npos ||
         (whole && std::filesystem::is_regular_file(*whole, ignored)))

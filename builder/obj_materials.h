@@ -40,6 +40,7 @@ public:
 
     [[nodiscard]] std::span<const Material> materials() const { return materials_; }
     [[nodiscard]] std::span<const std::string> warnings() const { return warnings_; }
+    [[nodiscard]] std::span<const SideFile> sideFiles() const { return sideFiles_; }
 
 private:
     std::string file_;
@@ -52,6 +53,7 @@ private:
     std::vector<Material> materials_;
     std::map<std::string, uint32_t, std::less<>> numbers_;
     std::vector<std::string> warnings_;
+    std::vector<SideFile> sideFiles_;
     bool unknownNamed_ = false;
     uint32_t current_ = kNoMaterial;
     UvArray uvs_;

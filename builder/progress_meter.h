@@ -1,4 +1,4 @@
-// Tells the caller how far a build is: never backwards, and about ten times a second.
+// Tells the caller how far a build is: never backwards, about ten times a second and whenever a stage begins.
 #pragma once
 
 #include <algorithm>
@@ -21,13 +21,14 @@ public:
     bool report(const std::string& stage, BuildProgress now) {
         if (!callback_) return true;
         const std::scoped_lock lock(mutex_);
-        const bool isEnd = now.fraction >= 1;
+        if (cancelled_) return false;
+        const bool isNews = stage != stage_ || now.fraction >= 1;
         now.fraction = fraction_ = std::max(fraction_, std::min(now.fraction, 1.0));
         now.seconds = seconds();
-        now.stage = stage.c_str();
-        if (now.seconds - lastSeconds_ < 0.1 && !isEnd) return !cancelled_;
+        if (now.seconds - lastSeconds_ < 0.1 && !isNews) return true;
         lastSeconds_ = now.seconds;
-        if (!callback_(now)) cancelled_ = true;
+        now.stage = stage_ = stage;
+        cancelled_ = !callback_(now);
         return !cancelled_;
     }
 
@@ -38,6 +39,7 @@ private:
     const std::function<bool(const BuildProgress&)>& callback_;
     const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::mutex mutex_;
+    std::string stage_;  // told last
     double lastSeconds_ = -1, fraction_ = 0;
     bool cancelled_ = false;
 };

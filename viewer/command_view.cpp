@@ -1,5 +1,8 @@
 // vcp view: the window.
+#include <cstdio>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "streaming/http_reader.h"
 #include "viewer/build_settings.h"
@@ -14,8 +17,6 @@
 namespace vcp {
 
 namespace {
-
-constexpr uint32_t kRememberedOcclusionRays = 8;
 
 struct ViewCommand {
     std::vector<std::string> inputs;
@@ -68,28 +69,19 @@ Result<void> checkInputs(const ViewCommand& command) {
     return {};
 }
 
-/// What is remembered stands in for options that were not given.
-void applyRemembered(ViewCommand& command, const CLI::App& app, UserSettings& user) {
-    const auto given = [&](const char* option) { return app.count(option) > 0; };
-    RenderSettings& render = command.render;
-    if (!given("--error-pixels")) render.errorPixels = user.errorPixels;
-    if (!given("--budget")) render.budget = std::to_string(user.budgetBytes);
-    if (!given("--shadows")) render.shadows = user.shadows;
-    if (!given("--occlusion") && user.occlusion) render.occlusionRays = kRememberedOcclusionRays;
-    if (given("--up"))
-        user.up = render.upAxis();
-    else
-        render.up = user.up == UpAxis::Z ? "z" : "y";
-}
+void warn(const std::string& line) { fmt::print(stderr, "warning: {}\n", line); }
 
 Result<int> run(ViewCommand command, const CLI::App& app) {
     VCP_TRY(checkInputs(command));
     const auto settingsPath = userSettingsPath();
     WindowOptions options;
     // Settings that cannot be read are those of the first time.
-    if (settingsPath)
-        if (const auto user = readUserSettings(*settingsPath)) options.session.user = *user;
-    applyRemembered(command, app, options.session.user);
+    if (settingsPath) {
+        const auto user = readUserSettings(*settingsPath);
+        if (user) options.session.user = *user;
+        else warn(user.error().line());
+    }
+    applyRemembered(command.render, options.session.user, [&](const char* option) { return app.count(option) > 0; });
     options.session.inputs = command.inputs;
     options.session.build = command.build;
     options.session.render = command.render;
@@ -97,7 +89,11 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     if (!command.size.empty()) options.size = parseSize(command.size).value();
     const auto report = showWindow(options);
     if (!report) return report.error();
-    if (settingsPath) VCP_TRY(writeUserSettings(report->user, *settingsPath));
+    if (settingsPath) {
+        // What was seen was seen: it is no failure that it cannot be remembered.
+        const auto saved = saveChanges(report->changes, *settingsPath);
+        if (!saved || !saved->empty()) warn(saved ? *saved : saved.error().line());
+    }
     if (command.report.json) VCP_TRY(printJson(toJson(*report)));
     if (!report->firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
     if (!report->firstPictureSeconds && !report->problem.empty()) return Error{ErrorCode::InvalidInput, report->problem};
@@ -120,7 +116,7 @@ Command addView(CLI::App& vcp) {
     addBuildSettings(*app, command->build);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
-    app->footer("Files may also be dropped into the window. Looks, limits, bookmarks and recent files are remembered.\n\n" + keyMapText());
+    app->footer("Files may also be dropped into the window. Looks, limits, bookmarks and recent files are remembered as they are changed in the window; options hold for one run.\n\n" + keyMapText());
     return {app, [command, app] { return run(*command, *app); }};
 }
 

@@ -1,8 +1,9 @@
 // The folder where `vcp view MESH` and `vcp render MESH` keep the octrees they build.
 //
-// A dataset is named by a hash of what it was built from: each mesh's absolute path, size and time of last
-// change, and the options that shape the output. A mesh that changes gets a new name; the old one ages and
-// goes. The folder is held under a size by removing what was used least recently. Several processes may
+// A dataset is named by a hash of what it was built from: each mesh's absolute path, size and times of last
+// change, the same of the files that it names (materials, images, buffers), and the options that shape the output.
+// Which files those are is known once it was built: a list beside the datasets says it (KEY.files, KEY the hash of
+// meshes and options alone). A mesh that changes gets a new name; the old one ages and goes. The folder is held under a size by removing what was used least recently. Several processes may
 // use it at once: a dataset appears by a rename, whole or not at all.
 #pragma once
 
@@ -34,7 +35,7 @@ public:
 
     /// The dataset for `options.inputs`: from the folder when it is there and whole, else built by `build`
     /// (normally buildOctree); `options.output` is ignored. Errors: Io (folder cannot be made, input
-    /// missing); what the builder reports.
+    /// missing); InvalidInput (a file was changed while it was read); what the builder reports.
     Result<std::filesystem::path> dataset(BuildOptions options, const Builder& build);
 
     /// Where the dataset for `options` is or would be. Errors: Io (input missing).

@@ -1,9 +1,12 @@
-// What `vcp view` remembers: recent files, bookmarks, looks. A small JSON file.
+// What `vcp view` remembers: recent files, bookmarks, looks. A small JSON file, which several windows share: each saves
+// what was changed in it by hand, into the file as it is by then, and leaves the rest, also what this version does not
+// know.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +23,7 @@ struct UserSettings {
     static constexpr size_t kMostBookmarks = 9;
     static constexpr size_t kMostBookmarkedFiles = 50;
 
-    std::vector<std::string> recent;  ///< absolute paths and addresses, the last one first
+    std::vector<std::string> recent;                              ///< absolute paths and addresses, the last one first
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< of a path or address; numbers 1 to 9
     glm::ivec2 windowSize{1280, 800};
     bool panel = false;
@@ -31,8 +34,22 @@ struct UserSettings {
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
 
-    /// Puts an input to the front of `recent`; a path becomes absolute.
-    void remember(const std::string& input);
+    /// Puts a remembered name to the front of `recent`.
+    void remember(const std::string& name);
+};
+
+/// What was done by hand in one window. What options, scene files and bookmarks set is none of it.
+struct SettingsChanges {
+    std::vector<std::string> opened;                              ///< remembered names, in order
+    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< that were kept: UserSettings::bookmarks
+    std::optional<glm::ivec2> windowSize;
+    std::optional<bool> panel, shadows, occlusion;
+    std::optional<UpAxis> up;
+    std::optional<double> errorPixels;
+    std::optional<uint64_t> budgetBytes;
+    std::optional<glm::vec3> backgroundTop, backgroundBottom;
+
+    [[nodiscard]] bool empty() const;
 };
 
 /// What a file is remembered as: an address as it is, a path made absolute.
@@ -42,10 +59,13 @@ std::string rememberedName(const std::string& input);
 Result<std::filesystem::path> userSettingsPath();
 
 /// Defaults for what is missing, of a wrong type or out of range; may be hostile. Errors: Io (exists and cannot be
-/// read), InvalidInput (not JSON). A file that is not there gives the defaults.
+/// read, is no regular file), InvalidInput (not JSON, larger than 1 MiB). A file that is not there gives the defaults.
 Result<UserSettings> readUserSettings(const std::filesystem::path& path);
 
-/// Makes the folder where needed; the file is replaced whole. Errors: Io.
-Result<void> writeUserSettings(const UserSettings& settings, const std::filesystem::path& path);
+/// Puts the changes into the file; makes it and its folder where needed; any number of processes at once. The file is
+/// replaced whole; where it is a symbolic link, its target is. One that is damaged is kept beside it, as
+/// view.json.damaged or with the next free number behind. Without changes nothing is done. Returns a warning, empty
+/// where there is none. Errors: Io.
+Result<std::string> saveChanges(const SettingsChanges& changes, const std::filesystem::path& path);
 
 }  // namespace vcp

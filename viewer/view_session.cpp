@@ -19,6 +19,7 @@ constexpr double kOpeningPollSeconds = 0.1;
 constexpr double kPickPollSeconds = 0.01;
 
 constexpr int kMostExports = 10000;
+constexpr uint32_t kRememberedOcclusionRays = 8;
 constexpr uint32_t kSavedTile = 512;  // small: the window goes on between tiles
 
 /// The first number from 1 on that is free; of too many the last.
@@ -46,6 +47,14 @@ bool writeText(const std::filesystem::path& path, const std::string& text) {
 
 }  // namespace
 
+void applyRemembered(RenderSettings& render, const UserSettings& user, const std::function<bool(const char* option)>& isGiven) {
+    if (!isGiven("--error-pixels")) render.errorPixels = user.errorPixels;
+    if (!isGiven("--budget")) render.budget = std::to_string(user.budgetBytes);
+    if (!isGiven("--shadows")) render.shadows = user.shadows;
+    if (!isGiven("--occlusion") && user.occlusion) render.occlusionRays = kRememberedOcclusionRays;
+    if (!isGiven("--up")) render.up = user.up == UpAxis::Z ? "z" : "y";
+}
+
 Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options, std::optional<SurfaceSource> surface) {
     ViewerOptions viewerOptions;
     viewerOptions.renderer = options.render.rendererOptions();
@@ -64,7 +73,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options), user_(options.user), viewer_(std::move(viewer)) {}
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.upAxis()) {}
 
 ViewSession::~ViewSession() {
     cancelSaving();
@@ -94,7 +103,7 @@ void ViewSession::takeOpened() {
 Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::string>& inputs) {
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
-    camera.up = user_.up;
+    camera.up = up_;
     camera.look(View::Fit, open.bounds(), size, viewer_->covered());
     // What the command line says is for what it opens.
     if (!std::exchange(wasShown_, true)) {
@@ -129,7 +138,10 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     shown_ = rememberedName(inputs.front());
-    for (const std::string& input : inputs) user_.remember(input);
+    for (const std::string& input : inputs) {
+        changes_.opened.push_back(rememberedName(input));
+        user_.remember(changes_.opened.back());
+    }
     return {};
 }
 
@@ -137,6 +149,7 @@ Result<NextStep> ViewSession::update(double now) {
     takeOpened();
     takePicked();
     goOnSaving();
+    noteChanges();
     auto next = viewer_->update(now);
     if (!next) return next;
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
@@ -146,6 +159,8 @@ Result<NextStep> ViewSession::update(double now) {
 }
 
 void ViewSession::act(ViewerAction action) {
+    // A camera of a scene or a bookmark brings its own axis: this alone is by hand.
+    if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen()) changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
     viewer_->act(action);
     if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
 }
@@ -164,7 +179,7 @@ void ViewSession::dismissProblem() {
 
 void ViewSession::keepBookmark(int number) {
     if (shown_.empty()) return;
-    user_.bookmarks[shown_][number] = viewer_->camera();
+    user_.bookmarks[shown_][number] = changes_.bookmarks[shown_][number] = viewer_->camera();
     note(fmt::format("bookmark {} kept; Shift+{} goes back to it", number, number));
 }
 
@@ -301,15 +316,34 @@ void ViewSession::goOnSaving() {
     note(endSaving());
 }
 
-void ViewSession::collectSettings() {
+const SettingsChanges& ViewSession::changes() {
+    noteChanges();
+    return changes_;
+}
+
+void ViewSession::togglePanel() {
+    user_.panel = !user_.panel;
+    changes_.panel = user_.panel;
+}
+
+ViewSession::Looks ViewSession::looks() const {
     const Shading& shading = viewer_->shading();
-    user_.shadows = shading.shadows;
-    user_.occlusion = shading.occlusionRays > 0;
-    user_.backgroundTop = shading.backgroundTop;
-    user_.backgroundBottom = shading.backgroundBottom;
-    user_.errorPixels = viewer_->errorPixels();
-    user_.budgetBytes = viewer_->status().budgetBytes;
-    if (viewer_->isOpen()) user_.up = viewer_->camera().up;
+    return {shading.shadows, shading.occlusionRays > 0, viewer_->errorPixels(), viewer_->status().budgetBytes, shading.backgroundTop, shading.backgroundBottom};
+}
+
+/// What options and scenes set is there when they are set; what differs from the last update is by hand.
+void ViewSession::noteChanges() {
+    const Looks now = looks();
+    const auto compare = [](const auto& value, const auto& before, auto& changed) {
+        if (value != before) changed = value;
+    };
+    compare(now.shadows, seenLooks_.shadows, changes_.shadows);
+    compare(now.occlusion, seenLooks_.occlusion, changes_.occlusion);
+    compare(now.errorPixels, seenLooks_.errorPixels, changes_.errorPixels);
+    compare(now.budgetBytes, seenLooks_.budgetBytes, changes_.budgetBytes);
+    compare(now.backgroundTop, seenLooks_.backgroundTop, changes_.backgroundTop);
+    compare(now.backgroundBottom, seenLooks_.backgroundBottom, changes_.backgroundBottom);
+    seenLooks_ = now;
 }
 
 }  // namespace vcp

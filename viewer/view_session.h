@@ -6,6 +6,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -22,11 +23,14 @@
 
 namespace vcp {
 
+/// What is remembered stands in for options that were not given: `isGiven("--up")`.
+void applyRemembered(RenderSettings& render, const UserSettings& user, const std::function<bool(const char* option)>& isGiven);
+
 struct SessionOptions {
     std::vector<std::string> inputs;  ///< what the window opens first
     BuildSettings build;
     RenderSettings render;
-    UserSettings user;
+    UserSettings user;  ///< as they are remembered; `render` goes before them
     ProgressStyle progress = ProgressStyle::None;
 };
 
@@ -45,7 +49,13 @@ public:
 
     [[nodiscard]] Viewer& viewer() { return *viewer_; }
     [[nodiscard]] const Viewer& viewer() const { return *viewer_; }
-    [[nodiscard]] UserSettings& user() { return user_; }
+    /// As they are remembered, with what was changed since.
+    [[nodiscard]] const UserSettings& user() const { return user_; }
+    /// What was changed by hand, to be saved when the window closes.
+    [[nodiscard]] const SettingsChanges& changes();
+    void togglePanel();
+    /// By hand, not by the window system.
+    void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
 
     /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
     void open(std::vector<std::string> inputs);
@@ -55,7 +65,7 @@ public:
     /// Viewer::update, and takes in what was opened or picked meanwhile.
     Result<NextStep> update(double now);
 
-    /// Viewer::act, and says so where that shows nothing.
+    /// Viewer::act, by hand; says so where that shows nothing.
     void act(ViewerAction action);
 
     /// What went wrong last, in one line; empty: nothing.
@@ -103,13 +113,20 @@ public:
     /// Pictures of a sequence that are finished stay; nothing half-written does.
     void cancelSaving();
 
-    /// Looks that are remembered, from the viewer into user().
-    void collectSettings();
-
 private:
+    /// What hands may change in the viewer, and what is remembered.
+    struct Looks {
+        bool shadows, occlusion;
+        double errorPixels;
+        uint64_t budgetBytes;
+        glm::vec3 backgroundTop, backgroundBottom;
+    };
+
     using Picked = Result<std::optional<SceneHit>>;
 
     ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
+    [[nodiscard]] Looks looks() const;
+    void noteChanges();
     void takeOpened();
     Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
@@ -120,7 +137,10 @@ private:
 
     SessionOptions options_;
     UserSettings user_;
+    SettingsChanges changes_;
     std::unique_ptr<Viewer> viewer_;
+    Looks seenLooks_;  // of the last update
+    UpAxis up_;        // of what is opened next
     std::unique_ptr<DatasetOpening> opening_;
     std::string shown_;  // rememberedName of what is shown; empty: nothing
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;

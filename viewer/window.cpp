@@ -62,6 +62,16 @@ public:
         return source;
     }
 
+    /// As open() takes it.
+    [[nodiscard]] glm::ivec2 size() const {
+        glm::ivec2 window(0), framebuffer(0);
+        glm::vec2 scale(1);
+        glfwGetWindowSize(window_, &window.x, &window.y);
+        glfwGetFramebufferSize(window_, &framebuffer.x, &framebuffer.y);
+        glfwGetWindowContentScale(window_, &scale.x, &scale.y);
+        return unscaledSize(window, framebuffer, scale);
+    }
+
     [[nodiscard]] float contentScale() const {
         float x = 1, y = 1;
         glfwGetWindowContentScale(window_, &x, &y);
@@ -102,6 +112,7 @@ public:
             return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         };
         WindowReport report;
+        std::optional<glm::ivec2> shownSize;
         while (!glfwWindowShouldClose(window_)) {
             // While something is built Ctrl-C is to clean up; the loop looks often enough then.
             if (!session_->opening()) catching_.reset();
@@ -117,14 +128,15 @@ public:
             if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
             if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
             wait(*next);
+            // By now the window system has made it as large as it wants it.
+            if (!shownSize) shownSize = system_->size();
             if (interrupted()) break;
         }
         report.framesDrawn = session_->viewer().framesDrawn();
         report.status = session_->viewer().status();
         report.problem = session_->problem();
-        session_->collectSettings();
-        glfwGetWindowSize(window_, &session_->user().windowSize.x, &session_->user().windowSize.y);
-        report.user = session_->user();
+        if (const glm::ivec2 size = system_->size(); shownSize && size != *shownSize) session_->keepWindowSize(size);
+        report.changes = session_->changes();
         return report;
     }
 
@@ -277,7 +289,7 @@ private:
     }
 
     void togglePanel() {
-        session_->user().panel = !session_->user().panel;
+        session_->togglePanel();
         layOut();  // what is fitted next keeps clear of it
     }
 
@@ -334,6 +346,11 @@ private:
 };
 
 }  // namespace
+
+glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale) {
+    if (window != framebuffer || !(scale.x > 0 && scale.y > 0)) return window;
+    return glm::ivec2(glm::round(glm::dvec2(window) / scale));
+}
 
 Result<WindowReport> showWindow(const WindowOptions& options) {
     const auto start = std::chrono::steady_clock::now();

@@ -26,8 +26,12 @@ struct WindowReport {
     uint64_t framesDrawn = 0;
     ViewerStatus status;
     std::string problem;  ///< what stood in the window when it was closed
-    UserSettings user;    ///< to be remembered
+    SettingsChanges changes;  ///< to be remembered
 };
+
+/// A window's size in units of a display that is not scaled, as it is made from (GLFW_SCALE_TO_MONITOR): where the window system counts
+/// pixels, `window` has grown by `scale`.
+glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale);
 
 /// Opens the window at once, the inputs in it as soon as they are built, and returns when it is closed. Main thread
 /// only, one at a time (GLFW). Errors: Device (no display, no Vulkan for it, and what the renderer says).

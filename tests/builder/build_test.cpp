@@ -480,6 +480,39 @@ TEST_F(Build, ProgressNeverDecreases) {
     EXPECT_GE(calls, 2);
 }
 
+TEST_F(Build, EveryStageIsToldWholeAndInOrder) {
+    BuildOptions o = options({ply(scene())});
+    // Kept for longer than the call: the text is the listener's own.
+    std::vector<BuildProgress> told;
+    o.progress = [&](const BuildProgress& p) { return told.push_back(p), true; };
+    const auto report = buildOctree(o);
+    ASSERT_TRUE(report) << report.error().line();
+    ASSERT_GE(report->levels, 2u);
+    std::vector<std::string> stages, wanted{"reading", "sorting"};
+    for (const BuildProgress& each : told)
+        if (stages.empty() || stages.back() != each.stage) stages.push_back(each.stage);
+    for (uint32_t i = 1; i <= report->levels; ++i) wanted.push_back(fmt::format("level {} of {}", i, report->levels));
+    wanted.insert(wanted.end(), {"writing", "done"});
+    EXPECT_EQ(stages, wanted);
+    EXPECT_EQ(told.back().fraction, 1);
+    for (size_t i = 1; i < told.size(); ++i) EXPECT_GE(told[i].fraction, told[i - 1].fraction) << told[i].stage;
+    EXPECT_LT(told[told.size() - 2].fraction, 1) << "only what is done is told as all of it";
+}
+
+TEST_F(Build, WhoCancelledHearsNoMore) {
+    BuildOptions o = options({ply(scene())});
+    o.threads = 4;
+    for (const size_t after : {1, 2, 3, 4, 5}) {
+        size_t calls = 0;
+        o.progress = [&](const BuildProgress&) { return ++calls < after; };
+        const auto report = buildOctree(o);
+        ASSERT_FALSE(report);
+        EXPECT_EQ(report.error().code, ErrorCode::Cancelled);
+        EXPECT_EQ(calls, after);
+        expectNothingLeft();
+    }
+}
+
 TEST_F(Build, CancellationLeavesNothing) {
     BuildOptions o = options({ply(scene())});
     for (const int after : {0, 1, 2, 3}) {

@@ -77,6 +77,14 @@ if [ -d "$PYTHONPATH" ]; then
     for python in python3 /usr/bin/python3; do
         "$python" -c 'import numpy' 2>/dev/null || continue
         run "$python" "$source/viewer/examples/notebook.py" octahedron.off "$work"
+        # The page's own, with a mesh of the name that it says: every stage arrives as the text that it is.
+        { printf 'ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement face 8\nproperty list uchar int vertex_indices\nend_header\n'
+          tail -n +3 octahedron.off; } >statue.ply
+        awk '/^```python$/ { inside = 1; next } /^```/ { inside = 0 } inside' "$source/docs/embedding.md" >snippet.py
+        run "$python" snippet.py >snippet.txt || { cat snippet.txt; exit 1; }
+        for stage in reading sorting "level 1 of" writing "done 1.0"; do
+            grep "^$stage" snippet.txt >/dev/null || { cat snippet.txt; echo "the stage $stage did not arrive"; exit 1; }
+        done
         break
     done
 fi

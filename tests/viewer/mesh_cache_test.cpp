@@ -1,9 +1,12 @@
 // The cache of built meshes, with a builder that only pretends.
 #include "viewer/mesh_cache.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
+#include <iterator>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -71,6 +74,9 @@ TEST_F(MeshCacheTest, NameDependsOnMeshAndOptionsAlone) {
     other = options_;
     other.colour = ColourChoice::None;
     EXPECT_NE(*cache.pathFor(other), first);
+    other = options_;
+    other.format = "obj";
+    EXPECT_NE(*cache.pathFor(other), first);
 
     age(mesh_, 1);
     EXPECT_NE(*cache.pathFor(options_), first) << "a mesh that was written again";
@@ -83,6 +89,115 @@ TEST_F(MeshCacheTest, TheSameMeshByAnotherPathIsTheSame) {
     BuildOptions other = options_;
     other.inputs = {folder_ / "." / "mesh.ply"};
     EXPECT_EQ(*cache.pathFor(other), *cache.pathFor(options_));
+}
+
+TEST_F(MeshCacheTest, AMeshWithItsTimeSetBackIsAnother) {
+    const MeshCache cache(cacheFolder());
+    const auto time = fs::last_write_time(mesh_);
+    const fs::path first = *cache.pathFor(options_);
+    std::ofstream(mesh_) << "NOT LOOKED AT";  // as long as before
+    ASSERT_EQ(fs::file_size(mesh_), std::string("not looked at").size());
+    fs::last_write_time(mesh_, time);
+    EXPECT_NE(*cache.pathFor(options_), first);
+}
+
+TEST_F(MeshCacheTest, AMeshThatChangesWhileItIsReadIsNotKept) {
+    const auto path = MeshCache(cacheFolder()).dataset(options_, [&](const BuildOptions& options) -> Result<BuildReport> {
+        std::ofstream(options.output) << "of half of it";
+        std::ofstream(mesh_, std::ios::app) << "more";
+        return BuildReport{};
+    });
+    ASSERT_FALSE(path);
+    EXPECT_EQ(path.error().file, mesh_.string());
+    EXPECT_NE(path.error().message.find("changed"), std::string::npos) << path.error().message;
+    EXPECT_TRUE(fs::is_empty(cacheFolder()));
+}
+
+/// With buildOctree: a triangle whose colours lie beside it.
+class MeshCacheSideFilesTest : public MeshCacheTest {
+protected:
+    [[nodiscard]] fs::path build() {
+        const auto path = MeshCache(cacheFolder()).dataset(options_, [&](const BuildOptions& options) {
+            ++builds_;
+            return buildOctree(options);
+        });
+        EXPECT_TRUE(path) << path.error().line();
+        return path ? *path : fs::path();
+    }
+    static void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+    static std::string content(const fs::path& path) {
+        std::ifstream file(path, std::ios::binary);
+        return {std::istreambuf_iterator<char>(file), {}};
+    }
+    /// Built anew since `change`, to other bytes; not again without one.
+    void expectStale(const std::function<void()>& change) {
+        const std::string before = content(build());
+        const int builds = builds_;
+        EXPECT_EQ(content(build()), before);
+        EXPECT_EQ(builds_, builds);
+        change();
+        EXPECT_NE(content(build()), before);
+        EXPECT_EQ(builds_, builds + 1);
+        (void)build();
+        EXPECT_EQ(builds_, builds + 1);
+    }
+};
+
+TEST_F(MeshCacheSideFilesTest, MaterialsOfAnObj) {
+    mesh_ = folder_ / "mesh.obj";
+    options_.inputs = {mesh_};
+    write(mesh_, "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 2/1 4/1 3/1\n");
+    const fs::path mtl = folder_ / "colours.mtl";
+    expectStale([&] { write(mtl, "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n"); });  // which was missing
+    expectStale([&] { write(mtl, "newmtl a\nKd 0 0 1\nnewmtl b\nKd 0 1 0\n"); });
+    expectStale([&] { fs::remove(mtl); });
+}
+
+TEST_F(MeshCacheSideFilesTest, BuffersOfAGltf) {
+    mesh_ = folder_ / "mesh.gltf";
+    options_.inputs = {mesh_};
+    write(mesh_, R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "buffers": [{"uri": "mesh.bin", "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [9, 9, 9]}]})");
+    const auto corners = [&](float x) {
+        const float values[9] = {0, 0, 0, x, 0, 0, 0, 1, 0};
+        write(folder_ / "mesh.bin", std::string(reinterpret_cast<const char*>(values), sizeof(values)));
+    };
+    corners(1);
+    expectStale([&] { corners(2); });
+}
+
+TEST_F(MeshCacheSideFilesTest, ASideFileThatChangesWhileItIsReadIsNotKept) {
+    mesh_ = folder_ / "mesh.obj";
+    options_.inputs = {mesh_};
+    write(mesh_, "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const auto path = MeshCache(cacheFolder()).dataset(options_, [&](const BuildOptions& options) {
+        auto report = buildOctree(options);
+        write(folder_ / "colours.mtl", "newmtl a\n");
+        return report;
+    });
+    ASSERT_FALSE(path);
+    EXPECT_EQ(path.error().file, (folder_ / "colours.mtl").string());
+    EXPECT_TRUE(fs::is_empty(cacheFolder()));
+}
+
+TEST_F(MeshCacheSideFilesTest, ListsGoWithTheirDatasets) {
+    mesh_ = folder_ / "mesh.obj";
+    options_.inputs = {mesh_};
+    write(mesh_, "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const fs::path dataset = build();
+    const auto lists = [&] {
+        return std::count_if(fs::directory_iterator(cacheFolder()), fs::directory_iterator(), [](const fs::directory_entry& each) { return each.path().extension() == ".files"; });
+    };
+    EXPECT_EQ(lists(), 1);
+    MeshCache(cacheFolder(), 1).trim(dataset);
+    EXPECT_EQ(lists(), 1);
+    MeshCache(cacheFolder(), 1).trim({});
+    EXPECT_FALSE(fs::exists(dataset));
+    write(cacheFolder() / "00000000000000ff.vcp", "later");
+    MeshCache(cacheFolder()).trim({});
+    EXPECT_EQ(lists(), 0);
 }
 
 TEST_F(MeshCacheTest, MissingMeshIsNamed) {

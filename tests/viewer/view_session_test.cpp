@@ -1,7 +1,9 @@
 // What the window of vcp view does, without the window: saving pictures between its frames.
 #include "viewer/view_session.h"
 
+#include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <functional>
 #include <set>
 #include <thread>
@@ -10,6 +12,7 @@
 
 #include "built_ball.h"
 #include "render/picture.h"
+#include "viewer/orbit_camera.h"
 
 namespace vcp {
 namespace {
@@ -79,6 +82,168 @@ protected:
     std::unique_ptr<ViewSession> session_;
     double now_ = 0;
 };
+
+/// Sessions that remember, as vcp view has them: each reads the settings when it begins, and saves what was changed.
+class RememberingSessionTest : public BuiltBall {
+protected:
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    }
+    void TearDown() override { fs::remove(settings_); }
+
+    struct Remembering {
+        std::unique_ptr<ViewSession> session;
+        double now = 0;
+
+        void open(const fs::path& file) {
+            session->open({file.string()});
+            for (int i = 0; i < 10000 && session->opening(); ++i) turn();
+            EXPECT_TRUE(session->viewer().isOpen()) << session->problem();
+        }
+        void turn() {
+            const auto next = session->update(now += 0.02);
+            ASSERT_TRUE(next) << next.error().line();
+            if (session->opening()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        /// Smooth moves are over.
+        void rest() {
+            for (int i = 0; i < 50; ++i) turn();
+        }
+    };
+
+    /// `given`: options, and what they say.
+    Remembering begin(const std::set<std::string>& given = {}, RenderSettings render = {}) {
+        const auto user = readUserSettings(settings_);
+        EXPECT_TRUE(user);
+        SessionOptions options;
+        options.user = *user;
+        options.render = std::move(render);
+        applyRemembered(options.render, options.user, [&](const char* option) { return given.contains(option); });
+        auto session = ViewSession::create(options, {});
+        EXPECT_TRUE(session) << session.error().line();
+        Remembering made{*std::move(session)};
+        made.session->viewer().resize({96, 64});
+        return made;
+    }
+    void end(Remembering& each) {
+        const auto saved = saveChanges(each.session->changes(), settings_);
+        EXPECT_TRUE(saved) << saved.error().line();
+        each.session.reset();
+    }
+    [[nodiscard]] fs::path ball() const { return *folder_ / "ball.vcp"; }
+    fs::path copyOfBall(const std::string& name) const {
+        fs::copy_file(ball(), *folder_ / name, fs::copy_options::overwrite_existing);
+        return *folder_ / name;
+    }
+    /// The ball seen from a side with z up, lit from above and cut.
+    fs::path scene() const {
+        const fs::path path = *folder_ / "scene.json";
+        std::ofstream(path) << R"({"datasets": [{"file": "ball.vcp"}], "lights": [{"direction": [0, 1, 0]}],
+            "camera": {"position": [5, 0, 0], "target": [0, 0, 0], "up": [0, 0, 1], "up_axis": "z"}, "sections": [{"normal": [1, 0, 0], "offset": 0.1}]})";
+        return path;
+    }
+
+    const fs::path settings_ = *folder_ / "view.json";
+};
+
+TEST_F(RememberingSessionTest, ThreeWindowsRememberThreeFiles) {
+    Remembering windows[3] = {begin(), begin(), begin()};
+    const fs::path files[3] = {copyOfBall("a.vcp"), copyOfBall("b.vcp"), copyOfBall("c.vcp")};
+    for (int i = 0; i < 3; ++i) windows[i].open(files[i]);
+    windows[1].session->keepBookmark(2);
+    for (const int i : {2, 0, 1}) end(windows[i]);
+    const auto read = readUserSettings(settings_);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->recent, (std::vector<std::string>{files[1], files[0], files[2]}));
+    EXPECT_EQ(read->bookmarks.count(files[1]), 1u);
+}
+
+TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
+    RenderSettings render;
+    render.up = "z";
+    render.shadows = true;
+    render.occlusionRays = 16;
+    render.errorPixels = 7;
+    render.budget = "64M";
+    render.light = "fixed";
+    render.sections = {"x<50%"};
+    Remembering given = begin({"--up", "--shadows", "--occlusion", "--error-pixels", "--budget"}, render);
+    given.open(ball());
+    EXPECT_EQ(given.session->viewer().camera().up, UpAxis::Z);
+    EXPECT_TRUE(given.session->viewer().shading().shadows);
+    given.rest();
+    end(given);
+
+    Remembering plain = begin();
+    plain.open(ball());
+    EXPECT_EQ(plain.session->viewer().camera().up, UpAxis::Y);
+    EXPECT_FALSE(plain.session->viewer().shading().shadows);
+    EXPECT_EQ(plain.session->viewer().shading().occlusionRays, 0u);
+    EXPECT_EQ(plain.session->viewer().errorPixels(), 0.5);
+    EXPECT_EQ(plain.session->viewer().status().budgetBytes, 512u << 20);
+    const auto json = contentOf(settings_);
+    for (const char* field : {"up", "shadows", "occlusion", "error_pixels", "budget_bytes", "background", "width", "panel"})
+        EXPECT_EQ(json.find(field), std::string::npos) << field << " in " << json;
+}
+
+TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
+    RenderSettings render;
+    render.up = "z";
+    render.shadows = true;
+    render.errorPixels = 7;
+    render.budget = "64M";
+    Remembering first = begin({"--up", "--shadows", "--error-pixels", "--budget"}, render);
+    first.open(ball());
+    first.session->act(ViewerAction::ToggleUpAxis);  // to y, which is the default: nothing of it shows below
+    first.rest();
+    first.session->act(ViewerAction::ToggleUpAxis);
+    // Off and on again: what it was, and by hand.
+    first.session->act(ViewerAction::ToggleShadows);
+    first.turn();
+    first.session->act(ViewerAction::ToggleShadows);
+    first.turn();
+    first.session->viewer().setErrorPixels(3);
+    ASSERT_TRUE(first.session->viewer().setBudget(96 << 20));
+    first.session->togglePanel();
+    first.session->act(ViewerAction::ToggleOcclusion);
+    Shading shading = first.session->viewer().shading();
+    shading.backgroundTop = {1, 0, 0};
+    first.session->viewer().setShading(shading);  // and the window closes in the same turn
+    end(first);
+
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Z);
+    EXPECT_TRUE(second.session->viewer().shading().shadows);
+    EXPECT_EQ(second.session->viewer().shading().occlusionRays, 8u);
+    EXPECT_EQ(second.session->viewer().shading().backgroundTop, glm::vec3(1, 0, 0));
+    EXPECT_EQ(second.session->viewer().errorPixels(), 3);
+    EXPECT_EQ(second.session->viewer().status().budgetBytes, 96u << 20);
+    EXPECT_TRUE(second.session->user().panel);
+    EXPECT_EQ(second.session->changes().shadows, std::nullopt) << "what is remembered is not changed";
+}
+
+TEST_F(RememberingSessionTest, ScenesBookmarksAndPastedCamerasTurnNothingOver) {
+    Remembering first = begin();
+    first.open(scene());
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Z);
+    first.session->keepBookmark(1);
+    first.rest();
+    first.session->goToBookmark(1);
+    first.rest();
+    first.session->pasteCamera(cameraToJson(first.session->viewer().camera()));
+    first.rest();
+    EXPECT_EQ(first.session->changes().up, std::nullopt);
+    first.open(ball());
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Y) << "nor what is opened next";
+    EXPECT_TRUE(first.session->viewer().sections().empty());
+    end(first);
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Y);
+    EXPECT_TRUE(second.session->viewer().sections().empty());
+    EXPECT_TRUE(second.session->viewer().shading().lightFollowsCamera);
+}
 
 TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
     session_->savePicture(kSmall);

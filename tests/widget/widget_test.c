@@ -187,6 +187,9 @@ static void input(void) {
 /* What callbacks were told, and by what they were answered. */
 typedef struct told {
     int logs, errors, redraws, settled, progress, cancel_at;
+    int stages, is_over; /* of a build */
+    char stage[16][32];
+    double fraction;
     vcp_status last_error, answer;
     vcp_context* context;
 } told;
@@ -212,8 +215,49 @@ static void on_settled(void* user, vcp_view* view) {
 }
 static int on_progress(void* user, const vcp_progress* progress) {
     told* t = user;
-    CHECK(progress->stage && progress->fraction >= 0 && progress->fraction <= 1);
-    return ++t->progress != t->cancel_at;
+    CHECK(!t->is_over && progress->stage && strlen(progress->stage) < sizeof(t->stage[0]));
+    CHECK(progress->fraction >= t->fraction && progress->fraction <= 1);
+    t->fraction = progress->fraction;
+    if (t->stages == 0 || strcmp(t->stage[t->stages - 1], progress->stage) != 0) {
+        CHECK(t->stages < 16);
+        strcpy(t->stage[t->stages++], progress->stage);
+    }
+    t->is_over = ++t->progress == t->cancel_at;
+    return !t->is_over;
+}
+
+/* Every stage is told whole and in order, and nothing when the build is over or was cancelled. */
+static void progress(void) {
+    write_ball(0);
+    const char* inputs[] = {ply};
+    vcp_build_options build = VCP_INIT(vcp_build_options);
+    vcp_build_report report = VCP_INIT(vcp_build_report);
+    told t = {0};
+    build.inputs = inputs;
+    build.input_count = 1;
+    build.output = tree;
+    build.cell = 0.01;
+    build.progress = on_progress;
+    build.user = &t;
+    OK(vcp_build(&build, &report));
+    t.is_over = 1;
+    CHECK(t.fraction == 1 && report.levels >= 2 && t.stages == 4 + (int)report.levels);
+    CHECK(strcmp(t.stage[0], "reading") == 0 && strcmp(t.stage[1], "sorting") == 0);
+    for (int i = 1; i <= (int)report.levels; ++i) {
+        char wanted[32];
+        snprintf(wanted, sizeof(wanted), "level %d of %d", i, (int)report.levels);
+        CHECK(strcmp(t.stage[1 + i], wanted) == 0);
+    }
+    CHECK(strcmp(t.stage[t.stages - 2], "writing") == 0 && strcmp(t.stage[t.stages - 1], "done") == 0);
+
+    /* Cancelled at each of the first calls. */
+    build.cell = 0.005;
+    for (int at = 1; at <= 2; ++at) {
+        told none = {0};
+        none.cancel_at = at;
+        build.user = &none;
+        CHECK(vcp_build(&build, NULL) == VCP_CANCELLED && none.progress == at);
+    }
 }
 
 static void callbacks(void) {
@@ -242,20 +286,6 @@ static void callbacks(void) {
     CHECK(strstr(vcp_context_last_error(t.context), "/nowhere/at.vcp"));
     OK(vcp_view_destroy(view));
     OK(vcp_context_destroy(t.context));
-
-    const char* inputs[] = {ply};
-    vcp_build_options build = VCP_INIT(vcp_build_options);
-    build.inputs = inputs;
-    build.input_count = 1;
-    build.output = tree;
-    build.progress = on_progress;
-    build.user = &t;
-    OK(vcp_build(&build, NULL));
-    CHECK(t.progress >= 1);
-    t.progress = 0;
-    t.cancel_at = 1;
-    build.cell = 0.005; /* takes long enough to be cancelled */
-    CHECK(vcp_build(&build, NULL) == VCP_CANCELLED && t.progress >= 1);
 }
 
 /* Wrong calls give errors, and change nothing. */
@@ -367,6 +397,16 @@ static void wrong_calls(void) {
     CHECK(vcp_build(&build, NULL) == VCP_USAGE);
     build.input_count = 1;
     CHECK(vcp_build(&build, NULL) == VCP_IO);
+    /* Texts are UTF-8, whatever a file is called and wherever they are cut off. */
+    inputs[0] = "/nowhere/\xff\xc3\xa9.ply";
+    build.error_text = text;
+    build.error_text_size = sizeof(text);
+    CHECK(vcp_build(&build, NULL) == VCP_IO && strstr(text, "/nowhere/\xef\xbf\xbd\xc3\xa9.ply"));
+    build.error_text_size = 14;
+    CHECK(vcp_build(&build, NULL) == VCP_IO && strcmp(text, "/nowhere/\xef\xbf\xbd") == 0);
+    CHECK(vcp_context_create(NULL, &context) == VCP_OK && vcp_context_open(context, "/nowhere/\xe9.vcp", NULL) == VCP_IO);
+    CHECK(strstr(vcp_context_last_error(context), "/nowhere/\xef\xbf\xbd.vcp"));
+    OK(vcp_context_destroy(context));
     CHECK(vcp_version()[0] && vcp_status_text(-5)[0] && vcp_context_last_error(NULL)[0] && vcp_view_last_error(NULL)[0]);
 }
 
@@ -616,7 +656,7 @@ int main(int argc, char** argv) {
     static const struct {
         const char* name;
         void (*run)(void);
-    } cases[] = {{"picture", picture}, {"input", input}, {"callbacks", callbacks}, {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"placed", placed}, {"scenes", scenes}, {"cycles", cycles}, {"threads", threads}};
+    } cases[] = {{"picture", picture}, {"input", input}, {"callbacks", callbacks}, {"progress", progress}, {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"placed", placed}, {"scenes", scenes}, {"cycles", cycles}, {"threads", threads}};
     if (argc != 3) return 2;
     snprintf(ply, sizeof(ply), "%s/ball-%s.ply", argv[2], argv[1]);
     snprintf(tree, sizeof(tree), "%s/ball-%s.vcp", argv[2], argv[1]);

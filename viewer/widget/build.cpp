@@ -1,6 +1,8 @@
 #include <condition_variable>
 #include <mutex>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "builder/build.h"
 #include "viewer/widget/handles.h"
@@ -9,7 +11,7 @@ namespace vcp::widget {
 
 namespace {
 
-constexpr std::chrono::milliseconds kProgressEvery{50};
+constexpr std::chrono::milliseconds kProgressEvery{100};
 
 /// A build in a thread of its own, so that the host hears of it in the one that called.
 class BuildRun {
@@ -18,28 +20,33 @@ public:
         options_.progress = [this](const BuildProgress& at) { return hear(at); };
     }
 
-    /// Until it is done. `tell` returns false to cancel.
+    /// Until it is done. `tell` returns false to cancel, and is not called again then; nor is it once this has
+    /// returned.
     template <class Tell>
     Result<BuildReport> run(Tell tell) {
-        std::thread thread([this] {
-            Outcome thrown = outcomeOf([&] { report_ = buildOctree(options_); return Outcome(); });
+        std::jthread thread([this] {
+            Outcome thrown = outcomeOf([&] {
+                report_ = buildOctree(options_);
+                return Outcome();
+            });
             const std::lock_guard lock(mutex_);
             if (thrown.status != VCP_OK) report_ = Error{.code = ErrorCode::Limit, .message = thrown.text};
             done_ = true;
             news_.notify_one();
         });
-        std::unique_lock lock(mutex_);
-        bool told = true;  // not asked again once it has cancelled
-        while (!done_) {
-            news_.wait_for(lock, kProgressEvery, [this] { return done_; });
-            const BuildProgress at = at_;
-            lock.unlock();
-            const bool goesOn = !told || tell(at);
-            told = goesOn;
-            lock.lock();
-            cancelled_ = cancelled_ || !goesOn;
+        std::vector<BuildProgress> untold;
+        for (bool isOver = false, goesOn = true; !isOver;) {
+            {
+                std::unique_lock lock(mutex_);
+                cancelled_ = !goesOn;
+                news_.wait_for(lock, kProgressEvery, [this] { return done_ || !heard_.empty(); });
+                isOver = done_;
+                // Where nothing is new the last is told again, so that a host may cancel in a stage that takes long.
+                if (isOver || !heard_.empty()) untold = std::exchange(heard_, {});
+            }
+            for (const BuildProgress& at : untold) goesOn = goesOn && tell(at);
+            if (!untold.empty()) untold.erase(untold.begin(), std::prev(untold.end()));
         }
-        lock.unlock();
         thread.join();
         return *std::move(report_);
     }
@@ -47,14 +54,19 @@ public:
 private:
     bool hear(const BuildProgress& at) {
         const std::lock_guard lock(mutex_);
-        at_ = at;
+        // A host that is slow misses steps of a stage, never a stage.
+        if (heard_.empty() || heard_.back().stage != at.stage)
+            heard_.push_back(at);
+        else
+            heard_.back() = at;
+        news_.notify_one();
         return !cancelled_;
     }
 
     BuildOptions options_;
     std::mutex mutex_;
     std::condition_variable news_;
-    BuildProgress at_;         // guarded by mutex_, like the next two
+    std::vector<BuildProgress> heard_;  // guarded by mutex_, like the next two
     bool cancelled_ = false, done_ = false;
     std::optional<Result<BuildReport>> report_;  // of the thread until done_
 };
@@ -83,7 +95,7 @@ Result<BuildOptions> buildOptions(const vcp_build_options& given) {
 /// False where the host cancels. What its callback throws ends the build as well.
 bool tellHost(const vcp_build_options& given, const BuildProgress& at) {
     if (!given.progress) return true;
-    const vcp_progress progress{sizeof(vcp_progress), at.stage, at.fraction, at.triangles, at.seconds};
+    const vcp_progress progress{sizeof(vcp_progress), at.stage.c_str(), at.fraction, at.triangles, at.seconds};
     bool goesOn = false;
     const Outcome outcome = outcomeOf([&] {
         goesOn = given.progress(given.user, &progress) != 0;

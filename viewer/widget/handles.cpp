@@ -7,9 +7,33 @@ namespace {
 // No struct of ours is near as large: what says so was not set.
 constexpr uint32_t kLargestStruct = 4096;
 
+/// Bytes of the character of UTF-8 at a place; 0 where there is none.
+size_t characterAt(const std::string& text, size_t at) {
+    const auto byte = [&](size_t i) { return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u; };
+    const unsigned first = byte(0);
+    if (first < 0x80) return 1;
+    const size_t length = first >= 0xC2 && first < 0xE0 ? 2 : (first & 0xF0) == 0xE0 ? 3 : first >= 0xF0 && first < 0xF5 ? 4 : 0;
+    for (size_t i = 1; i < length; ++i)
+        if ((byte(i) & 0xC0) != 0x80) return 0;
+    // Longer than it need be, half of a pair of UTF-16, or beyond the last.
+    const unsigned second = byte(1);
+    const bool isWrong = (first == 0xE0 && second < 0xA0) || (first == 0xED && second >= 0xA0) || (first == 0xF0 && second < 0x90) || (first == 0xF4 && second >= 0x90);
+    return isWrong ? 0 : length;
+}
+
 }  // namespace
 
-Outcome::Outcome(const Error& error) : text(error.line()) {
+std::string utf8Of(const std::string& text) {
+    std::string valid;
+    for (size_t at = 0; at < text.size();) {
+        const size_t length = characterAt(text, at);
+        valid += length > 0 ? text.substr(at, length) : "\xEF\xBF\xBD";
+        at += std::max<size_t>(length, 1);
+    }
+    return valid;
+}
+
+Outcome::Outcome(const Error& error) : text(utf8Of(error.line())) {
     switch (error.code) {
         case ErrorCode::InvalidInput: status = VCP_INVALID_INPUT; break;
         case ErrorCode::Io: status = VCP_IO; break;
@@ -57,7 +81,9 @@ Result<void> giveStruct(void* out, const void* value, size_t size) {
 
 void copyText(char* to, size_t size, const std::string& text) {
     if (!to || size == 0) return;
-    const size_t length = std::min(size - 1, text.size());
+    size_t length = std::min(size - 1, text.size());
+    // No character is cut in two.
+    while (length > 0 && length < text.size() && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
     std::memcpy(to, text.data(), length);
     to[length] = '\0';
 }

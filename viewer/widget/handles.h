@@ -20,6 +20,11 @@
 #include "viewer/viewer.h"
 #include "viewer/widget/vcp.h"
 
+namespace vcp::widget {
+/// For hosts, which take texts for UTF-8: names of files and what stands in them may be anything. What is none becomes U+FFFD.
+std::string utf8Of(const std::string& text);
+}  // namespace vcp::widget
+
 struct vcp_context {
     std::atomic_flag busy;  // a call is under way
     vcp_callbacks callbacks{};
@@ -35,7 +40,7 @@ struct vcp_context {
 
     [[nodiscard]] double now() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
     void log(vcp_log_level level, const std::string& text) const {
-        if (callbacks.log) callbacks.log(callbacks.user, level, text.c_str());
+        if (callbacks.log) callbacks.log(callbacks.user, level, vcp::widget::utf8Of(text).c_str());
     }
 };
 

@@ -80,7 +80,7 @@ typedef struct vcp_callbacks {
     uint32_t struct_size;
     void* user; /* handed back */
     void (*log)(void* user, vcp_log_level level, const char* text);
-    /* A call failed; text is what last_error says. */
+    /* A call failed; text is what last_error says. Like that of `log`, it lives until the callback returns. */
     void (*error)(void* user, vcp_status status, const char* text);
     /* The view's picture would differ: update it soon. From calls that change the view, and from updates of
      * others that share its pages. */
@@ -379,8 +379,8 @@ VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);
 
 typedef struct vcp_progress {
     uint32_t struct_size;
-    const char* stage;
-    double fraction; /* of the whole, 0 to 1 */
+    const char* stage; /* "reading", "sorting", "level 1 of 6", "writing", "done"; lives until the callback returns */
+    double fraction;   /* of the whole, 0 to 1, never less than before; 1: done */
     uint64_t triangles;
     double seconds;
 } vcp_progress;
@@ -396,7 +396,7 @@ typedef struct vcp_build_options {
     uint64_t memory_bytes;     /* cap; 0: a part of what the machine has */
     uint32_t threads;          /* 0: one a processor */
     uint32_t resume;           /* 1: goes on where an interrupted build of the same output was */
-    /* About ten times a second, in the calling thread; 0 cancels. */
+    /* About ten times a second, and of every stage, in the calling thread; 0 cancels, and then it is not called again. */
     int (*progress)(void* user, const vcp_progress* progress);
     void* user;
     char* error_text;
