@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "streaming/http_reader.h"
+#include "streaming/web_address.h"
 
 namespace vcp {
 
@@ -58,7 +58,7 @@ void readBookmarks(const Json& json, UserSettings& settings) {
         if (!views.is_object() || settings.bookmarks.size() >= UserSettings::kMostBookmarkedFiles) continue;
         for (const auto& [number, camera] : views.items()) {
             const auto read = cameraFromJson(camera.dump(), file);
-            if (read && number.size() == 1 && number[0] >= '1' && number[0] <= '9') settings.bookmarks[file][number[0] - '0'] = *read;
+            if (read && number.size() == 1 && number[0] >= '1' && number[0] <= '9') settings.bookmarks[addressWithoutUser(file)][number[0] - '0'] = *read;
         }
     }
 }
@@ -68,7 +68,7 @@ UserSettings settingsFrom(const Json& json) {
     const Fields fields(json);
     if (const Json* recent = fields.find("recent"); recent && recent->is_array())
         for (const Json& each : *recent)
-            if (each.is_string() && settings.recent.size() < UserSettings::kMostRecent) settings.recent.push_back(each.get<std::string>());
+            if (each.is_string() && settings.recent.size() < UserSettings::kMostRecent) settings.recent.push_back(addressWithoutUser(each.get<std::string>()));
     if (const Json* bookmarks = fields.find("bookmarks"); bookmarks && bookmarks->is_object()) readBookmarks(*bookmarks, settings);
     fields.number("width", settings.windowSize.x, 64, 16384);
     fields.number("height", settings.windowSize.y, 64, 16384);
@@ -110,7 +110,7 @@ Error notWritten(const fs::path& path, const std::string& why) {
 }  // namespace
 
 std::string rememberedName(const std::string& input) {
-    if (isHttpUrl(input)) return input;
+    if (isHttpUrl(input)) return addressWithoutUser(input);
     std::error_code failed;
     const fs::path absolute = fs::absolute(input, failed);
     return failed ? input : absolute.lexically_normal().string();
