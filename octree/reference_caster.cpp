@@ -143,7 +143,7 @@ private:
     using Mark = ReferenceCaster::Mark;
 
     void visitPage(uint64_t page) {
-        if (caster_.marks_[page] == Mark::None) return;
+        if ((*caster_.marks_)[page] == Mark::None) return;
         const PageEntry& entry = dataset_.pages[page];
         const double cell = dataset_.cellOf(entry.level);
         const glm::dvec3 origin = (ray_.origin - dataset_.originOf(entry)) / cell;
@@ -151,7 +151,7 @@ private:
         const PageRay in{caster_.cache_->view(page), page, cell, origin, ray_.direction, 1e-9 + 1e-14 * reach};
         const double edge = double(uint64_t{1} << dataset_.header.log2Cells);
         if (!touches(in, clipToCube(in.origin, in.direction, glm::dvec3(0), edge))) return;
-        if (caster_.marks_[page] == Mark::Chosen) {
+        if ((*caster_.marks_)[page] == Mark::Chosen) {
             if (counters_) ++counters_->pages;
             visitNode(in, in.view->header.root, glm::dvec3(0), edge);
             return;
@@ -282,7 +282,7 @@ Result<PageCache> PageCache::fromPages(Dataset dataset, std::vector<PageBytes> p
         auto view = parsePage(loaded->bytes.geometryBytes(), loaded->bytes.colourBytes());
         if (!view) return view.error();
         loaded->view = *view;
-        cache.pages_[page] = std::move(loaded);
+        cache.keep(page, std::move(loaded));
     }
     return cache;
 }
@@ -299,6 +299,11 @@ Result<PageCache> PageCache::open(const std::filesystem::path& path) {
     return PageCache(*reader, std::move(*dataset));
 }
 
+void PageCache::keep(uint64_t page, std::unique_ptr<const Loaded> loaded) {
+    loaded_.push_back(std::move(loaded));
+    pages_[page] = loaded_.back().get();
+}
+
 Result<void> PageCache::load(uint64_t page) {
     if (page >= pages_.size())
         return Error{.code = ErrorCode::Usage, .message = "no such page", .element = fmt::format("page {}", page)};
@@ -310,7 +315,7 @@ Result<void> PageCache::load(uint64_t page) {
     auto view = parsePage(loaded->bytes.geometryBytes(), loaded->bytes.colourBytes());
     if (!view) return view.error();
     loaded->view = *view;
-    pages_[page] = std::move(loaded);
+    keep(page, std::move(loaded));
     return {};
 }
 
@@ -336,8 +341,7 @@ const PageView* PageCache::view(uint64_t page) const {
 
 uint64_t PageCache::bytes() const {
     uint64_t sum = 0;
-    for (const auto& page : pages_)
-        if (page) sum += page->bytes.geometryBytes().size() + page->bytes.colourBytes().size();
+    for (const auto& page : loaded_) sum += page->bytes.geometryBytes().size() + page->bytes.colourBytes().size();
     return sum;
 }
 
@@ -353,26 +357,30 @@ Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::spa
                                                 CastOptions options) {
     ReferenceCaster caster(cache, options);
     const PageDirectory& pages = cache.dataset().pages;
-    caster.marks_.assign(pages.size(), Mark::None);
+    auto marks = std::make_shared<SparseArray<Mark>>(pages.size());
     for (const uint64_t page : cut) {
         if (!cache.view(page))
             return Error{.code = ErrorCode::Usage,
                          .message = "a page of the cut is not loaded",
                          .element = fmt::format("page {}", page)};
-        caster.marks_[page] = Mark::Chosen;
+        (*marks)[page] = Mark::Chosen;
     }
     // Children come after their parents in the directory: backwards, every mark below a page is known.
     for (uint64_t page = pages.size(); page-- > 0;) {
-        if (!pages.knows(page)) continue;
+        if (!pages.knows(page)) {
+            page -= page % kEntriesPerBlock;  // nor is any other of its block
+            continue;
+        }
         for (const uint64_t child : childrenOf(pages[page])) {
-            if (caster.marks_[child] == Mark::None) continue;
-            if (caster.marks_[page] == Mark::Chosen)
+            if ((*marks)[child] == Mark::None) continue;
+            if ((*marks)[page] == Mark::Chosen)
                 return Error{.code = ErrorCode::Usage,
                              .message = "the cut names a page and one below it",
                              .element = fmt::format("page {}", page)};
-            caster.marks_[page] = Mark::Above;
+            (*marks)[page] = Mark::Above;
         }
     }
+    caster.marks_ = std::move(marks);
     return caster;
 }
 

@@ -58,9 +58,12 @@ private:
         PageBytes bytes;
         PageView view;
     };
+    void keep(uint64_t page, std::unique_ptr<const Loaded> loaded);
+
     std::shared_ptr<const ByteReader> reader_;
     Dataset dataset_;
-    std::vector<std::unique_ptr<Loaded>> pages_;
+    SparseArray<const Loaded*> pages_;  // of loaded_; null: not loaded
+    std::vector<std::unique_ptr<const Loaded>> loaded_;
 };
 
 /// All pages of a level: each level holds the whole surface. levels - 1 (or anything larger) is the finest.
@@ -118,7 +121,7 @@ private:
 
     const PageCache* cache_;
     CastOptions options_;
-    std::vector<Mark> marks_;  ///< of each page: in the cut, above one that is, or neither
+    std::shared_ptr<const SparseArray<Mark>> marks_;  ///< of each page: in the cut, above one that is, or neither
 
     friend class CastWalk;
 };

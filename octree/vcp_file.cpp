@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>
+#include <new>
+#include <optional>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -181,10 +183,33 @@ Result<void> checkBlockHash(const std::string& file, uint64_t block, std::span<c
     return broken(file, fmt::format("directory block {}", block), blockOffset(block), "hash does not match: the file was changed or damaged");
 }
 
+/// Reads `bytes` in pieces, the first of at most kFirstPiece, each as large as all before it, so that a claim takes no more
+/// memory than a few times what came. take(piece) -> Result<void>.
+constexpr uint64_t kFirstPiece = 1 << 20;
+constexpr uint64_t kLargestPiece = 16 << 20;
+template <class Take>
+Result<void> readInPieces(const ByteReader& reader, uint64_t offset, uint64_t bytes, Take&& take) {
+    std::vector<std::byte> piece;
+    for (uint64_t done = 0; done < bytes; done += piece.size()) {
+        piece.resize(std::min({std::max(done, kFirstPiece), kLargestPiece, bytes - done}));
+        VCP_TRY(reader.read(offset + done, piece));
+        VCP_TRY(take(std::span<const std::byte>(piece)));
+    }
+    return {};
+}
+
 /// The stored bytes of a page, checked against their hash.
 Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset, uint32_t stored, uint64_t hash) {
-    std::vector<std::byte> packed(stored);
-    VCP_TRY(reader.read(offset, packed));
+    std::vector<std::byte> packed;
+    if (stored <= kFirstPiece) {
+        packed.resize(stored);
+        VCP_TRY(reader.read(offset, packed));
+    } else {
+        VCP_TRY(readInPieces(reader, offset, stored, [&](std::span<const std::byte> piece) -> Result<void> {
+            packed.insert(packed.end(), piece.begin(), piece.end());
+            return {};
+        }));
+    }
     if (hashBytes(packed) != hash) return broken(reader, element, offset, "hash does not match: the page was changed or damaged");
     return packed;
 }
@@ -210,13 +235,13 @@ private:
 
 /// What a directory that comes in parts must know beside its entries.
 struct PageDirectory::Parts {
-    explicit Parts(size_t pages) : known(blocksOf(pages)), parents(pages, kNoPage) {}
-    static constexpr uint32_t kNoPage = UINT32_MAX;
+    explicit Parts(size_t pages) : known(blocksOf(pages)), afterParents(pages) {}
+    static constexpr uint32_t kNoPage = 0;
 
     std::atomic_flag admitting;
-    std::vector<std::atomic<uint8_t>> known;  // by block; 1 after its entries were written
+    SparseArray<std::atomic<uint8_t>> known;  // by block; 1 after its entries were written
     std::atomic<uint64_t> blocksKnown{0};
-    std::vector<uint32_t> parents;  // as known blocks say: a page has one
+    SparseArray<uint32_t> afterParents;  // 1 more than each page's parent, of which it has one, as known blocks say
 };
 
 PageDirectory::PageDirectory() = default;
@@ -227,22 +252,27 @@ PageDirectory::~PageDirectory() = default;
 
 PageDirectory& PageDirectory::operator=(const PageDirectory& other) {
     if (this == &other) return *this;
-    if (!other.parts_) {
-        parts_.reset();
-        entries_ = other.entries_;
-        return *this;
-    }
+    parts_.reset();
+    sparse_ = {};
+    entries_ = other.entries_;
+    if (!other.parts_) return *this;
     const Turn turn(other.parts_->admitting);
     expect(other.size());
-    entries_ = other.entries_;
-    parts_->parents = other.parts_->parents;
-    for (size_t b = 0; b < parts_->known.size(); ++b) parts_->known[b] = other.parts_->known[b].load();
+    for (size_t b = 0; b < parts_->known.size(); ++b) {
+        if (other.parts_->known[b].load() == 0) continue;
+        const size_t first = b * kEntriesPerBlock, count = std::min<size_t>(kEntriesPerBlock, size() - first);
+        std::copy_n(other.sparse_.data() + first, count, sparse_.data() + first);
+        for (size_t page = first; page < first + count; ++page)
+            for (const uint64_t child : childrenOf(sparse_[page])) parts_->afterParents[child] = static_cast<uint32_t>(page + 1);
+        parts_->known[b] = 1;
+    }
     parts_->blocksKnown = other.parts_->blocksKnown.load();
     return *this;
 }
 
 void PageDirectory::expect(size_t pages) {
-    entries_.assign(pages, {});
+    entries_ = {};
+    sparse_ = SparseArray<PageEntry>(pages);
     parts_ = std::make_unique<Parts>(pages);
 }
 
@@ -261,10 +291,10 @@ public:
         PageDirectory::Parts& parts = *directory_.parts_;
         const Turn turn(parts.admitting);
         if (directory_.knowsBlock(block_)) return {};
-        std::memcpy(&directory_.entries_[first_], bytes.data(), count_ * sizeof(PageEntry));
+        std::memcpy(&directory_.sparse_[first_], bytes.data(), count_ * sizeof(PageEntry));
         if (auto sound = check(); !sound) {
             // Nobody is to come across what was refused.
-            std::fill_n(&directory_.entries_[first_], count_, PageEntry{});
+            std::fill_n(&directory_.sparse_[first_], count_, PageEntry{});
             return sound;
         }
         parts.known[block_].store(1, std::memory_order_release);
@@ -296,19 +326,20 @@ private:
         const LevelRow& below = d_.header.level[e.level + 1];
         if (e.firstChild < below.firstEntry || *childrenOf(e).end() > below.firstEntry + below.pages) return brokenEntry(file_, page, "wrong child pages");
         return eachChild(e, [&](uint64_t child, uint32_t octant) -> Result<void> {
-            uint32_t& parent = directory_.parts_->parents[child];
-            if (parent != PageDirectory::Parts::kNoPage && parent != page) return brokenEntry(file_, page, "wrong child pages");
-            parent = static_cast<uint32_t>(page);
+            uint32_t& parent = directory_.parts_->afterParents[child];
+            if (parent != PageDirectory::Parts::kNoPage && parent != page + 1) return brokenEntry(file_, page, "wrong child pages");
+            parent = static_cast<uint32_t>(page + 1);
             if (isThere(child) && !isChildAt(directory_[child], e, octant)) return brokenEntry(file_, page, "child pages do not match");
             return {};
         });
     }
 
     Result<void> checkParent(uint64_t page) const {
-        const uint32_t parent = directory_.parts_->parents[page];
-        if (parent == PageDirectory::Parts::kNoPage || !isThere(parent)) return {};
-        return eachChild(directory_[parent], [&](uint64_t child, uint32_t octant) -> Result<void> {
-            if (child == page && !isChildAt(directory_[page], directory_[parent], octant)) return brokenEntry(file_, page, "child pages do not match");
+        const uint32_t after = directory_.parts_->afterParents[page];
+        if (after == PageDirectory::Parts::kNoPage || !isThere(after - 1)) return {};
+        const PageEntry& parent = directory_[after - 1];
+        return eachChild(parent, [&](uint64_t child, uint32_t octant) -> Result<void> {
+            if (child == page && !isChildAt(directory_[page], parent, octant)) return brokenEntry(file_, page, "child pages do not match");
             return {};
         });
     }
@@ -360,30 +391,43 @@ Result<FileHeader> readHeader(const ByteReader& reader) {
     return header;
 }
 
-/// `directory`: its bytes where all of them are there, else nothing.
-Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header, std::span<const std::byte> directory) {
+/// `directoryHash`: of its bytes, where all of them are there.
+Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header, std::optional<uint64_t> directoryHash) {
     CommitRecord commit;
     const uint64_t offset = reader.size() - sizeof commit;
     VCP_TRY(reader.read(offset, std::as_writable_bytes(std::span(&commit, 1))));
     if (std::memcmp(commit.magic, CommitRecord{}.magic, 8) != 0 || commit.fileBytes != reader.size() || commit.headerHash != header.hash ||
-        (!directory.empty() && commit.directoryHash != hashBytes(directory)) ||
+        (directoryHash && commit.directoryHash != *directoryHash) ||
         commit.hash != hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash))))
         return broken(reader, "commit record", offset, "does not match the file: it was not finished, changed or damaged");
     return {};
 }
 
+/// Takes over the entries of blocks that follow what is there, each checked against its hash.
+Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<const std::byte> blocks) {
+    for (uint64_t from = 0; from < blocks.size(); from += kBlockBytes) {
+        const std::span block = blocks.subspan(from, kBlockBytes);
+        const uint64_t first = dataset.pages.size(), count = std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - first);
+        VCP_TRY(checkBlockHash(file, first / kEntriesPerBlock, block));
+        for (uint64_t i = 0; i < count; ++i) {
+            PageEntry entry;
+            std::memcpy(&entry, block.data() + i * sizeof entry, sizeof entry);
+            dataset.pages.push_back(entry);
+        }
+    }
+    return {};
+}
+
+/// A file that only claims to have so many pages ends at the first block that does not match its hash.
 Result<Dataset> readWhole(const ByteReader& reader, const FileHeader& header) {
     Dataset dataset{header, {}};
-    std::vector<std::byte> directory(blocksOf(header.pages) * kBlockBytes);
-    VCP_TRY(reader.read(kDirectoryOffset, directory));
-    dataset.pages.resize(header.pages);
-    for (uint64_t b = 0; b < dataset.pages.blocks(); ++b) {
-        const std::span block = std::span(directory).subspan(b * kBlockBytes, kBlockBytes);
-        VCP_TRY(checkBlockHash(reader.name(), b, block));
-        const uint64_t count = std::min<uint64_t>(kEntriesPerBlock, header.pages - b * kEntriesPerBlock);
-        std::memcpy(&dataset.pages[b * kEntriesPerBlock], block.data(), count * sizeof(PageEntry));
-    }
-    VCP_TRY(checkCommitRecord(reader, header, directory));
+    XXH3_state_t hash;
+    XXH3_64bits_reset(&hash);
+    VCP_TRY(readInPieces(reader, kDirectoryOffset, blocksOf(header.pages) * kBlockBytes, [&](std::span<const std::byte> piece) {
+        XXH3_64bits_update(&hash, piece.data(), piece.size());
+        return appendBlocks(dataset, reader.name(), piece);
+    }));
+    VCP_TRY(checkCommitRecord(reader, header, XXH3_64bits_digest(&hash)));
     VCP_TRY(checkDirectory(reader.name(), dataset));
     return dataset;
 }
@@ -404,7 +448,11 @@ Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes) {
     std::vector<std::byte> lead(leadBytes - kDirectoryOffset);
     VCP_TRY(reader.read(kDirectoryOffset, lead));
     VCP_TRY(checkCommitRecord(reader, *header, {}));
-    dataset.pages.expect(header->pages);
+    try {
+        dataset.pages.expect(header->pages);
+    } catch (const std::bad_alloc&) {
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("a directory of {} pages needs more addresses than this process may have", header->pages), .file = reader.name()};
+    }
     for (uint64_t b = 0; b < lead.size() / kBlockBytes; ++b) VCP_TRY(admitBlock(dataset, reader.name(), b, std::span(lead).subspan(b * kBlockBytes, kBlockBytes)));
     return dataset;
 }

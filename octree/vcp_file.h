@@ -29,6 +29,7 @@
 #include "octree/page.h"
 #include "octree/paper_page.h"
 #include "octree/result.h"
+#include "octree/sparse_array.h"
 
 namespace vcp {
 
@@ -146,7 +147,7 @@ static_assert(sizeof(CommitRecord) == 64);
 
 /// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those of
 /// some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any thread may
-/// read it; the entry of a page that is not known must not be read.
+/// read it; the entry of a page that is not known must not be read. Entries that are not known take no memory.
 class PageDirectory {
 public:
     PageDirectory();
@@ -156,17 +157,18 @@ public:
     PageDirectory& operator=(PageDirectory&& other) noexcept;
     ~PageDirectory();
 
-    [[nodiscard]] size_t size() const { return entries_.size(); }
-    [[nodiscard]] bool empty() const { return entries_.empty(); }
-    [[nodiscard]] const PageEntry& operator[](size_t page) const { return entries_[page]; }
-    [[nodiscard]] PageEntry& operator[](size_t page) { return entries_[page]; }
-    [[nodiscard]] auto begin() const { return entries_.cbegin(); }
-    [[nodiscard]] auto end() const { return entries_.cend(); }
-    [[nodiscard]] const PageEntry* data() const { return entries_.data(); }
+    [[nodiscard]] size_t size() const { return parts_ ? sparse_.size() : entries_.size(); }
+    [[nodiscard]] bool empty() const { return size() == 0; }
+    [[nodiscard]] const PageEntry& operator[](size_t page) const { return data()[page]; }
+    [[nodiscard]] PageEntry& operator[](size_t page) { return parts_ ? sparse_[page] : entries_[page]; }
+    [[nodiscard]] const PageEntry* begin() const { return data(); }
+    [[nodiscard]] const PageEntry* end() const { return data() + size(); }
+    [[nodiscard]] const PageEntry* data() const { return parts_ ? sparse_.data() : entries_.data(); }
+    /// Of a directory that is known as a whole.
     void push_back(const PageEntry& entry) { entries_.push_back(entry); }
     void resize(size_t pages) { entries_.resize(pages); }
 
-    /// So many pages, none of them known.
+    /// So many pages, none of them known. Throws std::bad_alloc where there are no addresses for them.
     void expect(size_t pages);
     [[nodiscard]] bool knows(uint64_t page) const { return !parts_ || knowsBlock(page / kEntriesPerBlock); }
     [[nodiscard]] bool knowsBlock(uint64_t block) const;
@@ -176,8 +178,9 @@ public:
 private:
     friend class BlockAdmission;
     struct Parts;
-    mutable std::vector<PageEntry> entries_;
-    std::unique_ptr<Parts> parts_;  // nothing: all is known
+    std::vector<PageEntry> entries_;         // where all is known
+    mutable SparseArray<PageEntry> sparse_;  // where it comes in parts
+    std::unique_ptr<Parts> parts_;           // nothing: all is known
 };
 
 /// Header and directory of a .vcp file, checked. Copy it, share it, read from any thread.
@@ -211,15 +214,15 @@ public:
 /// Opens a local file for bounded reads (pread). Errors: Io.
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 
-/// Reads and checks header, directory and commit record; no page. Errors: InvalidInput, Unsupported (version, method), Io;
-/// each names the file and the byte.
+/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header claims.
+/// Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
 inline constexpr uint64_t kLeadBytes = 64 << 10;
 
 /// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so that
 /// what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of kBlockBytes,
-/// more than kDirectoryOffset.
+/// more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many pages.
 Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
 constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
 

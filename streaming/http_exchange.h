@@ -12,6 +12,7 @@
 
 #include "octree/result.h"
 #include "streaming/http_reader.h"
+#include "streaming/web_address.h"
 
 namespace vcp {
 
@@ -42,10 +43,14 @@ std::vector<BodyPart> parseBodyParts(std::span<const std::byte> body, std::strin
 /// What the server answered, after all redirects.
 struct HttpAnswer {
     long status = 0;
-    std::string url;  ///< that answered
-    std::string range, type, coding, entityTag, lastModified;  ///< header fields; empty where there are none
+    std::string range, type, coding, entityTag, lastModified, location;  ///< header fields; empty where there are none
     std::vector<std::byte> body;
 };
+
+/// The text of a header field for a message: its beginning, where it is long.
+std::string quoted(const std::string& field);
+
+inline constexpr int kMostRedirects = 5;
 
 /// A connection, kept alive between requests. One thread at a time.
 class HttpConnection {
@@ -57,13 +62,23 @@ public:
 
     /// Sends GET with `Range: bytes=RANGES` and `condition` (a header line, may be empty). At most `most` bytes
     /// of body are taken: a longer one is an error, and so is one shorter than announced. The body of an
-    /// answer other than 206 is not read. Stops when `epoch` changes. Errors: Io, InvalidInput (TLS,
-    /// redirects), Cancelled; the message only.
-    Result<HttpAnswer> get(const std::string& url, const std::string& ranges, const std::string& condition, uint64_t most,
-                           const std::atomic<uint64_t>& epoch);
+    /// answer other than 206 is not read, but for up to 16 KiB of a redirect's. Header lines of all answers together
+    /// have at most options.headerBytes; all of it takes no longer than ExchangePace allows. Ends within some 50 ms
+    /// where `epoch` changes or options.cancelled says so. User and password go to the address's origin only. Memory:
+    /// what has come. Errors: Io, InvalidInput (TLS, redirects, headers), Cancelled; the message only.
+    Result<HttpAnswer> get(const WebAddress& address, const std::string& ranges, const std::string& condition,
+                           uint64_t most, const std::atomic<uint64_t>& epoch);
 
 private:
-    void* curl_;
+    struct Exchange;
+    static size_t onHeader(char* data, size_t, size_t bytes, void* user);
+    static size_t onBody(char* data, size_t, size_t bytes, void* user);
+    void prepare(const WebAddress& address, const std::string& ranges, bool mayBePlain, Exchange& exchange);
+    Result<void> transfer(Exchange& exchange);
+    Result<void> perform(Exchange& exchange, const char* detail);
+
+    void* curl_ = nullptr;
+    void* multi_ = nullptr;
     HttpOptions options_;
 };
 

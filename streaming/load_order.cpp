@@ -58,10 +58,12 @@ std::optional<LoadOrder> loadOrderNamed(std::string_view name) {
 
 std::string_view nameOf(LoadOrder order) { return kNames[static_cast<size_t>(order)]; }
 
-LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::vector<uint64_t> pageUnits, LoadOrder order)
-    : dataset_(std::move(dataset)), pageUnits_(std::move(pageUnits)), parents_(dataset_->pages.size(), 0), order_(order) {
-    for (uint64_t page = 0; page < pageUnits_.size(); ++page)
-        if (pageUnits_[page] != 0) learn(page, pageUnits_[page]);
+LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits, LoadOrder order)
+    : dataset_(std::move(dataset)), pageUnits_(pageUnits.size()), parents_(dataset_->pages.size()), order_(order) {
+    for (uint64_t page = 0; page < pageUnits.size(); ++page) {
+        if (!dataset_->pages.knows(page)) page += kEntriesPerBlock - 1 - page % kEntriesPerBlock;  // nor is any other of its block
+        else if (pageUnits[page] != 0) learn(page, pageUnits[page]);
+    }
 }
 
 void LoadPriorities::learn(uint64_t page, uint64_t units) {
@@ -157,7 +159,7 @@ std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing,
 uint64_t LoadPriorities::bytesHeld() const {
     constexpr uint64_t kEntry = 4 * sizeof(void*);
     const auto bytesOf = [](const auto& map) { return map.bucket_count() * sizeof(void*) + map.size() * kEntry; };
-    return pageUnits_.capacity() * sizeof(pageUnits_[0]) + parents_.capacity() * sizeof(parents_[0]) + bytesOf(gains_) + bytesOf(nearness_);
+    return pageUnits_.bytes() + parents_.bytes() + bytesOf(gains_) + bytesOf(nearness_);
 }
 
 }  // namespace vcp

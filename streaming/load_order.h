@@ -62,8 +62,8 @@ struct RayFeedback {
 
 class LoadPriorities {
 public:
-    /// `pageUnits[i]`: what page i takes of the pool; 0 where its entry is not known yet.
-    LoadPriorities(std::shared_ptr<const Dataset> dataset, std::vector<uint64_t> pageUnits, LoadOrder order);
+    /// `pageUnits[i]`: what page i takes of the pool; 0 where its entry is not known yet. Only those of known entries are read.
+    LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits, LoadOrder order);
 
     [[nodiscard]] LoadOrder order() const { return order_; }
     void setOrder(LoadOrder order) { order_ = order; }
@@ -91,8 +91,8 @@ private:
     [[nodiscard]] double nearnessOf(uint64_t page) const;
 
     std::shared_ptr<const Dataset> dataset_;
-    std::vector<uint64_t> pageUnits_;
-    std::vector<uint32_t> parents_;  // the root's is itself
+    SparseArray<uint64_t> pageUnits_;
+    SparseArray<uint32_t> parents_;  // the root's is itself
     LoadOrder order_;
     std::unordered_map<uint64_t, double> gains_, nearness_;  // by the page that is refined
 };

@@ -76,10 +76,10 @@ struct ChildrenBytes {
     bool areKnown = true;
 };
 /// Of children that are not known: about as large as their parent.
-ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
+ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<const uint64_t> pageBytes) {
     ChildrenBytes sum;
     for (const uint64_t child : childrenOf(parent)) {
-        const bool isKnown = states[child] != kUnknown;
+        const bool isKnown = pageBytes[child] != 0;
         sum.bytes += isKnown ? pageBytes[child] : parentBytes;
         sum.areKnown = sum.areKnown && isKnown;
     }
@@ -91,7 +91,7 @@ ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<c
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
                        std::span<const uint8_t> states) {
     PageChoice choice;
-    choice.refined.assign(dataset.pages.size(), kNotRefined);
+    choice.refined = SparseArray<uint8_t>(dataset.pages.size());  // kNotRefined
     if (dataset.pages.empty() || states[0] != kAvailable || pageBytes[0] > budgetBytes) return choice;
     std::priority_queue<Candidate> open;
     uint64_t bytes = pageBytes[0];
@@ -103,7 +103,7 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
         if (next.error <= 0) break;
         const PageEntry& entry = dataset.pages[next.page];
         if (!mayBeRefined(entry, states)) continue;
-        const ChildrenBytes more = bytesOf(entry, pageBytes[next.page], pageBytes, states);
+        const ChildrenBytes more = bytesOf(entry, pageBytes[next.page], pageBytes);
         if (!more.areKnown) {
             choice.awaited.push_back(next.page);
             choice.refined[next.page] = kAwaited;

@@ -49,7 +49,6 @@ struct WantedPage {
 enum PageState : uint8_t {
     kAvailable,
     kUnavailable,  ///< it cannot be read: its parent is drawn in its place
-    kUnknown,      ///< its entry is not known yet
 };
 /// Whether a choice replaces a page by its children.
 enum Refinement : uint8_t {
@@ -63,12 +62,12 @@ struct PageChoice {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
     std::vector<uint64_t> awaited; ///< pages that would be refined next, were their children known; most urgent first
-    std::vector<uint8_t> refined;  ///< a Refinement for each page of the dataset
+    SparseArray<uint8_t> refined;  ///< a Refinement for each page of the dataset
     bool relaxed = false;          ///< the budget kept a page from being refined
 };
 
-/// `pageBytes[i]`: what page i takes of the budget (any unit). `states[i]`: a PageState. Both have one element a page of
-/// the dataset.
+/// `pageBytes[i]`: what page i takes of the budget (any unit); 0: its entry is not known yet. `states[i]`: a PageState. Both have
+/// one element a page of the dataset.
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
                        std::span<const uint8_t> states);
 

@@ -48,9 +48,9 @@ std::optional<SelectionView> aheadOf(const SelectionView& view, const SelectionV
 bool isWhole(const Dataset& dataset) { return dataset.pages.blocksKnown() == dataset.pages.blocks(); }
 
 /// Nothing but zeros where the directory comes in parts: look() learns what there is.
-std::vector<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
-    std::vector<uint64_t> units(dataset.pages.size(), 0);
-    if (isWhole(dataset)) std::transform(dataset.pages.begin(), dataset.pages.end(), units.begin(), [&](const PageEntry& page) { return pageUnits(page, withColour); });
+SparseArray<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
+    SparseArray<uint64_t> units(dataset.pages.size());
+    if (isWhole(dataset)) std::transform(dataset.pages.begin(), dataset.pages.end(), units.data(), [&](const PageEntry& page) { return pageUnits(page, withColour); });
     return units;
 }
 
@@ -82,17 +82,18 @@ ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool wi
       priorities_(dataset_, pageUnits_, order) {
     pool_ = pool;
     const size_t pages = dataset_->pages.size();
-    resident_.assign(pages, 0);
-    states_.assign(pages, kAvailable);
+    resident_ = SparseArray<uint8_t>(pages);
+    states_ = SparseArray<uint8_t>(pages);
+    loadedIn_ = SparseArray<uint64_t>(pages);
+    ranks_ = SparseArray<Rank>(pages);
     withColour_ = withColour;
-    if (!isWhole(*dataset_)) {
-        blocksSeen_.assign(dataset_->pages.blocks(), 0);
-        states_.assign(pages, kUnknown);
+    if (isWhole(*dataset_)) {
+        if (pages > 0) largestUnits_ = *std::max_element(pageUnits_.data(), pageUnits_.data() + pages);
+    } else {
+        blocksSeen_ = SparseArray<uint8_t>(dataset_->pages.blocks());
         learnBlocks();
     }
     planFor(pool);
-    loadedIn_.assign(pages, 0);
-    ranks_.assign(pages, Rank::Stale);
 }
 
 /// Takes over what is known of the directory since the last time.
@@ -106,8 +107,9 @@ void ResidencyPolicy::learnBlocks() {
         const uint64_t first = block * kEntriesPerBlock, end = std::min<uint64_t>(first + kEntriesPerBlock, pages.size());
         for (uint64_t page = first; page < end; ++page) {
             pageUnits_[page] = pageUnits(pages[page], withColour_);
+            largestUnits_ = std::max(largestUnits_, pageUnits_[page]);
             priorities_.learn(page, pageUnits_[page]);
-            states_[page] = kAvailable;
+            if (states_[page] != kAvailable) states_[page] = kAvailable;
         }
     }
     stale_ = true;
@@ -118,8 +120,7 @@ void ResidencyPolicy::learnBlocks() {
 
 void ResidencyPolicy::planFor(PoolShape pool) {
     pool_ = pool;
-    const uint64_t largest = pageUnits_.empty() ? 1 : *std::max_element(pageUnits_.begin(), pageUnits_.end());
-    const uint64_t unusable = unusableUnits(pool, largest);
+    const uint64_t unusable = unusableUnits(pool, largestUnits_);
     planned_ = pool.units > unusable ? pool.units - unusable : 0;
 }
 
@@ -161,8 +162,9 @@ void ResidencyPolicy::choose() {
         views_.push_back(motion.view);
         later.push_back(motion.later.value_or(motion.view));
     }
+    for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Stale;
+    for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Stale;
     choice_ = choosePages(*dataset_, views_, planned_, pageUnits_, states_);
-    std::fill(ranks_.begin(), ranks_.end(), Rank::Stale);
     ahead_ = {};
     if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, states_);
     for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Ahead;
@@ -251,7 +253,7 @@ bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove
 
 Placement ResidencyPolicy::place(uint64_t page) {
     Placement placement;
-    if (isResident(page) || states_[page] != kAvailable) return placement;
+    if (isResident(page) || states_[page] != kAvailable || pageUnits_[page] == 0) return placement;
     const uint64_t units = pageUnits_[page];
     const Rank rank = rankOf(page);
     placement.slot = allocator_.allocate(units);
@@ -357,15 +359,15 @@ bool ResidencyPolicy::giveUp(uint64_t page) {
 uint64_t ResidencyPolicy::bytesHeld() const {
     constexpr uint64_t kNode = 4 * sizeof(void*);  // of a map, beside its value
     const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-    uint64_t bytes = bytesOf(pageUnits_) + bytesOf(resident_) + bytesOf(states_) + bytesOf(blocksSeen_) + bytesOf(loadedIn_) + bytesOf(views_) + bytesOf(ahead_.wanted) + bytesOf(ahead_.refined) + bytesOf(ranks_);
-    bytes += bytesOf(choice_.wanted) + bytesOf(choice_.refined) + priorities_.bytesHeld() + allocator_.bytesHeld();
+    uint64_t bytes = pageUnits_.bytes() + resident_.bytes() + states_.bytes() + blocksSeen_.bytes() + loadedIn_.bytes() + bytesOf(views_) + bytesOf(ahead_.wanted) + ahead_.refined.bytes() + ranks_.bytes();
+    bytes += bytesOf(choice_.wanted) + choice_.refined.bytes() + priorities_.bytesHeld() + allocator_.bytesHeld();
     bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);
 }
 
 void ResidencyPolicy::restore(uint64_t page) {
     const std::span<uint8_t> states = statesOf(page);
-    std::fill(states.begin(), states.end(), uint8_t{isBlock(page) ? kUnknown : kAvailable});
+    std::fill(states.begin(), states.end(), uint8_t{kAvailable});
     stale_ = true;
 }
 

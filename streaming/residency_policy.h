@@ -120,7 +120,7 @@ public:
     [[nodiscard]] bool isMoving() const { return moving_; }
     /// Counts up with all that can change a cut or a page's place.
     [[nodiscard]] uint64_t version() const { return version_; }
-    /// Memory that this takes, near enough: bounded by the dataset, whatever the number of rounds.
+    /// Memory that this takes at most, near enough: bounded by the dataset, whatever the number of rounds.
     [[nodiscard]] uint64_t bytesHeld() const;
 
     [[nodiscard]] bool isResident(uint64_t page) const { return resident_[page] != 0; }
@@ -170,7 +170,8 @@ private:
 
     std::shared_ptr<const Dataset> dataset_;
     SlotAllocator allocator_;
-    std::vector<uint64_t> pageUnits_;
+    SparseArray<uint64_t> pageUnits_;  // 0: its entry is not known yet
+    uint64_t largestUnits_ = 1;  // of pageUnits_
     bool withColour_ = false;
     LoadPriorities priorities_;
     PoolShape pool_;
@@ -178,17 +179,17 @@ private:
     std::map<uint64_t, Resident> slots_;
     std::map<uint64_t, uint64_t> pageAt_;  // by the slot's first unit
     std::optional<std::priority_queue<Evictable>> evictable_;  // of this round, once one had to go; some may have gone
-    std::vector<uint8_t> resident_;
-    std::vector<uint8_t> states_;       // PageState
-    std::vector<uint8_t> blocksSeen_;   // of the directory; empty: all
+    SparseArray<uint8_t> resident_;
+    SparseArray<uint8_t> states_;       // PageState
+    SparseArray<uint8_t> blocksSeen_;   // of the directory; empty: all
     uint64_t blocksKnown_ = 0;          // of these, seen
-    std::vector<uint64_t> loadedIn_;  // the still view that a page was last placed in: its stillSince_
+    SparseArray<uint64_t> loadedIn_;  // the still view that a page was last placed in: its stillSince_
 
     std::map<ViewNumber, Motion> motions_;
     std::vector<SelectionView> views_;  // of motions_
     PageChoice choice_;
     PageChoice ahead_;  // of where views will be, while they move
-    std::vector<Rank> ranks_;
+    SparseArray<Rank> ranks_;
     bool moving_ = false, stale_ = true, emptied_ = false;
     double seconds_ = 0;
     uint64_t round_ = 0, stillSince_ = 0, version_ = 0;

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "builder/build.h"
+#include "streaming/web_address.h"
 #include "viewer/analytic_models.h"
 #include "viewer/bench_folder.h"
 #include "viewer/build_settings.h"
@@ -86,7 +87,7 @@ private:
         if (!open) return open.error();
         StressOptions run = o_.run;
         run.openSeconds = std::chrono::duration<double>(Clock::now() - start).count();
-        run.name = open->isRemote ? file : std::filesystem::path(file).filename().string();
+        run.name = open->isRemote ? shownAddress(file) : std::filesystem::path(file).filename().string();
         run.path = path;
         run.renderer.budgetBytes = budget;
         run.renderer.loaderThreads = open->loaderThreads();

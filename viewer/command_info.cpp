@@ -3,6 +3,7 @@
 
 #include "octree/vcp_file.h"
 #include "viewer/commands.h"
+#include "viewer/interrupt.h"
 #include "viewer/option_values.h"
 #include "viewer/source_settings.h"
 
@@ -108,14 +109,15 @@ std::string summary(const std::string& file, const Dataset& dataset) {
 }
 
 Result<int> run(const InfoCommand& command) {
+    const InterruptScope catching;
     const auto reader = openReader(command.file, command.source);
     if (!reader) return reader.error();
     const auto dataset = readDataset(**reader);
     if (!dataset) return dataset.error();
     if (command.report.json)
-        VCP_TRY(printJson(toJson(command.file, *dataset)));
+        VCP_TRY(printJson(toJson((*reader)->name(), *dataset)));
     else
-        VCP_TRY(printLine(summary(command.file, *dataset)));
+        VCP_TRY(printLine(summary((*reader)->name(), *dataset)));
     return 0;
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "streaming/web_address.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/motion_bench.h"
@@ -49,7 +50,7 @@ Result<void> writeReport(const StressCommand& command, const StressReport& repor
 
 StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) {
     StressOptions options;
-    options.name = std::filesystem::path(command.file).filename().string();
+    options.name = std::filesystem::path(shownAddress(command.file)).filename().string();
     options.path = command.path;
     options.faults = parseFaults(command.faults).value();
     options.faults.seed = command.seed;

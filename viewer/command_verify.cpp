@@ -137,7 +137,7 @@ Result<int> run(const VerifyCommand& command) {
     if (!dataset) return broken(command, dataset.error());
 
     Json json = {{"ok", true}, {"pages", dataset->header.pages}, {"bytes", dataset->header.fileBytes}};
-    std::string text = fmt::format("{}: intact, {} subvolumes, {}", command.file, formatCount(dataset->header.pages),
+    std::string text = fmt::format("{}: intact, {} subvolumes, {}", ahead.name(), formatCount(dataset->header.pages),
                                    formatBytes(dataset->header.fileBytes));
     bool within = true;
     std::optional<SurfaceDistance> distance;

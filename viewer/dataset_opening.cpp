@@ -4,17 +4,18 @@
 
 #include <fmt/format.h>
 
+#include "streaming/web_address.h"
 #include "viewer/interrupt.h"
 
 namespace vcp {
 
 std::string nameOf(const std::vector<std::string>& inputs) {
     if (inputs.empty()) return {};
-    std::string first = std::filesystem::path(inputs.front()).filename().string();
+    std::string first = std::filesystem::path(shownAddress(inputs.front())).filename().string();
     return inputs.size() == 1 ? first : fmt::format("{} and {} more", first, inputs.size() - 1);
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source,
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source,
                               const std::function<bool(const BuildProgress&)>& progress) {
     const auto kind = kindOf(inputs);
     if (!kind) return kind.error();
@@ -44,7 +45,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     return scene;
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress) {
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source, ProgressStyle progress) {
     ProgressDisplay display(progress, stderr);
     const InterruptScope catching;
     return openScene(inputs, build, source, [&](const BuildProgress& at) {
@@ -53,8 +54,9 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     });
 }
 
-DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style)
-    : inputs_(std::move(inputs)), build_(std::move(build)), source_(std::move(source)), style_(style) {
+DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, ProgressStyle style)
+    : inputs_(std::move(inputs)), build_(std::move(build)), source_(source), style_(style) {
+    source_.cancelled = [token = cancelled_, others = source.cancelled] { return *token || (others && others()); };
     thread_ = std::thread([this] {
         opened_ = open();
         done_ = true;
@@ -62,7 +64,8 @@ DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings bu
 }
 
 DatasetOpening::~DatasetOpening() {
-    cancel();
+    // What was opened lives on.
+    if (!done_) cancel();
     thread_.join();
 }
 
@@ -79,7 +82,7 @@ Result<OpenedScene> DatasetOpening::open() {
         display.update(at.stage, at.fraction, detailsOf(at));
         const std::lock_guard lock(mutex_);
         progress_ = {at.stage, at.fraction, at.triangles};
-        return !cancelled_ && !interrupted();
+        return !*cancelled_ && !interrupted();
     });
 }
 

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,23 +12,23 @@
 
 #include "viewer/build_settings.h"
 #include "viewer/opened_scene.h"
-#include "viewer/source_settings.h"
+#include "viewer/progress_display.h"
 
 namespace vcp {
 
-/// "statue.ply", or "statue.ply and 2 more".
+/// "statue.ply", or "statue.ply and 2 more"; of addresses no user and password.
 std::string nameOf(const std::vector<std::string>& inputs);
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
 /// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. Any thread. Errors:
 /// Usage (.vcp files among meshes); those of readScene, MeshCache and openDataset.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source,
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source,
                               const std::function<bool(const BuildProgress&)>& progress);
 
 /// The same with progress on stderr, cancelled by Ctrl-C.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress);
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source, ProgressStyle progress);
 
-/// One thread may call; destroying it cancels and waits for the build to notice.
+/// One thread may call; destroying it before it is done cancels and waits for the build, or the exchange with a server, to notice.
 class DatasetOpening {
 public:
     struct Progress {
@@ -37,14 +38,14 @@ public:
     };
 
     /// `inputs`: as openScene takes them. `style`: told on stderr as well.
-    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style);
+    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, ProgressStyle style);
     ~DatasetOpening();
     DatasetOpening(const DatasetOpening&) = delete;
     DatasetOpening& operator=(const DatasetOpening&) = delete;
 
     [[nodiscard]] const std::vector<std::string>& inputs() const { return inputs_; }
     [[nodiscard]] Progress progress() const;
-    void cancel() { cancelled_ = true; }
+    void cancel() { *cancelled_ = true; }
     [[nodiscard]] bool isDone() const { return done_; }
     /// Once, when it is done. Errors: those of openScene; Cancelled.
     Result<OpenedScene> take();
@@ -54,9 +55,10 @@ private:
 
     std::vector<std::string> inputs_;
     BuildSettings build_;
-    SourceSettings source_;
+    SourceAccess source_;
     ProgressStyle style_;
-    std::atomic<bool> cancelled_ = false, done_ = false;
+    const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);  // readers ask it, which live longer
+    std::atomic<bool> done_ = false;
     mutable std::mutex mutex_;
     Progress progress_;                         // guarded by mutex_
     std::optional<Result<OpenedScene>> opened_;  // of the thread until done_

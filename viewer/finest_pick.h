@@ -22,6 +22,8 @@ public:
     /// server, so it may take long. One thread at a time. Errors: those of readPage.
     Result<std::optional<RayHit>> cast(Ray ray, std::span<const SectionPlane> sections = {});
     [[nodiscard]] uint64_t bytesKept() const { return pages_.bytes(); }
+    /// Ends a cast that reads from a server soon, with Cancelled. Any thread.
+    void interrupt() const { reader_->interrupt(); }
     void forget() { pages_ = PageCache(reader_, pages_.dataset()); }
 
 private:
@@ -40,6 +42,10 @@ public:
         parts_.push_back({FinestPick(std::move(reader), dataset), placement});
     }
     Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {});
+    /// As that of each. The read that is under way ends; another may follow.
+    void interrupt() const {
+        for (const Part& part : parts_) part.pick.interrupt();
+    }
 
 private:
     struct Part {

@@ -1,11 +1,11 @@
-// Ctrl-C during a long task: the first one asks it to stop and clean up, the second one ends the process.
+// Ctrl-C during a long task, or the terminal's end: the first one asks it to stop and clean up, the second one ends the process.
 #pragma once
 
 #include <csignal>
 
 namespace vcp {
 
-/// Takes SIGINT and SIGTERM while it lives, then gives them back. One at a time.
+/// Takes SIGINT, SIGTERM and, unless it is ignored as by nohup, SIGHUP while it lives, then gives them back. One at a time.
 class InterruptScope {
 public:
     InterruptScope();
@@ -16,6 +16,7 @@ public:
 private:
     struct sigaction interrupt_ {};
     struct sigaction terminate_ {};
+    struct sigaction hangUp_ {};
 };
 
 /// True once a signal came within a scope. Any thread.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "streaming/web_address.h"
 #include "viewer/commands.h"
 
 namespace vcp {
@@ -14,8 +15,9 @@ namespace {
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
-/// One line on stderr, whatever the message contains.
-void complain(std::string message) {
+/// One line on stderr, whatever the message contains; what was typed wrongly may be an address with a password.
+void complain(const std::string& what) {
+    std::string message = shownAddress(what);
     std::replace(message.begin(), message.end(), '\n', ' ');
     std::fprintf(stderr, "vcp: %s\n", message.c_str());
 }

@@ -13,6 +13,7 @@ Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, c
     }
     HttpOptions options;
     options.caFile = access.caFile;
+    options.cancelled = access.cancelled;
     auto http = HttpReader::open(where, options);
     if (!http) return http.error();
     if (access.cache.empty()) return std::shared_ptr<const ByteReader>(*http);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -17,6 +18,9 @@ struct SourceAccess {
     std::string caFile;  ///< PEM; empty: the system's
     std::string cache;   ///< folder that keeps what a server sends; empty: nothing is kept
     uint64_t cacheBytes = 4ull << 30;  ///< limit of that folder
+    /// Ends what a server is asked for, within some 50 ms, once it says so: while a dataset is opened, and in its later reads. Any
+    /// thread asks.
+    std::function<bool()> cancelled = {};
 };
 
 /// Opens a path or an http(s) address, through the cache where one is asked for. Errors: those of openFile,

@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "streaming/web_address.h"
+
 namespace vcp {
 
 Box OpenedScene::bounds() const {
@@ -31,7 +33,7 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std
     if (!surfaces) return surfaces.error();
     scene.surfaces = *std::move(surfaces);
     const Box all = scene.bounds();
-    if (!std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", name};
+    if (!std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", shownAddress(name)};
     return scene;
 }
 

@@ -1,5 +1,6 @@
 #include "viewer/source_settings.h"
 
+#include "viewer/interrupt.h"
 #include "viewer/option_values.h"
 
 namespace vcp {
@@ -15,6 +16,6 @@ void addSourceSettings(CLI::App& app, SourceSettings& settings) {
         ->check([](const std::string& text) { return parseBytes(text) ? std::string() : "must be like 512M or 4G, not \"" + text + "\""; });
 }
 
-SourceSettings::operator SourceAccess() const { return {caFile, cache, *parseBytes(cacheLimit)}; }
+SourceSettings::operator SourceAccess() const { return {caFile, cache, *parseBytes(cacheLimit), interrupted}; }
 
 }  // namespace vcp

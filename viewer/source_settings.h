@@ -13,6 +13,7 @@ struct SourceSettings {
     std::string cache;
     std::string cacheLimit = "4G";
 
+    /// Cancelled by the signals of an InterruptScope (interrupt.h).
     operator SourceAccess() const;
 };
 

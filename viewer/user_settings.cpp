@@ -16,7 +16,7 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include "streaming/http_reader.h"
+#include "streaming/web_address.h"
 
 namespace vcp {
 
@@ -70,7 +70,7 @@ void readBookmarks(const Json& json, UserSettings& settings) {
         for (const auto& [number, camera] : views.items()) {
             const auto read = cameraFromJson(camera.dump(), file);
             if (read && number.size() == 1 && number[0] >= '1' && number[0] <= '9')
-                settings.bookmarks[file][number[0] - '0'] = *read;
+                settings.bookmarks[addressWithoutUser(file)][number[0] - '0'] = *read;
         }
     }
 }
@@ -81,7 +81,7 @@ UserSettings settingsFrom(const Json& json) {
     if (const Json* recent = fields.find("recent"); recent && recent->is_array())
         for (const Json& each : *recent)
             if (each.is_string() && settings.recent.size() < UserSettings::kMostRecent)
-                settings.recent.push_back(each.get<std::string>());
+                settings.recent.push_back(addressWithoutUser(each.get<std::string>()));
     if (const Json* bookmarks = fields.find("bookmarks"); bookmarks && bookmarks->is_object())
         readBookmarks(*bookmarks, settings);
     fields.number("width", settings.windowSize.x, 64, 16384);
@@ -104,8 +104,10 @@ void addRecent(Json& json, const std::vector<std::string>& opened) {
     if (!json.is_array()) json = Json::array();
     for (const std::string& name : opened) {
         Json recent = Json::array({name});
-        for (const Json& each : json)
-            if (each != Json(name) && recent.size() < UserSettings::kMostRecent) recent.push_back(each);
+        for (const Json& each : json) {
+            const Json kept = each.is_string() ? Json(addressWithoutUser(each.get<std::string>())) : each;
+            if (kept != Json(name) && recent.size() < UserSettings::kMostRecent) recent.push_back(kept);
+        }
         json = std::move(recent);
     }
 }
@@ -283,7 +285,7 @@ Result<fs::path> putAside(const fs::path& path) {
 }  // namespace
 
 std::string rememberedName(const std::string& input) {
-    if (isHttpUrl(input)) return input;
+    if (isHttpUrl(input)) return addressWithoutUser(input);
     std::error_code failed;
     const fs::path absolute = fs::absolute(input, failed);
     return failed ? input : absolute.lexically_normal().string();

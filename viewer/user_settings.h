@@ -23,7 +23,7 @@ struct UserSettings {
     static constexpr size_t kMostBookmarks = 9;
     static constexpr size_t kMostBookmarkedFiles = 50;
 
-    std::vector<std::string> recent;                              ///< absolute paths and addresses, the last one first
+    std::vector<std::string> recent;                              ///< absolute paths and addresses without passwords, the last one first
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< of a path or address; numbers 1 to 9
     glm::ivec2 windowSize{1280, 800};
     bool panel = false;
@@ -52,7 +52,7 @@ struct SettingsChanges {
     [[nodiscard]] bool empty() const;
 };
 
-/// What a file is remembered as: an address as it is, a path made absolute.
+/// What a file is remembered as: an address without user and password, a path made absolute.
 std::string rememberedName(const std::string& input);
 
 /// $XDG_CONFIG_HOME/vcp/view.json, else $HOME/.config/vcp/view.json. Errors: Io when neither is set.

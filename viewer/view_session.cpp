@@ -77,7 +77,13 @@ ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> 
 
 ViewSession::~ViewSession() {
     cancelSaving();
-    if (pick_.valid()) pick_.wait();
+    endPick();
+}
+
+/// A server may take long; a cast may be about to read again.
+void ViewSession::endPick() {
+    while (pick_.valid() && pick_.wait_for(std::chrono::milliseconds(10)) != std::future_status::ready) finest_->interrupt();
+    pick_ = {};
 }
 
 void ViewSession::open(std::vector<std::string> inputs) {
@@ -131,7 +137,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         hasSceneLight_ = open.file.light.has_value();
     }
     cancelSaving();
-    if (pick_.valid()) pick_.wait(), pick_ = {};
+    endPick();
     measurement_.clear();
     finest_ = std::make_shared<ScenePick>();
     for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);

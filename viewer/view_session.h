@@ -130,6 +130,7 @@ private:
     void takeOpened();
     Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
+    void endPick();
     void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
     void beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence);
     void goOnSaving();

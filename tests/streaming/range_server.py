@@ -13,9 +13,18 @@ Query: fault=NAME, with
   ftp        redirects to another protocol                   gzip       Content-Encoding: gzip
   weak       a weak entity tag, Last-Modified as well        untagged   neither
   nomulti    the first of several ranges only
+  drip       the body by one byte in 20 ms                   dripheader the same of a header line
+  headers    header lines without end                        hints      answers of status 103 without end
+  claims     announces a body of 10^15 bytes                 moved      to the same file, with a page that never ends
+  heavy      to the same file, with a page of 10^12 bytes    missing    status 404 with a page that never ends
+  reset      breaks the connection within the header         escape     Content-Range with an escape sequence and 60000 letters
+  auth       status 401 unless user "user" and password "se/cret" come along
+  inside     to fault=auth of the same server                away       to fault=auth of another name of it
+What would never end does after 30 s. log=1: writes the file "asked" into the folder, at each request.
 after=K: the fault begins with the request after K good ones. Files are read anew for each request; the
 entity tag is made from time of change and size.
 """
+import base64
 import http.server
 import os
 import re
@@ -25,6 +34,8 @@ import time
 import urllib.parse
 
 BOUNDARY = "4d2f"
+MOST_SECONDS = 30
+LOGIN = "Basic " + base64.b64encode(b"user:se/cret").decode()
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
@@ -45,6 +56,48 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
+    def endlessly(self, piece, pause=0.0):
+        """Sends pieces until the client hangs up."""
+        end = time.monotonic() + MOST_SECONDS
+        while time.monotonic() < end:
+            self.wfile.write(piece)
+            time.sleep(pause)
+        self.close_connection = True
+
+    def send_broken(self, path, fault):
+        """Answers that are wrong before the file matters; False: it is none of these."""
+        start = b"HTTP/1.1 206 Partial Content\r\n"
+        to = ("Location: %s\r\n" % urllib.parse.urlsplit(self.path).path).encode()
+        if fault == "dripheader":
+            self.wfile.write(start + b"X-Slow: ")
+            self.endlessly(b"x", 0.02)
+        elif fault == "headers":
+            self.wfile.write(start)
+            self.endlessly(b"X-More: " + b"x" * 500 + b"\r\n")
+        elif fault == "hints":
+            self.endlessly(b"HTTP/1.1 103 Early Hints\r\nLink: </x>\r\n\r\n")
+        elif fault == "moved":
+            self.wfile.write(b"HTTP/1.1 302 Found\r\n" + to + b"Connection: close\r\n\r\n")
+            self.endlessly(b"moved ", 0.02)
+        elif fault == "heavy":
+            self.wfile.write(b"HTTP/1.1 302 Found\r\n" + to + b"Content-Length: 1000000000000\r\n\r\n")
+            self.endlessly(b"moved " * 1000)
+        elif fault == "missing":
+            self.wfile.write(b"HTTP/1.1 404 Not Found\r\nConnection: close\r\n\r\n")
+            self.endlessly(b"sorry ", 0.02)
+        elif fault == "reset":
+            self.wfile.write(start + b"Content-Ra")
+            self.close_connection = True
+        elif fault in ("inside", "away"):
+            host = "127.0.0.1" if fault == "inside" else "localhost"
+            to = "http://%s:%d/%s?fault=auth" % (host, self.server.server_address[1], os.path.basename(path))
+            self.answer(302, [("Location", to)], b"moved")
+        elif fault == "auth" and self.headers.get("Authorization") != LOGIN:
+            self.answer(401, [("WWW-Authenticate", "Basic")], b"who?")
+        else:
+            return False
+        return True
+
     def do_GET(self):
         address = urllib.parse.urlsplit(self.path)
         if address.path == "/count":
@@ -52,6 +105,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         Handler.count += 1
         query = urllib.parse.parse_qs(address.query)
         fault = query.get("fault", [""])[0]
+        if "log" in query:
+            with open(os.path.join(Handler.folder, "asked"), "w") as file:
+                file.write(self.path)
         seen = Handler.good.get(self.path, 0)
         Handler.good[self.path] = seen + 1
         if seen < int(query.get("after", ["0"])[0]) and fault not in ("weak", "untagged", "nomulti"):
@@ -64,7 +120,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if fault in ("redirect", "loop", "ftp"):
             to = {"redirect": address.path, "loop": self.path, "ftp": "ftp://127.0.0.1/x.vcp"}[fault]
             return self.answer(302, [("Location", to)], b"moved")
-        self.send_ranges(path, fault)
+        if not self.send_broken(path, fault):
+            self.send_ranges(path, fault)
 
     def send_ranges(self, path, fault):
         with open(path, "rb") as file:
@@ -104,7 +161,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def send_range(self, data, first, last, fields, fault):
         if fault == "shifted":
             first, last = first + 1, last + 1
-        if fault != "unnamed":
+        if fault == "escape":
+            fields = fields + [("Content-Range", "bytes \x1b]0;title\x07" + "x" * 60000)]
+        elif fault != "unnamed":
             fields = fields + [("Content-Range", "bytes %d-%d/%d" % (first, last, len(data)))]
         if fault == "gzip":
             fields = fields + [("Content-Encoding", "gzip")]
@@ -112,12 +171,21 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if fault == "long":
             return self.answer(206, fields, body + b"x")
         if fault == "silent":
-            time.sleep(30)
+            time.sleep(MOST_SECONDS)
+        if fault == "claims":
+            return self.answer(206, fields, body, 10**15)
+        if fault == "drip":
+            self.answer(206, fields, b"", len(body))
+            for byte in range(min(len(body), 50 * MOST_SECONDS)):
+                self.wfile.write(body[byte:byte + 1])
+                time.sleep(0.02)
+            self.close_connection = True
+            return None
         if fault in ("short", "stall"):
             self.answer(206, fields, body[:len(body) // 2], len(body))
             self.wfile.flush()
             if fault == "stall":
-                time.sleep(30)
+                time.sleep(MOST_SECONDS)
             self.close_connection = True
             return None
         return self.answer(206, fields, body)

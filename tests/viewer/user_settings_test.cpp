@@ -104,6 +104,21 @@ TEST_F(UserSettingsTest, NoJsonIsSaid) {
     }
 }
 
+TEST_F(UserSettingsTest, PasswordsAreNotRemembered) {
+    UserSettings settings;
+    settings.remember("https://user:secret@host/x.vcp?token=1");
+    EXPECT_EQ(settings.recent.front(), "https://host/x.vcp?token=1");
+    EXPECT_EQ(rememberedName("https://user:secret@host/x.vcp"), "https://host/x.vcp");
+    // Those of before go.
+    const std::string camera = cameraToJson(OrbitCamera{});
+    write(std::string(R"({"recent": ["https://user:secret@host/y.vcp"], "bookmarks": {"https://user:secret@host/y.vcp": {"1": )") + camera + "}}}");
+    const auto read = readUserSettings(file_);
+    ASSERT_TRUE(read) << read.error().line();
+    EXPECT_EQ(read->recent, std::vector<std::string>{"https://host/y.vcp"});
+    EXPECT_TRUE(read->bookmarks.contains("https://host/y.vcp"));
+    EXPECT_EQ(read->bookmarks.size(), 1u);
+}
+
 TEST_F(UserSettingsTest, RecentFilesAreDistinctAndFew) {
     UserSettings settings;
     SettingsChanges changes;

@@ -1,3 +1,4 @@
+#include "streaming/web_address.h"
 #include "viewer/widget/handles.h"
 #include "viewer/widget/window_surface.h"
 
@@ -53,16 +54,49 @@ Result<SourceAccess> accessFor(const vcp_open_options* given) {
     return access;
 }
 
-Result<void> openFor(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
-    const auto access = accessFor(options);
+/// What is opened meanwhile can be cancelled by another thread.
+class Opening {
+public:
+    explicit Opening(vcp_context& context) : context_(context) { set(isCancelled_); }
+    ~Opening() { set(nullptr); }
+    Opening(const Opening&) = delete;
+    Opening& operator=(const Opening&) = delete;
+    /// For readers, which live longer.
+    [[nodiscard]] std::function<bool()> cancelled() const {
+        return [token = isCancelled_] { return token->load(); };
+    }
+
+private:
+    void set(std::shared_ptr<std::atomic<bool>> token) {
+        const std::lock_guard lock(context_.openingMutex);
+        context_.openingIsCancelled = std::move(token);
+    }
+
+    vcp_context& context_;
+    std::shared_ptr<std::atomic<bool>> isCancelled_ = std::make_shared<std::atomic<bool>>(false);
+};
+
+void cancelOpening(vcp_context& context) {
+    const std::lock_guard lock(context.openingMutex);
+    if (context.openingIsCancelled) *context.openingIsCancelled = true;
+}
+
+Result<OpenedScene> openCancellably(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
+    auto access = accessFor(options);
     if (!access) return access.error();
-    auto open = openScene(std::move(file), name, [&](const std::string& each) { return openDataset(each, *access); });
+    const Opening opening(context);
+    access->cancelled = opening.cancelled();
+    return openScene(std::move(file), name, [&](const std::string& each) { return openDataset(each, *access); });
+}
+
+Result<void> openFor(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
+    auto open = openCancellably(context, std::move(file), name, options);
     if (!open) return open.error();
     context.finest.reset();
     context.open.reset();
     VCP_TRY(context.renderer->open(open->placed(), open->surfaces.surfaces));
     context.open = *std::move(open);
-    context.name = std::filesystem::path(name).filename().string();
+    context.name = std::filesystem::path(shownAddress(name)).filename().string();
     context.finest = std::make_unique<ScenePick>();
     for (const OpenedScene::Part& part : context.open->parts) {
         context.finest->add(part.open.reader, *part.open.dataset, part.placement);
@@ -96,7 +130,7 @@ Result<SceneDataset> placedFrom(const vcp_placed& given, uint32_t number) {
     const std::span<const double, 16> rows(given.world_from_dataset);
     if (std::all_of(rows.begin(), rows.end(), [](double x) { return x == 0; })) return dataset;
     const auto placement = scenePlacement(rows);
-    if (!placement) return Error{.code = ErrorCode::Usage, .message = "its matrix " + placement.error().message, .file = given.path, .element = who};
+    if (!placement) return Error{.code = ErrorCode::Usage, .message = "its matrix " + placement.error().message, .file = shownAddress(given.path), .element = who};
     dataset.placement = *placement;
     return dataset;
 }
@@ -164,7 +198,10 @@ vcp_status vcp_context_create(const vcp_context_options* given, vcp_context** co
 vcp_status vcp_context_destroy(vcp_context* context) {
     if (!context) return VCP_OK;
     Turn turn(*context);
-    if (!turn.isTaken()) return VCP_BUSY;
+    if (!turn.isTaken()) {
+        cancelOpening(*context);
+        return VCP_BUSY;
+    }
     if (!context->views.empty()) return report(*context, context->lastError, wrong("the context still has views"));
     turn.drop();
     delete context;

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <optional>
 #include <string>
@@ -27,6 +28,8 @@ std::string utf8Of(const std::string& text);
 
 struct vcp_context {
     std::atomic_flag busy;  // a call is under way
+    std::mutex openingMutex;
+    std::shared_ptr<std::atomic<bool>> openingIsCancelled;  // guarded by openingMutex; null: nothing is being opened
     vcp_callbacks callbacks{};
     std::string lastError;
     std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();

@@ -115,7 +115,8 @@ typedef struct vcp_context_options {
 } vcp_context_options;
 
 VCP_API vcp_status vcp_context_create(const vcp_context_options* options, vcp_context** context);
-/* VCP_USAGE while it has views. NULL: nothing is done. */
+/* VCP_USAGE while it has views. While another thread opens something: VCP_BUSY, and that call ends soon, with VCP_CANCELLED; then call
+ * again. NULL: nothing is done. */
 VCP_API vcp_status vcp_context_destroy(vcp_context* context);
 /* The last line of what went wrong for the context; "" when nothing has. Lives until the next call. VCP_BUSY leaves it as it is;
  * do not read it while another thread's call is under way. */
