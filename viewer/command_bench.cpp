@@ -100,7 +100,7 @@ Result<int> publish(const BenchCommand& command, const std::string& name, const 
         VCP_TRY(writeText(folder / (name + ".md"), texts.markdown));
         for (const auto& [plot, svg] : texts.plots) VCP_TRY(writeText(folder / (plot + ".svg"), svg));
     }
-    VCP_TRY(printLine(command.report.json ? texts.json : texts.markdown));
+    VCP_TRY(command.report.json ? printJsonText(texts.json) : printLine(texts.markdown));
     return 0;
 }
 

@@ -49,8 +49,13 @@ struct ReportOptions {
 void addJsonOption(CLI::App& app, ReportOptions& options);
 void addProgressOption(CLI::App& app, ReportOptions& options);
 
-/// Writes to stdout with a newline behind. Errors: Io (stdout is closed or full).
+/// Writes lines of text to stdout, shown as terminal_text.h says, with a newline behind. Errors: Io (stdout is closed or full).
 Result<void> printLine(const std::string& text);
 Result<void> printJson(const Json& json);
+/// `json`: valid JSON.
+Result<void> printJsonText(const std::string& json);
+
+/// A line on stderr that begins with "warning: ".
+void warnOnTerminal(const std::string& warning);
 
 }  // namespace vcp

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -11,7 +10,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include "octree/durable_file.h"
+#include "octree/regular_file.h"
 #include "viewer/exr_picture.h"
 
 namespace vcp {
@@ -94,8 +93,9 @@ meso::HeightMap heightsOf(const FloatPicture& picture, double range) {
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {
     const auto fail = [&](ErrorCode code, std::string message) { return Error{.code = code, .message = std::move(message), .file = path.string()}; };
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
-    if (!file) return systemError(path, "cannot open", errno);
+    const auto opened = openRegularStream(path);
+    if (!opened) return opened.error();
+    const auto& file = *opened;
     png_byte signature[8] = {};
     const size_t got = std::fread(signature, 1, 8, file.get());
     std::rewind(file.get());
@@ -104,6 +104,9 @@ Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, doubl
         if (map) return map;
         Error error = map.error();
         error.file = path.string();
+        // OpenEXR names the stream that it reads, which has no name.
+        constexpr std::string_view kNobody = "image file \"\"";
+        if (const size_t at = error.message.find(kNobody); at != std::string::npos) error.message.replace(at, kNobody.size(), "the picture");
         return error;
     }
     if (got < 8 || png_sig_cmp(signature, 0, 8) != 0) return fail(ErrorCode::InvalidInput, got == 0 ? "the file is empty" : "is neither a PNG nor an EXR picture");

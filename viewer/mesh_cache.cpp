@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <system_error>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "octree/regular_file.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {
@@ -89,9 +90,10 @@ Result<fs::path> defaultCacheFolder() {
 
 bool looksLikeDataset(const fs::path& path) {
     std::array<char, 8> start{};
-    std::ifstream file(path, std::ios::binary);
     const FileHeader header;
-    if (file.read(start.data(), start.size()) && std::equal(start.begin(), start.end(), header.magic)) return true;
+    // A pipe may be a mesh: what is read of it is gone.
+    const auto file = openRegularStream(path);
+    if (file && std::fread(start.data(), 1, start.size(), file->get()) == start.size() && std::equal(start.begin(), start.end(), header.magic)) return true;
     return path.extension() == kExtension;
 }
 

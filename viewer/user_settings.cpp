@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "streaming/http_reader.h"
+#include "viewer/text_file.h"
 
 namespace vcp {
 
@@ -134,11 +134,9 @@ Result<fs::path> userSettingsPath() {
 Result<UserSettings> readUserSettings(const fs::path& path) {
     std::error_code failed;
     if (!fs::exists(path, failed)) return UserSettings{};
-    if (fs::file_size(path, failed) > kLargestFile || failed) return Error{ErrorCode::Io, "is no file of settings", path.string()};
-    std::ifstream file(path, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file) return Error{ErrorCode::Io, "cannot be read", path.string()};
-    const Json json = Json::parse(text, nullptr, false);
+    const auto text = readText(path, kLargestFile, "a file of settings");
+    if (!text) return text.error();
+    const Json json = Json::parse(*text, nullptr, false);
     if (!json.is_object()) return Error{ErrorCode::InvalidInput, "is no JSON object; what was remembered is lost", path.string()};
     return settingsFrom(json);
 }
