@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "octree/header_check.h"
 #include "octree/vcp_file.h"
 
 namespace {
@@ -95,6 +96,16 @@ std::vector<std::byte> fileOf(std::span<const std::byte> input) {
     return file;
 }
 
+void checkEntry(const Dataset& d, uint64_t page, uint64_t fileBytes) {
+    const PageEntry& e = d.pages[page];
+    require(e.level < d.header.levels && e.offset + e.storedBytes <= fileBytes && e.pageBytes > 0,
+            "an entry's numbers");
+    require(e.certifiedError >= 0 && e.certifiedError <= d.header.level[e.level].certifiedError,
+            "an entry's error is within its level's");
+    require(e.colourBytes == 0 || d.hasColour(), "colour as the header says");
+    for (const uint64_t child : childrenOf(e)) require(child > page && child < d.header.pages, "children follow");
+}
+
 /// What a traversal, a camera and a pool rely on.
 void checkDataset(const Dataset& d, uint64_t fileBytes) {
     const FileHeader& h = d.header;
@@ -102,14 +113,10 @@ void checkDataset(const Dataset& d, uint64_t fileBytes) {
     require(h.cell > 0 && std::isfinite(h.cell) && std::isfinite(d.edgeOf(d.pages[0])), "cell");
     require(h.certifiedErrorMax >= 0 && std::isfinite(h.certifiedErrorMax), "certified error");
     std::vector<uint8_t> parents(h.pages, 0);
-    for (uint64_t i = 0; i < h.pages; ++i) {
-        const PageEntry& e = d.pages[i];
-        require(e.level < h.levels && e.offset + e.storedBytes <= fileBytes && e.pageBytes > 0, "an entry's numbers");
-        require(e.certifiedError >= 0 && e.certifiedError <= h.level[e.level].certifiedError,
-                "an entry's error is within its level's");
-        require(e.colourBytes == 0 || d.hasColour(), "colour as the header says");
-        for (const uint64_t child : childrenOf(e)) {
-            require(child > i && child < h.pages && d.pages[child].level == e.level + 1, "children lie below");
+    for (uint64_t page = 0; page < h.pages; ++page) {
+        checkEntry(d, page, fileBytes);
+        for (const uint64_t child : childrenOf(d.pages[page])) {
+            require(d.pages[child].level == d.pages[page].level + 1, "children lie below");
             ++parents[child];
         }
     }
@@ -117,15 +124,29 @@ void checkDataset(const Dataset& d, uint64_t fileBytes) {
             "each page has one parent");
 }
 
-/// The directory read a block at a time, the last one first: what is accepted as a whole is accepted in parts.
-void readInParts(const MemoryFile& file, const Dataset& whole) {
-    const auto start = readDatasetStart(file, 2 * kBlockBytes);
-    require(start.ok(), "a good file opens by its start");
-    for (uint64_t b = start->pages.blocks(); b-- > 0;)
-        require(admitBlock(*start, file.name(), b, std::span(file.bytes).subspan(blockOffset(b), kBlockBytes)).ok(),
-                "good blocks are admitted");
-    require(start->pages.blocksKnown() == start->pages.blocks(), "all blocks are known");
-    require(std::memcmp(start->pages.data(), whole.pages.data(), whole.pages.size() * sizeof(PageEntry)) == 0,
+/// The directory a block at a time, the last one first. True: each was admitted.
+bool admitAll(const MemoryFile& file, const Dataset& parts) {
+    bool all = true;
+    for (uint64_t b = parts.pages.blocks(); b-- > 0;)
+        all = admitBlock(parts, file.name(), b, std::span(file.bytes).subspan(blockOffset(b), kBlockBytes)).ok() && all;
+    return all;
+}
+
+/// What is accepted as a whole is accepted in parts; what is not meets only the checks of each block.
+void readInParts(const MemoryFile& file, const Dataset* whole) {
+    FileHeader header;
+    std::memcpy(static_cast<void*>(&header), file.bytes.data(), sizeof header);
+    if (!checkHeader(file.name(), header, std::span(file.bytes).first(kDirectoryOffset), file.size()).ok() ||
+        blockOffset(blocksOf(header.pages)) > file.size())
+        return;
+    Dataset parts{header, {}};
+    parts.pages.expect(header.pages);
+    const bool all = admitAll(file, parts);
+    for (uint64_t page = 0; page < header.pages; ++page)
+        if (parts.pages.knows(page)) checkEntry(parts, page, file.size());
+    if (whole == nullptr) return;
+    require(all && parts.pages.blocksKnown() == parts.pages.blocks(), "good blocks are admitted");
+    require(std::memcmp(parts.pages.data(), whole->pages.data(), whole->pages.size() * sizeof(PageEntry)) == 0,
             "entries in parts are the same");
 }
 
@@ -135,19 +156,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (size > kMostBytes) return 0;
     const MemoryFile file(fileOf(std::as_bytes(std::span(data, size))));
     const auto dataset = readDataset(file);
-    if (dataset.ok()) {
-        checkDataset(*dataset, file.size());
-        readInParts(file, *dataset);
-        const bool intact = verifyFile(file).ok();
-        for (uint64_t page = 0; page < dataset->pages.size(); ++page)
-            require(readPage(file, *dataset, page, true).ok() || !intact, "an intact file's pages can be read");
+    readInParts(file, dataset.ok() ? &*dataset : nullptr);
+    const auto verified = verifyFile(file);
+    if (!dataset.ok()) {
+        require(!dataset.error().file.empty() && dataset.error().byte && !verified.ok(), "what is refused says where");
         return 0;
     }
-    require(!dataset.error().file.empty() && !verifyFile(file).ok(), "what is refused says where");
-    // A directory that comes in parts meets its blocks one by one, wrong ones among them.
-    const auto start = readDatasetStart(file, 2 * kBlockBytes);
-    if (!start.ok()) return 0;
-    for (uint64_t b = 0; b < start->pages.blocks(); ++b)
-        (void)admitBlock(*start, file.name(), b, std::span(file.bytes).subspan(blockOffset(b), kBlockBytes));
+    checkDataset(*dataset, file.size());
+    for (uint64_t page = 0; page < dataset->pages.size(); ++page)
+        require(readPage(file, *dataset, page, true).ok() || !verified.ok(), "an intact file's pages can be read");
     return 0;
 }
