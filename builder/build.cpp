@@ -107,6 +107,7 @@ private:
     /// What the output may replace: nothing that is read.
     [[nodiscard]] OutputRules rules() const {
         OutputRules rules{.overwrite = options_.overwrite, .inputs = options_.inputs};
+        for (const SideFile& each : report_.sideFiles) rules.inputs.push_back(each.path);
         return rules;
     }
 
@@ -204,12 +205,15 @@ private:
 
     /// A disk that is too small is found now, not after hours.
     Result<void> checkFreeSpace() const {
-        const auto check = [](const std::filesystem::path& at, uint64_t needed, const char* option) -> Result<void> {
+        const auto check = [&](const std::filesystem::path& at, uint64_t needed, const char* option) -> Result<void> {
             const uint64_t free = freeBytesAt(at);
             if (needed <= free) return {};
+            // Rounded apart, so that the two are never the same number.
             return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("about {} MB are needed here and {} MB are free; free some space or choose another folder{}", needed / 1000000, free / 1000000, option),
-                         .file = at.string()};
+                         .message = fmt::format("about {} MB are needed in the folder {} and {} MB are free there; free some space or choose another folder{}", needed / 1000000 + 1,
+                                                at.has_filename() && !std::filesystem::is_directory(at) ? std::filesystem::absolute(at).parent_path().string() : at.string(),
+                                                free / 1000000, option),
+                         .file = options_.output.string()};
         };
         const uint64_t temp = expectedTempBytes(measures_.triangles, memory_.tempBytes), there = space_.diskBytes();
         VCP_TRY(check(space_.folder().path(), temp > there ? temp - there : 0, " with --temp"));
@@ -423,7 +427,11 @@ Result<BuildReport> buildOctree(const BuildOptions& options) {
     auto inputs = expandInputs(options.inputs);
     if (!inputs) return inputs.error();
     expanded.inputs = std::move(*inputs);
-    return Builder(expanded, *plan, threads).run();
+    auto report = Builder(expanded, *plan, threads).run();
+    if (report || !report.error().file.empty() || report.error().code == ErrorCode::Cancelled) return report;
+    Error error = report.error();
+    error.file = options.inputs.front().string();
+    return error;
 }
 
 }  // namespace vcp

@@ -21,6 +21,8 @@ Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     if (h.faces > kLeafIndexMask || h.triangles > kLeafIndexMask || h.vertices > kField21Mask || h.groups > (1u << 27))
         return broken(12, "page counts out of range");
     if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError)) return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
+    for (size_t i = 0; i < std::size(h.reserved); ++i)
+        if (h.reserved[i] != 0) return broken(offsetof(PageHeader, reserved) + 4 * i, "reserved bytes must be zero");
     if (pageSections(h).end != bytes)
         return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", pageSections(h).end, bytes));
     return {};

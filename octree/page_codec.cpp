@@ -99,8 +99,7 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
     CodecPage page;
     page.header = source->header;
     page.source = &*source;
-    const auto& reserved = page.header.reserved;
-    if (!plausible(page.header, geometry.size()) || std::any_of(std::begin(reserved), std::end(reserved), [](uint32_t word) { return word != 0; })) return plainly();
+    if (!plausible(page.header, geometry.size())) return plainly();
     page.allocate();
     RangeEncoder coder;
     codeHeader(coder, page.header);

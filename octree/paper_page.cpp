@@ -29,6 +29,8 @@ Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2
     if (h.nodes < roots || (h.nodes - roots) % 8 != 0 || h.nodes > uint32_t{paper::kPaperEmpty}) return broken(12, "node count out of range");
     const auto isLength = [](float x) { return x > 0 && std::isfinite(x); };
     if (!isLength(h.cutoff) || !isLength(h.longest)) return broken(offsetof(PaperPageHeader, cutoff), "lengths are not numbers");
+    for (size_t i = 0; i < std::size(h.reserved); ++i)
+        if (h.reserved[i] != 0) return broken(offsetof(PaperPageHeader, reserved) + 4 * i, "reserved bytes must be zero");
     if (paperSections(h).end != bytes) return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", paperSections(h).end, bytes));
     return {};
 }

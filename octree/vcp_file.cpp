@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fcntl.h>
+#include <limits>
 #include <new>
 #include <optional>
 #include <sys/stat.h>
@@ -15,7 +15,9 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include "octree/header_check.h"
 #include "octree/page_codec.h"
+#include "octree/regular_file.h"
 
 namespace vcp {
 
@@ -23,7 +25,6 @@ namespace {
 
 // A page is built from at most a few 10^5 leaves; anything above this is a lie.
 constexpr uint64_t kMaxPageBytes = uint64_t{1} << 28;
-constexpr uint64_t kMaxPages = uint64_t{1} << 31;
 
 class LocalFile final : public ByteReader {
 public:
@@ -63,47 +64,12 @@ Error broken(const ByteReader& reader, std::string element, uint64_t byte, std::
     return broken(reader.name(), std::move(element), byte, std::move(message));
 }
 
-bool finite(const double* values, int count) { return std::all_of(values, values + count, [](double v) { return std::isfinite(v); }); }
-
-Result<void> checkHeader(const ByteReader& reader, const FileHeader& h, std::span<const std::byte> bytes) {
-    const auto fail = [&](uint64_t byte, std::string message) { return broken(reader, "header", byte, std::move(message)); };
-    if (std::memcmp(h.magic, FileHeader{}.magic, sizeof h.magic) != 0) return fail(0, "not a .vcp file");
-    const auto unsupported = [&](uint64_t byte, std::string message) {
-        return Error{.code = ErrorCode::Unsupported, .message = std::move(message), .file = reader.name(), .element = "header", .byte = byte};
-    };
-    if (h.version < kFileVersion || h.version > kMethodFileVersion)
-        return unsupported(8, fmt::format("file version {} is not known; this program reads version {} and version {}: {}", h.version, kFileVersion, kMethodFileVersion,
-                                          h.version < kFileVersion ? "build it again" : "use a newer program"));
-    std::vector<std::byte> unhashed(bytes.begin(), bytes.end());
-    std::memset(unhashed.data() + offsetof(FileHeader, hash), 0, 8);
-    if (hashBytes(unhashed) != h.hash) return fail(0, "the header's hash does not match: the file was changed or damaged");
-    if (h.headerBytes != kDirectoryOffset) return fail(12, "wrong header size");
-    if (h.fileBytes != reader.size())
-        return fail(16, fmt::format("the file should have {} bytes, it has {}: it was truncated or appended to", h.fileBytes, reader.size()));
-    const bool isPaper = h.method == Method::Paper;
-    if ((h.method != Method::Certified) != (h.version == kMethodFileVersion)) return fail(140, "the method does not go with the version");
-    if (h.method != Method::Certified && !isPaper)
-        return unsupported(140, fmt::format("it was built by method {}, which this program does not know: use a newer program", static_cast<uint32_t>(h.method)));
-    if (isPaper && (h.levels != 1 || h.pages != 1 || h.flags != 0)) return fail(128, "a file of this method has one page");
-    if (h.levels < 1 || h.levels > kMaxLevels || h.log2Cells < 1 || h.log2Cells > (isPaper ? kMaxPaperLog2Cells : 7)) return fail(128, "levels or page size out of range");
-    if (!(h.cell > 0) || !std::isfinite(h.cell) || !finite(h.origin, 3) || !finite(h.boundsMin, 3) || !finite(h.boundsMax, 3))
-        return fail(32, "origin, cell or bounds are not finite");
-    if (h.pages < 1 || h.pages > kMaxPages || h.pages > h.fileBytes / sizeof(PageEntry)) return fail(24, "page count out of range");
-    uint64_t next = 0;
-    for (uint32_t l = 0; l < h.levels; ++l) {
-        const uint64_t byte = offsetof(FileHeader, level) + l * sizeof(LevelRow);
-        if (h.level[l].firstEntry != next || h.level[l].pages < 1 || h.level[l].pages > h.pages - next) return fail(byte, "level table does not add up");
-        if (!(h.level[l].certifiedError >= 0) || !std::isfinite(h.level[l].certifiedError)) return fail(byte + 16, "certified error is not a number");
-        next += h.level[l].pages;
-    }
-    if (next != h.pages || h.level[0].pages != 1) return fail(184, "level table does not add up");
-    return {};
-}
-
 constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock; }
 
-Error brokenEntry(const std::string& file, uint64_t index, std::string message) {
-    return broken(file, fmt::format("directory entry {}", index), blockOffset(index / kEntriesPerBlock) + index % kEntriesPerBlock * sizeof(PageEntry), std::move(message));
+/// `field`: offset of what is wrong within the entry.
+Error brokenEntry(const std::string& file, uint64_t index, std::string message, uint64_t field = 0) {
+    const uint64_t byte = blockOffset(index / kEntriesPerBlock) + index % kEntriesPerBlock * sizeof(PageEntry) + field;
+    return broken(file, fmt::format("directory entry {}", index), byte, std::move(message));
 }
 
 /// What an entry says for itself: sizes fit the file, offsets ascend from one entry to the next.
@@ -113,22 +79,38 @@ public:
         : file_(file), header_(dataset.header), hasColour_(dataset.hasColour()), end_(blockOffset(blocksOf(dataset.header.pages))) {}
 
     Result<void> check(uint64_t index, const PageEntry& e, uint32_t level) {
-        if (e.level != level) return brokenEntry(file_, index, "wrong level");
+        const auto fail = [&](uint64_t field, const char* message) { return brokenEntry(file_, index, message, field); };
+        if (e.level != level) return fail(offsetof(PageEntry, level), "wrong level");
         VCP_TRY(extent(index, e.offset, e.storedBytes, e.pageBytes));
-        if (e.colourStoredBytes == 0 && (e.colourBytes != 0 || (hasColour_ && e.leaves != 0))) return brokenEntry(file_, index, "colour is missing");
-        if (e.colourStoredBytes != 0) {
-            if (e.colourOffset > end_ + kBlockBytes) return brokenEntry(file_, index, "its colour does not follow it");
-            VCP_TRY(extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes));
-        }
-        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError) || e.hardLeaves > e.leaves)
-            return brokenEntry(file_, index, "certified error or counts out of range");
-        if (level == 0 && e.morton != 0) return brokenEntry(file_, index, "the root is not at the origin");
+        VCP_TRY(colour(index, e));
+        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError)) return fail(offsetof(PageEntry, certifiedError), "certified error is not a length");
+        if (e.certifiedError > header_.level[level].certifiedError) return fail(offsetof(PageEntry, certifiedError), "certified error is larger than its level's in the header");
+        if (e.hardLeaves > e.leaves) return fail(offsetof(PageEntry, hardLeaves), "leaf counts: more hard leaves than leaves");
+        // The root's word stands in the page's header, each other leaf's among the nodes.
+        if (e.leaves > e.pageBytes / sizeof(uint32_t)) return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");
+        if (e.childMask == 0 && e.firstChild != 0) return fail(offsetof(PageEntry, firstChild), "wrong child pages: a first one where there are none");
+        for (size_t i = 0; i < sizeof e.reserved; ++i)
+            if (e.reserved[i] != 0) return fail(offsetof(PageEntry, reserved) + i, "reserved bytes must be zero");
+        if (level == 0 && e.morton != 0) return fail(offsetof(PageEntry, morton), "the root is not at the origin");
         return {};
     }
 
 private:
+    Result<void> colour(uint64_t index, const PageEntry& e) {
+        const auto fail = [&](uint64_t field, const char* message) { return brokenEntry(file_, index, message, field); };
+        if (e.colourStoredBytes == 0) {
+            if (e.colourBytes != 0 || (hasColour_ && e.leaves != 0)) return fail(offsetof(PageEntry, colourStoredBytes), "colour is missing");
+            if (e.colourOffset != 0) return fail(offsetof(PageEntry, colourOffset), "a place of colour where there is none");
+            if (e.colourHash != 0) return fail(offsetof(PageEntry, colourHash), "a hash of colour where there is none");
+            return {};
+        }
+        if (!hasColour_) return fail(offsetof(PageEntry, colourStoredBytes), "has colour, but the header says that no page has");
+        if (e.colourOffset > end_ + kBlockBytes) return fail(offsetof(PageEntry, colourOffset), "its colour does not follow it");
+        return extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes);
+    }
+
     Result<void> extent(uint64_t index, uint64_t offset, uint64_t stored, uint64_t bytes) {
-        const uint64_t fileBytes = header_.fileBytes;
+        const uint64_t fileBytes = header_.fileBytes - sizeof(CommitRecord);
         if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > fileBytes || offset > fileBytes - stored)
             return brokenEntry(file_, index, "page lies outside the file or overlaps another");
         if (bytes == 0 || bytes > kMaxPageBytes || bytes % 16 != 0) return brokenEntry(file_, index, "page size out of range");
@@ -176,11 +158,15 @@ Result<void> checkDirectory(const std::string& file, const Dataset& d) {
     return {};
 }
 
-Result<void> checkBlockHash(const std::string& file, uint64_t block, std::span<const std::byte> bytes) {
+/// A block that holds `entries` and a hash, and is zero between.
+Result<void> checkBlock(const std::string& file, uint64_t block, uint64_t entries, std::span<const std::byte> bytes) {
+    const auto fail = [&](uint64_t byte, std::string message) { return broken(file, fmt::format("directory block {}", block), blockOffset(block) + byte, std::move(message)); };
     uint64_t hash = 0;
     std::memcpy(&hash, bytes.data() + kBlockBytes - 8, 8);
-    if (hashBytes(bytes.first(kBlockBytes - 8)) == hash) return {};
-    return broken(file, fmt::format("directory block {}", block), blockOffset(block), "hash does not match: the file was changed or damaged");
+    if (hashBytes(bytes.first(kBlockBytes - 8)) != hash) return fail(0, "hash does not match: the file was changed or damaged");
+    for (uint64_t byte = entries * sizeof(PageEntry); byte < kBlockBytes - 8; ++byte)
+        if (bytes[byte] != std::byte{0}) return fail(byte, "bytes behind the last entry must be zero");
+    return {};
 }
 
 /// Reads `bytes` in pieces, the first of at most kFirstPiece, each as large as all before it, so that a claim takes no more
@@ -352,7 +338,7 @@ private:
 
 Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block, std::span<const std::byte> bytes) {
     if (dataset.pages.knowsBlock(block)) return {};
-    VCP_TRY(checkBlockHash(file, block, bytes));
+    VCP_TRY(checkBlock(file, block, std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - block * kEntriesPerBlock), bytes));
     return BlockAdmission(dataset, file, block).run(bytes);
 }
 
@@ -365,15 +351,14 @@ glm::dvec3 Dataset::originOf(const PageEntry& page) const {
 }
 
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) {
-    const auto fail = [&](std::string message) { return Error{.code = ErrorCode::Io, .message = std::move(message), .file = path.string()}; };
-    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return fail(std::string("cannot open: ") + std::strerror(errno));
+    const auto file = openRegular(path);
+    if (!file) return file.error();
     struct stat info {};
-    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
-        ::close(fd);
-        return fail(S_ISDIR(info.st_mode) ? "is a folder; give a .vcp file" : "is not a regular file");
+    if (::fstat(*file, &info) != 0) {
+        ::close(*file);
+        return Error{.code = ErrorCode::Io, .message = "its size cannot be asked", .file = path.string()};
     }
-    return std::shared_ptr<ByteReader>(std::make_shared<LocalFile>(fd, static_cast<uint64_t>(info.st_size), path.string()));
+    return std::shared_ptr<ByteReader>(std::make_shared<LocalFile>(*file, static_cast<uint64_t>(info.st_size), path.string()));
 }
 
 namespace {
@@ -385,7 +370,7 @@ Result<FileHeader> readHeader(const ByteReader& reader) {
     std::vector<std::byte> first(kDirectoryOffset);
     VCP_TRY(reader.read(0, first));
     std::memcpy(&header, first.data(), sizeof(FileHeader));
-    VCP_TRY(checkHeader(reader, header, first));
+    VCP_TRY(checkHeader(reader.name(), header, first, reader.size()));
     if (blocksOf(header.pages) * kBlockBytes > reader.size() - kDirectoryOffset - sizeof(CommitRecord))
         return broken(reader, "header", 24, "the directory does not fit the file");
     return header;
@@ -400,6 +385,8 @@ Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& heade
         (directoryHash && commit.directoryHash != *directoryHash) ||
         commit.hash != hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash))))
         return broken(reader, "commit record", offset, "does not match the file: it was not finished, changed or damaged");
+    for (size_t i = 0; i < std::size(commit.reserved); ++i)
+        if (commit.reserved[i] != 0) return broken(reader, "commit record", offset + offsetof(CommitRecord, reserved) + 8 * i, "reserved bytes must be zero");
     return {};
 }
 
@@ -408,7 +395,7 @@ Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<c
     for (uint64_t from = 0; from < blocks.size(); from += kBlockBytes) {
         const std::span block = blocks.subspan(from, kBlockBytes);
         const uint64_t first = dataset.pages.size(), count = std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - first);
-        VCP_TRY(checkBlockHash(file, first / kEntriesPerBlock, block));
+        VCP_TRY(checkBlock(file, first / kEntriesPerBlock, count, block));
         for (uint64_t i = 0; i < count; ++i) {
             PageEntry entry;
             std::memcpy(&entry, block.data() + i * sizeof entry, sizeof entry);
@@ -457,6 +444,19 @@ Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes) {
     return dataset;
 }
 
+/// A page's header and its entry in the directory say the same.
+static Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset, uint64_t index, const PageHeader& page) {
+    const PageEntry& e = dataset.pages[index];
+    const auto fail = [&](std::string message) { return broken(reader, fmt::format("page {}", index), e.offset, std::move(message)); };
+    const uint64_t leaves = uint64_t{page.softLeaves} + page.hardLeaves;
+    if (leaves != e.leaves || page.hardLeaves != e.hardLeaves)
+        return fail(fmt::format("has {} leaves, {} of them hard; its directory entry says {} and {}", leaves, page.hardLeaves, e.leaves, e.hardLeaves));
+    // Both were rounded up to single precision, one in cells and one in world units.
+    const double error = page.certifiedError * dataset.cellOf(e.level), slack = 1e-6 * error + 4 * double(std::numeric_limits<float>::denorm_min());
+    if (std::abs(error - e.certifiedError) > slack) return fail(fmt::format("has a certified error of {:g}, its directory entry says {:g}", error, e.certifiedError));
+    return {};
+}
+
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t index, bool withColour) {
     const PageEntry& e = dataset.pages[index];
     const std::string element = fmt::format("page {}", index);
@@ -469,11 +469,14 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     if (dataset.header.method == Method::Paper) {
         const auto paper = parsePaperPage(page.geometryBytes(), dataset.header.log2Cells);
         if (!paper) return broken(reader, element, e.offset, paper.error().line());
+        if (paper->header.leaves != e.leaves) return broken(reader, element, e.offset, fmt::format("has {} leaves, its directory entry says {}", paper->header.leaves, e.leaves));
+        if (paper->header.packing != dataset.header.paper.packing) return broken(reader, element, e.offset, "its packing differs from the file's");
         return page;
     }
     const auto view = parsePage(page.geometryBytes());
     if (!view) return broken(reader, element, e.offset, view.error().line());
     if (view->header.log2Cells != dataset.header.log2Cells) return broken(reader, element, e.offset, "page size differs from the file's");
+    VCP_TRY(checkAgainstEntry(reader, dataset, index, view->header));
     if (!withColour || e.colourBytes == 0) return page;
     const auto storedColour = readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash);
     if (!storedColour) return storedColour.error();
@@ -482,32 +485,6 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     if (!colour) return broken(reader, element + " colour", e.colourOffset, colour.error().message);
     page.colour = *std::move(colour);
     return page;
-}
-
-Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t), void* user) {
-    auto dataset = readDataset(reader);
-    if (!dataset) return dataset.error();
-    uint64_t end = blockOffset(dataset->pages.blocks());
-    const auto gap = [&](uint64_t to) -> Result<void> {
-        if (to < end || to - end > kBlockBytes) return broken(reader, "padding", end, "unexpected bytes between pages");
-        std::vector<std::byte> bytes(to - end);
-        VCP_TRY(reader.read(end, bytes));
-        for (size_t i = 0; i < bytes.size(); ++i)
-            if (bytes[i] != std::byte{0}) return broken(reader, "padding", end + i, "is not zero: the file was changed or damaged");
-        return {};
-    };
-    for (uint64_t i = 0; i < dataset->pages.size(); ++i) {
-        const PageEntry& e = dataset->pages[i];
-        VCP_TRY(gap(e.offset));
-        if (auto page = readPage(reader, *dataset, i, true); !page) return page.error();
-        end = e.offset + e.storedBytes;
-        if (e.colourBytes != 0) {
-            VCP_TRY(gap(e.colourOffset));
-            end = e.colourOffset + e.colourStoredBytes;
-        }
-        if (progress != nullptr && !progress(user, end)) return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = reader.name()};
-    }
-    return gap(reader.size() - sizeof(CommitRecord));
 }
 
 uint64_t hashBytes(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }

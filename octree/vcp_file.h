@@ -211,7 +211,7 @@ public:
     virtual void distrust(uint64_t offset, uint64_t bytes) const { static_cast<void>(offset), static_cast<void>(bytes); }
 };
 
-/// Opens a local file for bounded reads (pread). Errors: Io.
+/// Opens a local file for bounded reads (pread); a pipe or device in its place is not waited for. Errors: Io.
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 
 /// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header claims.
@@ -240,11 +240,11 @@ struct PageBytes {
     [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
 };
 
-/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage) one page. Safe on hostile bytes: allocates
+/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page. Safe on hostile bytes: allocates
 /// at most a few times the entry's pageBytes, which readDataset has bounded. The page's entry is known. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 
-/// Reads every byte of the file and checks it, also those between pages. Calls `progress(bytes done)` now and
+/// Reads every byte of the file and checks it, also those between pages, and that header, directory and pages say the same. Calls `progress(bytes done)` now and
 /// then; it returns false to cancel. Errors: the first thing that is wrong.
 Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t) = nullptr, void* user = nullptr);
 

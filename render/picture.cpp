@@ -8,6 +8,8 @@
 #include <png.h>
 #include <unistd.h>
 
+#include "octree/regular_file.h"
+
 namespace vcp {
 
 namespace {
@@ -54,8 +56,9 @@ Result<void> writePng(const Picture& picture, const std::filesystem::path& path,
 }
 
 Result<Picture> readPng(const std::filesystem::path& path) {
-    const File file(std::fopen(path.c_str(), "rb"));
-    if (!file) return ioError(path, "cannot read");
+    const auto opened = openRegularStream(path);
+    if (!opened) return opened.error();
+    const auto& file = *opened;
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     const auto invalid = [&](const std::string& what) { return Error{.code = ErrorCode::InvalidInput, .message = what, .file = path.string()}; };

@@ -49,7 +49,8 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
         if (!dataset_->pages.empty() && !policy_->hasRoom())
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
-                                                pageUnits(dataset_->pages[0], hasColour()) * kPoolUnitBytes)};
+                                                pageUnits(dataset_->pages[0], hasColour()) * kPoolUnitBytes),
+                         .file = source_->name()};
         auto pool = PagePool::create(device, shape.units * kPoolUnitBytes, access);
         if (pool) {
             pool_ = std::move(*pool);
@@ -82,7 +83,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
     const uint64_t chunkBytes = poolChunkBytes(device.limits(), access);
     const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budgetBytes, chunkBytes);
     if (!hasRoomIn(shape))
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes)};
+        return Error{.code = ErrorCode::Limit, .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes), .file = source_->name()};
     options_.budgetBytes = budgetBytes;
     options_.loader.heldBytes = ramBytes;
     startLoader();  // what the old one held is gone

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 
 #include <fmt/format.h>
 #include <unistd.h>
+
+#include "octree/regular_file.h"
 
 namespace vcp {
 
@@ -67,13 +70,12 @@ uint64_t CachingReader::bytesKept() const {
 
 bool CachingReader::load(uint64_t block, std::span<std::byte> bytes) const {
     const fs::path path = pathOf(block);
-    std::ifstream file(path, std::ios::binary);
+    const auto file = openRegularStream(path);
     if (!file) return false;
     uint64_t seal = 0;
-    file.read(reinterpret_cast<char*>(&seal), sizeof seal);
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const bool isRead = std::fread(&seal, sizeof seal, 1, file->get()) == 1 && std::fread(bytes.data(), 1, bytes.size(), file->get()) == bytes.size();
     std::error_code ignored;
-    if (file && file.peek() == std::ifstream::traits_type::eof() && seal == sealOf(source_, block, bytes)) {
+    if (isRead && std::fgetc(file->get()) == EOF && seal == sealOf(source_, block, bytes)) {
         fs::last_write_time(path, fs::file_time_type::clock::now(), ignored);
         return true;
     }

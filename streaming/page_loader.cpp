@@ -109,7 +109,8 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     if (bytes > options_.heldBytes) {
         queue_.begin(first);
         handOver(first, Error{.code = ErrorCode::Limit,
-                              .message = fmt::format("reading it takes {} bytes of memory, more than the {} bytes allowed", bytes, options_.heldBytes),
+                              .message = fmt::format("reading it takes {} bytes of memory, more than the {} bytes allowed for pages on their way; allow more, or build the file with smaller cells", bytes, options_.heldBytes),
+                              .file = source_->name(),
                               .element = fmt::format("page {}", first)});
         return Run{first, 0};
     }

@@ -36,6 +36,8 @@ public:
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
+    /// The file that the pages are of, for errors; empty where there is none.
+    [[nodiscard]] virtual std::string name() const { return {}; }
 };
 
 /// Pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none unless it may (keepWithin).
@@ -52,6 +54,7 @@ public:
     [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override;
     uint64_t keepWithin(uint64_t bytes) const override { return kept_.limitTo(bytes); }
     void interrupt() const override { reader_->interrupt(); }
+    [[nodiscard]] std::string name() const override { return reader_->name(); }
 
 private:
     Result<PageBytes> readFrom(const ByteReader& bytes, uint64_t page, bool withColour) const;

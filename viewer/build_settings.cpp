@@ -111,4 +111,10 @@ Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs,
     return MeshCache(*folder).dataset(std::move(options), buildOctree);
 }
 
+std::vector<std::filesystem::path> sideFilesOf(const std::vector<std::string>& inputs, const BuildSettings& settings) {
+    const auto folder = defaultCacheFolder();
+    if (!folder || (inputs.size() == 1 && isHttpUrl(inputs.front()))) return {};
+    return MeshCache(*folder).sideFilesOf(settings.optionsFor(inputs));
+}
+
 }  // namespace vcp

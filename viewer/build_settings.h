@@ -41,4 +41,7 @@ Result<InputKind> kindOf(const std::vector<std::string>& inputs);
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          const std::function<bool(const BuildProgress&)>& progress);
 
+/// Files that meshes name, as datasetFor met them: material files, images, buffers. None for what is no mesh.
+std::vector<std::filesystem::path> sideFilesOf(const std::vector<std::string>& inputs, const BuildSettings& settings);
+
 }  // namespace vcp

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
+#include "viewer/json_lines.h"
 #include "viewer/text_file.h"
 
 namespace vcp {
@@ -55,6 +56,18 @@ Key keyAt(const std::vector<Key>& keys, std::ptrdiff_t i) {
     return at(i);
 }
 
+/// An error of camera `number` of a path, with the line where it or its field stands.
+Error inPath(Error error, std::string_view text, size_t number) {
+    std::string pointer = fmt::format("/{}", number), field;
+    if (error.element.starts_with('"')) {
+        field = ": " + error.element;
+        pointer += "/" + error.element.substr(1, error.element.size() - 2);
+    }
+    error.element = fmt::format("line {}: camera {}{}", LinesOf(text)(pointer), number, field);
+    error.byte.reset();
+    return error;
+}
+
 }  // namespace
 
 std::vector<OrbitCamera> turntable(const OrbitCamera& from, glm::dvec3 pivot, int count) {
@@ -94,9 +107,9 @@ Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const st
     if (!json.is_array() || json.empty() || json.size() > kMostCameras)
         return Error{ErrorCode::InvalidInput, fmt::format("is not a JSON array of 1 to {} cameras", kMostCameras), name};
     std::vector<OrbitCamera> cameras;
-    for (const auto& element : json) {
-        auto camera = cameraFromJson(element.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), name);
-        if (!camera) return camera.error();
+    for (size_t i = 0; i < json.size(); ++i) {
+        auto camera = cameraFromJson(json[i].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), name);
+        if (!camera) return inPath(camera.error(), text, i);
         cameras.push_back(*camera);
     }
     return cameras;

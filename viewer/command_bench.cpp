@@ -92,7 +92,7 @@ Result<int> publish(const BenchCommand& command, const std::string& name, const 
         VCP_TRY(writeFile(folder / (name + ".md"), OutputKind::Text, texts.markdown, rules));
         for (const auto& [plot, svg] : texts.plots) VCP_TRY(writeFile(folder / (plot + ".svg"), OutputKind::Svg, svg, rules));
     }
-    VCP_TRY(printLine(command.report.json ? texts.json : texts.markdown));
+    VCP_TRY(command.report.json ? printJsonText(texts.json) : printLine(texts.markdown));
     return 0;
 }
 

@@ -240,7 +240,7 @@ Result<int> run(const RenderCommand& command) {
     if (!open) return open.error();
     if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
     const SceneFile& scene = open->file;
-    for (const std::string& warning : open->surfaces.warnings) fmt::print(stderr, "warning: {}\n", warning);
+    for (const std::string& warning : open->surfaces.warnings) warnOnTerminal(warning);
     const Box bounds = open->bounds();
     const auto camera = command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size);
     if (!camera) return camera.error();
@@ -279,7 +279,7 @@ Result<int> run(const RenderCommand& command) {
     if (!drawing) return drawing.error();
     VCP_TRY(writeFiles(**renderer, request, command, rules));
     if (drawing->stats.unresolvedRays > 0)
-        fmt::print(stderr, "warning: {} rays of mesostructure were given up: too many pieces of a base, or of its map, along them\n", drawing->stats.unresolvedRays);
+        warnOnTerminal(fmt::format("{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them", drawing->stats.unresolvedRays));
     if (command.report.json)
         VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
     else

@@ -79,7 +79,7 @@ Result<int> runMotion(const StressCommand& command, const OpenDataset& open, con
     options.cancel = interrupted;
     const auto report = measureMotion({{open.dataset, open.source, {}}}, open.bounds(), options);
     if (!report) return report.error();
-    VCP_TRY(printLine(command.report.json ? motionJson(*report) : motionText(*report)));
+    VCP_TRY(command.report.json ? printJsonText(motionJson(*report)) : printLine(motionText(*report)));
     return 0;
 }
 
@@ -101,7 +101,7 @@ Result<int> run(const StressCommand& command) {
     if (!report) return report.error();
     report->faults = command.faults;
     VCP_TRY(writeReport(command, *report));
-    VCP_TRY(printLine(command.report.json ? stressJson(*report) : stressMarkdown(*report)));
+    VCP_TRY(command.report.json ? printJsonText(stressJson(*report)) : printLine(stressMarkdown(*report)));
     return report->violations.empty() ? 0 : 1;
 }
 

@@ -5,8 +5,19 @@
 #include <cstring>
 
 #include "octree/output_file.h"
+#include "viewer/terminal_text.h"
 
 namespace vcp {
+
+namespace {
+
+Result<void> print(const std::string& text) {
+    if (std::fprintf(stdout, "%s\n", text.c_str()) < 0 || std::fflush(stdout) != 0)
+        return Error{ErrorCode::Io, std::string("cannot be written: ") + std::strerror(errno), "standard output"};
+    return {};
+}
+
+}  // namespace
 
 void addJsonOption(CLI::App& app, ReportOptions& options) {
     app.add_flag("--json", options.json, "Print one JSON object on stdout at the end");
@@ -32,19 +43,19 @@ std::string extensionProblem(const std::string& name, const std::string& extensi
 
 Result<void> printLineAbout(const std::string& output, const std::string& text) {
     if (output != kStandardOutput) return printLine(text);
-    std::fprintf(stderr, "%s\n", text.c_str());
+    std::fprintf(stderr, "%s\n", terminalLines(text).c_str());
     return {};
 }
 
-Result<void> printLine(const std::string& text) {
-    if (std::fprintf(stdout, "%s\n", text.c_str()) < 0 || std::fflush(stdout) != 0)
-        return Error{ErrorCode::Io, std::string("cannot be written: ") + std::strerror(errno), "standard output"};
-    return {};
-}
+Result<void> printLine(const std::string& text) { return print(terminalLines(text)); }
+
+Result<void> printJsonText(const std::string& json) { return print(terminalJson(json)); }
+
+void warnOnTerminal(const std::string& warning) { std::fprintf(stderr, "warning: %s\n", terminalText(warning).c_str()); }
 
 Result<void> printJson(const Json& json) {
     // File names need not be UTF-8; JSON must.
-    return printLine(json.dump(2, ' ', false, Json::error_handler_t::replace));
+    return printJsonText(json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
 }  // namespace vcp

@@ -58,10 +58,15 @@ void addOverwriteOption(CLI::App& app, bool& overwrite);
 /// Empty where `name` ends in `extension`, or is "-" and `mayBePipe`; else what to write instead.
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe);
 
-/// Writes to stdout with a newline behind. Errors: Io (stdout is closed or full).
+/// Writes lines of text to stdout, shown as terminal_text.h says, with a newline behind. Errors: Io (stdout is closed or full).
 Result<void> printLine(const std::string& text);
 /// The same for what is said of an output: on stderr when the output itself goes to stdout.
 Result<void> printLineAbout(const std::string& output, const std::string& text);
 Result<void> printJson(const Json& json);
+/// `json`: valid JSON.
+Result<void> printJsonText(const std::string& json);
+
+/// A line on stderr that begins with "warning: ".
+void warnOnTerminal(const std::string& warning);
 
 }  // namespace vcp

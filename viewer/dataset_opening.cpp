@@ -35,10 +35,16 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     double opened = 0;
     std::vector<std::filesystem::path> filesRead = filesOf(file);
     filesRead.insert(filesRead.end(), inputs.begin(), inputs.end());
+    const auto addSideFiles = [&](const std::vector<std::string>& meshes) {
+        const auto named = sideFilesOf(meshes, build);
+        filesRead.insert(filesRead.end(), named.begin(), named.end());
+    };
+    if (*kind == InputKind::Meshes) addSideFiles(inputs);
     auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
         if (progress && !progress({.stage = "opening", .fraction = opened++ / count})) return Error{ErrorCode::Cancelled, "cancelled"};
         const auto path = datasetFor({each}, build, progress);
         if (!path) return path.error();
+        addSideFiles({each});
         return openDataset(path->string(), source);
     });
     if (scene) scene->filesRead = std::move(filesRead);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -14,7 +13,7 @@
 #include <png.h>
 
 #include "builder/png_chunks.h"
-#include "octree/durable_file.h"
+#include "octree/regular_file.h"
 #include "viewer/exr_picture.h"
 
 namespace vcp {
@@ -155,9 +154,9 @@ Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double ra
 }
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
-    if (!file) return systemError(path, "cannot open", errno);
-    const auto bytes = wholeFile(file.get());
+    const auto file = openRegularStream(path);
+    if (!file) return file.error();
+    const auto bytes = wholeFile(file->get());
     auto map = bytes ? decodeHeights(*bytes, range) : Result<meso::HeightMap>(bytes.error());
     if (map) return map;
     Error error = map.error();

@@ -7,6 +7,7 @@
 
 #include "streaming/web_address.h"
 #include "viewer/commands.h"
+#include "viewer/terminal_text.h"
 
 namespace vcp {
 
@@ -19,7 +20,7 @@ constexpr int kWrongUsage = 2;
 void complain(const std::string& what) {
     std::string message = shownAddress(what);
     std::replace(message.begin(), message.end(), '\n', ' ');
-    std::fprintf(stderr, "vcp: %s\n", message.c_str());
+    std::fprintf(stderr, "vcp: %s\n", terminalText(message).c_str());
 }
 
 /// `vcp help`, `vcp help CMD`, `vcp help bench rays`.
@@ -52,6 +53,17 @@ std::string commandPath(const CLI::App& vcp) {
     return path;
 }
 
+/// The files that a command was given, shortened; empty without any.
+std::string inputsOf(const CLI::App& vcp) {
+    const CLI::App* at = &vcp;
+    while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+    std::vector<std::string> inputs;
+    for (const CLI::Option* option : at->get_options())
+        if (option->get_positional()) inputs.insert(inputs.end(), option->results().begin(), option->results().end());
+    if (inputs.empty()) return {};
+    return inputs.size() == 1 ? inputs.front() : inputs.front() + " and " + std::to_string(inputs.size() - 1) + " more";
+}
+
 int complainOfUsage(const CLI::App& vcp, const std::string& message) {
     const std::string path = commandPath(vcp);
     complain((path.empty() ? "" : path + ": ") + message + "; see `vcp help" + (path.empty() ? "`" : " " + path + "`"));
@@ -64,7 +76,7 @@ int runParsed(const CLI::App& vcp, const std::vector<Command>& commands) {
         try {
             return parsed->run();
         } catch (const std::bad_alloc&) {
-            return Error{ErrorCode::Limit, "needs more memory than there is"};
+            return Error{ErrorCode::Limit, "needs more memory than there is; close other programs, or give less at once", inputsOf(vcp)};
         }
     }();
     if (status) return *status;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "octree/regular_file.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {
@@ -144,10 +146,16 @@ Result<fs::path> defaultCacheFolder() {
 
 bool looksLikeDataset(const fs::path& path) {
     std::array<char, 8> start{};
-    std::ifstream file(path, std::ios::binary);
     const FileHeader header;
-    if (file.read(start.data(), start.size()) && std::equal(start.begin(), start.end(), header.magic)) return true;
+    // A pipe may be a mesh: what is read of it is gone.
+    const auto file = openRegularStream(path);
+    if (file && std::fread(start.data(), 1, start.size(), file->get()) == start.size() && std::equal(start.begin(), start.end(), header.magic)) return true;
     return path.extension() == kExtension;
+}
+
+std::vector<fs::path> MeshCache::sideFilesOf(const BuildOptions& options) const {
+    const auto key = keyOf(options);
+    return key ? readList(listOf(folder_, *key)) : std::vector<fs::path>();
 }
 
 Result<fs::path> MeshCache::pathFor(const BuildOptions& options) const {

@@ -38,6 +38,9 @@ public:
     /// missing); InvalidInput (a file was changed while it was read); what the builder reports.
     Result<std::filesystem::path> dataset(BuildOptions options, const Builder& build);
 
+    /// Files that the meshes named when they were built: material files, images, buffers. None before.
+    [[nodiscard]] std::vector<std::filesystem::path> sideFilesOf(const BuildOptions& options) const;
+
     /// Where the dataset for `options` is or would be. Errors: Io (input missing).
     [[nodiscard]] Result<std::filesystem::path> pathFor(const BuildOptions& options) const;
 

@@ -80,6 +80,12 @@ void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::
 
 }  // namespace
 
+Error ScenePlace::blamed(Error error) const {
+    if (file.empty() || error.code != ErrorCode::Usage) return error;
+    const std::string about = error.file.empty() ? std::string() : error.file + ": ";
+    return {.code = ErrorCode::InvalidInput, .message = (key.empty() ? "" : fmt::format("\"{}\": ", key)) + about + error.message, .file = file, .element = fmt::format("line {}", line)};
+}
+
 Result<Asset> openMesoAsset(const std::string& name) {
     Asset asset;
     const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
@@ -107,21 +113,21 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
     for (const MesoSurfaceDescription& d : descriptions) {
         const auto asset = openMesoAsset(d.asset);
-        if (!asset) return asset.error();
+        if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
-        if (!base) return base.error();
+        if (!base) return d.from.blamed(base.error());
         auto arrays = arraysOf(*asset, d.method);
         if (!arrays) {
             Error error = arrays.error();
             if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
-            return error;
+            return d.from.blamed(std::move(error));
         }
         const double edge = tileEdge(*base);
         auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
         if (!shell) {
             Error error = shell.error();
             if (isFile(d)) error.file = d.base;
-            return error;
+            return d.from.blamed(std::move(error));
         }
         warn(d, *shell, scene.warnings);
         scene.bounds = scene.bounds.joined({shell->low, shell->high});

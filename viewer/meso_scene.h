@@ -2,6 +2,7 @@
 // renderer (Renderer::setSurfaces).
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +15,16 @@ namespace vcp {
 
 /// A procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those of readAsset.
 Result<meso::Asset> openMesoAsset(const std::string& name);
+
+/// Where a scene file says something; no file: somebody else said it.
+struct ScenePlace {
+    std::string file;
+    size_t line = 0;
+    std::string key;  ///< empty: in that line
+
+    /// An error of what was said there: where a person's arguments would be wrong, the file is.
+    [[nodiscard]] Error blamed(Error error) const;
+};
 
 struct MesoSurfaceDescription {
     std::string asset;           ///< as openMesoAsset
@@ -28,6 +39,7 @@ struct MesoSurfaceDescription {
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/tile_texture.h); empty: none
     bool withBase = true;
     bool withFar = true;         ///< far away it is not marched (MesoLook::errorPixels)
+    ScenePlace from = {};
 };
 
 /// A direction or place in a world where z is up, in one where y may be.

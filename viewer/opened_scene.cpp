@@ -26,7 +26,7 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std
     scene.file = std::move(file);
     for (const SceneDataset& each : scene.file.datasets) {
         auto opened = open(each.file);
-        if (!opened) return opened.error();
+        if (!opened) return each.from.blamed(opened.error());
         scene.parts.push_back({*std::move(opened), each.placement});
     }
     auto surfaces = makeMesoScene(scene.file.surfaces);

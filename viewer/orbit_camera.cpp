@@ -1,17 +1,19 @@
 #include "viewer/orbit_camera.h"
 
-#include "viewer/text_file.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <sstream>
 
+#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <nlohmann/json.hpp>
+
+#include "viewer/json_lines.h"
+#include "viewer/text_file.h"
 
 namespace vcp {
 
@@ -325,7 +327,7 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
     const glm::dvec3 target = fields.triple("target", std::nullopt);
     const glm::dvec3 up = fields.triple("up", axisOf(camera.up));
     const double degrees = fields.number("fov_degrees", 45);
-    if (!(degrees > 0.001 && degrees < 179)) fields.wrong("fov_degrees", "must be between 0.001 and 179");
+    if (!(degrees > 0.001 && degrees < 177)) fields.wrong("fov_degrees", "must be between 0.001 and 177");
     if (fields.error()) return *fields.error();
 
     const glm::dvec3 view = target - camera.position;
@@ -342,12 +344,14 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
 
 Result<OrbitCamera> readCamera(const std::filesystem::path& path) {
     constexpr size_t kLimit = 1 << 20;
-    std::error_code failed;
-    if (std::filesystem::is_directory(path, failed))
-        return Error{ErrorCode::Io, "is a folder, not a camera file", path.string()};
     const auto text = readText(path, kLimit, "a camera file", "cannot be opened; views are " + viewNames() + " or a JSON file");
     if (!text) return text.error();
-    return cameraFromJson(*text, path.string());
+    auto camera = cameraFromJson(*text, path.string());
+    if (camera) return camera;
+    Error error = camera.error();
+    // A field stands in quotes; what is no camera has no line.
+    if (error.element.starts_with('"')) error.element = fmt::format("line {}: {}", LinesOf(*text)("/" + error.element.substr(1, error.element.size() - 2)), error.element);
+    return error;
 }
 
 }  // namespace vcp

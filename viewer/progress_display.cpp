@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "viewer/option_values.h"
+#include "viewer/terminal_text.h"
 
 namespace vcp {
 
@@ -64,9 +65,9 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
             json["triangles_per_second"] = fraction * static_cast<double>(details.triangles) / std::max(elapsed, 1e-9);
             json["temp_bytes"] = details.tempBytes;
         }
-        line = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+        line = terminalJson(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     } else {
-        line = fmt::format("{:3.0f} % {} ({}{})", 100 * fraction, stage, formatSeconds(elapsed), facts);
+        line = fmt::format("{:3.0f} % {} ({}{})", 100 * fraction, terminalText(stage), formatSeconds(elapsed), facts);
     }
     std::fprintf(out_, "%s\n", line.c_str());
     std::fflush(out_);
@@ -81,12 +82,14 @@ void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std
     lastPerMille_ = perMille;
     const int columns = std::max(20, terminalColumns(out_) - 1);
     const std::string head = fmt::format("{:3.0f} % ", 100 * fraction);
-    const std::string tail = fmt::format(" {}{}", stage, facts);
+    const std::string tail = fmt::format(" {}{}", terminalText(stage), facts);
     const int room = std::clamp(columns - static_cast<int>(head.size() + tail.size()) - 2, 0, 40);
     const int filled = static_cast<int>(std::lround(fraction * room));
     const std::string bar = head + "[" + std::string(static_cast<size_t>(filled), '=') +
                             std::string(static_cast<size_t>(room - filled), ' ') + "]" + tail;
     lastBar_ = bar.substr(0, static_cast<size_t>(columns));
+    // A character of several bytes is cut off whole.
+    while (lastBar_.size() < bar.size() && (static_cast<uint8_t>(bar[lastBar_.size()]) & 0xc0) == 0x80) lastBar_.pop_back();
     std::fprintf(out_, "\r%s\x1b[K", lastBar_.c_str());
     std::fflush(out_);
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -11,7 +10,9 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "mesostructure/solids.h"
 #include "streaming/http_reader.h"
+#include "viewer/json_lines.h"
 #include "viewer/text_file.h"
 
 namespace vcp {
@@ -23,84 +24,8 @@ using Json = nlohmann::json;
 constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
 constexpr int kDeepest = 16;
-// What a scene may have of them: nothing else has a line of its own.
-constexpr int kDeepestLine = 5;
-constexpr size_t kLongestKey = 64, kMostItems = 1024;
 // So far apart that double precision resolves a millimetre where units are metres, and further.
 constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
-
-/// The line of each value of a JSON text, by its JSON pointer; of a member the line of its key.
-class LinesOf {
-public:
-    /// Precondition: the text is valid JSON.
-    explicit LinesOf(std::string_view text) : text_(text) { value("", 0, true); }
-
-    /// A member that is there twice, by its JSON pointer; its line is that of the second.
-    [[nodiscard]] const std::optional<std::pair<std::string, size_t>>& twice() const { return twice_; }
-    [[nodiscard]] size_t operator()(const std::string& pointer) const {
-        const auto found = lines_.find(pointer);
-        return found == lines_.end() ? 1 : found->second;
-    }
-
-private:
-    void skipSpace() {
-        for (; at_ < text_.size() && std::string_view(" \t\r\n").find(text_[at_]) != std::string_view::npos; ++at_)
-            if (text_[at_] == '\n') ++line_;
-    }
-
-    std::string string() {
-        const size_t begin = at_++;
-        while (at_ < text_.size() && text_[at_] != '"') at_ += text_[at_] == '\\' ? 2 : 1;
-        ++at_;
-        const Json decoded = Json::parse(text_.substr(begin, at_ - begin), nullptr, false);
-        return decoded.is_string() ? decoded.get<std::string>() : std::string();
-    }
-
-    void value(const std::string& pointer, int depth, bool keep) {
-        skipSpace();
-        if (keep) lines_.emplace(pointer, line_);
-        if (at_ >= text_.size() || depth > kDeepest) return;
-        if (text_[at_] == '"') {
-            string();
-        } else if (text_[at_] == '{' || text_[at_] == '[') {
-            members(pointer, depth, keep && depth < kDeepestLine);
-        } else {
-            while (at_ < text_.size() && std::string_view(",]} \t\r\n").find(text_[at_]) == std::string_view::npos) ++at_;
-        }
-    }
-
-    void members(const std::string& pointer, int depth, bool keep) {
-        const bool isObject = text_[at_++] == '{';
-        for (size_t i = 0;; ++i) {
-            skipSpace();
-            if (at_ >= text_.size()) return;
-            if (text_[at_] == '}' || text_[at_] == ']') {
-                ++at_;
-                return;
-            }
-            if (text_[at_] == ',') {
-                ++at_;
-                skipSpace();
-            }
-            std::string key = std::to_string(i);
-            bool keepThis = keep && i < kMostItems;
-            if (isObject) {
-                const size_t line = line_;
-                key = string();
-                keepThis = keepThis && key.size() <= kLongestKey;
-                if (keepThis && !lines_.emplace(pointer + "/" + key, line).second && !twice_) twice_.emplace(pointer + "/" + key, line);
-                skipSpace();
-                ++at_;
-            }
-            value(keepThis ? pointer + "/" + key : std::string(), depth + 1, keepThis);
-        }
-    }
-
-    std::string_view text_;
-    size_t at_ = 0, line_ = 1;
-    std::map<std::string, size_t> lines_;
-    std::optional<std::pair<std::string, size_t>> twice_;
-};
 
 bool isDeeperThan(const Json& json, int depth) {
     if (!json.is_structured()) return false;
@@ -187,6 +112,7 @@ private:
         SceneDataset made;
         if (!isObject(json, at)) return made;
         onlyKeys(json, at, {"file", "transform", "translate", "rotate", "scale"});
+        made.from = {name_, lines_(at + "/file"), "file"};
         if (!json.contains("file")) wrong(at, "\"file\" is missing");
         else if (!json["file"].is_string() || json["file"].get<std::string>().empty()) wrong(at + "/file", "must be a file's name");
         else made.file = fileNamed(json["file"].get<std::string>());
@@ -215,7 +141,8 @@ private:
         if (!isObject(json, at)) return made;
         onlyKeys(json, at, {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "texture", "normal_texture", "method", "base"});
         if (!json.contains("asset")) wrong(at, "\"asset\" is missing");
-        else made.asset = named(json["asset"], at + "/asset", [](const std::string& name) { return name.ends_with(".meso"); });
+        else made.asset = assetNamed(json["asset"], at + "/asset");
+        made.from = {name_, lines_(at), {}};
         // A base that is none by name is a mesh.
         const auto bases = meso::baseSurfaceNames();
         const auto isMesh = [&](const std::string& name) { return std::ranges::find(bases, name) == bases.end(); };
@@ -240,6 +167,14 @@ private:
         if (!json.is_string() || json.get<std::string>().empty()) return wrong(at, "must be a name or a file's name"), std::string();
         const std::string name = json.get<std::string>();
         return isFile(name) ? fileNamed(name) : name;
+    }
+
+    std::string assetNamed(const Json& json, const std::string& at) {
+        const std::string name = named(json, at, [](const std::string& file) { return file.ends_with(".meso"); });
+        const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
+        if (!error_ && !name.ends_with(".meso") && !isIn(meso::heightFieldNames()) && !isIn(meso::solidNames()))
+            wrong(at, fmt::format("must be an asset (.meso), a height field ({}) or a solid ({})", fmt::join(meso::heightFieldNames(), ", "), fmt::join(meso::solidNames(), ", ")));
+        return name;
     }
 
     UpAxis upAxis(const Json& json, const std::string& at) {
@@ -322,7 +257,9 @@ private:
             if (!isObject(json[i], at)) return planes;
             onlyKeys(json[i], at, {"normal", "offset"});
             if (!json[i].contains("offset")) wrong(at, "\"offset\" is missing");
-            planes.push_back({direction(json[i], "normal", at), json[i].contains("offset") ? number(json[i]["offset"], at + "/offset") : 0});
+            const glm::dvec3 normal = direction(json[i], "normal", at);
+            if (!error_ && !(glm::length(normal) > 0)) wrong(at + "/normal", "is too short");
+            planes.push_back({normal, json[i].contains("offset") ? number(json[i]["offset"], at + "/offset") : 0});
         }
         return planes;
     }

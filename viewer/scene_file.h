@@ -21,6 +21,7 @@ namespace vcp {
 struct SceneDataset {
     std::string file;  ///< a .vcp or its address, or a mesh
     Similarity placement;
+    ScenePlace from = {};
 };
 
 struct SceneLight {

@@ -170,11 +170,13 @@ struct AnalyticDataset {
 inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const AnalyticOptions& o) {
     AnalyticDataset result;
     FileHeader& h = result.dataset.header;
-    for (int i = 0; i < 3; ++i) h.origin[i] = o.origin[i];
+    for (int i = 0; i < 3; ++i) {
+        h.origin[i] = h.boundsMin[i] = o.origin[i];
+        h.boundsMax[i] = o.origin[i] + o.finestCell * std::exp2(double(o.log2Cells + o.levels - 1));
+    }
     h.cell = o.finestCell;
     h.levels = o.levels;
     h.log2Cells = o.log2Cells;
-    h.certifiedErrorMax = o.errorCells * o.finestCell;
     const auto makePage = [&](uint32_t level, glm::u32vec3 at, AnalyticPage& page) {
         const double cell = o.finestCell * std::exp2(double(o.levels - 1 - level));
         const glm::dvec3 origin = o.origin + glm::dvec3(at) * cell * std::exp2(double(o.log2Cells));
@@ -216,8 +218,14 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
         first = end;
     }
     h.pages = result.dataset.pages.size();
-    for (uint32_t level = 0; level < o.levels; ++level)
-        h.level[level].certifiedError = o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level));
+    for (size_t i = 0; i < result.dataset.pages.size(); ++i) {
+        PageEntry& entry = result.dataset.pages[i];
+        if (entry.childMask == 0) entry.firstChild = 0;
+        double& error = h.level[entry.level].certifiedError;
+        error = std::max(error, double(entry.certifiedError));
+        if (entry.level + 1u == o.levels) h.leaves += entry.leaves;
+    }
+    h.certifiedErrorMax = h.level[o.levels - 1].certifiedError;
     return result;
 }
 

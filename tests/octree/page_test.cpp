@@ -312,6 +312,9 @@ TEST(Page, HeaderValuesAreChecked) {
         p.header.certifiedError = error;
         expectRefused(p, "certified error");
     }
+    PageParts reserved = smallPage();
+    reserved.header.reserved[5] = 1;
+    expectRefused(reserved, "byte 60: reserved");
 }
 
 TEST(Page, LeavesStayInTheirSections) {

@@ -105,6 +105,7 @@ protected:
         header.levels = 1;
         header.log2Cells = kLog2Cells;
         header.level[0].pages = 1;
+        header.leaves = 14;
         header.paper.band = 3;
         change(header);
         const std::filesystem::path file = folder_ / "small.vcp";
@@ -122,6 +123,27 @@ protected:
 
     TestFolder folder_;
 };
+
+TEST_F(PaperFileTest, ParametersThatNoMethodHasAreRefused) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const auto expectRefused = [&](uint64_t byte, const char* words, const std::function<void(FileHeader&)>& change) {
+        const Error error = refusal(write(change));
+        EXPECT_NE(error.line().find(words), std::string::npos) << error.line();
+        EXPECT_EQ(error.byte, byte) << error.line();
+    };
+    constexpr uint64_t at = offsetof(FileHeader, paper);
+    expectRefused(at, "band", [&](FileHeader& h) { h.paper.band = nan; });
+    expectRefused(at, "band", [&](FileHeader& h) { h.paper.band = -1; });
+    expectRefused(at + 4, "merge threshold", [&](FileHeader& h) { h.paper.mergeThreshold = nan; });
+    expectRefused(at + 8, "rounds of growing", [&](FileHeader& h) { h.paper.growRounds = -2; });
+    expectRefused(at + 12, "packing", [&](FileHeader& h) { h.paper.packing = 2; });
+    expectRefused(at + 16, "merge scheme", [&](FileHeader& h) { h.paper.mergeScheme = 3; });
+    expectRefused(at + 20, "empty nodes", [&](FileHeader& h) { h.paper.safeEmpty = 2; });
+    expectRefused(at + 24, "reserved", [&](FileHeader& h) { h.paper.reserved[0] = 1; });
+    const auto page = [&](const std::function<void(FileHeader&)>& change) { return verifyFile(**openFile(write(change))).error().line(); };
+    EXPECT_NE(page([](FileHeader& h) { h.paper.packing = 1; }).find("its packing differs"), std::string::npos);
+    EXPECT_NE(page([](FileHeader& h) { h.leaves = 13; }).find("13 leaves, but the pages of the finest level have 14"), std::string::npos);
+}
 
 TEST_F(PaperFileTest, ComesBackAndIsNoCertifiedDataset) {
     const auto file = write([](FileHeader&) {});

@@ -353,7 +353,32 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
         f.header().level[0].pages = 2;
         f.header().level[1] = {2, 7, 0};
     });
-    expectRefused("certified error", [&](F& f) { f.header().level[1].certifiedError = nan; });
+    expectRefused("more pages than the level above", [](F& f) {
+        f.header().levels = 3;
+        f.header().pages = 18;
+        f.header().level[1] = {1, 1, 0};
+        f.header().level[2] = {2, 16, f.header().certifiedErrorMax};
+    });
+    for (const double error : {nan, infinity, -5.0, 0.0}) {
+        expectRefused(fmt::format("byte {}: certified error", offsetof(FileHeader, level) + 24 + 16), [&](F& f) { f.header().level[1].certifiedError = error == 0 ? nan : error; });
+        expectRefused(fmt::format("byte {}: certified error", offsetof(FileHeader, certifiedErrorMax)), [&](F& f) { f.header().certifiedErrorMax = error; });
+        if (error != 0) expectRefused(fmt::format("byte {}: error target", offsetof(FileHeader, errorTarget)), [&](F& f) { f.header().errorTarget = error; });
+    }
+    expectRefused("cell is too large", [](F& f) { f.header().cell = 1e308; });
+    expectRefused("byte 80: the bounds end before they begin", [](F& f) { f.header().boundsMin[0] = f.header().boundsMax[0] + 1; });
+    expectRefused(fmt::format("byte {}: more hard leaves", offsetof(FileHeader, hardLeaves)), [](F& f) { f.header().hardLeaves = f.header().leaves + 1; });
+    expectRefused(fmt::format("byte {}: more triangles without area", offsetof(FileHeader, degenerateTriangles)), [](F& f) { f.header().degenerateTriangles = 1; });
+    expectRefused("byte 752: reserved", [](F& f) { f.bytes[sizeof(FileHeader)] = std::byte{1}; });
+    expectRefused("byte 4095: reserved", [](F& f) { f.bytes[4095] = std::byte{1}; });
+    expectRefused("reserved", [](F& f) { f.header().paper.packing = 1; });
+    expectRefused("rows behind the level table", [](F& f) { f.header().level[2].pages = 1; });
+    Forgery flags{bytes_};
+    flags.header().flags |= 2;
+    flags.seal();
+    const auto dataset = readDataset(MemoryFile(flags.bytes));
+    ASSERT_FALSE(dataset.ok());
+    EXPECT_EQ(dataset.error().code, ErrorCode::Unsupported);
+    EXPECT_EQ(dataset.error().line(), "memory.vcp: header: byte 136: flags 0x2 are not known to this program: use a newer program");
 }
 
 TEST_F(VcpFile, HugeCountsAllocateNothing) {
@@ -362,8 +387,12 @@ TEST_F(VcpFile, HugeCountsAllocateNothing) {
         expectRefused("page count", [&](Forgery& f) { f.header().pages = f.header().level[1].pages = pages; });
     // The largest count that the file's size allows: the directory does not fit.
     expectRefused("directory does not fit", [&](Forgery& f) {
-        f.header().pages = f.bytes.size() / sizeof(PageEntry);
-        f.header().level[1].pages = f.header().pages - 1;
+        FileHeader& h = f.header();
+        h.pages = f.bytes.size() / sizeof(PageEntry);
+        h.levels = 4;
+        h.level[1].pages = 8;
+        h.level[2] = {9, 64, 0};
+        h.level[3] = {73, h.pages - 73, h.certifiedErrorMax};
     });
     EXPECT_LT(peakBytes() - before, 16u << 20);
 }
@@ -399,7 +428,23 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused("child pages do not match", [](F& f) { std::swap(f.entry(1).morton, f.entry(2).morton); });
     expectRefused("child pages do not match", [](F& f) { f.entry(8).morton = 8; });
     expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0x7f; });
-    expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0; });
+    expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0, f.entry(0).firstChild = 0; });
+    expectRefused("a first one where there are none", [](F& f) { f.entry(0).childMask = 0; });
+    const auto at = [](uint64_t entry, uint64_t field) { return fmt::format("directory entry {}: byte {}: ", entry, kDirectoryOffset + entry * sizeof(PageEntry) + field); };
+    expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger", [](F& f) { f.entry(1).certifiedError *= 2; });
+    expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger", [](F& f) { f.header().level[1].certifiedError = f.header().certifiedErrorMax = 0; });
+    expectRefused(at(2, offsetof(PageEntry, leaves)) + "leaf counts", [](F& f) { f.entry(2).leaves = 0xffffffff; });
+    expectRefused(at(3, offsetof(PageEntry, reserved) + 5) + "reserved", [](F& f) { f.entry(3).reserved[5] = 1; });
+    expectRefused(at(0, offsetof(PageEntry, colourStoredBytes)) + "has colour", [](F& f) { f.header().flags = 0; });
+    expectRefused(at(0, offsetof(PageEntry, colourOffset)) + "a place of colour", [](F& f) {
+        f.header().flags = 0;
+        f.entry(0).colourBytes = f.entry(0).colourStoredBytes = 0;
+    });
+    expectRefused("outside", [](F& f) { f.entry(8).colourOffset = f.bytes.size() - sizeof(CommitRecord); });
+    // One block holds nine entries here; its bytes behind them are nobody's.
+    expectRefused(fmt::format("directory block 0: byte {}: bytes behind", kDirectoryOffset + 9 * sizeof(PageEntry)), [](F& f) { f.entry(9).leaves = 0, f.entry(9).morton = 1; });
+    expectRefused("directory block 0: byte 8183: bytes behind", [](F& f) { f.bytes[8183] = std::byte{1}; });
+    expectRefused(fmt::format("commit record: byte {}: reserved", bytes_.size() - sizeof(CommitRecord) + offsetof(CommitRecord, reserved) + 8), [](F& f) { f.commit().reserved[1] = 1; });
 }
 
 TEST_F(VcpFile, LyingPageSizesAllocateNothing) {
@@ -455,6 +500,111 @@ TEST_F(VcpFile, PagesBehindValidHashesAreChecked) {
     header.groups = 0;
     header.log2Cells = 3;
     expectPage("page size differs", 64, true);
+}
+
+/// What only the whole file can contradict.
+TEST_F(VcpFile, VerifyFindsContradictions) {
+    const auto expectFound = [&](const std::string& words, const auto& change) {
+        Forgery forgery{bytes_};
+        change(forgery);
+        forgery.seal();
+        const auto verified = verifyFile(MemoryFile(forgery.bytes));
+        ASSERT_FALSE(verified.ok()) << "intact, but should say: " << words;
+        EXPECT_NE(verified.error().line().find(words), std::string::npos) << verified.error().line();
+    };
+    using F = Forgery;
+    const auto header = [](uint64_t byte) { return fmt::format("memory.vcp: header: byte {}: ", byte); };
+    expectFound(header(offsetof(FileHeader, leaves)) + "0 leaves, but the pages", [](F& f) { f.header().leaves = 0; });
+    expectFound(header(offsetof(FileHeader, hardLeaves)) + "1 hard leaves, but the pages", [](F& f) { f.header().hardLeaves = 1; });
+    expectFound(header(offsetof(FileHeader, level) + 16) + "certified error of level 0", [](F& f) { f.header().level[0].certifiedError *= 2; });
+    expectFound(header(offsetof(FileHeader, level) + 24 + 16) + "certified error of level 1", [](F& f) { f.header().certifiedErrorMax = f.header().level[1].certifiedError *= 2; });
+    expectFound(header(offsetof(FileHeader, boundsMin) + 8) + "the bounds begin outside", [](F& f) { f.header().boundsMin[1] = -1e9; });
+    expectFound(header(offsetof(FileHeader, boundsMax) + 16) + "the bounds end outside", [](F& f) { f.header().boundsMax[2] = 1e9; });
+    expectFound("page 3: ", [](F& f) { f.entry(3).certifiedError = 0; });
+    expectFound("its directory entry says", [](F& f) { f.entry(3).certifiedError *= 0.5f; });
+    expectFound("page 4: ", [](F& f) { f.header().leaves -= 1, f.entry(4).leaves -= 1; });
+    expectFound("page 4: ", [](F& f) { f.header().hardLeaves += 1, f.entry(4).hardLeaves += 1; });
+    expectFound("page 0: ", [](F& f) { f.header().cell *= 2; });
+}
+
+/// A field of the header or of an entry, and whether any value of its kind is one that nothing else in the file contradicts.
+struct Field {
+    const char* name;
+    uint64_t offset;
+    char kind;  ///< 'd', 'f', or an integer of '1', '4', '8' bytes
+    bool free = false;
+};
+
+template <class T>
+void put(Bytes& bytes, uint64_t at, T value) {
+    std::memcpy(&bytes[at], &value, sizeof value);
+}
+
+/// The hostile values of a field, each put there.
+std::vector<Bytes> hostileCopies(const Bytes& bytes, uint64_t at, char kind) {
+    std::vector<Bytes> copies;
+    const auto add = [&](auto value) {
+        Bytes copy = bytes;
+        put(copy, at, value);
+        if (copy != bytes) copies.push_back(std::move(copy));
+    };
+    constexpr double kDoubles[] = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), -5, 0, 1e-300, 1e300, -1e300};
+    for (const double value : kDoubles) {
+        if (kind == 'd') add(value);
+        if (kind == 'f') add(static_cast<float>(value));
+    }
+    constexpr uint64_t kIntegers[] = {0, 1, 2, 7, 8, 31, 0x7f, 0x80, 0xff, 4096, 0x7fffffff, 0x80000000, 0xffffff00, 0xffffffff, 0x7fffffffffffffff, 0x8000000000000000, 0xffffffffffffff00, ~uint64_t{0}};
+    for (const uint64_t value : kIntegers) {
+        if (kind == '1') add(static_cast<uint8_t>(value));
+        if (kind == '4') add(static_cast<uint32_t>(value));
+        if (kind == '8') add(value);
+    }
+    return copies;
+}
+
+TEST_F(VcpFile, HostileFieldsAreRefused) {
+    std::vector<Field> header = {{"version", 8, '4'}, {"headerBytes", 12, '4'}, {"fileBytes", 16, '8'}, {"pages", 24, '8'}, {"cell", 56, 'd'}, {"errorTarget", 64, 'd', true},
+        {"certifiedErrorMax", 72, 'd'}, {"levels", 128, '4'}, {"log2Cells", 132, '4'}, {"flags", 136, '4'}, {"method", 140, '4'}, {"triangles", 144, '8', true},
+        {"degenerateTriangles", 152, '8'}, {"vertices", 160, '8', true}, {"leaves", 168, '8'}, {"hardLeaves", 176, '8'}};
+    for (uint64_t i = 0; i < 3; ++i) {
+        header.push_back({"origin", 32 + 8 * i, 'd', true});
+        header.push_back({"boundsMin", 80 + 8 * i, 'd', true});
+        header.push_back({"boundsMax", 104 + 8 * i, 'd', true});
+    }
+    for (uint64_t l = 0; l < kMaxLevels; ++l) {
+        header.push_back({"level.firstEntry", 184 + 24 * l, '8'});
+        header.push_back({"level.pages", 184 + 24 * l + 8, '8'});
+        header.push_back({"level.certifiedError", 184 + 24 * l + 16, 'd'});
+    }
+    for (uint64_t byte = sizeof(FileHeader) - sizeof(PaperParameters); byte < kDirectoryOffset; byte += 200) header.push_back({"rest", byte, '8'});
+    const std::vector<Field> entry = {{"morton", 0, '8'}, {"offset", 8, '8'}, {"hash", 16, '8'}, {"colourOffset", 24, '8'}, {"colourHash", 32, '8'}, {"storedBytes", 40, '4'},
+        {"pageBytes", 44, '4'}, {"colourStoredBytes", 48, '4'}, {"colourBytes", 52, '4'}, {"firstChild", 56, '4'}, {"leaves", 60, '4'}, {"hardLeaves", 64, '4'},
+        {"certifiedError", 68, 'f'}, {"childMask", 72, '1'}, {"level", 73, '1'}, {"reserved", 74, '1'}, {"reserved", 79, '1'}};
+    const uint64_t before = peakBytes();
+    uint64_t tried = 0;
+    const auto sweep = [&](const std::vector<Field>& fields, uint64_t base) {
+        for (const Field& field : fields)
+            for (Bytes& copy : hostileCopies(bytes_, base + field.offset, field.kind)) {
+                Forgery forgery{std::move(copy)};
+                forgery.seal();
+                const auto verified = verifyFile(MemoryFile(forgery.bytes));
+                ++tried;
+                if (!verified.ok()) {
+                    ASSERT_EQ(verified.error().file, "memory.vcp");
+                    ASSERT_TRUE(verified.error().byte.has_value()) << verified.error().line();
+                    continue;
+                }
+                EXPECT_TRUE(field.free) << field.name << " at byte " << base + field.offset << " was accepted";
+                // What is free is a number still.
+                const FileHeader& h = forgery.header();
+                for (const double value : {h.errorTarget, h.origin[0], h.origin[1], h.origin[2], h.boundsMin[0], h.boundsMax[0]}) EXPECT_TRUE(std::isfinite(value)) << field.name;
+                EXPECT_GE(h.errorTarget, 0);
+            }
+    };
+    sweep(header, 0);
+    for (const uint64_t page : {0, 1, 8}) sweep(entry, kDirectoryOffset + page * sizeof(PageEntry));
+    EXPECT_GT(tried, 1000u);
+    EXPECT_LT(peakBytes() - before, 64u << 20);
 }
 
 TEST_F(VcpFile, VerifyReportsAndStops) {

@@ -65,10 +65,12 @@ inline std::vector<std::byte> directoryFile(Dataset& tree) {
         PageEntry& e = tree.pages[i];
         LevelRow& row = h.level[e.level];
         if (row.pages++ == 0) row.firstEntry = i;
+        row.certifiedError = std::max(row.certifiedError, double(e.certifiedError));
         e.offset = place(e.storedBytes);
         if (e.colourStoredBytes != 0) e.colourOffset = place(e.colourStoredBytes);
     }
     while (h.levels > 1 && h.level[h.levels - 1].pages == 0) --h.levels;
+    h.certifiedErrorMax = h.level[h.levels - 1].certifiedError;
     h.fileBytes = (end + kPageAlignment - 1) / kPageAlignment * kPageAlignment + sizeof(CommitRecord);
     std::vector<std::byte> bytes(h.fileBytes);
     std::memcpy(bytes.data(), &h, sizeof h);

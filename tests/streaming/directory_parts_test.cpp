@@ -237,7 +237,7 @@ TEST(DirectoryParts, LiesBehindValidHashesAreFoundInAnyOrder) {
         {"outside the file", child, [](PageEntry& e) { e.offset = 256; }},
         {"outside the file", child, [](PageEntry& e) { e.storedBytes = 0x80000000; }},
         {"page size out of range", child, [](PageEntry& e) { e.pageBytes = 7; }},
-        {"out of range", child, [](PageEntry& e) { e.certifiedError = -1; }},
+        {"certified error", child, [](PageEntry& e) { e.certifiedError = -1; }},
     };
     for (const auto& [words, page, change] : lies)
         for (uint64_t seed = 0; seed < 4; ++seed) {

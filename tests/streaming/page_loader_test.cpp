@@ -55,6 +55,7 @@ public:
         changed_.notify_all();
     }
     void letGo() const { interrupt(); }
+    [[nodiscard]] std::string name() const override { return "fake.vcp"; }
     /// Keeps all it may.
     uint64_t keepWithin(uint64_t bytes) const override { return kept = keeps ? bytes : 0; }
     bool keeps = false;
@@ -193,6 +194,19 @@ TEST(PageLoader, AnErrorIsDeliveredLikeAPage) {
     ASSERT_FALSE(pages[0].bytes);
     EXPECT_EQ(pages[0].bytes.error().line(), "page 13: broken");
     EXPECT_EQ(loader.stats().bytesRead, 0u);
+}
+
+TEST(PageLoader, APageThatIsTooLargeIsRefusedWithItsFile) {
+    const auto source = std::make_shared<FakeSource>(64);
+    PageLoader loader(source, options(false, 1, 1000));
+    loader.request(std::vector<PageRequest>{{28, 0}});
+    ASSERT_TRUE(loader.waitForPage(kLong));
+    const auto pages = loader.collect();
+    ASSERT_EQ(pages.size(), 1u);
+    ASSERT_FALSE(pages[0].bytes.ok());
+    const std::string line = pages[0].bytes.error().line();
+    EXPECT_TRUE(line.starts_with("fake.vcp: page 28: reading it takes 1024 bytes")) << line;
+    EXPECT_NE(line.find("allow more"), std::string::npos) << line;
 }
 
 TEST(PageLoader, MemoryIsNeverExceeded) {

@@ -37,6 +37,7 @@ inline Dataset randomTree(uint64_t seed, uint32_t levels, double density, uint32
                 page.childMask = static_cast<uint8_t>(page.childMask | 1u << octant);
                 next.push_back(place << 3 | octant);
             }
+            if (page.childMask == 0) page.firstChild = 0;
             dataset.pages.push_back(page);
         }
         places = std::move(next);

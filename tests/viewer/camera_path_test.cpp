@@ -91,6 +91,8 @@ TEST(CameraPath, AFileOfCameras) {
         EXPECT_EQ(broken.error().code, ErrorCode::InvalidInput);
         EXPECT_TRUE(broken.error().line().starts_with("path.json"));
     }
+    const std::string third = "[\n{\"position\":[0,0,5],\"target\":[0,0,0]},\n{\"position\":[2,0,5],\n\"target\":[2,0,\"x\"]}]";
+    EXPECT_EQ(camerasFromJson(third, "path.json").error().line(), "path.json: line 4: camera 1: \"target\": must be three numbers");
     EXPECT_EQ(readCameras("/no/such/file.json").error().code, ErrorCode::Io);
     EXPECT_EQ(readCameras("/").error().code, ErrorCode::Io);
 }

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/stat.h>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
@@ -152,6 +154,85 @@ TEST_F(CommandLine, BadInputsEndWith1AndNameTheFile) {
     if (fs::exists(*folder_ / "cache" / "vcp")) {
         EXPECT_TRUE(fs::is_empty(*folder_ / "cache" / "vcp")) << "a failed build left something in the cache";
     }
+}
+
+/// Nothing of a name or of what a file says drives the terminal; each line is one.
+TEST_F(CommandLine, NothingThatANameHoldsDrivesTheTerminal) {
+    const auto expectHarmless = [](const Ran& ran) {
+        for (const std::string* said : {&ran.out, &ran.err})
+            for (const char c : *said) ASSERT_TRUE(c == '\n' || (static_cast<unsigned char>(c) >= 0x20 && c != '\x7f')) << ran.out << ran.err;
+        EXPECT_EQ((ran.out + ran.err).find("\u202e"), std::string::npos) << ran.out << ran.err;
+    };
+    const fs::path hostile = *folder_ / "a\x1b]0;owned\x07\x7f\u202e.vcp", missing = *folder_ / "b\x1b[2J.vcp";
+    fs::copy_file(dataset(), hostile, fs::copy_options::overwrite_existing);
+    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{{"info", hostile.string()}, {"verify", hostile.string(), "--progress", "plain"}}) {
+        const Ran ran = run(arguments);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        EXPECT_NE(ran.out.find("a\\x1b]0;owned\\x07\\x7f\\xe2\\x80\\xae.vcp"), std::string::npos) << ran.out;
+        expectHarmless(ran);
+    }
+    const Ran json = run({"info", hostile.string(), "--json"});
+    expectHarmless(json);
+    EXPECT_EQ(Json::parse(json.out)["file"], hostile.string());
+    const Ran refused = run({"info", missing.string()});
+    expectFailure(refused, 1, "b\\x1b[2J.vcp");
+    expectHarmless(refused);
+    const Ran usage = run({"inf\x1b[2Jo"});
+    EXPECT_EQ(usage.status, 2);
+    expectHarmless(usage);
+
+    const fs::path mesh = *folder_ / "hostile.obj", built = *folder_ / "hostile.vcp";
+    write(mesh, "mtllib \x1b[31m\xc2\x9b" "31m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \x1b[1m\nf 1 2 3\n");
+    const Ran ran = run({"build", mesh.string(), "-o", built.string()});
+    EXPECT_EQ(ran.status, 0) << ran.err;
+    EXPECT_NE(ran.out.find("\\x1b[31m"), std::string::npos) << ran.out << ran.err;
+    expectHarmless(ran);
+
+    const fs::path scene = *folder_ / "hostile.json";
+    write(scene, "{\n\"datasets\": [{\"file\": \"a.vcp\"}],\n\"\\u001b[31m\": 1}");
+    const Ran key = run({"render", scene.string(), "-o", (*folder_ / "none.png").string()});
+    expectFailure(key, 1, scene.string() + ": line 3: \"\\x1b[31m\" is no key here");
+    expectHarmless(key);
+}
+
+/// What a scene, a camera or a path says wrongly is not the command line's fault.
+TEST_F(CommandLine, WhatFilesSayEndsWith1) {
+    const fs::path scene = *folder_ / "wrong_scene.json", camera = *folder_ / "wrong_camera.json", path = *folder_ / "wrong_path.json", png = *folder_ / "wrong.png";
+    write(*folder_ / "points.xyz", "0 0 0\n");
+    const std::pair<const char*, const char*> scenes[] = {
+        {"{\"datasets\": [\n{\"file\": \"points.xyz\"}]}", ": line 2: \"file\": "},
+        {"{\"mesostructure\": [\n{\"asset\": \"brick\"}]}", ": line 2: \"asset\" must be"},
+        {"{\"mesostructure\": [\n{\"asset\": \"beads\", \"surface\": \"blob\"}]}", ": line 2: "},
+        {"{\"mesostructure\": [\n{\"asset\": \"beads\",\n\"tiles\": 1e6}]}", ": line "},
+        {"{\"datasets\": [{\"file\": \"a.vcp\"}],\n\"sections\": [{\"normal\": [1e-320, 0, 0], \"offset\": 0}]}", ": line 2: \"normal\""},
+    };
+    for (const auto& [text, words] : scenes) {
+        write(scene, text);
+        const Ran ran = run({"render", scene.string(), "-o", png.string(), "--size", "16x16"});
+        expectFailure(ran, 1, scene.string() + words);
+        EXPECT_EQ(ran.err.find("vcp help"), std::string::npos) << ran.err;
+    }
+    write(camera, "{\"position\": [0, 0, 5],\n\"target\": [0, 0, 0],\n\"fov_degrees\": 178.5}");
+    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--camera", camera.string()}), 1, camera.string() + ": line 3: \"fov_degrees\"");
+    write(path, "[{\"position\": [0, 0, 5], \"target\": [0, 0, 0]},\n{\"position\": [0, 0, 5]}]");
+    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--path", path.string(), "--frames", "2"}), 1, path.string() + ": line 2: camera 1: \"target\"");
+    EXPECT_FALSE(fs::exists(png));
+}
+
+/// No command waits for a pipe that stands where a file should; a mesh may come through one.
+TEST_F(CommandLine, PipesAreNoFiles) {
+    const fs::path pipe = *folder_ / "pipe", scene = *folder_ / "pipe.json", png = *folder_ / "pipe.png";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    ASSERT_EQ(::mkfifo(scene.c_str(), 0600), 0);
+    const std::string whole = dataset().string();
+    expectFailure(run({"info", pipe.string()}), 1, pipe.string() + ": is a pipe, not a file");
+    expectFailure(run({"verify", pipe.string()}), 1, pipe.string() + ": is a pipe, not a file");
+    expectFailure(run({"render", scene.string(), "-o", png.string()}), 1, scene.string() + ": is a pipe, not a file");
+    expectFailure(run({"render", whole, "-o", png.string(), "--camera", pipe.string()}), 1, pipe.string() + ": is a pipe, not a file");
+    expectFailure(run({"render", whole, "-o", png.string(), "--path", pipe.string(), "--frames", "2"}), 1, pipe.string() + ": is a pipe, not a file");
+    expectFailure(run({"meso", "info", pipe.string()}), 1, pipe.string());
+    EXPECT_EQ(run({"render", pipe.string(), "-o", png.string()}).status, 1);
+    EXPECT_FALSE(fs::exists(png));
 }
 
 TEST_F(CommandLine, MeshIsNoDatasetForInfoAndVerify) {

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <limits>
 
+#include <sys/stat.h>
+
 #include <gtest/gtest.h>
 
 #include "test_folder.h"
@@ -124,6 +126,21 @@ protected:
     }
     TestFolder folder_;
 };
+
+TEST_F(Exr, WhatIsNoFileIsNotWaitedForAndDamageNamesTheFile) {
+    const std::string pipe = (folder_ / "pipe.exr").string();
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const auto refused = readHeightImage(pipe, 1);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().line(), pipe + ": is a pipe, not a file");
+    const Bytes whole = ExrFile(0, 0, 3, 2).channel("Y", {-2, 0, 2, 6, 1, -2}).bytes();
+    for (size_t size = 4; size < whole.size(); ++size) {
+        const auto map = read(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(size)));
+        if (map) continue;
+        EXPECT_TRUE(map.error().line().starts_with((folder_ / "a.exr").string() + ": ")) << map.error().line();
+        EXPECT_EQ(map.error().message.find("\"\""), std::string::npos) << map.error().line();
+    }
+}
 
 TEST_F(Exr, FloatsBecomeHeightsBetweenTheirLeastAndGreatest) {
     // Rows from the top, a data window away from the origin, values below 0 and above 1.

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "test_folder.h"
+#include "viewer/opened_scene.h"
 
 namespace vcp {
 namespace {
@@ -61,6 +62,7 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"colour\": [1, 2, 1]}]"), 4, "from 0 to 1"},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"texture\": 7}]"), 4, "\"texture\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"normal_texture\": \"\"}]"), 4, "\"normal_texture\""},
+        {beside("\"mesostructure\": [{\n\"asset\": \"brick\"}]"), 4, "\"asset\" must be"},
         {beside("\"lights\": [{}, {}]"), 3, "more are not supported"},
         {beside("\"lights\": [{}]"), 3, "direction"},
         {beside("\"caps\": 1"), 3, "true or false"},
@@ -68,6 +70,8 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"camera\": {\"position\": [0, 0, 0]}"), 3, "\"target\""},
         {beside("\"sections\": [\n{\"normal\": [1, 0, 0], \"offset\": 0},\n{\"normal\": [0, 0, 0], \"offset\": 0}]"), 5, "\"normal\""},
         {beside("\"sections\": [{\"normal\": [1, 0, 0]}]"), 3, "offset"},
+        {beside("\"sections\": [\n{\"normal\": [1e-320, 0, 0], \"offset\": 0}]"), 4, "\"normal\" is too short"},
+        {beside("\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0],\n \"fov_degrees\": 178.5}"), 4, "\"fov_degrees\""},
         {"{\n\n\"datasets\" [", 3, "JSON"},
         {"", 1, "JSON"},
         {beside("\"caps\":\n 1e999"), 4, "out of range"},
@@ -91,6 +95,27 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
     EXPECT_FALSE(sceneFromJson("{\"" + key + "\": [" + zeros + "]}", "wide.json", {}));
     EXPECT_FALSE(sceneFromJson(std::string(5000, '['), "deep.json", {}));
     EXPECT_FALSE(sceneFromJson(std::string(40, '[') + std::string(40, ']'), "deep.json", {}));
+}
+
+// What is wrong only with the file or the asset that a scene names is the scene's fault too, not that of who typed its name.
+TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
+    const auto refusal = [](const std::string& text) {
+        auto scene = sceneFromJson(text, "museum.json", {});
+        EXPECT_TRUE(scene) << scene.error().line();
+        const auto open = [](const std::string& file) -> Result<OpenDataset> { return Error{ErrorCode::Usage, "unknown mesh format", file}; };
+        const auto opened = openScene(*std::move(scene), "museum.json", open);
+        EXPECT_FALSE(opened);
+        return opened ? Error{} : opened.error();
+    };
+    const Error dataset = refusal("{\n\"datasets\": [{\n\"file\": \"a.xyz\"}]}");
+    EXPECT_EQ(dataset.code, ErrorCode::InvalidInput);
+    EXPECT_EQ(dataset.line(), "museum.json: line 3: \"file\": a.xyz: unknown mesh format");
+    const Error method = refusal("{\n\"mesostructure\": [\n{\"asset\": \"beads\", \"surface\": \"nowhere\"}]}");
+    EXPECT_EQ(method.code, ErrorCode::InvalidInput);
+    EXPECT_TRUE(method.line().starts_with("museum.json: line 3: ")) << method.line();
+    // What cannot be read is named itself, as before.
+    EXPECT_EQ(ScenePlace({"museum.json", 3, "file"}).blamed({ErrorCode::Io, "no such file", "a.vcp"}).line(), "a.vcp: no such file");
+    EXPECT_EQ(ScenePlace().blamed({ErrorCode::Usage, "no such name"}).code, ErrorCode::Usage);
 }
 
 // Whatever is cut off or in the wrong place is an error or a scene, nothing else.

@@ -1,0 +1,52 @@
+#include "octree/regular_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cerrno>
+
+#include "octree/durable_file.h"
+
+namespace vcp {
+
+namespace {
+
+/// What stands there instead of a file; nothing: a file does.
+const char* otherThanFile(mode_t mode) {
+    if (S_ISREG(mode)) return nullptr;
+    if (S_ISDIR(mode)) return "is a folder, not a file";
+    if (S_ISFIFO(mode)) return "is a pipe, not a file";
+    if (S_ISSOCK(mode)) return "is a socket, not a file";
+    return "is a device, not a file";
+}
+
+}  // namespace
+
+Result<int> openRegular(const std::filesystem::path& path) {
+    const auto refuse = [&](const char* what) {
+        return Error{.code = ErrorCode::Io, .message = what, .file = path.string()};
+    };
+    struct stat status {};
+    // Asked before as well, since to open a device can do something already.
+    if (::stat(path.c_str(), &status) != 0) return systemError(path, "cannot open", errno);
+    if (const char* other = otherThanFile(status.st_mode)) return refuse(other);
+    // Not to wait, should it have become a pipe since; for files this changes nothing.
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (file < 0) return systemError(path, "cannot open", errno);
+    const char* other = ::fstat(file, &status) != 0 ? "cannot be asked what it is" : otherThanFile(status.st_mode);
+    if (!other) return file;
+    ::close(file);
+    return refuse(other);
+}
+
+Result<std::unique_ptr<std::FILE, FileCloser>> openRegularStream(const std::filesystem::path& path) {
+    const auto file = openRegular(path);
+    if (!file) return file.error();
+    std::unique_ptr<std::FILE, FileCloser> stream(::fdopen(*file, "rb"));
+    if (stream) return stream;
+    const int problem = errno;
+    ::close(*file);
+    return systemError(path, "cannot open", problem);
+}
+
+}  // namespace vcp

@@ -1,0 +1,115 @@
+// verifyFile: every byte of a .vcp, and that what it says of itself in several places is the same.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+namespace {
+
+class FileVerification {
+public:
+    FileVerification(const ByteReader& reader, const Dataset& dataset)
+        : reader_(reader), d_(dataset), end_(blockOffset(dataset.pages.blocks())) {}
+
+    /// What the header says of all pages together.
+    [[nodiscard]] Result<void> sums() const {
+        const FileHeader& h = d_.header;
+        for (uint32_t l = 0; l < h.levels; ++l) {
+            double error = 0;
+            for (const uint64_t page : EntryRange(h.level[l].firstEntry, h.level[l].pages))
+                error = std::max(error, double(d_.pages[page].certifiedError));
+            if (error != h.level[l].certifiedError)
+                return broken("header",
+                              offsetof(FileHeader, level) + l * sizeof(LevelRow) + offsetof(LevelRow, certifiedError),
+                              fmt::format("certified error of level {} is {:g}, of its pages {:g}", l,
+                                          h.level[l].certifiedError, error));
+        }
+        uint64_t leaves = 0, hardLeaves = 0;
+        const LevelRow& finest = h.level[h.levels - 1];
+        for (const uint64_t page : EntryRange(finest.firstEntry, finest.pages))
+            leaves += d_.pages[page].leaves, hardLeaves += d_.pages[page].hardLeaves;
+        if (leaves != h.leaves)
+            return broken("header", offsetof(FileHeader, leaves),
+                          fmt::format("{} leaves, but the pages of the finest level have {}", h.leaves, leaves));
+        if (hardLeaves != h.hardLeaves)
+            return broken(
+                "header", offsetof(FileHeader, hardLeaves),
+                fmt::format("{} hard leaves, but the pages of the finest level have {}", h.hardLeaves, hardLeaves));
+        return bounds();
+    }
+
+    [[nodiscard]] Result<void> page(uint64_t index) {
+        const PageEntry& e = d_.pages[index];
+        VCP_TRY(gap(e.offset));
+        if (auto page = readPage(reader_, d_, index, true); !page) return page.error();
+        end_ = e.offset + e.storedBytes;
+        if (e.colourBytes == 0) return {};
+        VCP_TRY(gap(e.colourOffset));
+        end_ = e.colourOffset + e.colourStoredBytes;
+        return {};
+    }
+
+    /// The bytes up to `to` are zero.
+    [[nodiscard]] Result<void> gap(uint64_t to) const {
+        if (to < end_ || to - end_ > kBlockBytes) return broken("padding", end_, "unexpected bytes between pages");
+        std::vector<std::byte> bytes(to - end_);
+        VCP_TRY(reader_.read(end_, bytes));
+        for (size_t i = 0; i < bytes.size(); ++i)
+            if (bytes[i] != std::byte{0})
+                return broken("padding", end_ + i, "is not zero: the file was changed or damaged");
+        return {};
+    }
+
+    [[nodiscard]] uint64_t done() const { return end_; }
+
+private:
+    [[nodiscard]] Error broken(std::string element, uint64_t byte, std::string message) const {
+        return {.code = ErrorCode::InvalidInput,
+                .message = std::move(message),
+                .file = reader_.name(),
+                .element = std::move(element),
+                .byte = byte};
+    }
+
+    /// The mesh lies in the root page.
+    [[nodiscard]] Result<void> bounds() const {
+        const FileHeader& h = d_.header;
+        const double edge = d_.edgeOf(d_.pages[0]);
+        for (int i = 0; i < 3; ++i) {
+            // The builder leaves a cell around the mesh; far from the origin a coordinate is rounded by more than that.
+            const double slack = h.cell + 1e-12 * std::max(std::abs(h.boundsMin[i]), std::abs(h.boundsMax[i]));
+            const uint64_t axis = 8 * static_cast<uint64_t>(i);
+            if (h.boundsMin[i] < h.origin[i] - slack)
+                return broken("header", offsetof(FileHeader, boundsMin) + axis,
+                              "the bounds begin outside the root page");
+            if (h.boundsMax[i] > h.origin[i] + edge + slack)
+                return broken("header", offsetof(FileHeader, boundsMax) + axis, "the bounds end outside the root page");
+        }
+        return {};
+    }
+
+    const ByteReader& reader_;
+    const Dataset& d_;
+    uint64_t end_;  ///< of what was checked
+};
+
+}  // namespace
+
+Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t), void* user) {
+    const auto dataset = readDataset(reader);
+    if (!dataset) return dataset.error();
+    FileVerification verification(reader, *dataset);
+    VCP_TRY(verification.sums());
+    for (uint64_t i = 0; i < dataset->pages.size(); ++i) {
+        VCP_TRY(verification.page(i));
+        if (progress != nullptr && !progress(user, verification.done()))
+            return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = reader.name()};
+    }
+    return verification.gap(reader.size() - sizeof(CommitRecord));
+}
+
+}  // namespace vcp
