@@ -6,7 +6,7 @@
 #include <fmt/ranges.h>
 
 #include "builder/memory_plan.h"
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 #include "streaming/http_reader.h"
 #include "viewer/interrupt.h"
 #include "viewer/mesh_cache.h"

@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/ingest.h"
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 #include "octree/vcp_writer.h"
 
 namespace vcp {
