@@ -4,7 +4,7 @@
 #include "octree/vcp_file.h"
 #include "viewer/commands.h"
 #include "viewer/option_values.h"
-#include "viewer/source_settings.h"
+#include "viewer/source_arguments.h"
 
 namespace vcp {
 

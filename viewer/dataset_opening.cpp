@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "viewer/interrupt.h"
-
 namespace vcp {
 
 std::string nameOf(const std::vector<std::string>& inputs) {
@@ -40,17 +38,8 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     });
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress) {
-    ProgressDisplay display(progress, stderr);
-    const InterruptScope catching;
-    return openScene(inputs, build, source, [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction, detailsOf(at));
-        return !interrupted();
-    });
-}
-
-DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style)
-    : inputs_(std::move(inputs)), build_(std::move(build)), source_(std::move(source)), style_(style) {
+DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, std::function<bool(const BuildProgress&)> told)
+    : inputs_(std::move(inputs)), build_(std::move(build)), source_(std::move(source)), told_(std::move(told)) {
     thread_ = std::thread([this] {
         opened_ = open();
         done_ = true;
@@ -70,12 +59,13 @@ DatasetOpening::Progress DatasetOpening::progress() const {
 Result<OpenedScene> DatasetOpening::take() { return *std::exchange(opened_, std::nullopt); }
 
 Result<OpenedScene> DatasetOpening::open() {
-    ProgressDisplay display(style_, stderr);
+    // It goes with the work: what it shows is taken away before what went wrong is told.
+    const auto told = std::exchange(told_, nullptr);
     return openScene(inputs_, build_, source_, [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction, detailsOf(at));
+        const bool goesOn = !told || told(at);
         const std::lock_guard lock(mutex_);
         progress_ = {at.stage, at.fraction, at.triangles};
-        return !cancelled_ && !interrupted();
+        return goesOn && !cancelled_;
     });
 }
 

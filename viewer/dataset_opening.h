@@ -24,9 +24,6 @@ std::string nameOf(const std::vector<std::string>& inputs);
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source,
                               const std::function<bool(const BuildProgress&)>& progress);
 
-/// The same with progress on stderr, cancelled by Ctrl-C.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceSettings& source, ProgressStyle progress);
-
 /// One thread may call; destroying it cancels and waits for the build to notice.
 class DatasetOpening {
 public:
@@ -36,8 +33,8 @@ public:
         uint64_t triangles = 0;
     };
 
-    /// `inputs`: as openScene takes them. `style`: told on stderr as well.
-    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, ProgressStyle style);
+    /// `inputs`: as openScene takes them. `told`: called in the thread, false cancels; gone when it is done; may be empty.
+    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, SourceSettings source, std::function<bool(const BuildProgress&)> told);
     ~DatasetOpening();
     DatasetOpening(const DatasetOpening&) = delete;
     DatasetOpening& operator=(const DatasetOpening&) = delete;
@@ -55,7 +52,7 @@ private:
     std::vector<std::string> inputs_;
     BuildSettings build_;
     SourceSettings source_;
-    ProgressStyle style_;
+    std::function<bool(const BuildProgress&)> told_;  // of the thread
     std::atomic<bool> cancelled_ = false, done_ = false;
     mutable std::mutex mutex_;
     Progress progress_;                         // guarded by mutex_

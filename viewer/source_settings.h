@@ -1,9 +1,8 @@
-// The options of `vcp` for datasets on servers.
+// Settings for datasets on servers.
 #pragma once
 
 #include <string>
 
-#include "viewer/commands.h"
 #include "viewer/open_dataset.h"
 
 namespace vcp {
@@ -15,7 +14,5 @@ struct SourceSettings {
 
     operator SourceAccess() const;
 };
-
-void addSourceSettings(CLI::App& app, SourceSettings& settings);
 
 }  // namespace vcp

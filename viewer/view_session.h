@@ -6,6 +6,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -27,7 +28,8 @@ struct SessionOptions {
     BuildSettings build;
     RenderSettings render;
     UserSettings user;
-    ProgressStyle progress = ProgressStyle::None;
+    /// Gives each opening what is told of its progress (DatasetOpening). May be empty.
+    std::function<std::function<bool(const BuildProgress&)>()> makeProgress;
 };
 
 /// Pictures to be saved: the switches of the panel.
