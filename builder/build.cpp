@@ -20,6 +20,7 @@
 #include "builder/journal.h"
 #include "builder/level_plan.h"
 #include "builder/memory_plan.h"
+#include "builder/open_mesh.h"
 #include "builder/progress_meter.h"
 #include "octree/output_file.h"
 

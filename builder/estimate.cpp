@@ -9,7 +9,7 @@
 
 #include "builder/exact_sum.h"
 #include "builder/memory_plan.h"
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 
 namespace vcp {
 

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 
 namespace vcp {
 

@@ -11,7 +11,7 @@
 
 #include "builder/exact_sum.h"
 #include "builder/lattice_mesh.h"
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 #include "builder/vertex_join.h"
 #include "octree/leaf_math.h"
 

@@ -85,7 +85,7 @@ public:
 };
 
 struct MeshOpenOptions {
-    /// One of meshFormats(), without regard to case; empty: told by content, then by extension. What content tells
+    /// One of meshFormats() (open_mesh.h), without regard to case; empty: told by content, then by extension. What content tells
     /// beyond doubt goes before it; a pipe needs it where content does not tell.
     std::string format;
     bool materials = true;  ///< false: MTL files are not looked for, chunks carry no uvs
@@ -94,18 +94,5 @@ struct MeshOpenOptions {
     std::filesystem::path tempFolder = {};
     uint64_t decoderBytes = uint64_t{1} << 30;  ///< limit on the memory that decodes Draco and meshopt
 };
-
-/// "ply", "obj", ...: what MeshOpenOptions::format may say.
-std::span<const std::string_view> meshFormats();
-
-/// Opens a mesh by its content, then by its extension, from a file or, for "-", from standard input: PLY (ASCII,
-/// binary of either byte order), OBJ, STL (ASCII, binary), OFF (ASCII, binary), glTF and GLB, Draco; each also
-/// compressed with gzip or zstd. Errors: Io (missing, unreadable, a folder), InvalidInput (empty, broken header),
-/// Unsupported (unknown format; the message lists what is known), Usage (no such format as the options say).
-Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, const MeshOpenOptions& options = {});
-
-/// Replaces each folder among `paths` by the mesh files in it, told by extension and sorted by name; not those in
-/// folders inside it. Errors: Io (a folder cannot be read), InvalidInput (a folder has no mesh file).
-Result<std::vector<std::filesystem::path>> expandInputs(std::span<const std::filesystem::path> paths);
 
 }  // namespace vcp

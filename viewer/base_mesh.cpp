@@ -7,7 +7,7 @@
 #include <fast_float/fast_float.h>
 #include <fmt/format.h>
 
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 
 namespace vcp {
 

@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "viewer/peers/distance_octree.h"
-#include "viewer/peers/paper_file.h"
+#include "viewer/peers/paper_dataset.h"
 #include "viewer/peers/peer_tracer.h"
 #include "viewer/peers/voxel_octree.h"
 

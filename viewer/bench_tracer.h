@@ -44,7 +44,7 @@ Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, u
 Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device,
                                                        double errorPixels = 0.5);
 
-/// The renderer over a dataset of the method `paper` (peers/paper_file.h). Errors: Device.
+/// The renderer over a dataset of the method `paper` (peers/paper_dataset.h). Errors: Device.
 Result<std::unique_ptr<RayTracer>> makePaperGpuTracer(std::shared_ptr<const Dataset> dataset,
                                                       std::shared_ptr<const PageSource> source,
                                                       const std::string& device, const PaperMarch& march);

@@ -1,5 +1,4 @@
-// The options that say how a mesh is built: those of `vcp build`, and of the commands that build a mesh into
-// the cache first.
+// How a mesh is built: the settings of `vcp build`, and of the commands that build a mesh into the cache first.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +7,7 @@
 #include <vector>
 
 #include "builder/build.h"
-#include "viewer/commands.h"
+#include "octree/result.h"
 
 namespace vcp {
 
@@ -25,11 +24,6 @@ struct BuildSettings {
     /// while parsing.
     [[nodiscard]] BuildOptions optionsFor(const std::vector<std::string>& inputs) const;
 };
-
-void addBuildSettings(CLI::App& app, BuildSettings& settings);
-
-/// What a display is told of a build.
-ProgressDetails detailsOf(const BuildProgress& at);
 
 /// One scene file (.json), .vcp files and addresses, or meshes.
 enum class InputKind { Scene, Datasets, Meshes };

@@ -14,8 +14,8 @@
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
-#include "viewer/paper_settings.h"
-#include "viewer/source_settings.h"
+#include "viewer/paper_arguments.h"
+#include "viewer/source_arguments.h"
 #include "viewer/stress_path.h"
 
 namespace vcp {

@@ -5,11 +5,11 @@
 
 #include "builder/build.h"
 #include "builder/estimate.h"
-#include "viewer/build_settings.h"
+#include "viewer/build_arguments.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
-#include "viewer/paper_settings.h"
+#include "viewer/paper_arguments.h"
 #include "viewer/peers/paper_file.h"
 
 namespace vcp {

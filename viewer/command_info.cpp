@@ -5,7 +5,7 @@
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/option_values.h"
-#include "viewer/source_settings.h"
+#include "viewer/source_arguments.h"
 
 namespace vcp {
 

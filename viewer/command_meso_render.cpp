@@ -1,5 +1,6 @@
 // vcp meso render: pictures of mesostructure on surfaces, one a method, side by side.
 #include "viewer/command_meso_render.h"
+#include "viewer/build_arguments.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,10 +14,10 @@
 #include <fmt/ranges.h>
 #include <glm/common.hpp>
 
+#include "viewer/dataset_opening.h"
 #include "viewer/image_files.h"
 #include "viewer/interrupt.h"
 #include "viewer/meso_scene.h"
-#include "viewer/dataset_opening.h"
 #include "viewer/option_values.h"
 #include "viewer/quantile.h"
 #include "viewer/render_settings.h"
@@ -243,7 +244,7 @@ Result<int> runRender(const RenderMeso& command) {
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
     OpenedScene behind;
     if (!command.scan.empty()) {
-        auto opened = openScene({command.scan}, BuildSettings{}, SourceSettings{}, ProgressStyle::None);
+        auto opened = openSceneShown({command.scan}, BuildSettings{}, SourceSettings{}, ProgressStyle::None);
         if (!opened) return opened.error();
         behind = *std::move(opened);
     }

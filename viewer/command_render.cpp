@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "render/renderer.h"
-#include "viewer/build_settings.h"
+#include "viewer/build_arguments.h"
 #include "viewer/camera_path.h"
 #include "viewer/commands.h"
 #include "viewer/dataset_opening.h"
@@ -16,7 +16,7 @@
 #include "viewer/option_values.h"
 #include "viewer/picture_sequence.h"
 #include "viewer/quantile.h"
-#include "viewer/render_settings.h"
+#include "viewer/render_arguments.h"
 
 namespace vcp {
 
@@ -236,7 +236,7 @@ Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     const glm::ivec2 size = parseSize(command.size).value();
-    const auto open = openScene(command.inputs, command.build, command.render.source, command.report.progressStyle());
+    const auto open = openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle());
     if (!open) return open.error();
     if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
     const SceneFile& scene = open->file;

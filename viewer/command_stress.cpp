@@ -11,6 +11,7 @@
 #include "viewer/motion_bench.h"
 #include "viewer/option_values.h"
 #include "viewer/render_settings.h"
+#include "viewer/source_arguments.h"
 #include "viewer/stress.h"
 #include "viewer/stress_path.h"
 

@@ -5,13 +5,13 @@
 #include <fmt/format.h>
 
 #include "streaming/http_reader.h"
-#include "viewer/build_settings.h"
+#include "viewer/build_arguments.h"
 #include "viewer/commands.h"
 #include "viewer/interrupt.h"
 #include "viewer/key_map.h"
 #include "viewer/mesh_cache.h"
 #include "viewer/option_values.h"
-#include "viewer/render_settings.h"
+#include "viewer/render_arguments.h"
 #include "viewer/window.h"
 
 namespace vcp {
@@ -85,7 +85,9 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     options.session.inputs = command.inputs;
     options.session.build = command.build;
     options.session.render = command.render;
-    options.session.progress = command.report.progressStyle();
+    options.session.makeProgress = [style = command.report.progressStyle()] { return shownProgress(style); };
+    options.catchInterrupts = [] { return std::make_shared<InterruptScope>(); };
+    options.interrupted = interrupted;
     if (!command.size.empty()) options.size = parseSize(command.size).value();
     const auto report = showWindow(options);
     if (!report) return report.error();

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "streaming/web_address.h"
-#include "viewer/interrupt.h"
 
 namespace vcp {
 
@@ -51,17 +50,8 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     return scene;
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source, ProgressStyle progress) {
-    ProgressDisplay display(progress, stderr);
-    const InterruptScope catching;
-    return openScene(inputs, build, source, [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction, detailsOf(at));
-        return !interrupted();
-    });
-}
-
-DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, ProgressStyle style)
-    : inputs_(std::move(inputs)), build_(std::move(build)), source_(source), style_(style) {
+DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, std::function<bool(const BuildProgress&)> told)
+    : inputs_(std::move(inputs)), build_(std::move(build)), source_(source), told_(std::move(told)) {
     source_.cancelled = [token = cancelled_, others = source.cancelled] { return *token || (others && others()); };
     thread_ = std::thread([this] {
         opened_ = open();
@@ -83,12 +73,13 @@ DatasetOpening::Progress DatasetOpening::progress() const {
 Result<OpenedScene> DatasetOpening::take() { return *std::exchange(opened_, std::nullopt); }
 
 Result<OpenedScene> DatasetOpening::open() {
-    ProgressDisplay display(style_, stderr);
+    // It goes with the work: what it shows is taken away before what went wrong is told.
+    const auto told = std::exchange(told_, nullptr);
     return openScene(inputs_, build_, source_, [&](const BuildProgress& at) {
-        display.update(at.stage, at.fraction, detailsOf(at));
+        const bool goesOn = !told || told(at);
         const std::lock_guard lock(mutex_);
         progress_ = {at.stage, at.fraction, at.triangles};
-        return !*cancelled_ && !interrupted();
+        return goesOn && !*cancelled_;
     });
 }
 

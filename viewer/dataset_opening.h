@@ -25,9 +25,6 @@ std::string nameOf(const std::vector<std::string>& inputs);
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source,
                               const std::function<bool(const BuildProgress&)>& progress);
 
-/// The same with progress on stderr, cancelled by Ctrl-C.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source, ProgressStyle progress);
-
 /// One thread may call; destroying it before it is done cancels and waits for the build, or the exchange with a server, to notice.
 class DatasetOpening {
 public:
@@ -37,8 +34,8 @@ public:
         uint64_t triangles = 0;
     };
 
-    /// `inputs`: as openScene takes them. `style`: told on stderr as well.
-    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, ProgressStyle style);
+    /// `inputs`: as openScene takes them. `told`: called in the thread, false cancels; gone when it is done; may be empty.
+    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, std::function<bool(const BuildProgress&)> told);
     ~DatasetOpening();
     DatasetOpening(const DatasetOpening&) = delete;
     DatasetOpening& operator=(const DatasetOpening&) = delete;
@@ -56,7 +53,7 @@ private:
     std::vector<std::string> inputs_;
     BuildSettings build_;
     SourceAccess source_;
-    ProgressStyle style_;
+    std::function<bool(const BuildProgress&)> told_;  // of the thread
     const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);  // readers ask it, which live longer
     std::atomic<bool> done_ = false;
     mutable std::mutex mutex_;

@@ -1,12 +1,12 @@
-// The options that say how a dataset is shown: of `vcp render` and `vcp view`.
+// How a dataset is shown: the settings of `vcp render` and `vcp view`.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "octree/paper_page.h"
 #include "octree/result.h"
 #include "render/renderer.h"
-#include "viewer/commands.h"
 #include "viewer/orbit_camera.h"
 #include "viewer/source_settings.h"
 
@@ -42,6 +42,7 @@ struct RenderSettings {
     [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered = {}) const;
 };
 
-void addRenderSettings(CLI::App& app, RenderSettings& settings);
+/// What RenderSettings::shading may say.
+std::vector<std::string> shadingNames();
 
 }  // namespace vcp

@@ -5,17 +5,6 @@
 
 namespace vcp {
 
-void addSourceSettings(CLI::App& app, SourceSettings& settings) {
-    app.add_option("--ca-file", settings.caFile, "Certificates of authorities to trust for https, PEM [the system's]")
-        ->type_name("FILE")
-        ->check(CLI::ExistingFile);
-    app.add_option("--cache", settings.cache, "Keep what a server sends in this folder, and read it from there next time")->type_name("DIR");
-    app.add_option("--cache-limit", settings.cacheLimit, "Bytes that the folder may hold; what was used longest ago goes")
-        ->type_name("BYTES")
-        ->capture_default_str()
-        ->check([](const std::string& text) { return parseBytes(text) ? std::string() : "must be like 512M or 4G, not \"" + text + "\""; });
-}
-
-SourceSettings::operator SourceAccess() const { return {caFile, cache, *parseBytes(cacheLimit), interrupted}; }
+SourceSettings::operator SourceAccess() const { return {caFile, cache, *parseBytes(cacheLimit), cancelled}; }
 
 }  // namespace vcp

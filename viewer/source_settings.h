@@ -1,9 +1,9 @@
-// The options of `vcp` for datasets on servers.
+// Settings for datasets on servers.
 #pragma once
 
+#include <functional>
 #include <string>
 
-#include "viewer/commands.h"
 #include "viewer/open_dataset.h"
 
 namespace vcp {
@@ -13,10 +13,9 @@ struct SourceSettings {
     std::string cache;
     std::string cacheLimit = "4G";
 
-    /// Cancelled by the signals of an InterruptScope (interrupt.h).
+    std::function<bool()> cancelled;  ///< asked during exchanges with a server; may be empty
+
     operator SourceAccess() const;
 };
-
-void addSourceSettings(CLI::App& app, SourceSettings& settings);
 
 }  // namespace vcp

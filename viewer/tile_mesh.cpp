@@ -6,7 +6,7 @@
 
 #include <glm/common.hpp>
 
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 
 namespace vcp {
 

@@ -31,7 +31,8 @@ struct SessionOptions {
     BuildSettings build;
     RenderSettings render;
     UserSettings user;  ///< as they are remembered; `render` goes before them
-    ProgressStyle progress = ProgressStyle::None;
+    /// Gives each opening what is told of its progress (DatasetOpening). May be empty.
+    std::function<std::function<bool(const BuildProgress&)>()> makeProgress;
 };
 
 /// Pictures to be saved: the switches of the panel.

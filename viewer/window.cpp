@@ -11,7 +11,6 @@
 
 #include "viewer/interface.h"
 #include "viewer/interface_painter.h"
-#include "viewer/interrupt.h"
 #include "viewer/key_map.h"
 
 namespace vcp {
@@ -86,8 +85,8 @@ private:
 /// The session in its window: what the callbacks reach.
 class ViewWindow {
 public:
-    ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter)
-        : system_(&system), window_(system.window()), session_(&session), painter_(std::move(painter)), interface_(session, host()) {
+    ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter, const WindowOptions& options)
+        : system_(&system), window_(system.window()), session_(&session), painter_(std::move(painter)), interface_(session, host()), options_(&options) {
         session.viewer().renderer().onDeviceLoss([this] { painter_.reset(); });
         glfwSetWindowUserPointer(window_, this);
         glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
@@ -116,7 +115,7 @@ public:
         while (!glfwWindowShouldClose(window_)) {
             // While something is built Ctrl-C is to clean up; the loop looks often enough then.
             if (!session_->opening()) catching_.reset();
-            else if (!catching_) catching_.emplace();
+            else if (!catching_ && options_->catchInterrupts) catching_ = options_->catchInterrupts();
             const auto next = session_->update(seconds());
             if (!next) return next.error();
             Viewer& viewer = session_->viewer();
@@ -130,7 +129,7 @@ public:
             wait(*next);
             // By now the window system has made it as large as it wants it.
             if (!shownSize) shownSize = system_->size();
-            if (interrupted()) break;
+            if (options_->interrupted && options_->interrupted()) break;
         }
         report.framesDrawn = session_->viewer().framesDrawn();
         report.status = session_->viewer().status();
@@ -334,7 +333,8 @@ private:
     ViewSession* session_;
     std::unique_ptr<InterfacePainter> painter_;
     Interface interface_;
-    std::optional<InterruptScope> catching_;
+    const WindowOptions* options_;
+    std::shared_ptr<void> catching_;
     glm::ivec2 framebuffer_{0};
     // Where the cursor was at the event in hand: asked for, it would be where it is by now, and a quick drag be lost.
     glm::dvec2 cursor_{0};
@@ -364,7 +364,7 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     if (!drawing) return drawing.error();
     auto painter = InterfacePainter::create(*drawing, system.contentScale());
     if (!painter) return painter.error();
-    return ViewWindow(system, **session, std::move(*painter)).run(start);
+    return ViewWindow(system, **session, std::move(*painter), options).run(start);
 }
 
 }  // namespace vcp

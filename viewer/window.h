@@ -2,6 +2,8 @@
 // happens, and draws when the session says so. What keys and the mouse do: key_map.cpp.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +18,9 @@ namespace vcp {
 struct WindowOptions {
     SessionOptions session;
     std::optional<glm::ivec2> size;  ///< in the window system's units; absent: as it was last time
+    /// Ctrl-C is caught while what it gives is held: as long as something is being built. May be empty.
+    std::function<std::shared_ptr<void>()> catchInterrupts;
+    std::function<bool()> interrupted;  ///< true ends the window; may be empty
 };
 
 /// What happened while the window was open; times from the call of showWindow.

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "builder/byte_source.h"
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 #include "tests/builder/piped_bytes.h"
 
 namespace vcp::test {

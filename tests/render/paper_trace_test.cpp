@@ -6,7 +6,8 @@
 
 #include "tests/builder/test_meshes.h"
 #include "tests/render/renderer_fixture.h"
-#include "viewer/peers/paper_file.h"
+#include "viewer/peers/grid_rays.h"
+#include "viewer/peers/paper_dataset.h"
 
 namespace vcp {
 namespace {

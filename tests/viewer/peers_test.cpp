@@ -11,6 +11,7 @@
 #include "viewer/bench_cameras.h"
 #include "viewer/peers/distance_octree.h"
 #include "viewer/peers/grid_points.h"
+#include "viewer/peers/grid_rays.h"
 #include "viewer/peers/paper_octree.h"
 #include "viewer/peers/peer_tracer.h"
 #include "viewer/peers/region_growing.h"

@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "builder/mesh_bvh.h"
-#include "viewer/peers/grid_rays.h"
 #include "viewer/peers/mesh_sides.h"
+#include "viewer/peers/root_grid.h"
 
 namespace vcp {
 

@@ -9,7 +9,7 @@
 #include <array>
 #include <bit>
 
-#include "viewer/peers/grid_rays.h"
+#include "viewer/peers/root_grid.h"
 
 namespace vcp {
 

@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/ingest.h"
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 #include "octree/output_file.h"
 #include "octree/vcp_writer.h"
 
@@ -20,16 +20,6 @@ namespace vcp {
 namespace {
 
 constexpr uint64_t kMostPageBytes = uint64_t{1} << 28;
-
-class OnePage final : public PageSource {
-public:
-    explicit OnePage(PageBytes page) : page_(std::move(page)) {}
-    Result<PageBytes> read(uint64_t, bool) const override { return page_; }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t, bool) const override { return page_.geometryBytes().size(); }
-
-private:
-    PageBytes page_;
-};
 
 Result<PageBytes> pageOf(const PaperCaster& octree) {
     const CornerOctree& tree = octree.tree();
@@ -126,13 +116,11 @@ private:
 
 OutputRules rulesOf(const BuildOptions& options) { return {.overwrite = options.overwrite, .inputs = options.inputs}; }
 
-Result<uint64_t> write(const BuildOptions& options, const PaperDataset& made) {
-    const auto page = made.source->read(0, false);
-    if (!page) return page.error();
+Result<uint64_t> write(const BuildOptions& options, const PaperFile& file) {
     auto writer = VcpWriter::create(options.output, 1, rulesOf(options));
     if (!writer) return writer.error();
-    VCP_TRY((*writer)->append(made.dataset->pages[0], compressPage(page->geometryBytes(), {})));
-    return (*writer)->commit(made.dataset->header);
+    VCP_TRY((*writer)->append(file.entry, compressPage(file.page.geometryBytes(), {})));
+    return (*writer)->commit(file.header);
 }
 
 uint64_t peakRssBytes() {
@@ -143,16 +131,13 @@ uint64_t peakRssBytes() {
 
 }  // namespace
 
-Result<PaperDataset> paperDataset(const PaperCaster& octree, const IndexedMesh& mesh) {
+Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh) {
     auto page = pageOf(octree);
     if (!page) return page.error();
-    auto dataset = std::make_shared<Dataset>();
-    dataset->header = headerOf(octree, measuresOf(mesh));
     PageEntry entry;
     entry.pageBytes = static_cast<uint32_t>(page->geometryBytes().size());
     entry.leaves = static_cast<uint32_t>(octree.tree().leaves);
-    dataset->pages.push_back(entry);
-    return PaperDataset{std::move(dataset), std::make_shared<const OnePage>(std::move(*page))};
+    return PaperFile{headerOf(octree, measuresOf(mesh)), entry, std::move(*page)};
 }
 
 Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper) {
@@ -174,9 +159,9 @@ Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptio
     const auto octree = PaperCaster::create(bvh, paper, {.cell = frame->cell, .threads = options.threads});
     if (!octree) return octree.error();
     VCP_TRY(stages.at("writing", 0.9, measures.triangles));
-    const auto dataset = paperDataset(*octree, *mesh);
-    if (!dataset) return dataset.error();
-    const auto bytes = write(options, *dataset);
+    const auto file = paperFile(*octree, *mesh);
+    if (!file) return file.error();
+    const auto bytes = write(options, *file);
     if (!bytes) return bytes.error();
     BuildReport report;
     report.triangles = measures.triangles;

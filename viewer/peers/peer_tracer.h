@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "viewer/bench_tracer.h"
+#include "viewer/peers/grid_rays.h"
 #include "viewer/peers/octree_walk.h"
 #include "viewer/peers/parallel_rows.h"
 #include "viewer/quantile.h"

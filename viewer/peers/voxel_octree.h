@@ -14,6 +14,8 @@
 #include <bit>
 #include <optional>
 
+#include <glm/geometric.hpp>
+
 #include "builder/mesh_bvh.h"
 #include "octree/result.h"
 #include "viewer/peers/octree_walk.h"

@@ -1,4 +1,4 @@
-// The options --paper-...: rules of Demir and Westermann's octree and of the march through it, for `vcp build`,
+// The arguments --paper-...: rules of Demir and Westermann's octree and of the march through it, for `vcp build`,
 // `vcp render` and `view`, and `vcp bench rays`.
 #pragma once
 

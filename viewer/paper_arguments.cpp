@@ -1,4 +1,4 @@
-#include "viewer/paper_settings.h"
+#include "viewer/paper_arguments.h"
 
 #include <cmath>
 #include <cstdlib>

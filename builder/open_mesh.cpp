@@ -1,4 +1,4 @@
-#include "builder/mesh_stream.h"
+#include "builder/open_mesh.h"
 
 #include <algorithm>
 #include <array>
