@@ -1,6 +1,5 @@
 #include "viewer/source_settings.h"
 
-#include "viewer/interrupt.h"
 #include "viewer/option_values.h"
 
 namespace vcp {
