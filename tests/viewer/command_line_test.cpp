@@ -198,9 +198,11 @@ TEST_F(CommandLine, NothingThatANameHoldsDrivesTheTerminal) {
 /// What a scene, a camera or a path says wrongly is not the command line's fault.
 TEST_F(CommandLine, WhatFilesSayEndsWith1) {
     const fs::path scene = *folder_ / "wrong_scene.json", camera = *folder_ / "wrong_camera.json", path = *folder_ / "wrong_path.json", png = *folder_ / "wrong.png";
-    write(*folder_ / "points.xyz", "0 0 0\n");
+    const fs::path points = *folder_ / "points.xyz";
+    write(points, "0 0 0\n");
+    write(scene, "{\"datasets\": [\n{\"file\": \"points.xyz\"}]}");
+    expectFailure(run({"render", scene.string(), "-o", png.string()}), 1, points.string() + ": unknown mesh format");
     const std::pair<const char*, const char*> scenes[] = {
-        {"{\"datasets\": [\n{\"file\": \"points.xyz\"}]}", ": line 2: \"file\": "},
         {"{\"mesostructure\": [\n{\"asset\": \"brick\"}]}", ": line 2: \"asset\" must be"},
         {"{\"mesostructure\": [\n{\"asset\": \"beads\", \"surface\": \"blob\"}]}", ": line 2: "},
         {"{\"mesostructure\": [\n{\"asset\": \"beads\",\n\"tiles\": 1e6}]}", ": line "},
