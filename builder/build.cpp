@@ -13,15 +13,15 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/checkpoint.h"
-#include "builder/collapsed_triangles.h"
 #include "builder/dataset_assembly.h"
 #include "builder/deal.h"
 #include "builder/estimate.h"
-#include "builder/journal.h"
+#include "builder/lattice/collapsed_triangles.h"
 #include "builder/level_plan.h"
 #include "builder/memory_plan.h"
-#include "builder/open_mesh.h"
+#include "builder/mesh/open_mesh.h"
 #include "builder/progress_meter.h"
+#include "builder/spill/journal.h"
 #include "octree/output_file.h"
 
 namespace vcp {

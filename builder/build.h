@@ -1,13 +1,13 @@
 // buildOctree: triangle meshes in, one .vcp file out.
 //
 // Nothing but bins that fit memory is ever held of the mesh. The stages, each in files of their own:
-//   ingest      meshes -> a soup of triangles in the world (mesh_stream.h, vertex_join.h, ingest.h)
-//   deal        soup -> the finest level's lattice (lattice_soup.h), dealt into bins (deal.h, page_partition.h)
-//   step        a level's bins -> the next coarser level's bins (level_step.h); the first step finds normals
-//   pages       a bin -> its certified pages (bin_triangles.h, page_builder.h, page_encoder.h)
+//   ingest      meshes -> a soup of triangles in the world (mesh/, vertex_join.h, ingest.h)
+//   deal        soup -> the finest level's lattice (lattice_soup.h), dealt into bins (deal.h)
+//   step        a level's bins -> the next coarser level's bins (level/); the first step finds normals
+//   pages       a bin -> its certified pages (page/, level_pages.h)
 //   write       pages, directory, hashes (dataset_assembly.h, octree/vcp_writer.h)
-// What passes between them lies on temporary files (temp_space.h, record_bins.h, page_spool.h), in memory while
-// there is room. A journal (journal.h, checkpoint.h) says how far things are: after an interruption the build goes on
+// What passes between them lies on temporary files (spill/), in memory while
+// there is room. A journal (checkpoint.h) says how far things are: after an interruption the build goes on
 // from there.
 // The output is the same bytes for any number of threads, any memory, any order of the triangles and however
 // often the build was interrupted.
@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "builder/side_file.h"
+#include "builder/stream/side_file.h"
 #include "octree/result.h"
 
 namespace vcp {

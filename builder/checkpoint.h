@@ -14,9 +14,9 @@
 
 #include "builder/build.h"
 #include "builder/ingest.h"
-#include "builder/level_step.h"
-#include "builder/page_spool.h"
-#include "builder/record_bins.h"
+#include "builder/level/level_step.h"
+#include "builder/spill/page_spool.h"
+#include "builder/spill/record_bins.h"
 
 namespace vcp {
 

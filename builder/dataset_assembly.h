@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "builder/ingest.h"
-#include "builder/page_spool.h"
+#include "builder/spill/page_spool.h"
 #include "octree/output_file.h"
 #include "octree/result.h"
 #include "octree/vcp_file.h"

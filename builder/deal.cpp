@@ -9,7 +9,7 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "builder/level_step.h"
+#include "builder/level/level_step.h"
 
 namespace vcp {
 

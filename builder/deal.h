@@ -5,9 +5,9 @@
 #include <functional>
 
 #include "builder/ingest.h"
+#include "builder/lattice/page_partition.h"
 #include "builder/lattice_soup.h"
-#include "builder/page_partition.h"
-#include "builder/record_bins.h"
+#include "builder/spill/record_bins.h"
 
 namespace vcp {
 

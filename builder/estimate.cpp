@@ -7,9 +7,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "builder/exact_sum.h"
+#include "builder/lattice/exact_sum.h"
 #include "builder/memory_plan.h"
-#include "builder/open_mesh.h"
+#include "builder/mesh/open_mesh.h"
 
 namespace vcp {
 

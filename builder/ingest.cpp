@@ -9,9 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "builder/exact_sum.h"
-#include "builder/lattice_mesh.h"
-#include "builder/open_mesh.h"
+#include "builder/lattice/exact_sum.h"
+#include "builder/lattice/lattice_mesh.h"
+#include "builder/mesh/open_mesh.h"
 #include "builder/vertex_join.h"
 #include "octree/leaf_math.h"
 

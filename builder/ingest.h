@@ -7,10 +7,10 @@
 #include <glm/vec3.hpp>
 
 #include "builder/build.h"
-#include "builder/material.h"
-#include "builder/mesh_stream.h"
-#include "builder/record_bins.h"
-#include "builder/soup.h"
+#include "builder/lattice/soup.h"
+#include "builder/spill/record_bins.h"
+#include "builder/stream/material.h"
+#include "builder/stream/mesh_stream.h"
 #include "octree/result.h"
 
 namespace vcp {

@@ -6,7 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "builder/colour_encoding.h"
+#include "builder/stream/colour_encoding.h"
 
 namespace vcp {
 

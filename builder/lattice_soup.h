@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "builder/ingest.h"
-#include "builder/lattice_mesh.h"
-#include "builder/material_colours.h"
-#include "builder/soup.h"
+#include "builder/lattice/lattice_mesh.h"
+#include "builder/lattice/soup.h"
+#include "builder/texture/material_colours.h"
 #include "octree/leaf_math.h"
 
 namespace vcp {

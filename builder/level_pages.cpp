@@ -12,9 +12,9 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
-#include "builder/bin_triangles.h"
-#include "builder/page_builder.h"
-#include "builder/page_encoder.h"
+#include "builder/page/bin_triangles.h"
+#include "builder/page/page_builder.h"
+#include "builder/page/page_encoder.h"
 
 namespace vcp {
 

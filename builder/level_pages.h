@@ -4,9 +4,9 @@
 #include <functional>
 
 #include "builder/ingest.h"
-#include "builder/lattice_mesh.h"
-#include "builder/page_partition.h"
-#include "builder/page_spool.h"
+#include "builder/lattice/lattice_mesh.h"
+#include "builder/lattice/page_partition.h"
+#include "builder/spill/page_spool.h"
 
 namespace vcp {
 

@@ -5,8 +5,8 @@
 #pragma once
 
 #include "builder/ingest.h"
+#include "builder/lattice/page_partition.h"
 #include "builder/level_pages.h"
-#include "builder/page_partition.h"
 
 namespace vcp {
 

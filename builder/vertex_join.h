@@ -13,9 +13,9 @@
 
 #include <xxhash.h>
 
-#include "builder/mesh_stream.h"
-#include "builder/record_bins.h"
-#include "builder/soup.h"
+#include "builder/lattice/soup.h"
+#include "builder/spill/record_bins.h"
+#include "builder/stream/mesh_stream.h"
 
 namespace vcp {
 

@@ -1,4 +1,6 @@
 # vcp_library(NAME SOURCES... ): one static or shared library a folder, with the project's warnings.
+# vcp_room(NAME [OF LIBRARY] SOURCES a.cpp... LINKS x...): a room of a folder, the target vcp_NAME. Its objects go into
+#   LIBRARY, which links what of LINKS is not ours once more; without one it is a static library of its own.
 # vcp_options(TARGET): the project's language level, warnings and sanitizers.
 
 function(vcp_options target)
@@ -23,5 +25,18 @@ function(vcp_library name)
     add_library(vcp::${name} ALIAS vcp_${name})
     target_include_directories(vcp_${name} PUBLIC
         $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/vcp>)
+    vcp_options(vcp_${name})
+endfunction()
+
+function(vcp_room name)
+    cmake_parse_arguments(PARSE_ARGV 1 arg "" "OF" "SOURCES;LINKS")
+    if(arg_OF)
+        add_library(vcp_${name} OBJECT ${arg_SOURCES})
+        target_sources(${arg_OF} PRIVATE $<TARGET_OBJECTS:vcp_${name}>)
+    else()
+        add_library(vcp_${name} STATIC ${arg_SOURCES})
+    endif()
+    target_include_directories(vcp_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+    target_link_libraries(vcp_${name} PUBLIC ${arg_LINKS})
     vcp_options(vcp_${name})
 endfunction()

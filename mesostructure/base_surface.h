@@ -1,5 +1,5 @@
 // Base surfaces that mesostructure is laid on: triangles with a texture map in tile units. The shapes are made here; mesh
-// files come from viewer/base_mesh.h.
+// files come from viewer/scene/base_mesh.h.
 #pragma once
 
 #include <array>

@@ -15,7 +15,7 @@
 #include <glm/vec3.hpp>
 
 #include "render/renderer.h"
-#include "viewer/orbit_camera.h"
+#include "viewer/camera/orbit_camera.h"
 
 namespace vcp {
 

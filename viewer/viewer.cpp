@@ -9,7 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "viewer/option_values.h"
+#include "viewer/scene/option_values.h"
 
 namespace vcp {
 

@@ -30,8 +30,8 @@
 
 #include "octree/result.h"
 #include "render/renderer.h"
-#include "viewer/meso_scene.h"
-#include "viewer/orbit_camera.h"
+#include "viewer/camera/orbit_camera.h"
+#include "viewer/scene/meso_scene.h"
 #include "viewer/section_handle.h"
 
 namespace vcp {

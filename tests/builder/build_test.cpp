@@ -16,8 +16,8 @@
 #include <gtest/gtest.h>
 
 #include "octree/vcp_file.h"
-#include "tests/builder/test_meshes.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_folder.h"
+#include "tests/support/test_meshes.h"
 
 namespace vcp {
 namespace {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/vcp_file.h"
-#include "tests/builder/built_mesh.h"
+#include "tests/support/built_mesh.h"
 
 namespace vcp {
 namespace {

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "builder/mesh_bvh.h"
-#include "tests/builder/lattice_meshes.h"
-#include "tests/builder/test_meshes.h"
+#include "builder/measure/mesh_bvh.h"
+#include "tests/support/lattice_meshes.h"
+#include "tests/support/test_meshes.h"
 
 namespace vcp {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "builder/ray_classes.h"
+#include "builder/measure/ray_classes.h"
 #include "octree/reference_caster.h"
-#include "tests/builder/built_mesh.h"
+#include "tests/support/built_mesh.h"
 
 namespace vcp {
 namespace {

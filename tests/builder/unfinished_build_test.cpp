@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "builder/build.h"
-#include "builder/journal.h"
-#include "tests/viewer/test_folder.h"
+#include "builder/spill/journal.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

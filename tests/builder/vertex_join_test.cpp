@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

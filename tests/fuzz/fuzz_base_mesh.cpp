@@ -4,7 +4,7 @@
 
 #include "mesostructure/shell.h"
 #include "tests/fuzz/mesh_fuzz.h"
-#include "viewer/base_mesh.h"
+#include "viewer/scene/base_mesh.h"
 
 namespace {
 

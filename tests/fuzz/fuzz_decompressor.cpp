@@ -1,8 +1,8 @@
 // Whatever gzip and zstd files hold: decompressed or refused, and the same in any steps.
 #include <optional>
 
-#include "tests/builder/piped_bytes.h"
 #include "tests/fuzz/mesh_fuzz.h"
+#include "tests/support/piped_bytes.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // The decoder itself runs in its process, out of reach: this fuzzes what is asked of it, and what comes back.
-#include "builder/draco.h"
+#include "builder/mesh/gltf/draco.h"
 #include "tests/fuzz/mesh_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,4 +1,4 @@
-#include "builder/gltf.h"
+#include "builder/mesh/gltf/gltf.h"
 #include "tests/fuzz/mesh_fuzz.h"
 
 namespace {

@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "viewer/height_image.h"
+#include "viewer/asset/height_image.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const std::span bytes(reinterpret_cast<const std::byte*>(data), size);

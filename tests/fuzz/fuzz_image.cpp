@@ -1,4 +1,4 @@
-#include "builder/texture.h"
+#include "builder/texture/texture.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     auto image = vcp::decodeImage({reinterpret_cast<const char*>(data), size},

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "tests/fuzz/mesh_fuzz.h"
-#include "viewer/scene_file.h"
+#include "viewer/scene/scene_file.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "builder/stl.h"
+#include "builder/mesh/stl.h"
 #include "tests/fuzz/mesh_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

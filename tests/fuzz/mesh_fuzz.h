@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "builder/byte_source.h"
-#include "builder/mesh_stream.h"
-#include "tests/builder/piped_bytes.h"
+#include "builder/stream/byte_source.h"
+#include "builder/stream/mesh_stream.h"
+#include "tests/support/piped_bytes.h"
 
 namespace vcp::fuzz {
 

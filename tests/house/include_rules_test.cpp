@@ -1,33 +1,88 @@
-// The include directions of the folders, and that the check itself can fail.
+// The arrows of the rooms, and that the check itself can fail.
 #include "tests/house/include_rules.h"
 
+#include <algorithm>
+#include <set>
+
 #include <gtest/gtest.h>
+
+#include "tests/house/rooms.h"
 
 namespace vcp::house {
 namespace {
 
 namespace fs = std::filesystem;
 const fs::path kRoot = VCP_SOURCE_DIR;
+/// Folders that are parted into rooms: each of theirs with sources stands in the table.
+const std::set<std::string> kParted{"builder", "viewer"};
 
-TEST(IncludeRules, EveryFolderKeepsTheArrows) {
-    size_t checked = 0;
-    for (const std::string& folder : folders())
-        for (const fs::path& file : sourceFiles(kRoot / folder)) {
-            ++checked;
-            for (const std::string& violation : includeViolations(folder, readText(file)))
-                ADD_FAILURE() << fs::relative(file, kRoot).string() << ": " << violation;
-        }
-    EXPECT_GT(checked, 5u);
+/// The top folders, each once.
+std::set<std::string> topFolders() {
+    std::set<std::string> tops;
+    for (const Room& room : rooms()) tops.insert(room.path.substr(0, room.path.find('/')));
+    return tops;
 }
 
-TEST(IncludeRules, EverySourceFolderIsKnown) {
-    const std::vector<std::string> known = folders();
+std::string folderOf(const fs::path& file) { return fs::relative(file.parent_path(), kRoot).generic_string(); }
+
+TEST(IncludeRules, ArrowsRunUpwardInTheTable) {
+    for (size_t i = 0; i < rooms().size(); ++i)
+        for (const std::string& name : rooms()[i].mayInclude) {
+            size_t found = 0;
+            for (size_t j = 0; j < rooms().size(); ++j) {
+                const std::string& other = rooms()[j].path;
+                if (name.ends_with('/') ? !(other + "/").starts_with(name) : other != name) continue;
+                ++found;
+                EXPECT_LT(j, i) << rooms()[i].path << " -> " << other;
+            }
+            EXPECT_GT(found, 0u) << rooms()[i].path << " -> " << name << ", which is no room";
+        }
+}
+
+TEST(IncludeRules, EveryRoomKeepsTheArrows) {
+    size_t checked = 0;
+    for (const std::string& top : topFolders())
+        for (const fs::path& file : sourceFiles(kRoot / top)) {
+            ++checked;
+            for (const std::string& violation : includeViolations(folderOf(file), readText(file)))
+                ADD_FAILURE() << fs::relative(file, kRoot).string() << ": " << violation;
+        }
+    EXPECT_GT(checked, 300u);
+}
+
+TEST(IncludeRules, EveryRoomLinksWhatItMayInclude) {
+    std::map<std::string, std::vector<std::string>> roomsOf;
+    std::vector<std::pair<std::string, RoomTarget>> targets;
+    for (const Room& room : rooms()) {
+        if (!kParted.contains(room.path.substr(0, room.path.find('/')))) {
+            roomsOf["vcp_" + room.path] = {room.path};
+            continue;
+        }
+        for (const RoomTarget& target : roomTargets(readText(kRoot / room.path / "CMakeLists.txt"))) {
+            roomsOf[target.name].push_back(room.path);
+            if (!target.library.empty()) roomsOf[target.library].push_back(room.path);
+            targets.emplace_back(room.path, target);
+        }
+    }
+    EXPECT_GT(targets.size(), 20u);
+    for (const auto& [room, target] : targets)
+        for (const std::string& violation : linkViolations(room, target, roomsOf)) ADD_FAILURE() << violation;
+}
+
+TEST(IncludeRules, EveryFolderIsInTheTable) {
+    const std::set<std::string> tops = topFolders();
     for (const auto& entry : fs::directory_iterator(kRoot)) {
         const std::string name = entry.path().filename().string();
         if (!entry.is_directory() || name[0] == '.' || name == "build" || name == "tests") continue;
         if (sourceFiles(entry.path()).empty()) continue;
-        EXPECT_NE(std::find(known.begin(), known.end(), name), known.end()) << name << "/ has sources but no rule";
+        EXPECT_TRUE(tops.contains(name)) << name << "/ has sources but no rule";
     }
+    for (const std::string& top : kParted)
+        for (const fs::path& file : sourceFiles(kRoot / top)) {
+            const Room* room = roomOf(folderOf(file));
+            EXPECT_TRUE(room && room->path == folderOf(file)) << folderOf(file) << "/ is no room";
+        }
+    for (const Room& room : rooms()) EXPECT_FALSE(sourceFiles(kRoot / room.path).empty()) << room.path << "/ is empty";
 }
 
 TEST(IncludeRules, CMakeListsItsSources) {
@@ -45,7 +100,7 @@ TEST(IncludeRules, CMakeListsItsSources) {
 }
 
 struct Sample {
-    const char* folder;
+    const char* room;
     const char* text;
     size_t violations;
 };
@@ -53,28 +108,55 @@ struct Sample {
 TEST(IncludeRules, SamplesAreJudged) {
     const Sample samples[] = {
         {"octree", "#include \"octree/page.h\"\n#include <vector>\n", 0},
-        {"octree", "#include \"builder/mesh_stream.h\"\n", 1},
-        {"octree", "  #  include <builder/mesh_stream.h>\n", 1},
+        {"octree", "#include \"octree/shared/leaf_math.h\"\n", 0},
+        {"octree", "#include \"builder/stream/mesh_stream.h\"\n", 1},
+        {"octree", "  #  include <builder/stream/mesh_stream.h>\n", 1},
         {"octree", "#include <thread>\n", 1},
         {"octree", "#include <atomic>\n", 0},
         {"builder", "#include \"octree/page.h\"\n#include <mutex>\n#include <tbb/parallel_for.h>\n", 0},
         {"builder", "#include \"streaming/policy.h\"\n", 1},
         {"builder", "#include <vulkan/vulkan.h>\n", 1},
+        {"builder", "#include \"builder/page/page_builder.h\"\n#include \"builder/build.h\"\n", 0},
+        {"builder", "#include \"builder/paper/paper_file.h\"\n", 1},
+        {"builder/page", "#include \"builder/lattice/soup.h\"\n#include \"builder/page/page_builder.h\"\n", 0},
+        {"builder/page", "#include \"builder/build.h\"\n#include \"builder/level/coarsen.h\"\n", 2},
+        {"builder/mesh/gltf", "#include \"builder/stream/mesh_stream.h\"\n#include \"builder/mesh/open_mesh.h\"\n", 1},
         {"mesostructure", "#include \"octree/result.h\"\n#include \"render/device.h\"\n", 1},
         {"streaming", "#include <condition_variable>\n#include \"builder/build.h\"\n", 1},
         {"render", "#include <vulkan/vulkan.h>\n#include \"streaming/page_source.h\"\n", 0},
+        {"render/passes", "#include \"render/vulkan/device.h\"\n#include \"viewer/viewer.h\"\n", 1},
         {"render", "#include \"builder/build.h\"\n#include <GLFW/glfw3.h>\n#include <future>\n", 3},
-        {"render", "#include \"viewer/window.h\"\n#include <imgui.h>\n#include <backends/imgui_impl_vulkan.h>\n", 3},
-        {"viewer", "#include <GLFW/glfw3.h>\n#include \"render/renderer.h\"\n#include <thread>\n", 0},
+        {"render", "#include \"viewer/window/window.h\"\n#include <imgui.h>\n#include <backends/imgui_impl_vulkan.h>\n", 3},
+        {"viewer", "#include \"render/renderer.h\"\n#include <thread>\n", 0},
+        {"viewer", "#include <GLFW/glfw3.h>\n#include \"viewer/window/window.h\"\n", 2},
         {"viewer", "#include \"tests/house/include_rules.h\"\n", 1},
-        {"datasets_scripts", "#include \"builder/mesh_stream.h\"\n#include \"viewer/scene.h\"\n", 1},
-        {"octree", "// #include \"viewer/window.h\"\n", 0},
+        {"viewer/scene", "#include \"builder/build.h\"\n#include \"builder/stream/byte_source.h\"\n", 0},
+        {"viewer/scene", "#include <CLI/CLI.hpp>\n#include \"viewer/command/commands.h\"\n", 2},
+        {"viewer/scene", "    std::fprintf(stderr, \"done\");\n", 1},
+        {"viewer/command", "#include <CLI/CLI.hpp>\n    std::fprintf(stderr, \"done\");  // stderr\n", 0},
+        {"viewer/window", "#include <GLFW/glfw3.h>\n#include \"viewer/viewer.h\"\n// on stdout\n", 0},
+        {"viewer/bench/peers", "#include \"builder/paper/paper_octree.h\"\n#include \"viewer/bench/rays/bench_tracer.h\"\n", 1},
+        {"datasets_scripts", "#include \"builder/stream/mesh_stream.h\"\n#include \"viewer/scene.h\"\n", 1},
+        {"octree", "// #include \"viewer/window/window.h\"\n", 0},
     };
     for (const Sample& sample : samples)
-        EXPECT_EQ(includeViolations(sample.folder, sample.text).size(), sample.violations) << sample.folder << ":\n"
-                                                                                           << sample.text;
+        EXPECT_EQ(includeViolations(sample.room, sample.text).size(), sample.violations) << sample.room << ":\n"
+                                                                                         << sample.text;
     EXPECT_EQ(cmakeViolations("set(a b)\nfile(GLOB sources *.cpp)\n").size(), 1u);
     EXPECT_EQ(cmakeViolations("file (glob_recurse s *.cpp)\n# file(GLOB s)\n").size(), 1u);
+}
+
+TEST(IncludeRules, LinksAreJudged) {
+    const auto targets = roomTargets("# Pages.\nvcp_room(builder_page OF vcp_builder\n    SOURCES\n        a.cpp\n    LINKS\n"
+                                     "        vcp_builder_lattice\n        vcp_builder_level\n        TBB::tbb\n        vcp_made_up)\n");
+    ASSERT_EQ(targets.size(), 1u);
+    EXPECT_EQ(targets[0].name, "vcp_builder_page");
+    EXPECT_EQ(targets[0].library, "vcp_builder");
+    EXPECT_EQ(targets[0].links.size(), 4u);
+    const std::map<std::string, std::vector<std::string>> roomsOf{{"vcp_builder_lattice", {"builder/lattice"}},
+                                                                  {"vcp_builder_level", {"builder/level"}}};
+    // One is below, the other beside; the third is nobody's.
+    EXPECT_EQ(linkViolations("builder/page", targets[0], roomsOf).size(), 2u);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ std::vector<std::string> allMatches(const std::string& text, const char* pattern
 TEST(Readme, LinksAndNamedFilesExist) {
     const std::string text = readText(kRoot / "README.md");
     std::vector<std::string> names = allMatches(text, "\\]\\(([^)#:]+)\\)");
-    // Backticked paths: `octree/`, `builder/mesh_stream.h`, `CHANGELOG.md`; not commands, options or outputs.
+    // Backticked paths: `octree/`, `builder/stream/mesh_stream.h`, `CHANGELOG.md`; not commands, options or outputs.
     for (const std::string& name : allMatches(text, "`([A-Za-z0-9_./]+(?:/|\\.(?:h|cpp|md|txt|json))|LICENSE)`"))
         names.push_back(name);
     EXPECT_GT(names.size(), 8u);

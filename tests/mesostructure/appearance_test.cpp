@@ -4,8 +4,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "meso_rays.h"
 #include "mesostructure/appearance.h"
+#include "tests/support/meso_rays.h"
 
 namespace vcp::meso {
 namespace {

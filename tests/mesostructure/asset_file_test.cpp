@@ -9,8 +9,8 @@
 #include <unistd.h>
 
 #include "octree/vcp_file.h"
-#include "tests/mesostructure/meso_rays.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/meso_rays.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp::meso {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "tests/mesostructure/meso_rays.h"
+#include "tests/support/meso_rays.h"
 
 namespace vcp::meso {
 namespace {

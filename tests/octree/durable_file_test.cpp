@@ -15,7 +15,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

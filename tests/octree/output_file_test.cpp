@@ -11,7 +11,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "octree/leaf_triangles.h"
-#include "tests/octree/analytic_page.h"
-#include "tests/octree/soup_page.h"
+#include "tests/support/analytic_page.h"
+#include "tests/support/soup_page.h"
 
 namespace vcp {
 namespace {

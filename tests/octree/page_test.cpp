@@ -1,5 +1,5 @@
 // parsePage: what it accepts can be walked without leaving the page, and hostile pages are refused. Pages written
-// by the builder are parsed in tests/builder/page_builder_test.cpp.
+// by the builder are parsed in tests/builder/page/page_builder_test.cpp.
 #include "octree/page.h"
 
 #include <cstring>
@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/packing.h"
-#include "tests/octree/analytic_page.h"
+#include "tests/support/analytic_page.h"
 
 namespace vcp {
 namespace {

@@ -8,7 +8,7 @@
 #include "octree/paper_page.h"
 #include "octree/reference_caster.h"
 #include "octree/vcp_writer.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/octree/analytic_page.h"
+#include "tests/support/analytic_page.h"
 
 namespace vcp {
 namespace {

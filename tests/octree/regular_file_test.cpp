@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/vcp_file.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

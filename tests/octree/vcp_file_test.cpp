@@ -20,8 +20,8 @@
 #include <gtest/gtest.h>
 
 #include "octree/vcp_writer.h"
-#include "tests/octree/analytic_page.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/analytic_page.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

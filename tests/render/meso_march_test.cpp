@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "render/meso_marcher.h"
-#include "tests/mesostructure/meso_rays.h"
+#include "tests/support/meso_rays.h"
 
 namespace vcp {
 namespace {

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "render/passes/meso_surface.h"
-#include "tests/mesostructure/meso_rays.h"
-#include "tests/render/renderer_fixture.h"
+#include "tests/support/meso_rays.h"
+#include "tests/support/renderer_fixture.h"
 
 namespace vcp {
 namespace {

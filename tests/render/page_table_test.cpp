@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "render/frame.h"
-#include "tests/octree/analytic_page.h"
+#include "tests/support/analytic_page.h"
 
 namespace vcp {
 namespace {

@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/builder/test_meshes.h"
-#include "tests/render/renderer_fixture.h"
-#include "viewer/peers/grid_rays.h"
-#include "viewer/peers/paper_dataset.h"
+#include "tests/support/renderer_fixture.h"
+#include "tests/support/test_meshes.h"
+#include "viewer/bench/peers/grid_rays.h"
+#include "viewer/bench/peers/paper_dataset.h"
 
 namespace vcp {
 namespace {

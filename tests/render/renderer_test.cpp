@@ -15,9 +15,9 @@
 #include <gtest/gtest.h>
 
 #include "render/frame_setup.h"
-#include "tests/render/renderer_fixture.h"
-#include "tests/streaming/test_files.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/renderer_fixture.h"
+#include "tests/support/test_files.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/render/renderer_fixture.h"
+#include "tests/support/renderer_fixture.h"
 
 namespace vcp {
 namespace {

@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "tests/render/renderer_fixture.h"
+#include "tests/support/renderer_fixture.h"
 
 namespace vcp {
 namespace {

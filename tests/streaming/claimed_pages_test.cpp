@@ -9,8 +9,8 @@
 #include "octree/reference_caster.h"
 #include "streaming/page_source.h"
 #include "streaming/residency_policy.h"
-#include "tests/streaming/directory_files.h"
-#include "tests/streaming/test_trees.h"
+#include "tests/support/directory_files.h"
+#include "tests/support/test_trees.h"
 
 namespace vcp {
 namespace {

@@ -6,9 +6,9 @@
 #include "streaming/exchange_pace.h"
 #include "streaming/http_reader.h"
 #include "streaming/web_address.h"
-#include "tests/streaming/range_server.h"
-#include "tests/streaming/test_files.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/range_server.h"
+#include "tests/support/test_files.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

@@ -8,11 +8,11 @@
 
 #include "streaming/http_exchange.h"
 #include "streaming/page_source.h"
-#include "tests/streaming/directory_files.h"
-#include "tests/streaming/range_server.h"
-#include "tests/streaming/test_files.h"
-#include "tests/streaming/test_trees.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/directory_files.h"
+#include "tests/support/range_server.h"
+#include "tests/support/test_files.h"
+#include "tests/support/test_folder.h"
+#include "tests/support/test_trees.h"
 
 namespace vcp {
 namespace {

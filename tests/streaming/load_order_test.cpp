@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/streaming/test_trees.h"
+#include "tests/support/test_trees.h"
 
 namespace vcp {
 namespace {

@@ -9,8 +9,8 @@
 #include "streaming/faulty_reader.h"
 #include "streaming/page_source.h"
 #include "streaming/read_ahead.h"
-#include "tests/streaming/test_files.h"
-#include "tests/viewer/test_folder.h"
+#include "tests/support/test_files.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

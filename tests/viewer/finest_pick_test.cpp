@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "built_ball.h"
+#include "tests/support/built_ball.h"
 
 namespace vcp {
 namespace {

@@ -16,7 +16,7 @@
 
 #include "render/picture.h"
 #include "render/renderer.h"
-#include "vcp_program.h"
+#include "tests/support/vcp_program.h"
 
 namespace vcp {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {

@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 
 #include "render/picture.h"
-#include "tests/viewer/vcp_program.h"
+#include "tests/support/vcp_program.h"
 
 namespace vcp {
 namespace {

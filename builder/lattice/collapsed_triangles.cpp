@@ -1,0 +1,89 @@
+#include "builder/lattice/collapsed_triangles.h"
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <span>
+#include <tuple>
+
+#include "builder/lattice/lattice_mesh.h"
+#include "octree/leaf_math.h"
+
+namespace vcp {
+
+namespace {
+
+using Point = std::array<int32_t, 3>;
+
+Point pointOf(glm::i32vec3 p) { return {p.x, p.y, p.z}; }
+glm::i32vec3 vectorOf(const Point& p) { return {p[0], p[1], p[2]}; }
+
+/// Part of a collapsed triangle's line; a == b where it is a point.
+struct Segment {
+    Point a, b;
+    std::array<uint32_t, 2> colour;
+
+    [[nodiscard]] std::pair<Point, Point> ends() const { return {a, b}; }
+    bool operator<(const Segment& o) const { return std::tie(a, b, colour) < std::tie(o.a, o.b, o.colour); }
+};
+
+/// The parts between neighbouring corners along the line. Points on a line are in order when sorted by coordinates.
+void addSegments(const LatticeTriangle& t, std::vector<Segment>& segments) {
+    std::array<std::pair<Point, uint32_t>, 3> corner;
+    for (int i = 0; i < 3; ++i) corner[i] = {pointOf(t.corner[i]), t.colour[i]};
+    std::sort(corner.begin(), corner.end());
+    const auto add = [&](int i, int k) { segments.push_back({corner[i].first, corner[k].first, {corner[i].second, corner[k].second}}); };
+    if (corner[0].first == corner[2].first) return add(0, 2);
+    if (corner[0].first != corner[1].first) add(0, 1);
+    if (corner[1].first != corner[2].first) add(1, 2);
+}
+
+/// Takes away the segments that are an edge, or a corner, of a triangle with area.
+void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segment>& segments) {
+    std::set<std::pair<Point, Point>> covered, wanted;
+    for (const Segment& s : segments) wanted.insert(s.ends());
+    for (const LatticeTriangle& t : triangles)
+        for (int i = 0; i < 3; ++i) {
+            const Point p = pointOf(t.corner[i]), q = pointOf(t.corner[(i + 1) % 3]);
+            for (const auto& ends : {std::pair(std::min(p, q), std::max(p, q)), std::pair(p, p)})
+                if (wanted.contains(ends)) covered.insert(ends);
+        }
+    std::erase_if(segments, [&](const Segment& s) { return covered.contains(s.ends()); });
+}
+
+/// A neighbour of `p` in its page that does not lie on the line from `p` to `q`.
+glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q, const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int step : {1, -1}) {
+            glm::i32vec3 r = p;
+            r[axis] += step;
+            if (r[axis] >= 0 && samePage(p, r) && (p == q || hasArea(p, q, r))) return r;
+        }
+    return p;  // a page has more than one lattice point along each axis
+}
+
+}  // namespace
+
+void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(glm::i32vec3)>& owns,
+                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
+    const auto firstCollapsed = std::partition(soup.begin(), soup.end(), [](const LatticeTriangle& t) { return hasArea(t.corner[0], t.corner[1], t.corner[2]); });
+    if (firstCollapsed == soup.end()) return;
+    std::vector<Segment> segments;
+    for (auto t = firstCollapsed; t != soup.end(); ++t) addSegments(*t, segments);
+    soup.erase(firstCollapsed, soup.end());
+    std::erase_if(segments, [&](const Segment& s) { return !owns(vectorOf(s.a)) && !owns(vectorOf(s.b)); });
+    removeCovered(soup, segments);
+    std::sort(segments.begin(), segments.end());
+    segments.erase(std::unique(segments.begin(), segments.end(), [](const Segment& a, const Segment& b) { return a.ends() == b.ends(); }), segments.end());
+    for (const Segment& s : segments) {
+        LatticeTriangle t{};
+        t.corner[0] = vectorOf(s.a);
+        t.corner[1] = s.a == s.b ? besideLine(t.corner[0], t.corner[0], samePage) : vectorOf(s.b);
+        t.corner[2] = besideLine(t.corner[0], t.corner[1], samePage);
+        for (int i = 0; i < 3; ++i) t.colour[i] = s.colour[i == 1 ? 1 : 0];
+        t.stray = static_cast<float>(kLatticeRounding + 1.0 / kLatticePerCell);
+        soup.push_back(t);
+    }
+}
+
+}  // namespace vcp

@@ -1,0 +1,193 @@
+#include "builder/lattice/lattice_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <glm/geometric.hpp>
+#include <oneapi/tbb/parallel_sort.h>
+
+#include "octree/leaf_math.h"
+#include "octree/vcp_file.h"
+#include "octree/vertex_normal.h"
+
+namespace vcp {
+
+namespace {
+
+struct PositionHash {
+    size_t operator()(glm::i32vec3 p) const {
+        uint64_t h = uint32_t(p.x) * 0x9e3779b97f4a7c15u ^ uint32_t(p.y) * 0xc2b2ae3d27d4eb4fu ^ uint32_t(p.z) * 0x165667b19e3779f9u;
+        return h ^ h >> 29;
+    }
+};
+
+/// An open-addressing map from position to index; the vertex array itself holds the keys.
+class PositionIndex {
+public:
+    explicit PositionIndex(size_t count) {
+        size_t size = 16;
+        while (size < count * 2) size *= 2;
+        slots_.assign(size, kEmpty);
+    }
+    /// Index of `p` in `positions`, or `next` after entering it.
+    uint32_t findOrAdd(const std::vector<glm::i32vec3>& positions, glm::i32vec3 p, uint32_t next) {
+        if (next * 3ull >= slots_.size() * 2) grow(positions);
+        const size_t mask = slots_.size() - 1;
+        for (size_t i = PositionHash{}(p) & mask;; i = (i + 1) & mask) {
+            if (slots_[i] == kEmpty) return slots_[i] = next;
+            if (positions[slots_[i]] == p) return slots_[i];
+        }
+    }
+
+private:
+    void grow(const std::vector<glm::i32vec3>& positions) {
+        slots_.assign(slots_.size() * 2, kEmpty);
+        const size_t mask = slots_.size() - 1;
+        for (uint32_t v = 0; v < positions.size(); ++v) {
+            size_t i = PositionHash{}(positions[v]) & mask;
+            while (slots_[i] != kEmpty) i = (i + 1) & mask;
+            slots_[i] = v;
+        }
+    }
+
+    static constexpr uint32_t kEmpty = 0xffffffff;
+    std::vector<uint32_t> slots_;
+};
+
+/// Vertex numbers of `corners` in the canonical order of the vertices, which are sorted into it.
+struct OrderedVertex {
+    uint64_t cell;
+    glm::i32vec3 position;
+    uint32_t number;
+
+    bool operator<(const OrderedVertex& b) const {
+        if (cell != b.cell) return cell < b.cell;
+        if (position.z != b.position.z) return position.z < b.position.z;
+        if (position.y != b.position.y) return position.y < b.position.y;
+        return position.x < b.position.x;
+    }
+};
+
+/// Sorts the vertices; returns the new number of each.
+std::vector<uint32_t> sortVertices(std::vector<glm::i32vec3>& positions) {
+    std::vector<OrderedVertex> order(positions.size());
+    for (uint32_t v = 0; v < order.size(); ++v) order[v] = {mortonEncode(glm::u32vec3(positions[v] >> 11)), positions[v], v};
+    tbb::parallel_sort(order.begin(), order.end());
+    std::vector<uint32_t> renamed(order.size());
+    for (uint32_t v = 0; v < order.size(); ++v) {
+        positions[v] = order[v].position;
+        renamed[order[v].number] = v;
+    }
+    return renamed;
+}
+
+/// A triangle whose smallest vertex is known: the other two ascending. `turned`: they were swapped to ascend.
+struct OrderedTriangle {
+    uint32_t second, third;
+    float stray;
+    uint32_t turned;
+
+    [[nodiscard]] uint64_t key() const { return uint64_t{second} << 32 | third; }
+    bool operator<(const OrderedTriangle& b) const { return key() != b.key() ? key() < b.key() : turned < b.turned; }
+};
+
+/// Triangles by smallest vertex, then by the others; of the repeated ones the first, with the largest stray.
+void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, LatticeMesh& mesh) {
+    std::vector<uint32_t> begin(mesh.positions.size() + 1, 0);
+    for (size_t k = 0; k < soup.size(); ++k) ++begin[std::min({corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]}) + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<OrderedTriangle> ordered(soup.size());
+    std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
+    for (size_t k = 0; k < soup.size(); ++k) {
+        std::array<uint32_t, 3> v{corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]};
+        std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
+        const bool turned = v[1] > v[2];
+        ordered[next[v[0]]++] = {std::min(v[1], v[2]), std::max(v[1], v[2]), soup[k].stray, turned};
+    }
+    mesh.triangles.reserve(soup.size());
+    mesh.stray.reserve(soup.size());
+    for (uint32_t v = 0; v + 1 < begin.size(); ++v) {
+        const auto from = ordered.begin() + begin[v], to = ordered.begin() + begin[v + 1];
+        std::sort(from, to);
+        for (auto t = from; t != to; ++t) {
+            if (t != from && t->key() == (t - 1)->key()) {
+                mesh.stray.back() = std::max(mesh.stray.back(), t->stray);
+                continue;
+            }
+            mesh.triangles.push_back(t->turned ? std::array<uint32_t, 3>{v, t->third, t->second} : std::array<uint32_t, 3>{v, t->second, t->third});
+            mesh.stray.push_back(t->stray);
+        }
+    }
+}
+
+/// Means of the colours that triangles give their vertices.
+std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, size_t vertices) {
+    std::vector<std::array<uint32_t, 5>> sums(vertices, {0, 0, 0, 0, 0});
+    for (size_t k = 0; k < corners.size(); ++k) {
+        const uint32_t colour = soup[k / 3].colour[k % 3];
+        auto& sum = sums[corners[k]];
+        for (int c = 0; c < 4; ++c) sum[c] += colour >> 8 * c & 255u;
+        ++sum[4];
+    }
+    std::vector<uint32_t> means(vertices, 0);
+    for (size_t v = 0; v < vertices; ++v)
+        for (int c = 0; c < 4; ++c) means[v] |= (sums[v][c] + sums[v][4] / 2) / sums[v][4] << 8 * c;
+    return means;
+}
+
+}  // namespace
+
+bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
+    // Coordinates may span 31 bits: the products need more than 64.
+    using Wide = __int128;
+    const int64_t ux = int64_t{b.x} - a.x, uy = int64_t{b.y} - a.y, uz = int64_t{b.z} - a.z;
+    const int64_t vx = int64_t{c.x} - a.x, vy = int64_t{c.y} - a.y, vz = int64_t{c.z} - a.z;
+    return Wide{uy} * vz != Wide{uz} * vy || Wide{uz} * vx != Wide{ux} * vz || Wide{ux} * vy != Wide{uy} * vx;
+}
+
+LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
+    LatticeMesh mesh;
+    std::vector<uint32_t> corners(soup.size() * 3);
+    {
+        PositionIndex index(soup.size() * 6 / 10);
+        for (size_t k = 0; k < corners.size(); ++k) {
+            const glm::i32vec3 p = soup[k / 3].corner[k % 3];
+            const uint32_t next = static_cast<uint32_t>(mesh.positions.size());
+            corners[k] = index.findOrAdd(mesh.positions, p, next);
+            if (corners[k] == next) mesh.positions.push_back(p);
+        }
+    }
+    {
+        const std::vector<uint32_t> renamed = sortVertices(mesh.positions);
+        for (uint32_t& v : corners) v = renamed[v];
+    }
+    // They agree, but where a kept thin part ends at another's vertex: then any will do that does not depend on the order.
+    mesh.normals.assign(mesh.positions.size(), 0xffffffffu);
+    for (size_t k = 0; k < corners.size(); ++k) mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);
+    if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
+    sortTriangles(soup, corners, mesh);
+    return mesh;
+}
+
+std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
+    const auto named = [](glm::i32vec3 q) { return OrderedVertex{mortonEncode(glm::u32vec3(q >> 11)), q, 0}; };
+    const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p), [&](glm::i32vec3 q, const OrderedVertex& wanted) { return named(q) < wanted; });
+    if (at == mesh.positions.end() || *at != p) return {};
+    return static_cast<uint32_t>(at - mesh.positions.begin());
+}
+
+void computeNormals(LatticeMesh& mesh) {
+    std::vector<WideVector> sum(mesh.positions.size(), WideVector(0));
+    std::vector<WideVector> faces(mesh.triangles.size());
+    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
+        const std::array<uint32_t, 3>& t = mesh.triangles[k];
+        faces[k] = areaNormal(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]);
+        for (const uint32_t v : t) addNormal(sum[v], faces[k]);
+    }
+    const std::vector<uint8_t> crease = creases(faces, sum, mesh.triangles);
+    mesh.normals.resize(mesh.positions.size());
+    for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
+}
+
+}  // namespace vcp

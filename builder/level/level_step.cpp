@@ -1,0 +1,183 @@
+#include "builder/level/level_step.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+
+#include <glm/geometric.hpp>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include "builder/level/stray_bound.h"
+
+namespace vcp {
+
+Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
+    // Where all pages are one bin's, none needs to be looked for.
+    if (sink_.partition_.bins() == 1) return batch_.add(0, t);
+    // A triangle seldom spans more than two bins: the list of those seen is short.
+    touched_.clear();
+    sink_.grid_.forPagesNear(t.corner, kStepMarginCells, [&](uint64_t page) {
+        const size_t bin = sink_.partition_.binOf(page);
+        if (std::find(touched_.begin(), touched_.end(), bin) == touched_.end()) touched_.push_back(bin);
+    });
+    for (const size_t bin : touched_) VCP_TRY(batch_.add(bin, t));
+    return {};
+}
+
+/// Per vertex of the bin's mesh.
+struct LevelStep::Images {
+    std::vector<uint32_t> bin;  ///< that the vertex lies in
+    std::vector<uint8_t> known;
+    std::vector<VertexImage> image;
+};
+
+/// Whether all that the image of a vertex depends on is within the bin's surroundings.
+bool LevelStep::isKnown(size_t bin, glm::i32vec3 p) const {
+    if (binOf(p) == bin) return true;
+    if (first_) return false;
+    // The coarse cell must lie within a page of the bin, widened.
+    const glm::dvec3 low = glm::dvec3(p >> static_cast<int>(PageGrid::kLog2LatticePerCell + 1)) * 2.0;
+    const double edge = grid_.edgeCells();
+    const glm::i32vec3 first = glm::max(glm::i32vec3(glm::ceil((low + 2.0 - kStepMarginCells) / edge)) - 1, 0);
+    const glm::i32vec3 last = glm::min(glm::i32vec3(glm::floor((low + kStepMarginCells) / edge)), grid_.lastPage());
+    for (int z = first.z; z <= last.z; ++z)
+        for (int y = first.y; y <= last.y; ++y)
+            for (int x = first.x; x <= last.x; ++x)
+                if (partition_.binOf(mortonEncode(glm::u32vec3(x, y, z))) == bin) return true;
+    return false;
+}
+
+LevelStep::Images LevelStep::imagesOf(size_t bin, const LatticeMesh& mesh) const {
+    Images images;
+    images.bin.resize(mesh.positions.size());
+    images.known.resize(mesh.positions.size());
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.positions.size(), 4096), [&](const auto& range) {
+        for (size_t v = range.begin(); v < range.end(); ++v) {
+            images.bin[v] = static_cast<uint32_t>(binOf(mesh.positions[v]));
+            images.known[v] = isKnown(bin, mesh.positions[v]);
+        }
+    });
+    return images;
+}
+
+Result<void> LevelStep::pass(const WaitingTriangle& w, LevelSink::Batch& batch) {
+    if (w.known != 7) {
+        size_t lowest = partition_.bins();
+        for (int i = 0; i < 3; ++i)
+            if (!(w.known >> i & 1)) lowest = std::min(lowest, binOf(w.from.corner[i]));
+        return waiting_.append(lowest, std::span(&w, 1));
+    }
+    if (!first_) return batch.add(longImage(w.from, w.image));
+    LatticeTriangle t = w.from;
+    for (int i = 0; i < 3; ++i) {
+        t.colour[i] = w.image[i].colour;
+        t.normal[i] = w.image[i].normal;
+    }
+    return batch.add(t);
+}
+
+Result<void> LevelStep::stepWaiting(size_t bin, const LatticeMesh& mesh, const Images& images) {
+    VCP_TRY(waiting_.raw().flush(bin));
+    LevelSink::Batch batch(sink_);
+    const auto blocks = waiting_.raw().blocks(bin);
+    for (const RawBins::Block& block : std::vector(blocks.begin(), blocks.end())) {
+        auto records = waiting_.read(block);
+        if (!records) return records.error();
+        for (WaitingTriangle& w : *records) {
+            for (int i = 0; i < 3; ++i) {
+                if (w.known >> i & 1) continue;
+                const auto vertex = findVertex(mesh, w.from.corner[i]);
+                if (!vertex || !images.known[*vertex]) continue;
+                w.image[i] = images.image[*vertex];
+                w.known |= 1u << i;
+            }
+            VCP_TRY(pass(w, batch));
+        }
+    }
+    return batch.flush();
+}
+
+namespace {
+
+/// Runs work(k, batch) for all k of [0, count) on all threads, each with a batch; the first error ends it.
+template <class Work>
+Result<void> inBatches(LevelSink& sink, size_t count, const Work& work) {
+    tbb::enumerable_thread_specific<LevelSink::Batch> batches([&] { return LevelSink::Batch(sink); });
+    std::mutex mutex;
+    std::atomic<bool> failed = false;
+    Result<void> result;
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 4096), [&](const auto& range) {
+        LevelSink::Batch& batch = batches.local();
+        for (size_t k = range.begin(); k < range.end() && !failed; ++k) {
+            auto done = work(k, batch);
+            if (done) continue;
+            const std::scoped_lock lock(mutex);
+            if (!failed.exchange(true)) result = done;
+        }
+    });
+    if (!result) return result;
+    for (auto& batch : batches) VCP_TRY(batch.flush());
+    return {};
+}
+
+}  // namespace
+
+Result<void> LevelStep::stepShort(size_t bin, const LatticeMesh& mesh, const VertexClusters& clusters) {
+    const CoarseTriangles coarse = coarseTriangles(mesh, clusters);
+    const std::vector<float> stray = boundStray(mesh, clusters, coarse);
+    const LatticeMesh& to = coarse.mesh;
+    return inBatches(sink_, to.triangles.size(), [&](size_t k, LevelSink::Batch& batch) -> Result<void> {
+        LatticeTriangle t;
+        size_t lowest = partition_.bins();
+        for (int i = 0; i < 3; ++i) {
+            const uint32_t v = to.triangles[k][i];
+            t.corner[i] = to.positions[v];
+            t.colour[i] = to.colours.empty() ? 0xffffffffu : to.colours[v];
+            t.normal[i] = to.normals[v];
+            lowest = std::min(lowest, binOf(to.positions[v] * 2));
+        }
+        // Images near the bin's ends are the business of others, and not known whole here.
+        if (lowest != bin) return {};
+        t.stray = stray[k];
+        return batch.add(t);
+    });
+}
+
+Result<void> LevelStep::stepLong(size_t bin, const LatticeMesh& mesh, const Images& images) {
+    return inBatches(sink_, mesh.triangles.size(), [&](size_t k, LevelSink::Batch& batch) -> Result<void> {
+        const auto& v = mesh.triangles[k];
+        if (std::min({images.bin[v[0]], images.bin[v[1]], images.bin[v[2]]}) != bin) return {};
+        if (!first_ && !isLong(mesh.positions[v[0]], mesh.positions[v[1]], mesh.positions[v[2]])) return {};
+        WaitingTriangle w{};
+        w.from.stray = mesh.stray[k];
+        for (int i = 0; i < 3; ++i) {
+            w.from.corner[i] = mesh.positions[v[i]];
+            if (!images.known[v[i]]) continue;
+            w.image[i] = images.image[v[i]];
+            w.known |= 1u << i;
+        }
+        return pass(w, batch);
+    });
+}
+
+Result<void> LevelStep::run(size_t bin, const LatticeMesh& mesh) {
+    Images images = imagesOf(bin, mesh);
+    images.image.resize(mesh.positions.size());
+    const auto colourOf = [](const std::vector<uint32_t>& colours, size_t v) { return colours.empty() ? 0xffffffffu : colours[v]; };
+    if (first_) {
+        for (size_t v = 0; v < mesh.positions.size(); ++v) images.image[v] = {mesh.positions[v], colourOf(mesh.colours, v), mesh.normals[v]};
+    } else {
+        const VertexClusters clusters = clusterVertices(mesh);
+        for (size_t v = 0; v < mesh.positions.size(); ++v)
+            if (const uint32_t c = clusters.ofVertex[v]; c != VertexClusters::kNone)
+                images.image[v] = {clusters.positions[c], colourOf(clusters.colours, c), clusters.normals[c]};
+        VCP_TRY(stepShort(bin, mesh, clusters));
+    }
+    VCP_TRY(stepWaiting(bin, mesh, images));
+    return stepLong(bin, mesh, images);
+}
+
+}  // namespace vcp

@@ -1,0 +1,89 @@
+// The step from one level's triangles to the next coarser one's, bin by bin.
+//
+// Each vertex has an image: where it goes, with which colour and normal (coarsen.h). A bin knows the images of its
+// own vertices and of those nearby, because it has all triangles around them; and every bin that knows an image
+// knows the same. Short triangles are stepped together, each image by the lowest bin that has one of its corners.
+// A long triangle is stepped by itself, from the lowest bin that has one of its corners. When another corner is
+// too far away, it waits for the bin that has that, taking the images along that are known: bins are worked on in
+// ascending order, so none is visited twice.
+//
+// The first step leads from the snapped triangles to the finest level: there a vertex stays where it is, and
+// gets its normal.
+#pragma once
+
+#include <atomic>
+
+#include "builder/lattice/lattice_mesh.h"
+#include "builder/lattice/page_partition.h"
+#include "builder/lattice/soup.h"
+#include "builder/level/coarsen.h"
+#include "builder/spill/record_bins.h"
+
+namespace vcp {
+
+/// A bin's surroundings, in cells, whose triangles it is given: what pages need (kBinMarginCells), and what the
+/// images and strays of its triangles depend on. From a page's wall, a short triangle reaches 2 cells, its
+/// clusters 2 more; those measured against it and what else these are measured against, 4 each.
+inline constexpr double kStepMarginCells = 12;
+
+/// A triangle whose images are not all known yet.
+struct WaitingTriangle {
+    LatticeTriangle from;
+    VertexImage image[3];
+    uint32_t known;  ///< bit i: corner i's image is there
+};
+
+/// Where the next level's triangles go: into every bin that needs them.
+class LevelSink {
+public:
+    LevelSink(const PageGrid& grid, const PagePartition& partition, RecordBins<LatticeTriangle>& bins) : grid_(grid), partition_(partition), bins_(bins) {}
+
+    /// A batch of its own for each thread; flush when done.
+    class Batch {
+    public:
+        explicit Batch(LevelSink& sink) : sink_(sink), batch_(sink.bins_) {}
+        Result<void> add(const LatticeTriangle& triangle);
+        Result<void> flush() { return batch_.flush(); }
+
+    private:
+        LevelSink& sink_;
+        BinBatch<LatticeTriangle> batch_;
+        std::vector<size_t> touched_;
+    };
+
+private:
+    const PageGrid& grid_;
+    const PagePartition& partition_;
+    RecordBins<LatticeTriangle>& bins_;
+};
+
+/// Steps one level. One thread calls, in ascending order of bins; the calling arena's threads work.
+class LevelStep {
+public:
+    /// `first`: the step from the snapped triangles to the finest level. `grid`, `partition`: of the level
+    /// stepped from.
+    LevelStep(bool first, const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting, LevelSink& sink)
+        : first_(first), grid_(grid), partition_(partition), waiting_(waiting), sink_(sink) {}
+
+    /// `mesh`: all triangles of the bin, with their normals.
+    Result<void> run(size_t bin, const LatticeMesh& mesh);
+
+private:
+    struct Images;
+    [[nodiscard]] Images imagesOf(size_t bin, const LatticeMesh& mesh) const;
+    [[nodiscard]] bool isKnown(size_t bin, glm::i32vec3 p) const;
+    [[nodiscard]] size_t binOf(glm::i32vec3 p) const { return partition_.binOf(grid_.pageOf(p)); }
+    Result<void> stepShort(size_t bin, const LatticeMesh& mesh, const VertexClusters& clusters);
+    Result<void> stepLong(size_t bin, const LatticeMesh& mesh, const Images& images);
+    Result<void> stepWaiting(size_t bin, const LatticeMesh& mesh, const Images& images);
+    /// Emits a triangle whose images are all known; else lets it wait.
+    Result<void> pass(const WaitingTriangle& w, LevelSink::Batch& batch);
+
+    bool first_;
+    const PageGrid& grid_;
+    const PagePartition& partition_;
+    RecordBins<WaitingTriangle>& waiting_;
+    LevelSink& sink_;
+};
+
+}  // namespace vcp

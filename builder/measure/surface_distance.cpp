@@ -1,0 +1,368 @@
+#include "builder/measure/surface_distance.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <numbers>
+#include <thread>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace vcp {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr uint64_t kBlock = 512;
+
+/// SplitMix64 (Steele, Lea and Flood 2014): a stream of its own for every sample.
+class SampleRandom {
+public:
+    SampleRandom(uint64_t seed, uint64_t sample) : state_(seed * 0x9e3779b97f4a7c15u ^ sample * 0xd1342543de82ef95u) {}
+
+    uint64_t next() {
+        uint64_t z = state_ += 0x9e3779b97f4a7c15u;
+        z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+        z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+        return z ^ z >> 31;
+    }
+    double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
+    uint64_t below(uint64_t count) {
+        return std::min(static_cast<uint64_t>(unit() * static_cast<double>(count)), count - 1);
+    }
+    glm::dvec3 direction() {
+        const double z = 2 * unit() - 1, phi = 2 * std::numbers::pi * unit();
+        const double r = std::sqrt(std::max(1 - z * z, 0.0));
+        return {r * std::cos(phi), r * std::sin(phi), z};
+    }
+
+private:
+    uint64_t state_;
+};
+
+/// Runs `work(sample)` for all samples below `count` in blocks. False when cancelled.
+class BlockRunner {
+public:
+    explicit BlockRunner(const SurfaceDistanceOptions& options)
+        : progress_(options.progress),
+          threads_(options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency())) {}
+
+    template <class Work>
+    bool run(uint64_t count, double from, double to, const Work& work) {
+        std::atomic<uint64_t> next{0};
+        std::atomic<bool> cancelled{false};
+        const uint64_t blocks = (count + kBlock - 1) / kBlock;
+        const auto loop = [&] {
+            for (uint64_t block = next++; block < blocks && !cancelled; block = next++) {
+                for (uint64_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) work(i);
+                if (!report(from + (to - from) * static_cast<double>(block + 1) / static_cast<double>(blocks)))
+                    cancelled = true;
+            }
+        };
+        std::vector<std::thread> threads;
+        for (unsigned t = 1; t < threads_; ++t) threads.emplace_back(loop);
+        loop();
+        for (std::thread& thread : threads) thread.join();
+        return !cancelled;
+    }
+
+private:
+    bool report(double fraction) {
+        if (!progress_) return true;
+        const std::lock_guard lock(mutex_);
+        done_ = std::max(done_, fraction);
+        return progress_(done_);
+    }
+
+    const std::function<bool(double)>& progress_;
+    unsigned threads_;
+    std::mutex mutex_;
+    double done_ = 0;
+};
+
+/// A convex polygon of a triangle cut off at the walls of a box: up to 3 + 6 corners.
+struct Polygon {
+    std::array<glm::dvec3, 12> corner;
+    int count = 0;
+};
+
+Polygon clipToHalfSpace(const Polygon& in, int axis, double wall, double side) {
+    Polygon out;
+    for (int i = 0; i < in.count; ++i) {
+        const glm::dvec3 a = in.corner[i], b = in.corner[(i + 1) % in.count];
+        const double da = side * (wall - a[axis]), db = side * (wall - b[axis]);
+        if (da >= 0) out.corner[out.count++] = a;
+        if ((da >= 0) == (db >= 0)) continue;
+        glm::dvec3 cut = a + (da / (da - db)) * (b - a);
+        cut[axis] = wall;
+        out.corner[out.count++] = cut;
+    }
+    return out;
+}
+
+double distanceToClipped(glm::dvec3 p, const std::array<glm::dvec3, 3>& triangle, glm::dvec3 lowest, double edge) {
+    Polygon polygon;
+    for (const glm::dvec3& corner : triangle) polygon.corner[polygon.count++] = corner;
+    for (int axis = 0; axis < 3 && polygon.count > 0; ++axis) {
+        polygon = clipToHalfSpace(polygon, axis, lowest[axis] + edge, 1);
+        if (polygon.count > 0) polygon = clipToHalfSpace(polygon, axis, lowest[axis], -1);
+    }
+    double nearest = kInfinity;
+    for (int i = 1; i + 1 < std::max(polygon.count, 2); ++i)
+        nearest = std::min(nearest, glm::distance(p, closestPointOfTriangle(p, polygon.corner[0], polygon.corner[i],
+                                                                            polygon.corner[i + 1])));
+    return nearest;
+}
+
+double boxDistance(glm::dvec3 p, glm::dvec3 lowest, double edge) {
+    return glm::length(glm::max(glm::max(lowest - p, p - lowest - glm::dvec3(edge)), glm::dvec3(0)));
+}
+
+glm::dvec3 octantOffset(uint32_t octant) { return {octant & 1u, octant >> 1 & 1u, octant >> 2 & 1u}; }
+
+/// A leaf of the level.
+struct LeafBox {
+    uint64_t page;
+    glm::dvec3 lowest;  ///< in cells from the page's lowest corner
+    double edge;
+};
+
+/// The leaves of the cut: as a list, and nearest hard leaves by descent.
+class LevelLeaves {
+public:
+    LevelLeaves(const PageCache& cache, const std::vector<uint64_t>& cut)
+        : cache_(cache), inCut_(cache.dataset().pages.size(), false) {
+        for (const uint64_t page : cut) inCut_[page] = true;
+    }
+
+    [[nodiscard]] std::vector<LeafBox> list() const {
+        std::vector<LeafBox> leaves;
+        for (uint64_t page = 0; page < inCut_.size(); ++page)
+            if (inCut_[page]) collect(page, cache_.view(page)->header.root, glm::dvec3(0), pageCells(), leaves);
+        return leaves;
+    }
+
+    /// Distance from a world point to the triangles of hard leaves, or `best` if that is less.
+    [[nodiscard]] double hardDistance(glm::dvec3 p, double best) const {
+        visitPage(0, p, best);
+        return best;
+    }
+
+private:
+    [[nodiscard]] double pageCells() const {
+        return static_cast<double>(uint64_t{1} << cache_.dataset().header.log2Cells);
+    }
+
+    void collect(uint64_t page, uint32_t node, glm::dvec3 lowest, double edge, std::vector<LeafBox>& leaves) const {
+        if (nodeType(node) == kNodeSoft || nodeType(node) == kNodeHard) leaves.push_back({page, lowest, edge});
+        if (nodeType(node) != kNodeInternal) return;
+        for (uint32_t o = 0; o < 8; ++o)
+            collect(page, cache_.view(page)->nodes[8 * (node & kNodePayloadMask) + o],
+                    lowest + octantOffset(o) * (edge / 2), edge / 2, leaves);
+    }
+
+    void visitPage(uint64_t page, glm::dvec3 p, double& best) const {
+        const Dataset& dataset = cache_.dataset();
+        const PageEntry& entry = dataset.pages[page];
+        const double cell = dataset.cellOf(entry.level);
+        const glm::dvec3 inPage = (p - dataset.originOf(entry)) / cell;
+        if (boxDistance(inPage, glm::dvec3(0), pageCells()) * cell >= best) return;
+        if (inCut_[page]) {
+            double cells = best / cell;
+            visitNode(*cache_.view(page), cache_.view(page)->header.root, inPage, glm::dvec3(0), pageCells(), cells);
+            best = std::min(best, cells * cell);
+            return;
+        }
+        for (const uint64_t child : childrenOf(entry)) visitPage(child, p, best);
+    }
+
+    void visitNode(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 lowest, double edge,
+                   double& best) const {
+        if (nodeType(node) == kNodeEmpty || nodeType(node) == kNodeSoft || boxDistance(p, lowest, edge) >= best) return;
+        if (nodeType(node) == kNodeInternal) {
+            for (uint32_t o = 0; o < 8; ++o)
+                visitNode(view, view.nodes[8 * (node & kNodePayloadMask) + o], p, lowest + octantOffset(o) * (edge / 2),
+                          edge / 2, best);
+            return;
+        }
+        const TriangleRange range = hardLeafTriangles(view, node);
+        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+            const glm::u32vec2 r = view.triangles[t];
+            const std::array<uint32_t, 3> v = {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y),
+                                               f64::decodeIndex2(r.y)};
+            std::array<glm::dvec3, 3> triangle;
+            for (int i = 0; i < 3; ++i) triangle[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
+            best = std::min(best, distanceToClipped(p, triangle, lowest, edge));
+        }
+    }
+
+    const PageCache& cache_;
+    std::vector<bool> inCut_;
+};
+
+/// Points of the mesh, by area, on edges and at vertices in the ratio 2 : 1 : 1. Triangles without area are no
+/// part of the surface: scans have hairs of them that stick out.
+class MeshSampler {
+public:
+    explicit MeshSampler(const IndexedMesh& mesh) : mesh_(mesh) {
+        double sum = 0;
+        for (uint64_t t = 0; t < mesh.triangles.size(); ++t) {
+            const auto v = mesh.corners(t);
+            const double area = glm::length(glm::cross(v[1] - v[0], v[2] - v[0]));
+            if (!(area > 0)) continue;
+            triangles_.push_back(static_cast<uint32_t>(t));
+            areaUpTo_.push_back(sum += area);
+        }
+    }
+
+    [[nodiscard]] bool empty() const { return triangles_.empty(); }
+
+    struct Sample {
+        glm::dvec3 position, normal;
+    };
+
+    Sample sample(uint64_t number, SampleRandom& random) const {
+        const uint64_t kind = number & 3;
+        const uint64_t triangle = kind < 2 ? byArea(random) : triangles_[random.below(triangles_.size())];
+        const auto v = mesh_.corners(triangle);
+        glm::dvec3 n = glm::cross(v[1] - v[0], v[2] - v[0]);
+        const double length = glm::length(n);
+        n /= length;
+        const uint64_t corner = random.below(3);
+        if (kind == 3) return {v[corner], n};
+        if (kind == 2) return {glm::mix(v[corner], v[(corner + 1) % 3], random.unit()), n};
+        double a = random.unit(), b = random.unit();
+        if (a + b > 1) a = 1 - a, b = 1 - b;
+        return {v[0] + a * (v[1] - v[0]) + b * (v[2] - v[0]), n};
+    }
+
+private:
+    uint64_t byArea(SampleRandom& random) const {
+        const double at = random.unit() * areaUpTo_.back();
+        const auto found = std::upper_bound(areaUpTo_.begin(), areaUpTo_.end(), at);
+        return triangles_[std::min<size_t>(found - areaUpTo_.begin(), areaUpTo_.size() - 1)];
+    }
+
+    const IndexedMesh& mesh_;
+    std::vector<uint32_t> triangles_;  ///< with area
+    std::vector<double> areaUpTo_;     ///< of these, summed up
+};
+
+/// Upper bound on the distance of a world point to the rendered surface.
+double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leaves, const MeshSampler::Sample& sample,
+                         double cell, double certifiedError) {
+    double best = kInfinity;
+    glm::dvec3 surfaceNormal{0};
+    const auto tryAlong = [&](glm::dvec3 direction, double reach) {
+        for (const double sign : {1.0, -1.0}) {
+            const auto hit = caster.cast({sample.position, sign * direction, 0, std::min(best, reach)});
+            if (!hit || hit->t >= best) continue;
+            best = hit->t;
+            surfaceNormal = hit->normal;
+        }
+    };
+    tryAlong(sample.normal, cell);
+    if (best < kInfinity) tryAlong(surfaceNormal, cell);
+    best = leaves.hardDistance(sample.position, best);
+    if (best <= 0.25 * certifiedError) return best;
+    if (best == kInfinity) tryAlong(sample.normal, kInfinity);
+    constexpr double d = 0.57735026918962573;
+    for (const glm::dvec3 direction :
+         {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(d, d, d), glm::dvec3(-d, d, d),
+          glm::dvec3(d, -d, d), glm::dvec3(d, d, -d)})
+        tryAlong(direction, best < kInfinity ? cell : kInfinity);
+    if (best < kInfinity && surfaceNormal != glm::dvec3(0)) tryAlong(surfaceNormal, kInfinity);
+    return best;
+}
+
+/// Hits of one random ray through a leaf that lie in the leaf.
+void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random,
+                std::vector<glm::dvec3>& hits) {
+    const Dataset& dataset = caster.cache().dataset();
+    const PageEntry& entry = dataset.pages[leaf.page];
+    const double cell = dataset.cellOf(entry.level);
+    const glm::dvec3 inLeaf = leaf.lowest + leaf.edge * glm::dvec3(random.unit(), random.unit(), random.unit());
+    const glm::dvec3 direction = random.direction();
+    const double reach = 2 * leaf.edge * cell;
+    const glm::dvec3 middle = dataset.originOf(entry) + inLeaf * cell;
+    for (const RayHit& hit : caster.castAll({middle - reach * direction, direction, 0, 2 * reach}))
+        if (hit.page == leaf.page && hit.leafMin == leaf.lowest && hit.leafEdge == leaf.edge)
+            hits.push_back(hit.position);
+}
+
+/// Keeps the largest of what threads report; ties go to the lowest sample.
+struct Worst {
+    std::mutex mutex;
+    double distance = -1;
+    uint64_t sample = 0;
+    glm::dvec3 position{0};
+    void add(double candidate, uint64_t number, glm::dvec3 at) {
+        const std::lock_guard lock(mutex);
+        if (candidate < distance || (candidate == distance && number >= sample)) return;
+        distance = candidate;
+        sample = number;
+        position = at;
+    }
+};
+
+}  // namespace
+
+Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
+                                               const SurfaceDistanceOptions& options) {
+    const Dataset& dataset = cache.dataset();
+    const uint32_t level = std::min(options.level, dataset.header.levels - 1);
+    const std::vector<uint64_t> cut = cutAtLevel(dataset, level);
+    const auto caster = ReferenceCaster::create(cache, cut);
+    if (!caster) return caster.error();
+    const LevelLeaves leavesOfLevel(cache, cut);
+    const MeshSampler sampler(mesh.mesh());
+    if (sampler.empty()) return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle with area"};
+    const double cell = dataset.cellOf(level), certified = dataset.header.level[level].certifiedError;
+    SurfaceDistance result;
+    result.cell = cell;
+    result.certifiedErrorMax = certified;
+    BlockRunner runner(options);
+    const Error cancelled{.code = ErrorCode::Cancelled, .message = "cancelled"};
+
+    std::vector<float> toSurface(options.samples);
+    Worst worstOfMesh;
+    if (!runner.run(options.samples, 0, 0.6, [&](uint64_t i) {
+            SampleRandom random(options.seed, 2 * i);
+            const MeshSampler::Sample sample = sampler.sample(i, random);
+            const double distance = distanceToSurface(*caster, leavesOfLevel, sample, cell, certified);
+            toSurface[i] = static_cast<float>(distance);
+            worstOfMesh.add(distance, i, sample.position);
+        }))
+        return cancelled;
+
+    const std::vector<LeafBox> leaves = leavesOfLevel.list();
+    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock);
+    Worst worstOfSurface;
+    if (!leaves.empty() && !runner.run(options.samples, 0.6, 1, [&](uint64_t i) {
+            SampleRandom random(options.seed, 2 * i + 1);
+            std::vector<glm::dvec3> hits;
+            // Most lines through a leaf pass its surface by.
+            const LeafBox& leaf = leaves[random.below(leaves.size())];
+            for (int ray = 0; ray < 8 && hits.empty(); ++ray) hitsOfLeaf(*caster, leaf, random, hits);
+            for (const glm::dvec3& hit : hits) {
+                const double distance = mesh.nearestPoint(hit)->distance;
+                toMesh[i / kBlock].push_back(static_cast<float>(distance));
+                worstOfSurface.add(distance, i, hit);
+            }
+        }))
+        return cancelled;
+
+    std::vector<float> allToMesh;
+    for (const auto& block : toMesh) allToMesh.insert(allToMesh.end(), block.begin(), block.end());
+    result.samples = toSurface.size() + allToMesh.size();
+    result.meshToSurface = quantilesOf(std::move(toSurface));
+    result.surfaceToMesh = quantilesOf(std::move(allToMesh));
+    result.worstOfMesh = worstOfMesh.position;
+    result.worstOfSurface = worstOfSurface.position;
+    return result;
+}
+
+}  // namespace vcp

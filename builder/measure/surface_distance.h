@@ -1,0 +1,46 @@
+// How far the surface of a level of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify --against`).
+//
+//   mesh to surface   samples: vertices, points on edges, points inside triangles, by area; of triangles that
+//                     have area, for the others show nothing. The distance to
+//                     the surface of the level is bounded from above: by short rays through the
+//                     sample in eight and more directions, which start with no wall tolerance, and by the
+//                     exact distance to the triangles of hard leaves, each cut off at its leaf's walls.
+//   surface to mesh   samples: hits of random rays through the leaves of the level, every leaf alike.
+//                     The distance to the mesh is exact (MeshBvh).
+// Both measurements are seeded: the same numbers whatever the threads.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "builder/measure/mesh_bvh.h"
+#include "builder/measure/ray_classes.h"
+#include "octree/reference_caster.h"
+
+namespace vcp {
+
+struct SurfaceDistanceOptions {
+    uint64_t samples = 200'000;  ///< points of the mesh, and visits of leaves
+    uint64_t seed = 1;
+    unsigned threads = 0;  ///< 0: one a processor
+    uint32_t level = UINT32_MAX;  ///< the level whose surface is measured; the finest if there is none of that number
+    /// Called from one thread at a time with the fraction done; false cancels. May be empty.
+    std::function<bool(double)> progress;
+};
+
+struct SurfaceDistance {
+    Quantiles meshToSurface;       ///< world units
+    Quantiles surfaceToMesh;       ///< world units
+    glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
+    glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
+    uint64_t samples = 0;          ///< measured, both ways together
+    double cell = 0;               ///< of the level, world units
+    double certifiedErrorMax = 0;  ///< of the level, world units
+};
+
+/// Measures one level of `cache`, all of whose pages it needs loaded. Errors: Usage (a page is not
+/// loaded), InvalidInput (the mesh has no triangle with area), Cancelled.
+Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
+                                               const SurfaceDistanceOptions& options = {});
+
+}  // namespace vcp

@@ -1,0 +1,40 @@
+// The part of draco.h that runs in the child process: decodes, and writes what the parent reads.
+//
+// First a DracoReply. When its `failed` is 0: `vertices` DracoVertex, then `faces` DracoFace. Else `messageBytes` of
+// text, and `failed` is an ErrorCode plus 1.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "builder/mesh/gltf/draco.h"
+
+namespace vcp {
+
+struct DracoReply {
+    uint64_t vertices = 0;
+    uint64_t faces = 0;
+    uint32_t failed = 0;
+    uint32_t messageBytes = 0;
+    uint32_t hasColour = 0;
+    uint32_t hasUv = 0;
+};
+
+struct DracoVertex {
+    double position[3];
+    uint32_t colour;
+    uint32_t unused;
+};
+
+struct DracoFace {
+    uint32_t vertex[3];
+    float uv[3][2];
+};
+
+static_assert(std::is_trivially_copyable_v<DracoReply> && sizeof(DracoReply) == 32);
+static_assert(sizeof(DracoVertex) == 32 && sizeof(DracoFace) == 36);
+
+/// Decodes what `bytes` gives and writes it to the pipe. Never returns.
+[[noreturn]] void runDracoChild(const DracoBytes& bytes, const DracoSelection& selection, int pipe);
+
+}  // namespace vcp

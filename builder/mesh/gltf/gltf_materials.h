@@ -1,0 +1,13 @@
+// The materials of a glTF file, with the textures and images of their base colour.
+#pragma once
+
+#include "builder/mesh/gltf/gltf_document.h"
+#include "builder/mesh/gltf/json_fields.h"
+
+namespace vcp {
+
+/// Fills images and materials of `document`, whose buffers and views were read. What is wrong with a texture
+/// becomes a warning; what is wrong with the JSON itself goes to `check`.
+void readGltfMaterials(const Json& json, GltfDocument& document, JsonCheck& check);
+
+}  // namespace vcp

@@ -1,0 +1,158 @@
+#include "builder/mesh/mtl.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "builder/stream/byte_source.h"
+#include "builder/stream/colour_encoding.h"
+#include "builder/stream/data_uri.h"
+#include "builder/stream/number_text.h"
+
+namespace vcp {
+namespace {
+
+constexpr uint64_t kMostBytes = 16u << 20;
+constexpr size_t kMostMaterials = 65536;
+constexpr size_t kLineLimit = 64 * 1024;
+
+// Takes words off the front of a line.
+class Words {
+public:
+    explicit Words(std::string_view line) : p_(line.data()), end_(line.data() + line.size()) {}
+
+    [[nodiscard]] std::string_view peek() {
+        p_ = skipSpaces(p_, end_);
+        return {p_, static_cast<size_t>(wordEnd(p_, end_) - p_)};
+    }
+    std::string_view take() {
+        const std::string_view word = peek();
+        p_ += word.size();
+        return word;
+    }
+    bool takeNumber(double& value) {
+        const std::string_view word = peek();
+        const char* const end = word.data() + word.size();
+        if (word.empty() || parseReal(word.data(), end, value) != end) return false;
+        p_ += word.size();
+        return true;
+    }
+    /// What is left, without the white space around it: names may hold spaces.
+    [[nodiscard]] std::string rest() {
+        (void)peek();
+        const char* end = end_;
+        while (end != p_ && isSpace(end[-1])) --end;
+        return {p_, end};
+    }
+
+private:
+    const char* p_;
+    const char* end_;
+};
+
+class MtlReader {
+public:
+    MtlReader(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
+              std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles)
+        : path_(path), materials_(materials), warnings_(warnings), sideFiles_(sideFiles) {}
+
+    void read() {
+        sideFiles_.emplace_back(path_);
+        // A named pipe would wait for its writer.
+        std::error_code ignored;
+        if (!std::filesystem::is_regular_file(path_, ignored)) return warn("no such file; its colours are left out");
+        auto source = ByteSource::open(path_);
+        if (!source) return warn(source.error().message + "; its colours are left out");
+        if (source->size() > kMostBytes) return warn("is larger than 16 MiB; its colours are left out");
+        while (true) {
+            const auto line = source->line(kLineLimit);
+            if (!line) return warn(line.error().message + "; the rest of it is left out");
+            if (!*line) break;
+            readLine(**line);
+        }
+        finish();
+    }
+
+private:
+    void warn(const std::string& what) { warnings_.push_back(path_.string() + ": " + what); }
+
+    void readLine(std::string_view line) {
+        Words words(line);
+        const std::string_view keyword = words.take();
+        if (keyword == "newmtl") {
+            finish();
+            current_ = {};
+            current_.material.name = words.rest();
+            open_ = true;
+        } else if (keyword == "Kd") {
+            std::array<double, 3> rgb{};
+            for (double& channel : rgb)
+                if (!words.takeNumber(channel)) return;
+            current_.material.factor = packRgba({toByte(rgb[0]), toByte(rgb[1]), toByte(rgb[2]), 255});
+        } else if (keyword == "map_Kd") {
+            readImage(words);
+        }
+    }
+
+    void readImage(Words& words) {
+        while (words.peek().starts_with('-')) readOption(words);
+        const std::string name = words.rest();
+        if (name.empty()) return;
+        const auto path = nameBelow(path_.parent_path(), name);
+        if (path) sideFiles_.emplace_back(*path);
+        std::error_code ignored;
+        if (!path)
+            warn(fmt::format("the image {} lies outside its folder; it is left out", shown(name)));
+        else if (!std::filesystem::is_regular_file(*path, ignored))
+            warn(fmt::format("the image {} is missing; it is left out", shown(name)));
+        else
+            current_.material.image.path = *path;
+    }
+
+    void readOption(Words& words) {
+        const std::string_view option = words.take();
+        if (option == "-o" || option == "-s" || option == "-t") {
+            std::array<double, 3> numbers{0, option == "-s" ? 1.0 : 0.0, 0};
+            for (double& number : numbers)
+                if (!words.takeNumber(number)) break;
+            const glm::vec2 pair(static_cast<float>(numbers[0]), static_cast<float>(numbers[1]));
+            if (!std::isfinite(pair.x) || !std::isfinite(pair.y)) return;
+            if (option == "-o") current_.uvOffset = pair;
+            if (option == "-s") current_.uvScale = pair;
+        } else if (option == "-mm") {
+            words.take();
+            words.take();
+        } else {
+            const std::string_view value = words.take();
+            if (option == "-clamp" && value == "on") current_.material.wrapU = current_.material.wrapV = Wrap::Clamp;
+        }
+    }
+
+    void finish() {
+        if (!open_) return;
+        open_ = false;
+        if (materials_.size() == kMostMaterials) return warn("more than 65536 materials; the rest is left out");
+        if (current_.material.image.exists()) current_.material.factor = kWhite;
+        materials_.push_back(std::move(current_));
+    }
+
+    std::filesystem::path path_;
+    std::vector<MtlMaterial>& materials_;
+    std::vector<std::string>& warnings_;
+    std::vector<SideFile>& sideFiles_;
+    MtlMaterial current_;
+    bool open_ = false;
+};
+
+}  // namespace
+
+void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings,
+             std::vector<SideFile>& sideFiles) {
+    MtlReader(path, materials, warnings, sideFiles).read();
+}
+
+}  // namespace vcp

@@ -1,0 +1,30 @@
+// Wavefront MTL: the materials of an OBJ file, as far as the colour of a surface goes.
+//
+// `newmtl`, `Kd` and `map_Kd` with its options -o, -s and -clamp; the others are read over. Where there is an image,
+// it is the colour: Kd is ignored then, as many exporters leave a grey one behind. Images lie below the folder of the
+// MTL file; others are left out with a warning, as is what is wrong in the file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "builder/stream/material.h"
+#include "builder/stream/side_file.h"
+
+namespace vcp {
+
+struct MtlMaterial {
+    Material material;
+    glm::vec2 uvOffset{0};
+    glm::vec2 uvScale{1};  ///< texture coordinates of the file are scaled, then moved
+};
+
+/// Appends the materials of a file. Limits: 16 MiB, 65536 materials. Never fails: what cannot be read is a warning,
+/// one line that names the file. `sideFiles` gets the file and the images that it names.
+void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings,
+             std::vector<SideFile>& sideFiles);
+
+}  // namespace vcp

@@ -1,0 +1,47 @@
+#include "builder/page/bin_triangles.h"
+
+#include <algorithm>
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
+
+namespace vcp {
+
+TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first, uint64_t end) {
+    struct Entry {
+        uint64_t page;
+        uint32_t triangle;
+    };
+    tbb::enumerable_thread_specific<std::vector<Entry>> parts;
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), 4096), [&](const auto& range) {
+        std::vector<Entry>& part = parts.local();
+        for (size_t k = range.begin(); k < range.end(); ++k) {
+            const auto& t = mesh.triangles[k];
+            const glm::i32vec3 corner[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+            grid.forPagesNear(corner, kBinMarginCells, [&](uint64_t page) {
+                if (page >= first && page < end) part.push_back({page, static_cast<uint32_t>(k)});
+            });
+        }
+    });
+    std::vector<Entry> entries;
+    for (auto& part : parts) {
+        entries.insert(entries.end(), part.begin(), part.end());
+        std::vector<Entry>().swap(part);
+    }
+    tbb::parallel_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.page != b.page ? a.page < b.page : a.triangle < b.triangle; });
+    TriangleBins bins;
+    bins.triangles.reserve(entries.size());
+    for (const Entry& e : entries) {
+        if (bins.pages.empty() || bins.pages.back() != e.page) {
+            bins.pages.push_back(e.page);
+            bins.begin.push_back(bins.triangles.size());
+        }
+        bins.triangles.push_back(e.triangle);
+    }
+    bins.begin.push_back(bins.triangles.size());
+    return bins;
+}
+
+}  // namespace vcp

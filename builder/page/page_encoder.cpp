@@ -1,0 +1,291 @@
+#include "builder/page/page_encoder.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <unordered_map>
+
+#include "octree/clearance.h"
+#include "octree/leaf_math.h"
+#include "octree/packing.h"
+#include "octree/page.h"
+
+namespace vcp {
+
+namespace {
+
+/// Corner i of a leaf as corner c of the face at end `end` of `axis`.
+int cornerOfFace(int axis, int end, int c) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    return end << axis | (c & 1) << u | (c >> 1) << v;
+}
+
+/// The soft leaves by position, to find neighbours.
+class LeafMap {
+public:
+    explicit LeafMap(const std::vector<SoftLeaf>& leaves) {
+        map_.reserve(leaves.size());
+        for (uint32_t i = 0; i < leaves.size(); ++i) map_.emplace(key(leaves[i].box), i);
+    }
+    /// Number of the leaf of this very box, or -1.
+    [[nodiscard]] int64_t find(const NodeBox& box) const {
+        const auto entry = map_.find(key(box));
+        return entry == map_.end() ? -1 : int64_t{entry->second};
+    }
+
+private:
+    static uint64_t key(const NodeBox& box) {
+        return uint64_t(uint32_t(box.lower.x) & 0xffffu) | uint64_t(uint32_t(box.lower.y) & 0xffffu) << 16 | uint64_t(uint32_t(box.lower.z) & 0xffffu) << 32 |
+               uint64_t(uint32_t(box.edge)) << 48;
+    }
+    std::unordered_map<uint64_t, uint32_t> map_;
+};
+
+NodeBox neighbour(const NodeBox& box, int axis, int end) {
+    NodeBox n = box;
+    n.lower[axis] += end ? box.edge : -box.edge;
+    return n;
+}
+
+/// Whether two equal leaves agree on the sides of the corners of the face between them: 1 yes, -1 all are
+/// flipped, 0 neither.
+int sideAgreement(const SoftLeaf& a, const SoftLeaf& b, int axis, int endOfA) {
+    int same = 0;
+    for (int c = 0; c < 4; ++c) {
+        const uint32_t ca = a.certificate.codes[cornerOfFace(axis, endOfA, c)], cb = b.certificate.codes[cornerOfFace(axis, 1 - endOfA, c)];
+        if (ca == cb) ++same;
+        else if (ca == flipSide(cb)) --same;
+    }
+    return same == 4 ? 1 : same == -4 ? -1 : 0;
+}
+
+/// A leaf needs its wall tolerance unless, at each face that the surface comes near, an equal leaf with the
+/// same f continues it.
+void setWalls(PageTree& tree, const LeafMap& map) {
+    for (SoftLeaf& leaf : tree.soft) {
+        const BernsteinCube cube(LeafSurface(leaf.certificate.codes), 0, 1);
+        const double near = 1.05 * leaf.certificate.maxValue + 1e-4;
+        bool continued = true;
+        for (int face = 0; face < 6 && continued; ++face) {
+            const int axis = face / 2, end = face % 2;
+            const BernsteinCube::Range range = cube.faceRange(axis, end);
+            if (range.min > near || range.max < -near) continue;
+            const int64_t next = map.find(neighbour(leaf.box, axis, end));
+            continued = next >= 0 && sideAgreement(leaf, tree.soft[static_cast<size_t>(next)], axis, end) != 0;
+        }
+        leaf.wall = continued ? 0 : wallCode(leaf.certificate.maxValue);
+    }
+}
+
+/// The faces array: leaves in runs along an axis, neighbours sharing the face between them.
+class FacePacker {
+public:
+    FacePacker(const PageTree& tree, const LeafMap& map, PageGeometry& geometry, bool withColour)
+        : tree_(tree), map_(map), geometry_(geometry), withColour_(withColour), first_(tree.soft.size(), kUnset), axis_(tree.soft.size(), 0) {
+        for (uint32_t i = 0; i < tree.soft.size(); ++i)
+            if (first_[i] == kUnset) packRun(i);
+    }
+
+    [[nodiscard]] uint32_t firstFace(uint32_t leaf) const { return first_[leaf]; }
+    [[nodiscard]] uint32_t axis(uint32_t leaf) const { return axis_[leaf]; }
+    std::vector<uint4> faces, colours;
+
+private:
+    static constexpr uint32_t kUnset = 0xffffffff;
+
+    struct Link {
+        uint32_t leaf;
+        bool flip;
+    };
+
+    /// The unpacked leaves that continue `leaf` along the axis, itself first.
+    std::vector<Link> runFrom(uint32_t leaf, int axis) const {
+        std::vector<Link> run{{leaf, false}};
+        for (;;) {
+            const SoftLeaf& last = tree_.soft[run.back().leaf];
+            const int64_t next = map_.find(neighbour(last.box, axis, 1));
+            if (next < 0 || first_[static_cast<size_t>(next)] != kUnset) return run;
+            const int agreement = sideAgreement(last, tree_.soft[static_cast<size_t>(next)], axis, 1);
+            if (agreement == 0) return run;
+            run.push_back({static_cast<uint32_t>(next), run.back().flip != (agreement < 0)});
+        }
+    }
+
+    /// Leaves come in the octree's order, so nothing unpacked lies before `leaf` on most axes: runs start here.
+    void packRun(uint32_t leaf) {
+        std::vector<Link> best;
+        int bestAxis = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            std::vector<Link> run = runFrom(leaf, axis);
+            if (run.size() > best.size()) {
+                best = std::move(run);
+                bestAxis = axis;
+            }
+        }
+        for (const Link& link : best) {
+            first_[link.leaf] = static_cast<uint32_t>(faces.size());
+            axis_[link.leaf] = static_cast<uint32_t>(bestAxis);
+            addFace(link, bestAxis, 0);
+        }
+        addFace(best.back(), bestAxis, 1);
+    }
+
+    void addFace(const Link& link, int axis, int end) {
+        const SoftLeaf& leaf = tree_.soft[link.leaf];
+        uint4 face(0), colour(0);
+        for (int c = 0; c < 4; ++c) {
+            const int corner = cornerOfFace(axis, end, c);
+            const uint32_t code = leaf.certificate.codes[corner];
+            face[c] = link.flip ? flipSide(code) : code;
+            if (withColour_) colour[c] = geometry_.corner(leaf.box.lower + leaf.box.edge * glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)).colour;
+        }
+        faces.push_back(face);
+        if (withColour_) colours.push_back(colour);
+    }
+
+    const PageTree& tree_;
+    const LeafMap& map_;
+    PageGeometry& geometry_;
+    bool withColour_;
+    std::vector<uint32_t> first_, axis_;
+};
+
+/// The cells of the page that hold a part of the mesh.
+Clearance clearanceOf(const PageGeometry& geometry) {
+    const int n = geometry.cells();
+    Clearance clearance(n);
+    for (int z = 0; z < n; ++z)
+        for (int y = 0; y < n; ++y)
+            for (int x = 0; x < n; ++x)
+                if (geometry.occupied({x, y, z})) clearance.occupy({x, y, z}, 1);
+    return clearance;
+}
+
+/// Triangle records and vertices of the hard leaves.
+class TrianglePacker {
+public:
+    TrianglePacker(const PageGeometry& geometry, const LatticeMesh& mesh) : geometry_(geometry), mesh_(mesh) {}
+
+    /// Appends a leaf's triangles; returns its node word.
+    uint32_t add(const HardLeaf& leaf) {
+        const uint32_t first = static_cast<uint32_t>(records.size());
+        const size_t count = leaf.triangles.size();
+        const bool isLong = count >= kHardCountLong;
+        if (isLong) records.emplace_back(static_cast<uint32_t>(count), 0u);
+        for (const uint32_t k : leaf.triangles) {
+            const auto& v = geometry_.vertices(k);
+            records.push_back(pack21(vertex(v[0]), vertex(v[1]), vertex(v[2])));
+        }
+        return kNodeHard << kNodeTypeShift | (isLong ? kHardCountLong : static_cast<uint32_t>(count)) << kHardCountShift | first;
+    }
+
+    std::vector<glm::u32vec2> records, vertices;
+    std::vector<uint32_t> normals, colours;
+
+private:
+    uint32_t vertex(uint32_t global) {
+        const auto [entry, isNew] = local_.try_emplace(global, static_cast<uint32_t>(vertices.size()));
+        if (isNew) {
+            const glm::i32vec3 p = mesh_.positions[global] - geometry_.originLattice() + kLatticeBias;
+            vertices.push_back(pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z)));
+            normals.push_back(mesh_.normals[global]);
+            if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
+        }
+        return entry->second;
+    }
+
+    const PageGeometry& geometry_;
+    const LatticeMesh& mesh_;
+    std::unordered_map<uint32_t, uint32_t> local_;
+};
+
+/// Node words in breadth-first groups, so that children come after their parent.
+class NodePacker {
+public:
+    NodePacker(const PageTree& tree, const FacePacker& faces, TrianglePacker& triangles, Clearance& clearance)
+        : tree_(tree), faces_(faces), triangles_(triangles), clearance_(clearance) {
+        std::vector<uint32_t> queue;  // internal nodes, by group
+        root = word(0, queue);
+        for (size_t i = 0; i < queue.size(); ++i)
+            for (uint32_t c = 0; c < 8; ++c) words.push_back(word(tree_.nodes[queue[i]].index + c, queue));
+    }
+
+    uint32_t root = 0;
+    std::vector<uint32_t> words;
+
+private:
+    uint32_t word(uint32_t node, std::vector<uint32_t>& queue) {
+        const TreeNode& n = tree_.nodes[node];
+        switch (n.kind) {
+            case TreeNode::Kind::Internal:
+                queue.push_back(node);
+                return kNodeInternal << kNodeTypeShift | static_cast<uint32_t>(queue.size() - 1);
+            case TreeNode::Kind::Soft: {
+                const SoftLeaf& leaf = tree_.soft[n.index];
+                return kNodeSoft << kNodeTypeShift | dipCode(leaf.certificate.curvature) << kSoftDipShift | leaf.wall << kSoftWallShift |
+                       faces_.axis(n.index) << kSoftAxisShift | faces_.firstFace(n.index);
+            }
+            case TreeNode::Kind::Hard: return triangles_.add(tree_.hard[n.index]);
+            default: return emptyNode(n.box.edge >= kSubcells ? clearance_.of(n.box.lower / kSubcells, n.box.edge / kSubcells) : 0);
+        }
+    }
+
+    const PageTree& tree_;
+    const FacePacker& faces_;
+    TrianglePacker& triangles_;
+    Clearance& clearance_;
+};
+
+template <class T>
+void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>& items) {
+    if (!items.empty()) std::memcpy(bytes.data() + offset, items.data(), items.size() * sizeof(T));
+}
+
+/// Everything that separates the page's surface from the mesh, in cells: certified leaves, the level's
+/// stray, the slack of hard leaves' triangles (1e-4 cells).
+double pageError(const PageTree& tree, const PageGeometry& geometry) { return std::max(tree.certifiedError(), 2e-4) + geometry.stray(); }
+
+}  // namespace
+
+EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh& mesh) {
+    const LeafMap map(tree.soft);
+    setWalls(tree, map);
+    const bool withColour = !mesh.colours.empty();
+    const FacePacker faces(tree, map, geometry, withColour);
+    TrianglePacker triangles(geometry, mesh);
+    Clearance clearance = clearanceOf(geometry);
+    const NodePacker nodes(tree, faces, triangles, clearance);
+
+    EncodedPage page;
+    page.certifiedError = pageError(tree, geometry);
+    page.hardLeaves = static_cast<uint32_t>(tree.hard.size());
+    page.leaves = static_cast<uint32_t>(tree.soft.size()) + page.hardLeaves;
+    PageHeader header;
+    header.log2Cells = static_cast<uint32_t>(std::countr_zero(static_cast<unsigned>(geometry.cells())));
+    header.root = nodes.root;
+    header.groups = static_cast<uint32_t>(nodes.words.size() / 8);
+    header.faces = static_cast<uint32_t>(faces.faces.size());
+    header.triangles = static_cast<uint32_t>(triangles.records.size());
+    header.vertices = static_cast<uint32_t>(triangles.vertices.size());
+    header.softLeaves = static_cast<uint32_t>(tree.soft.size());
+    header.hardLeaves = page.hardLeaves;
+    header.certifiedError = std::nextafter(static_cast<float>(page.certifiedError), std::numeric_limits<float>::infinity());
+    const PageSections s = pageSections(header);
+    page.geometry.resize(s.end);
+    std::memcpy(page.geometry.data(), &header, sizeof header);
+    copyTo(page.geometry, s.nodes, nodes.words);
+    copyTo(page.geometry, s.faces, faces.faces);
+    copyTo(page.geometry, s.triangles, triangles.records);
+    copyTo(page.geometry, s.vertices, triangles.vertices);
+    copyTo(page.geometry, s.normals, triangles.normals);
+    if (withColour && page.leaves > 0) {
+        page.colour.resize(colourPageBytes(header));
+        copyTo(page.colour, 0, faces.colours);
+        copyTo(page.colour, uint64_t{16} * header.faces, triangles.colours);
+    }
+    return page;
+}
+
+}  // namespace vcp

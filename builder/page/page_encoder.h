@@ -1,0 +1,24 @@
+// Turns the octree of a page into the bytes of octree/shared/page_layout.h.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "builder/page/page_builder.h"
+
+namespace vcp {
+
+/// A page's bytes, ready for compression.
+struct EncodedPage {
+    std::vector<std::byte> geometry;
+    std::vector<std::byte> colour;  ///< empty when the mesh has none
+    uint32_t leaves = 0;            ///< soft and hard
+    uint32_t hardLeaves = 0;
+    double certifiedError = 0;  ///< cells: of the leaves, the stray of the level's mesh and rounding
+};
+
+/// Sets the leaves' wall codes in `tree`.
+EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh& mesh);
+
+}  // namespace vcp

@@ -1,0 +1,25 @@
+// The octree of paper_octree.h as a .vcp file of the method `paper`.
+#pragma once
+
+#include "builder/build.h"
+#include "builder/paper/paper_octree.h"
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+/// What such a file holds: one page (octree/paper_page.h).
+struct PaperFile {
+    FileHeader header;
+    PageEntry entry;
+    PageBytes page;
+};
+
+/// `mesh`: what the octree was built from. Errors: Limit where the page would have more than 256 MiB.
+Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh);
+
+/// Builds meshes into a .vcp file of the method `paper`. Holds mesh and octree in memory; of `options` it heeds inputs,
+/// output, cell, threads and progress. The report's certified error is not a number. The same bytes for any number of
+/// threads. Errors: what loadMesh, chooseFrame, PaperCaster::create, paperFile and VcpWriter say; Cancelled.
+Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper);
+
+}  // namespace vcp

@@ -1,0 +1,37 @@
+// The journal of a build: what is done, durably, so that an interrupted build goes on where it was.
+//
+// A file of lines, each a JSON object behind its hash; later ones override the fields of earlier ones. A line
+// is appended only after the bytes that it speaks of are durable; a torn or damaged line counts as absent.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "builder/spill/temp_folder.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+class Journal {
+public:
+    ~Journal();
+    Journal() = default;
+    Journal(const Journal&) = delete;
+    Journal& operator=(const Journal&) = delete;
+
+    /// All fields of the journal in `folder`, which is taken; null when there is none. Errors: Io (it cannot be read,
+    /// is a link).
+    static Result<nlohmann::json> read(const TempFolder& folder);
+
+    /// Whether anything was recorded durably by this object.
+    [[nodiscard]] bool active() const { return active_; }
+    /// Appends to the journal in `folder`, which is taken, durably. Errors: Io.
+    Result<void> record(const TempFolder& folder, const nlohmann::json& fields);
+
+private:
+    Result<void> open(const TempFolder& folder);
+
+    int file_ = -1;
+    bool active_ = false;
+};
+
+}  // namespace vcp

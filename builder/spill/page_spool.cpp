@@ -1,0 +1,99 @@
+#include "builder/spill/page_spool.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+namespace vcp {
+
+namespace {
+
+/// An entry as it lies in its file.
+struct SpooledEntry {
+    PageEntry entry;
+    uint64_t hash = 0;  ///< of the entry and its place
+};
+static_assert(sizeof(SpooledEntry) == sizeof(PageEntry) + sizeof(uint64_t));
+
+/// Entries that are read at once.
+constexpr uint64_t kBatchEntries = 4096;
+
+}  // namespace
+
+PageSpool::PageSpool(TempSpace& space, uint32_t level)
+    : level_(level),
+      pages_(space, fmt::format("pages{}.spill", level)),
+      directory_(space, fmt::format("entries{}.spill", level)) {}
+
+uint64_t PageSpool::hashOf(const PageEntry& entry, uint64_t number) const {
+    return XXH3_64bits_withSeed(&entry, sizeof entry, number << 8 | level_);
+}
+
+Result<void> PageSpool::append(PageEntry entry, const StoredPage& page) {
+    entry.storedBytes = static_cast<uint32_t>(page.geometry.size());
+    entry.pageBytes = page.geometryBytes;
+    entry.colourStoredBytes = static_cast<uint32_t>(page.colour.size());
+    entry.colourBytes = page.colourBytes;
+    entry.hash = hashBytes(page.geometry);
+    entry.colourHash = page.colour.empty() ? 0 : hashBytes(page.colour);
+    const auto at = pages_.append(page.geometry);
+    if (!at) return at.error();
+    entry.offset = *at;
+    const auto colour = pages_.append(page.colour);
+    if (!colour) return colour.error();
+    const SpooledEntry spooled{entry, hashOf(entry, entries_.size())};
+    entries_.push_back(entry);
+    const auto listed = directory_.append(std::as_bytes(std::span(&spooled, 1)));
+    if (!listed) return listed.error();
+    return {};
+}
+
+Result<void> PageSpool::sync() {
+    VCP_TRY(pages_.sync());
+    return directory_.sync();
+}
+
+Result<void> PageSpool::reopen(uint64_t bytes, uint64_t entries) {
+    if (entries > std::numeric_limits<uint64_t>::max() / sizeof(SpooledEntry))
+        return damagedTempFile(directory_.path());
+    VCP_TRY(pages_.reopen(bytes));
+    VCP_TRY(directory_.reopen(entries * sizeof(SpooledEntry)));
+    uint64_t end = 0;  // of the pages before
+    std::vector<SpooledEntry> batch;
+    for (uint64_t first = 0; first < entries; first += batch.size()) {
+        batch.resize(std::min(kBatchEntries, entries - first));
+        VCP_TRY(directory_.read(first * sizeof(SpooledEntry), std::as_writable_bytes(std::span(batch))));
+        for (const auto& [entry, hash] : batch) {
+            const uint64_t number = entries_.size();
+            if (hash != hashOf(entry, number) || entry.offset != end)
+                return damagedTempFile(directory_.path(), number * sizeof(SpooledEntry));
+            end += uint64_t{entry.storedBytes} + entry.colourStoredBytes;
+            entries_.push_back(entry);
+        }
+    }
+    if (end != bytes) return damagedTempFile(directory_.path(), directory_.size());
+    return {};
+}
+
+Result<StoredPage> PageSpool::read(const PageEntry& entry) const {
+    StoredPage page;
+    page.geometry.resize(entry.storedBytes);
+    page.colour.resize(entry.colourStoredBytes);
+    page.geometryBytes = entry.pageBytes;
+    page.colourBytes = entry.colourBytes;
+    VCP_TRY(pages_.read(entry.offset, page.geometry));
+    VCP_TRY(pages_.read(entry.offset + entry.storedBytes, page.colour));
+    const bool isIntact =
+        entry.hash == hashBytes(page.geometry) && (page.colour.empty() || entry.colourHash == hashBytes(page.colour));
+    if (!isIntact) return damagedTempFile(pages_.path(), entry.offset);
+    return page;
+}
+
+void PageSpool::remove() {
+    pages_.remove();
+    directory_.remove();
+}
+
+}  // namespace vcp

@@ -1,0 +1,43 @@
+// The finished pages of all levels, on temporary files until the output's directory is known.
+//
+// An entry has the hashes of its page's bytes, made before these are written; each entry is followed by a hash of its
+// own.
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "builder/spill/temp_space.h"
+#include "octree/vcp_writer.h"
+
+namespace vcp {
+
+/// A page of a level: its directory entry, and where its bytes are (offsets of the entry point into the spool).
+class PageSpool {
+public:
+    PageSpool(TempSpace& space, uint32_t level);
+
+    /// Pages come in Morton order. One thread.
+    Result<void> append(PageEntry entry, const StoredPage& page);
+    Result<void> sync();
+    /// What an interrupted build had: so many bytes and entries. Errors: Io; InvalidInput (damaged).
+    Result<void> reopen(uint64_t bytes, uint64_t entries);
+    /// A page, as it was appended. Errors: Io; InvalidInput (damaged).
+    Result<StoredPage> read(const PageEntry& entry) const;
+    void remove();
+
+    [[nodiscard]] std::vector<PageEntry>& entries() { return entries_; }
+    [[nodiscard]] const std::vector<PageEntry>& entries() const { return entries_; }
+    [[nodiscard]] uint64_t bytes() const { return pages_.size(); }
+    [[nodiscard]] const std::string& pagesFile() const { return pages_.name(); }
+    [[nodiscard]] const std::string& directoryFile() const { return directory_.name(); }
+
+private:
+    [[nodiscard]] uint64_t hashOf(const PageEntry& entry, uint64_t number) const;
+
+    uint32_t level_;
+    TempFile pages_, directory_;
+    std::vector<PageEntry> entries_;
+};
+
+}  // namespace vcp

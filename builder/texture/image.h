@@ -1,0 +1,34 @@
+// Pictures as mesh files bring them: PNG and JPEG, decoded with limits. Hostile bytes are an error, never a crash.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "builder/stream/material.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+struct Image {
+    uint32_t width = 0;
+    uint32_t height = 0;
+    std::vector<Rgba8> texels;  ///< row by row from the top
+};
+
+struct ImageLimits {
+    uint32_t edge = 32768;                 ///< texels
+    uint64_t bytes = uint64_t{512} << 20;  ///< of the decoded texels
+    uint64_t fileBytes = uint64_t{256} << 20;
+};
+
+/// Decodes PNG (any type, 16 bits cut to 8) or JPEG (grey, RGB; baseline and progressive). Sizes are checked before
+/// texels are allocated, against the limits and against what as many bytes can hold. Errors: InvalidInput (damaged,
+/// truncated), Unsupported (another format, CMYK), Limit (also a JPEG of more than 100 scans, and a progressive one of
+/// more than 256 MiB); without file.
+Result<Image> decodeImage(std::string_view file, const ImageLimits& limits = {});
+
+/// Reads the file that `source` names, or decodes its bytes. Errors: as decodeImage(), and Io; with the file's name.
+Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits = {});
+
+}  // namespace vcp

@@ -1,0 +1,34 @@
+// What colour the materials give a vertex.
+#pragma once
+
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "builder/stream/material.h"
+#include "builder/texture/texture.h"
+
+namespace vcp {
+
+/// Any thread may call.
+class MaterialColours {
+public:
+    /// `textureBytes`: memory for images.
+    MaterialColours(std::vector<Material> materials, uint64_t textureBytes) : materials_(std::move(materials)), textures_(textureBytes) {}
+
+    [[nodiscard]] bool hasImages() const;
+    /// The colour of `material` (numbered from 1; 0: white) at `uv`, averaged over a square of edge `footprint`.
+    Rgba8 at(uint32_t material, glm::vec2 uv, float footprint);
+    /// Images that could not be read, one line each.
+    [[nodiscard]] std::span<const std::string> warnings() const { return textures_.warnings(); }
+
+private:
+    std::vector<Material> materials_;
+    std::mutex mutex_;
+    TextureCache textures_;
+};
+
+}  // namespace vcp

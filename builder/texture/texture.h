@@ -1,0 +1,72 @@
+// Texture: an image with a mip chain, sampled with filters; and the textures of a mesh's materials, in bounded memory.
+//
+// Texels are averaged as light, each level from the one above by areas (any size, not only powers of two), weighted by
+// alpha, so that what is transparent lends no colour. Sampling is trilinear (Williams 1983).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <list>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "builder/stream/material.h"
+#include "builder/texture/image.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+class Texture {
+public:
+    /// A white texel.
+    Texture();
+    explicit Texture(Image image, Wrap wrapU = Wrap::Repeat, Wrap wrapV = Wrap::Repeat);
+
+    /// The colour at `uv` ((0, 0): upper left corner, v downwards; finite), averaged over a square of the edge
+    /// `footprint` in the same units; 0: the finest texels. Any thread.
+    [[nodiscard]] Rgba8 sample(glm::vec2 uv, float footprint) const;
+
+    [[nodiscard]] glm::uvec2 size() const { return {levels_[0].width, levels_[0].height}; }
+    [[nodiscard]] uint64_t bytes() const;
+
+private:
+    [[nodiscard]] std::array<double, 4> bilinear(const Image& level, glm::dvec2 uv) const;
+
+    std::vector<Image> levels_;  // the finest first
+    Wrap wrapU_;
+    Wrap wrapV_;
+};
+
+/// The textures of a mesh, loaded when they are first asked for; those least recently used go when the memory limit is
+/// passed. One thread at a time.
+class TextureCache {
+public:
+    explicit TextureCache(uint64_t memoryBytes, ImageLimits limits = {}) : memoryBytes_(memoryBytes), limits_(limits) {}
+
+    /// The texture of `materials[number]`, valid until the next call; nullptr where it has none, or where it cannot be
+    /// read, which is a warning once.
+    const Texture* textureOf(std::span<const Material> materials, uint32_t number);
+
+    [[nodiscard]] std::span<const std::string> warnings() const { return warnings_; }
+    [[nodiscard]] uint64_t bytes() const { return bytes_; }
+
+private:
+    struct Loaded {
+        uint32_t material;
+        Texture texture;
+    };
+
+    uint64_t memoryBytes_;
+    ImageLimits limits_;
+    uint64_t bytes_ = 0;
+    std::list<Loaded> loaded_;  // the latest used first
+    std::map<uint32_t, std::list<Loaded>::iterator> byMaterial_;
+    std::map<uint32_t, bool> broken_;
+    std::vector<std::string> warnings_;
+};
+
+}  // namespace vcp

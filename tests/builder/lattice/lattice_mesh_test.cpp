@@ -1,0 +1,232 @@
+// Meshes from bags of triangles, whatever their order; normals.
+#include "builder/lattice/lattice_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "builder/measure/mesh_bvh.h"
+#include "octree/packing.h"
+#include "octree/vcp_file.h"
+#include "tests/support/lattice_meshes.h"
+#include "tests/support/test_meshes.h"
+
+namespace vcp {
+namespace {
+
+using Positions = std::vector<glm::i32vec3>;
+using Triangles = std::vector<std::array<uint32_t, 3>>;
+
+LatticeTriangle triangle(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c, float stray = 0.5f) {
+    LatticeTriangle t{};
+    t.corner[0] = a;
+    t.corner[1] = b;
+    t.corner[2] = c;
+    t.stray = stray;
+    return t;
+}
+
+LatticeTriangle coloured(LatticeTriangle t, uint32_t a, uint32_t b, uint32_t c) {
+    t.colour[0] = a;
+    t.colour[1] = b;
+    t.colour[2] = c;
+    return t;
+}
+
+TEST(MeshOf, MergesEqualPositions) {
+    const LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, 0}, {9, 0, 0}, {0, 9, 0}, 1), triangle({9, 0, 0}, {9, 9, 0}, {0, 9, 0}, 4)}, false);
+    // One cell: by z, y, x.
+    EXPECT_EQ(mesh.positions, (Positions{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {9, 9, 0}}));
+    EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {1, 3, 2}}));
+    EXPECT_EQ(mesh.stray, (std::vector<float>{1, 4}));
+    EXPECT_TRUE(mesh.colours.empty());
+}
+
+TEST(MeshOf, VerticesFollowTheMortonCurve) {
+    constexpr int32_t cell = kLatticePerCell;
+    const LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, cell}, {cell, 0, 0}, {0, cell - 1, 0}), triangle({0, 2 * cell, 0}, {cell, 1, 0}, {5, 5, 5})}, false);
+    EXPECT_EQ(mesh.positions, (Positions{{0, cell - 1, 0}, {5, 5, 5}, {cell, 0, 0}, {cell, 1, 0}, {0, 0, cell}, {0, 2 * cell, 0}}));
+    EXPECT_TRUE(std::is_sorted(mesh.triangles.begin(), mesh.triangles.end()));
+}
+
+TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
+    const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0};
+    const std::vector<LatticeTriangle> copies{triangle(c, b, a, 1), triangle(a, b, c, 2), triangle(b, c, a, 5), triangle(b, a, c, 3)};
+    // Of the two orientations the one that ascends, whichever comes first.
+    for (size_t first = 0; first < copies.size(); ++first) {
+        std::vector<LatticeTriangle> soup = copies;
+        std::rotate(soup.begin(), soup.begin() + static_cast<ptrdiff_t>(first), soup.end());
+        const LatticeMesh mesh = meshOf(soup, false);
+        EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}}));
+        EXPECT_EQ(mesh.stray, (std::vector<float>{5}));
+    }
+    EXPECT_EQ(meshOf(std::vector{triangle(c, b, a)}, false).triangles, (Triangles{{0, 2, 1}}));
+}
+
+TEST(MeshOf, ColoursAreMeansOverTheTriangles) {
+    const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0}, d{9, 9, 0};
+    const std::vector<LatticeTriangle> soup{coloured(triangle(a, b, c), 0xff000001u, 0xff102030u, 0), coloured(triangle(b, d, c), 0xff122131u, 7, 0), coloured(triangle(d, a, c), 9, 0x00000004u, 3)};
+    const LatticeMesh mesh = meshOf(soup, true);
+    // Halves are rounded up.
+    EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0x80000003u, 0xff112131u, 1, 8}));
+}
+
+TEST(MeshOf, NothingIsEmpty) {
+    const LatticeMesh mesh = meshOf({}, true);
+    EXPECT_TRUE(mesh.positions.empty());
+    EXPECT_TRUE(mesh.triangles.empty());
+    EXPECT_FALSE(findVertex(mesh, {0, 0, 0}).has_value());
+}
+
+TEST(HasArea, IsExactOverTheWholeLattice) {
+    constexpr int32_t far = 2147483647;
+    EXPECT_FALSE(hasArea({0, 0, 0}, {far, far, far}, {far - 1, far - 1, far - 1}));
+    EXPECT_TRUE(hasArea({0, 0, 0}, {far, far, far}, {far, far - 1, far}));
+    EXPECT_TRUE(hasArea({0, 0, 0}, {far, far, far}, {0, 0, 1}));
+    EXPECT_FALSE(hasArea({5, 5, 5}, {5, 5, 5}, {far, 0, 1}));
+    EXPECT_FALSE(hasArea({1, 2, 3}, {1, 2, 3}, {1, 2, 3}));
+}
+
+std::vector<LatticeTriangle> randomSoup(uint64_t seed) {
+    std::mt19937_64 random(seed);
+    const auto any = [&](int n) { return static_cast<int>(random() % static_cast<uint64_t>(n)); };
+    std::vector<LatticeTriangle> soup;
+    const int side = seed % 2 ? 6 : 100000;
+    while (soup.size() < 500) {
+        const auto point = [&] { return glm::i32vec3(any(side), any(side), any(side)); };
+        LatticeTriangle t = triangle(point(), point(), point(), static_cast<float>(any(100)));
+        if (!soup.empty() && any(3) == 0) std::copy_n(soup[random() % soup.size()].corner, 3, t.corner);
+        if (any(2)) std::swap(t.corner[0], t.corner[1]);
+        if (hasArea(t.corner[0], t.corner[1], t.corner[2])) soup.push_back(coloured(t, static_cast<uint32_t>(random()), static_cast<uint32_t>(random()), 0xff00ff00u));
+    }
+    return soup;
+}
+
+using Corners = std::array<std::array<int, 3>, 3>;
+
+Corners sorted(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
+    Corners key{{{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}}};
+    std::sort(key.begin(), key.end());
+    return key;
+}
+
+TEST(MeshOf, RandomAgainstMap) {
+    for (uint64_t seed = 0; seed < 50; ++seed) {
+        const std::vector<LatticeTriangle> soup = randomSoup(seed);
+        const LatticeMesh mesh = meshOf(soup, false);
+        std::map<Corners, float> want;
+        for (const LatticeTriangle& t : soup) {
+            float& stray = want[sorted(t.corner[0], t.corner[1], t.corner[2])];
+            stray = std::max(stray, t.stray);
+        }
+        ASSERT_EQ(mesh.triangles.size(), want.size()) << seed;
+        for (size_t k = 0; k < mesh.triangles.size(); ++k) {
+            const auto& v = mesh.triangles[k];
+            const auto found = want.find(sorted(mesh.positions[v[0]], mesh.positions[v[1]], mesh.positions[v[2]]));
+            ASSERT_NE(found, want.end()) << seed;
+            ASSERT_EQ(mesh.stray[k], found->second) << seed;
+            want.erase(found);
+        }
+        for (uint32_t v = 0; v < mesh.positions.size(); ++v) ASSERT_EQ(findVertex(mesh, mesh.positions[v]), v) << seed;
+        ASSERT_FALSE(findVertex(mesh, mesh.positions[0] + glm::i32vec3(1 << 20, 0, 0)).has_value());
+    }
+}
+
+TEST(MeshOf, OrderDoesNotMatter) {
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+        std::vector<LatticeTriangle> soup = randomSoup(seed);
+        const LatticeMesh before = meshOf(soup, true);
+        std::mt19937_64 random(seed);
+        std::shuffle(soup.begin(), soup.end(), random);
+        // Which corner comes first does not matter either.
+        for (LatticeTriangle& t : soup) {
+            const auto turn = static_cast<ptrdiff_t>(random() % 3);
+            std::rotate(t.corner, t.corner + turn, t.corner + 3);
+            std::rotate(t.colour, t.colour + turn, t.colour + 3);
+        }
+        LatticeMesh after = meshOf(soup, true);
+        ASSERT_EQ(before.positions, after.positions) << seed;
+        ASSERT_EQ(before.triangles, after.triangles) << seed;
+        ASSERT_EQ(before.stray, after.stray) << seed;
+        ASSERT_EQ(before.colours, after.colours) << seed;
+        LatticeMesh normals = before;
+        computeNormals(normals);
+        computeNormals(after);
+        ASSERT_EQ(normals.normals, after.normals) << seed;
+    }
+}
+
+TEST(MeshOf, PartsAgreeOnTheOrder) {
+    // What a bin sees of a vertex does not depend on what else it has.
+    const std::vector<LatticeTriangle> soup = test::soupOf(test::torusMesh({40, 40, 40}, 30, 9, 90, 40));
+    LatticeMesh whole = meshOf(soup, false);
+    computeNormals(whole);
+    std::vector<LatticeTriangle> half;
+    for (const LatticeTriangle& t : soup)
+        if (std::min({t.corner[0].x, t.corner[1].x, t.corner[2].x}) < 40 * kLatticePerCell) half.push_back(t);
+    LatticeMesh part = meshOf(half, false);
+    computeNormals(part);
+    size_t compared = 0;
+    for (uint32_t v = 0; v < part.positions.size(); ++v) {
+        if (part.positions[v].x >= 40 * kLatticePerCell) continue;  // some of its triangles are missing
+        const auto same = findVertex(whole, part.positions[v]);
+        ASSERT_TRUE(same.has_value());
+        ASSERT_EQ(part.normals[v], whole.normals[*same]);
+        ++compared;
+    }
+    EXPECT_GT(compared, 1000u);
+}
+
+bool isCrease(uint32_t normal) { return (normal & kNormalCreaseBit) != 0; }
+
+TEST(ComputeNormals, SphereIsSmooth) {
+    const glm::dvec3 centre(20, 20, 20);
+    const LatticeMesh mesh = test::onLattice(test::sphereMesh(centre, 15, 40));
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        const glm::dvec3 outward = glm::normalize(glm::dvec3(mesh.positions[v]) / double(kLatticePerCell) - centre);
+        const double cosine = std::abs(glm::dot(outward, f64::decodeNormal(mesh.normals[v])));
+        ASSERT_GT(cosine, std::cos(3 * test::kTwoPi / 360)) << v;
+        ASSERT_FALSE(isCrease(mesh.normals[v])) << v;
+    }
+}
+
+TEST(ComputeNormals, CubeHasCreases) {
+    const LatticeMesh mesh = test::onLattice(test::boxMesh(glm::dvec3(2), glm::dvec3(10), 4));
+    int creases = 0;
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        const glm::dvec3 p = glm::dvec3(mesh.positions[v]) / double(kLatticePerCell);
+        int onFaces = 0;
+        for (int axis = 0; axis < 3; ++axis) onFaces += p[axis] == 2 || p[axis] == 10;
+        EXPECT_EQ(isCrease(mesh.normals[v]), onFaces > 1) << v;
+        creases += onFaces > 1;
+    }
+    EXPECT_EQ(creases, 8 + 12 * 3);
+}
+
+TEST(ComputeNormals, OrientationDoesNotMatter) {
+    IndexedMesh ball = test::sphereMesh({20, 20, 20}, 15, 12);
+    const LatticeMesh straight = test::onLattice(ball);
+    std::mt19937 random(1);
+    for (auto& t : ball.triangles)
+        if (random() % 2) std::swap(t[0], t[1]);
+    const LatticeMesh turned = test::onLattice(ball);
+    ASSERT_EQ(straight.positions, turned.positions);
+    for (size_t v = 0; v < straight.positions.size(); ++v) {
+        const double cosine = glm::dot(f64::decodeNormal(straight.normals[v]), f64::decodeNormal(turned.normals[v]));
+        EXPECT_GT(std::abs(cosine), 0.9999) << v;
+        EXPECT_EQ(isCrease(straight.normals[v]), isCrease(turned.normals[v])) << v;
+    }
+}
+
+TEST(ComputeNormals, UnusedVerticesAndNeedlesAreFinite) {
+    LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, 0}, {1 << 19, 0, 0}, {1 << 18, 1, 0})}, false);
+    mesh.positions.push_back({1 << 20, 5, 5});
+    computeNormals(mesh);
+    ASSERT_EQ(mesh.normals.size(), 4u);
+    for (int v = 0; v < 3; ++v) EXPECT_GT(std::abs(f64::decodeNormal(mesh.normals[v]).z), 0.9999);
+}
+
+}  // namespace
+}  // namespace vcp

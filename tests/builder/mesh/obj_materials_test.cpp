@@ -1,0 +1,106 @@
+#include "builder/mesh/obj_materials.h"
+
+#include <fstream>
+
+#include "tests/support/mesh_reading.h"
+#include "tests/support/test_folder.h"
+
+namespace vcp {
+namespace {
+
+struct Painted {
+    std::vector<std::array<glm::vec2, 3>> uvs;
+    std::vector<uint32_t> materials;
+    std::vector<Material> list;
+    std::vector<std::string> warnings;
+    bool active = false;
+};
+
+class ObjMaterialFiles : public testing::Test {
+protected:
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+
+    Painted read(const std::string& obj, const MeshOpenOptions& options = {}) const {
+        write("mesh.obj", obj);
+        Painted painted;
+        auto stream = openMesh(folder_ / "mesh.obj", options);
+        EXPECT_TRUE(stream.ok());
+        painted.active = (*stream)->info().hasMaterials;
+        MeshChunk chunk;
+        while (true) {
+            const auto more = (*stream)->next(chunk);
+            EXPECT_TRUE(more.ok()) << more.error().line();
+            if (!more.ok() || !*more) break;
+            EXPECT_EQ(chunk.uvs.size(), painted.active ? chunk.triangles.size() : 0);
+            EXPECT_EQ(chunk.materials.size(), chunk.uvs.size());
+            painted.uvs.insert(painted.uvs.end(), chunk.uvs.begin(), chunk.uvs.end());
+            painted.materials.insert(painted.materials.end(), chunk.materials.begin(), chunk.materials.end());
+        }
+        painted.list.assign((*stream)->materials().begin(), (*stream)->materials().end());
+        painted.warnings.assign((*stream)->warnings().begin(), (*stream)->warnings().end());
+        return painted;
+    }
+
+    TestFolder folder_{"vcp_obj_materials"};
+};
+
+const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 0.25\n";
+
+TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
+    write("a b.mtl",
+          "# comment\nnewmtl wood\n  Kd 0.5 0.5 0.5\n  map_Kd -s 2 4 1 -o 0.5 0 0 -clamp on  my wood.png \nnewmtl "
+          "plain\nKd 1 0 0\n");
+    write("my wood.png", "never looked into");
+    const Painted mesh = read("mtllib a b.mtl\n" + kSquare +
+                              "usemtl wood\nf 1/1 2/2 3/3 -1/-1\nusemtl plain\nf 1 2 3\nusemtl wood\nf 1/9 2/2 3//1\n");
+    EXPECT_TRUE(mesh.active && mesh.warnings.empty()) << mesh.warnings.size();
+    ASSERT_EQ(mesh.list.size(), 2u);
+    EXPECT_EQ(mesh.list[0].image.path, folder_ / "my wood.png");
+    EXPECT_EQ(mesh.list[0].factor, kWhite) << "Kd beside an image does not count";
+    EXPECT_TRUE(mesh.list[0].wrapU == Wrap::Clamp && mesh.list[0].wrapV == Wrap::Clamp);
+    EXPECT_EQ(mesh.list[1].factor, 0xFF0000FFu);
+    EXPECT_EQ(mesh.materials, (std::vector<uint32_t>{0, 0, 1, 0}));
+    using Uvs = std::array<glm::vec2, 3>;
+    EXPECT_EQ(mesh.uvs[0], (Uvs{glm::vec2(0.5f, 1), {2.5f, 1}, {2.5f, -3}}));
+    EXPECT_EQ(mesh.uvs[1], (Uvs{glm::vec2(0.5f, 1), {2.5f, -3}, {0.5f, 0}}));
+    EXPECT_EQ(mesh.uvs[3], (Uvs{glm::vec2(0), {2.5f, 1}, glm::vec2(0)})) << "what does not exist is 0";
+}
+
+TEST_F(ObjMaterialFiles, PlainColoursCountWhereTheyDiffer) {
+    const std::string faces = kSquare + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
+    write("one.mtl", "newmtl a\nKd 0.8 0.8 0.8\nnewmtl b\nKd 0.8 0.8 0.8\n");
+    EXPECT_FALSE(read("mtllib one.mtl\n" + faces).active);
+    write("two.mtl", "newmtl a\nKd 0.8 0.8 0.8\nnewmtl b\nKd 0 1 0\n");
+    const Painted mesh = read("mtllib two.mtl\n" + faces);
+    EXPECT_TRUE(mesh.active);
+    EXPECT_EQ(mesh.materials, (std::vector<uint32_t>{0, 1}));
+    EXPECT_EQ(mesh.list[1].factor, 0xFF00FF00u);
+    EXPECT_FALSE(read("mtllib two.mtl\n" + faces, {.format = "", .materials = false}).active);
+}
+
+TEST_F(ObjMaterialFiles, WhatIsMissingIsAWarning) {
+    write("m.mtl", "newmtl a\nmap_Kd missing.png\nnewmtl b\nmap_Kd ../outside.png\nnewmtl c\nKd 1 0 0\n");
+    const Painted mesh =
+        read("mtllib no.mtl m.mtl ../m.mtl\n" + kSquare + "usemtl unknown\nf 1 2 3\nusemtl unknown\nf 1 2 3\n");
+    ASSERT_EQ(mesh.warnings.size(), 5u);
+    EXPECT_NE(mesh.warnings[0].find("no.mtl: no such file"), std::string::npos);
+    EXPECT_NE(mesh.warnings[1].find("missing.png' is missing"), std::string::npos);
+    EXPECT_NE(mesh.warnings[2].find("outside its folder"), std::string::npos);
+    EXPECT_NE(mesh.warnings[3].find("outside its folder"), std::string::npos);
+    EXPECT_NE(mesh.warnings[4].find("'unknown' is in none"), std::string::npos);
+    EXPECT_EQ(mesh.materials, (std::vector<uint32_t>{kNoMaterial, kNoMaterial}));
+}
+
+TEST_F(ObjMaterialFiles, ALibraryBeyondTheStartIsAWarning) {
+    write("m.mtl", "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n");
+    const std::string filler(300'000, '\n');
+    const Painted mesh = read("mtllib m.mtl\n" + kSquare + filler + "mtllib m.mtl\nusemtl a\nf 1 2 3\n");
+    ASSERT_EQ(mesh.warnings.size(), 1u);
+    EXPECT_NE(mesh.warnings[0].find("too late"), std::string::npos);
+    EXPECT_EQ(mesh.materials, std::vector<uint32_t>{0});
+}
+
+}  // namespace
+}  // namespace vcp

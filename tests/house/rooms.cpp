@@ -1,0 +1,70 @@
+#include "tests/house/rooms.h"
+
+#include <algorithm>
+
+namespace vcp::house {
+
+const std::vector<Room>& rooms() {
+    static const std::vector<Room> table{
+        {"octree", {}},
+
+        {"builder/stream", {"octree"}},
+        {"builder/texture", {"octree", "builder/stream"}},
+        {"builder/mesh/gltf", {"octree", "builder/stream"}},
+        {"builder/mesh", {"octree", "builder/stream", "builder/mesh/gltf"}},
+        {"builder/spill", {"octree"}},
+        {"builder/lattice", {"octree"}},
+        {"builder/page", {"octree", "builder/lattice"}},
+        {"builder/level", {"octree", "builder/lattice", "builder/spill"}},
+        {"builder/measure", {"octree", "builder/stream", "builder/mesh"}},
+        {"builder",
+         {"octree", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice", "builder/page",
+          "builder/level"}},
+        {"builder/paper", {"octree", "builder", "builder/mesh", "builder/measure"}},
+
+        {"mesostructure", {"octree"}},
+        {"streaming", {"octree"}},
+        {"render", {"octree", "mesostructure", "streaming"}},
+
+        {"viewer/camera", {"octree", "render"}},
+        {"viewer/scene", {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/camera"}},
+        {"viewer/picture", {"octree", "render"}},
+        {"viewer/asset", {"octree", "builder/", "mesostructure"}},
+        {"viewer", {"octree", "render", "viewer/camera", "viewer/scene"}},
+        {"viewer/widget", {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
+        {"viewer/window", {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
+        {"viewer/bench/report", {"octree"}},
+        {"viewer/bench/peers", {"octree", "builder/", "streaming", "render"}},
+        {"viewer/bench/rays", {"octree", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/peers"}},
+        {"viewer/bench/stress",
+         {"octree", "builder/", "streaming", "render", "viewer/camera", "viewer/scene", "viewer/bench/report", "viewer/bench/rays"}},
+        {"viewer/bench",
+         {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/scene", "viewer", "viewer/bench/report",
+          "viewer/bench/rays"}},
+        {"viewer/command",
+         {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/camera", "viewer/scene", "viewer/picture",
+          "viewer/asset", "viewer", "viewer/window", "viewer/bench/"}},
+        {"viewer/examples", {}},
+
+        {"datasets_scripts", {"octree", "builder/"}},
+    };
+    return table;
+}
+
+const Room* roomOf(std::string_view path) {
+    const Room* deepest = nullptr;
+    for (const Room& room : rooms()) {
+        const bool isInside = path.starts_with(room.path) && (path.size() == room.path.size() || path[room.path.size()] == '/');
+        if (isInside && (!deepest || room.path.size() > deepest->path.size())) deepest = &room;
+    }
+    return deepest;
+}
+
+bool mayInclude(const Room& room, const Room& other) {
+    const auto allows = [&](const std::string& name) {
+        return name.ends_with('/') ? (other.path + "/").starts_with(name) : name == other.path;
+    };
+    return &room == &other || std::ranges::any_of(room.mayInclude, allows);
+}
+
+}  // namespace vcp::house

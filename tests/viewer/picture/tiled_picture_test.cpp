@@ -1,0 +1,162 @@
+// Pictures in tiles against the same picture at once, and against the small picture.
+#include "viewer/picture/tiled_picture.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "tests/support/built_ball.h"
+#include "viewer/camera/orbit_camera.h"
+
+namespace vcp {
+namespace {
+
+class TiledPictureTest : public BuiltBall {
+protected:
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+        RendererOptions options;
+        options.budgetBytes = 64 << 20;
+        renderer_ = *Renderer::create(options);
+        auto reader = openFile(*folder_ / "ball.vcp").value();
+        const auto dataset = std::make_shared<const Dataset>(readDataset(*reader).value());
+        ASSERT_TRUE(renderer_->open(dataset, std::make_shared<FilePageSource>(reader, dataset)));
+    }
+
+    static FrameRequest request(uint32_t width, uint32_t height, Projection projection = Projection::Perspective) {
+        OrbitCamera camera;
+        camera.projection = projection;
+        camera.look(View::Isometric, {glm::dvec3(-1.1), glm::dvec3(1.1)}, {int(width), int(height)});
+        FrameRequest request;
+        request.camera = camera.current();
+        request.width = width;
+        request.height = height;
+        request.errorPixels = 0.02;  // the finest level, whatever the size
+        return request;
+    }
+
+    Picture atOnce(const FrameRequest& request) {
+        EXPECT_TRUE(renderer_->settle(request));
+        EXPECT_TRUE(renderer_->render(request));
+        return renderer_->readPicture().value();
+    }
+
+    Picture inTiles(const FrameRequest& request, uint32_t tile, PictureBand* planes = nullptr) {
+        TiledPictureOptions options;
+        options.tile = tile;
+        options.depth = options.normals = planes != nullptr;
+        Picture picture{request.width, request.height, {}};
+        TiledPicture tiled(*renderer_, request, options, [&](const PictureBand& band) -> Result<void> {
+            picture.rgba.insert(picture.rgba.end(), band.picture.rgba.begin(), band.picture.rgba.end());
+            if (planes) planes->depth.insert(planes->depth.end(), band.depth.begin(), band.depth.end());
+            if (planes) planes->normals.insert(planes->normals.end(), band.normals.begin(), band.normals.end());
+            return {};
+        });
+        double last = 0;
+        for (Result<bool> done = false; done && !*done;) {
+            done = tiled.step();
+            EXPECT_TRUE(done) << done.error().line();
+            if (tiled.isWaiting()) renderer_->waitForPage(std::chrono::milliseconds(100));
+            EXPECT_GE(tiled.fraction(), last);
+            last = tiled.fraction();
+        }
+        EXPECT_EQ(last, 1);
+        EXPECT_EQ(picture.rgba.size(), size_t{4} * request.width * request.height);
+        return picture;
+    }
+
+    /// Part of the pixels that differ by more than `by`.
+    static double differing(const Picture& a, const Picture& b, int by) {
+        if (a.rgba.size() != b.rgba.size()) return 1;
+        size_t count = 0;
+        for (size_t i = 0; i < a.rgba.size(); i += 4)
+            for (size_t c = 0; c < 4; ++c)
+                if (std::abs(a.rgba[i + c] - b.rgba[i + c]) > by) {
+                    ++count;
+                    break;
+                }
+        return 4.0 * static_cast<double>(count) / static_cast<double>(a.rgba.size());
+    }
+
+    std::unique_ptr<Renderer> renderer_;
+};
+
+// Rays of a tile are those of the whole but for rounding: a silhouette's pixel may flip.
+TEST_F(TiledPictureTest, TilesMakeThePictureThatIsDrawnAtOnce) {
+    for (const Projection projection : {Projection::Perspective, Projection::Orthographic}) {
+        const FrameRequest whole = request(250, 170, projection);
+        const Picture expected = atOnce(whole);
+        EXPECT_LT(differing(inTiles(whole, 100), expected, 2), 5e-4);
+        EXPECT_EQ(inTiles(whole, 256), expected) << "one tile is the whole";
+    }
+}
+
+TEST_F(TiledPictureTest, ShadowsAndOcclusionHaveNoSeams) {
+    FrameRequest whole = request(200, 140);
+    whole.shading.shadows = true;
+    whole.shading.occlusionRays = 4;
+    EXPECT_LT(differing(inTiles(whole, 64), atOnce(whole), 3), 3e-3);
+}
+
+// Three times the size: each third pixel of the large picture is at the place of one of the small one.
+TEST_F(TiledPictureTest, TheLargePictureIsTheSmallOneEnlarged) {
+    const Picture small = atOnce(request(96, 64)), large = inTiles(request(288, 192), 80);
+    Picture shrunk{96, 64, {}};
+    for (uint32_t y = 0; y < 64; ++y)
+        for (uint32_t x = 0; x < 96; ++x) {
+            const auto at = large.rgba.begin() + 4 * ((3 * y + 1) * 288 + 3 * x + 1);
+            shrunk.rgba.insert(shrunk.rgba.end(), at, at + 4);
+        }
+    EXPECT_LT(differing(shrunk, small, 2), 2e-3);
+}
+
+TEST_F(TiledPictureTest, DepthAndNormalsComeInTilesToo) {
+    const FrameRequest whole = request(120, 90);
+    PictureBand planes;
+    inTiles(whole, 48, &planes);
+    atOnce(whole);
+    const auto depth = renderer_->readDepth().value();
+    const auto normals = renderer_->readNormals().value();
+    ASSERT_EQ(planes.depth.size(), depth.size());
+    ASSERT_EQ(planes.normals.size(), normals.size());
+    size_t wrong = 0;
+    for (size_t i = 0; i < depth.size(); ++i)
+        if (std::isfinite(depth[i]) != std::isfinite(planes.depth[i]) ||
+            (std::isfinite(depth[i]) && (std::abs(depth[i] - planes.depth[i]) > 1e-3f || glm::dot(normals[i], planes.normals[i]) < 0.99f)))
+            ++wrong;
+    EXPECT_LT(wrong, depth.size() / 500);
+}
+
+TEST_F(TiledPictureTest, TransparentIsAlphaZeroWhereNothingIsHit) {
+    FrameRequest whole = request(96, 64);
+    const Picture opaque = atOnce(whole);
+    whole.shading.transparent = true;
+    const Picture picture = inTiles(whole, 40);
+    size_t clear = 0;
+    for (size_t i = 0; i < picture.rgba.size(); i += 4) {
+        EXPECT_EQ(opaque.rgba[i + 3], 255);
+        if (picture.rgba[i + 3] == 0) {
+            ++clear;
+            EXPECT_EQ(picture.rgba[i], 0);
+        } else {
+            EXPECT_EQ(picture.rgba[i + 3], 255);
+        }
+    }
+    EXPECT_GT(clear, 96u * 64u / 5);
+    EXPECT_LT(clear, 96u * 64u * 19 / 20);
+}
+
+TEST_F(TiledPictureTest, ATileOutsideOfItsPictureIsRefused) {
+    FrameRequest tile = request(32, 32);
+    tile.tile = {80, 0, 96, 64};
+    EXPECT_FALSE(renderer_->render(tile));
+    tile.tile = {64, 32, 96, 64};
+    EXPECT_TRUE(renderer_->update(tile));
+    EXPECT_TRUE(renderer_->render(tile));
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,147 @@
+// Scene files: what they say is taken over, and what is wrong is said with line and key.
+#include "viewer/scene/scene_file.h"
+
+#include <fstream>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "tests/support/test_folder.h"
+#include "viewer/scene/opened_scene.h"
+
+namespace vcp {
+namespace {
+
+TEST(SceneFile, TheDocumentsExampleIsRead) {
+    const std::string document = contentOf(std::string(VCP_SOURCE_DIR) + "/docs/scenes.md");
+    const size_t begin = document.find("```json\n") + 8, end = document.find("```", begin);
+    const auto scene = sceneFromJson(document.substr(begin, end - begin), "museum.json", "/data");
+    ASSERT_TRUE(scene) << scene.error().line();
+    ASSERT_EQ(scene->datasets.size(), 3u);
+    EXPECT_EQ(scene->datasets[0].file, "/data/statue.vcp");
+    EXPECT_EQ(scene->datasets[0].placement, Similarity{});
+    const Similarity& turned = scene->datasets[1].placement;
+    EXPECT_LT(glm::distance(turned.toWorld({0, 0, 1}), glm::dvec3(0.8, 0, 0)), 1e-15);
+    EXPECT_LT(glm::distance(scene->datasets[2].placement.toWorld({1, 2, 3}), glm::dvec3(1, 1.8, 3)), 1e-15);
+    ASSERT_TRUE(scene->light);
+    EXPECT_FALSE(scene->light->followsCamera);
+    EXPECT_NEAR(glm::length(scene->light->direction), 1, 1e-6);
+    ASSERT_TRUE(scene->camera);
+    EXPECT_EQ(scene->camera->position, glm::dvec3(0, 0.2, 1.5));
+    EXPECT_EQ(scene->sections, (std::vector<SectionPlane>{{{1, 0, 0}, 0.05}}));
+    EXPECT_TRUE(scene->sectionCaps);
+}
+
+TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
+    const auto inDataset = [](const std::string& more) { return "{\n \"datasets\": [\n  {\"file\": \"a.vcp\",\n   " + more + "}\n ]\n}"; };
+    const auto beside = [](const std::string& more) { return "{\"datasets\": [{\"file\": \"a.vcp\"}],\n\n" + more + "}"; };
+    const std::tuple<std::string, size_t, const char*> wrong[] = {
+        {"[]", 1, "object"},
+        {"{}", 1, "\"datasets\" is missing"},
+        {"{\n\"datasets\": []}", 2, "1 to 256"},
+        {"{\n\"datasets\":\n[\n{}]}", 4, "\"file\" is missing"},
+        {"{\n\"datasets\": [{\"file\": 7}]}", 2, "\"file\""},
+        {inDataset("\"colour\": 1"), 4, "\"colour\" is no key"},
+        {inDataset("\"scale\": [1, 2, 1]"), 4, "not supported"},
+        {inDataset("\"scale\": 0"), 4, "above 0"},
+        {inDataset("\"scale\": -1"), 4, "above 0"},
+        {inDataset("\"translate\": [1, 2]"), 4, "three numbers"},
+        {inDataset("\"translate\": [1, 2, \"3\"]"), 4, "three numbers"},
+        {inDataset("\"rotate\": {\"axis\": [0, 0, 0], \"degrees\": 1}"), 4, "\"axis\" must not be zero"},
+        {inDataset("\"rotate\": {\"axis\": [0, 0, 1]}"), 4, "degrees"},
+        {inDataset("\"rotate\": 90"), 4, "object"},
+        {inDataset("\"transform\": [1, 2]"), 4, "four rows"},
+        {inDataset("\"transform\": [[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]"), 4, "stretches"},
+        {inDataset("\"transform\": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]],\n\"scale\": 2"), 5, "does not go with"},
+        {beside("\"mesostructure\": []"), 3, "1 to 64"},
+        {beside("\"mesostructure\": [{\"tiles\": 2}]"), 3, "\"asset\" is missing"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"method\": \"magic\"}]"), 4, "must be one of"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"up\": \"x\"}]"), 4, "\"up\""},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"tiles\": 0}]"), 4, "\"tiles\""},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"colour\": [1, 2, 1]}]"), 4, "from 0 to 1"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"texture\": 7}]"), 4, "\"texture\""},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"normal_texture\": \"\"}]"), 4, "\"normal_texture\""},
+        {beside("\"mesostructure\": [{\n\"asset\": \"brick\"}]"), 4, "\"asset\" must be"},
+        {beside("\"lights\": [{}, {}]"), 3, "more are not supported"},
+        {beside("\"lights\": [{}]"), 3, "direction"},
+        {beside("\"caps\": 1"), 3, "true or false"},
+        {beside("\"camera\": {\"position\": [0, 0, 0],\n \"target\": [0, 0, 0]}"), 4, "\"target\""},
+        {beside("\"camera\": {\"position\": [0, 0, 0]}"), 3, "\"target\""},
+        {beside("\"sections\": [\n{\"normal\": [1, 0, 0], \"offset\": 0},\n{\"normal\": [0, 0, 0], \"offset\": 0}]"), 5, "\"normal\""},
+        {beside("\"sections\": [{\"normal\": [1, 0, 0]}]"), 3, "offset"},
+        {beside("\"sections\": [\n{\"normal\": [1e-320, 0, 0], \"offset\": 0}]"), 4, "\"normal\" is too short"},
+        {beside("\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0],\n \"fov_degrees\": 178.5}"), 4, "\"fov_degrees\""},
+        {"{\n\n\"datasets\" [", 3, "JSON"},
+        {"", 1, "JSON"},
+        {beside("\"caps\":\n 1e999"), 4, "out of range"},
+        {beside("\"caps\": true,\n\"caps\": false"), 4, "\"caps\" is there twice"},
+        {inDataset("\"scale\": 1e200"), 4, "must be between"},
+        {inDataset("\"scale\": 1e-310"), 4, "above 0"},
+        {inDataset("\"translate\": [0, -1e13, 0]"), 4, "must be between"},
+        {inDataset("\"transform\": [[1,0,0,1e300],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), 4, "moves by more"},
+    };
+    for (const auto& [text, line, word] : wrong) {
+        const auto refused = sceneFromJson(text, "wrong.json", {});
+        ASSERT_FALSE(refused) << text;
+        const std::string said = refused.error().line();
+        EXPECT_NE(said.find(fmt::format("wrong.json: line {}: ", line)), std::string::npos) << said << "\n" << text;
+        EXPECT_NE(said.find(word), std::string::npos) << said;
+    }
+    // Lines are kept of nothing that a scene has not: this would be 50 GB of them.
+    const std::string key(500'000, 'k');
+    std::string zeros = "0";
+    for (int i = 0; i < 100'000; ++i) zeros += ",0";
+    EXPECT_FALSE(sceneFromJson("{\"" + key + "\": [" + zeros + "]}", "wide.json", {}));
+    EXPECT_FALSE(sceneFromJson(std::string(5000, '['), "deep.json", {}));
+    EXPECT_FALSE(sceneFromJson(std::string(40, '[') + std::string(40, ']'), "deep.json", {}));
+}
+
+// What is wrong only with the file or the asset that a scene names is the scene's fault too, not that of who typed its name.
+TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
+    const auto refusal = [](const std::string& text) {
+        auto scene = sceneFromJson(text, "museum.json", {});
+        EXPECT_TRUE(scene) << scene.error().line();
+        const auto open = [](const std::string& file) -> Result<OpenDataset> { return Error{ErrorCode::Usage, "unknown mesh format", file}; };
+        const auto opened = openScene(*std::move(scene), "museum.json", open);
+        EXPECT_FALSE(opened);
+        return opened ? Error{} : opened.error();
+    };
+    const Error dataset = refusal("{\n\"datasets\": [{\n\"file\": \"a.xyz\"}]}");
+    EXPECT_EQ(dataset.code, ErrorCode::InvalidInput);
+    EXPECT_EQ(dataset.line(), "museum.json: line 3: \"file\": a.xyz: unknown mesh format");
+    const Error method = refusal("{\n\"mesostructure\": [\n{\"asset\": \"beads\", \"surface\": \"nowhere\"}]}");
+    EXPECT_EQ(method.code, ErrorCode::InvalidInput);
+    EXPECT_TRUE(method.line().starts_with("museum.json: line 3: ")) << method.line();
+    // What cannot be read is named itself, as before.
+    EXPECT_EQ(ScenePlace({"museum.json", 3, "file"}).blamed({ErrorCode::Io, "no such file", "a.vcp"}).line(), "a.vcp: no such file");
+    EXPECT_EQ(ScenePlace().blamed({ErrorCode::Usage, "no such name"}).code, ErrorCode::Usage);
+}
+
+// Whatever is cut off or in the wrong place is an error or a scene, nothing else.
+TEST(SceneFile, EveryPrefixAndFlippedByteIsAnAnswer) {
+    const std::string document = contentOf(std::string(VCP_SOURCE_DIR) + "/docs/scenes.md");
+    const size_t begin = document.find("```json\n") + 8, end = document.find("```", begin);
+    const std::string text = document.substr(begin, end - begin);
+    for (size_t i = 0; i + 2 < text.size(); ++i) EXPECT_FALSE(sceneFromJson(text.substr(0, i), "cut.json", {}));
+    size_t refused = 0;
+    for (size_t i = 0; i < text.size(); ++i) {
+        std::string flipped = text;
+        flipped[i] = static_cast<char>(flipped[i] ^ 1 << i % 7);
+        refused += sceneFromJson(flipped, "flipped.json", {}) ? 0 : 1;
+    }
+    EXPECT_GT(refused, text.size() / 4);
+}
+
+TEST(SceneFile, FilesThatAreNone) {
+    EXPECT_TRUE(isSceneName("a/b.json"));
+    EXPECT_FALSE(isSceneName("a.vcp"));
+    EXPECT_FALSE(isSceneName("https://host/a.json"));
+    EXPECT_EQ(readScene("/nowhere/scene.json").error().code, ErrorCode::Io);
+    TestFolder folder("vcp_scene_file_test");
+    std::ofstream(folder / "large.json") << std::string((1 << 20) + 1, ' ');
+    EXPECT_EQ(readScene(folder / "large.json").error().code, ErrorCode::Limit);
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,353 @@
+// What the window of vcp view does, without the window: saving pictures between its frames.
+#include "viewer/window/view_session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <functional>
+#include <set>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "render/picture.h"
+#include "tests/support/built_ball.h"
+#include "viewer/camera/orbit_camera.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr PictureChoice kSmall{.size = {64, 48}};
+constexpr PictureChoice kTwoTiles{.size = {600, 32}};
+
+class ViewSessionTest : public BuiltBall {
+protected:
+    /// A working folder of the test's own, and the ball in a session.
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+        before_ = fs::current_path();
+        fs::create_directory(*folder_ / "work");
+        fs::current_path(*folder_ / "work");
+        SessionOptions options;
+        options.render.budget = "64M";
+        auto session = ViewSession::create(options, {});
+        ASSERT_TRUE(session) << session.error().line();
+        session_ = *std::move(session);
+        session_->viewer().resize({96, 64});
+        session_->open({(*folder_ / "ball.vcp").string()});
+        ASSERT_TRUE(turnUntil([&] { return session_->viewer().dataset() && session_->viewer().status().update.settled; }));
+    }
+    void TearDown() override {
+        session_.reset();
+        if (!before_.empty()) fs::current_path(before_);
+        fs::remove_all(*folder_ / "work");
+    }
+
+    /// One turn of the window's loop.
+    void turn() {
+        const auto next = session_->update(now_ += 0.02);
+        ASSERT_TRUE(next) << next.error().line();
+        if (next->draw) {
+            ASSERT_TRUE(session_->viewer().draw());
+        }
+        if (next->waitSeconds > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    bool turnUntil(const std::function<bool()>& isDone) {
+        for (int i = 0; i < 10000 && !HasFatalFailure(); ++i) {
+            if (isDone()) return true;
+            turn();
+        }
+        return false;
+    }
+    bool isSaved() {
+        return turnUntil([&] { return !session_->saving(); }) && session_->problem().empty();
+    }
+    /// Goes elsewhere at once.
+    void orbit(double yaw) {
+        OrbitCamera camera = session_->viewer().camera();
+        camera.orbit(session_->viewer().bounds().centre(), yaw, 0.2);
+        session_->viewer().setCamera(camera);
+    }
+
+    static std::set<std::string> filesIn(const fs::path& path) {
+        std::set<std::string> names;
+        for (const fs::directory_entry& each : fs::directory_iterator(path)) names.insert(each.path().filename().string());
+        return names;
+    }
+    static Picture picture(const fs::path& path) { return readPng(path).value(); }
+
+    fs::path before_;
+    std::unique_ptr<ViewSession> session_;
+    double now_ = 0;
+};
+
+/// Sessions that remember, as vcp view has them: each reads the settings when it begins, and saves what was changed.
+class RememberingSessionTest : public BuiltBall {
+protected:
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    }
+    void TearDown() override { fs::remove(settings_); }
+
+    struct Remembering {
+        std::unique_ptr<ViewSession> session;
+        double now = 0;
+
+        void open(const fs::path& file) {
+            session->open({file.string()});
+            for (int i = 0; i < 10000 && session->opening(); ++i) turn();
+            EXPECT_TRUE(session->viewer().isOpen()) << session->problem();
+        }
+        void turn() {
+            const auto next = session->update(now += 0.02);
+            ASSERT_TRUE(next) << next.error().line();
+            if (session->opening()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        /// Smooth moves are over.
+        void rest() {
+            for (int i = 0; i < 50; ++i) turn();
+        }
+    };
+
+    /// `given`: options, and what they say.
+    Remembering begin(const std::set<std::string>& given = {}, RenderSettings render = {}) {
+        const auto user = readUserSettings(settings_);
+        EXPECT_TRUE(user);
+        SessionOptions options;
+        options.user = *user;
+        options.render = std::move(render);
+        applyRemembered(options.render, options.user, [&](const char* option) { return given.contains(option); });
+        auto session = ViewSession::create(options, {});
+        EXPECT_TRUE(session) << session.error().line();
+        Remembering made{*std::move(session)};
+        made.session->viewer().resize({96, 64});
+        return made;
+    }
+    void end(Remembering& each) {
+        const auto saved = saveChanges(each.session->changes(), settings_);
+        EXPECT_TRUE(saved) << saved.error().line();
+        each.session.reset();
+    }
+    [[nodiscard]] fs::path ball() const { return *folder_ / "ball.vcp"; }
+    fs::path copyOfBall(const std::string& name) const {
+        fs::copy_file(ball(), *folder_ / name, fs::copy_options::overwrite_existing);
+        return *folder_ / name;
+    }
+    /// The ball seen from a side with z up, lit from above and cut.
+    fs::path scene() const {
+        const fs::path path = *folder_ / "scene.json";
+        std::ofstream(path) << R"({"datasets": [{"file": "ball.vcp"}], "lights": [{"direction": [0, 1, 0]}],
+            "camera": {"position": [5, 0, 0], "target": [0, 0, 0], "up": [0, 0, 1], "up_axis": "z"}, "sections": [{"normal": [1, 0, 0], "offset": 0.1}]})";
+        return path;
+    }
+
+    const fs::path settings_ = *folder_ / "view.json";
+};
+
+TEST_F(RememberingSessionTest, ThreeWindowsRememberThreeFiles) {
+    Remembering windows[3] = {begin(), begin(), begin()};
+    const fs::path files[3] = {copyOfBall("a.vcp"), copyOfBall("b.vcp"), copyOfBall("c.vcp")};
+    for (int i = 0; i < 3; ++i) windows[i].open(files[i]);
+    windows[1].session->keepBookmark(2);
+    for (const int i : {2, 0, 1}) end(windows[i]);
+    const auto read = readUserSettings(settings_);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->recent, (std::vector<std::string>{files[1], files[0], files[2]}));
+    EXPECT_EQ(read->bookmarks.count(files[1]), 1u);
+}
+
+TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
+    RenderSettings render;
+    render.up = "z";
+    render.shadows = true;
+    render.occlusionRays = 16;
+    render.errorPixels = 7;
+    render.budget = "64M";
+    render.light = "fixed";
+    render.sections = {"x<50%"};
+    Remembering given = begin({"--up", "--shadows", "--occlusion", "--error-pixels", "--budget"}, render);
+    given.open(ball());
+    EXPECT_EQ(given.session->viewer().camera().up, UpAxis::Z);
+    EXPECT_TRUE(given.session->viewer().shading().shadows);
+    given.rest();
+    end(given);
+
+    Remembering plain = begin();
+    plain.open(ball());
+    EXPECT_EQ(plain.session->viewer().camera().up, UpAxis::Y);
+    EXPECT_FALSE(plain.session->viewer().shading().shadows);
+    EXPECT_EQ(plain.session->viewer().shading().occlusionRays, 0u);
+    EXPECT_EQ(plain.session->viewer().errorPixels(), 0.5);
+    EXPECT_EQ(plain.session->viewer().status().budgetBytes, 512u << 20);
+    const auto json = contentOf(settings_);
+    for (const char* field : {"up", "shadows", "occlusion", "error_pixels", "budget_bytes", "background", "width", "panel"})
+        EXPECT_EQ(json.find(field), std::string::npos) << field << " in " << json;
+}
+
+TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
+    RenderSettings render;
+    render.up = "z";
+    render.shadows = true;
+    render.errorPixels = 7;
+    render.budget = "64M";
+    Remembering first = begin({"--up", "--shadows", "--error-pixels", "--budget"}, render);
+    first.open(ball());
+    first.session->act(ViewerAction::ToggleUpAxis);  // to y, which is the default: nothing of it shows below
+    first.rest();
+    first.session->act(ViewerAction::ToggleUpAxis);
+    // Off and on again: what it was, and by hand.
+    first.session->act(ViewerAction::ToggleShadows);
+    first.turn();
+    first.session->act(ViewerAction::ToggleShadows);
+    first.turn();
+    first.session->viewer().setErrorPixels(3);
+    ASSERT_TRUE(first.session->viewer().setBudget(96 << 20));
+    first.session->togglePanel();
+    first.session->act(ViewerAction::ToggleOcclusion);
+    Shading shading = first.session->viewer().shading();
+    shading.backgroundTop = {1, 0, 0};
+    first.session->viewer().setShading(shading);  // and the window closes in the same turn
+    end(first);
+
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Z);
+    EXPECT_TRUE(second.session->viewer().shading().shadows);
+    EXPECT_EQ(second.session->viewer().shading().occlusionRays, 8u);
+    EXPECT_EQ(second.session->viewer().shading().backgroundTop, glm::vec3(1, 0, 0));
+    EXPECT_EQ(second.session->viewer().errorPixels(), 3);
+    EXPECT_EQ(second.session->viewer().status().budgetBytes, 96u << 20);
+    EXPECT_TRUE(second.session->user().panel);
+    EXPECT_EQ(second.session->changes().shadows, std::nullopt) << "what is remembered is not changed";
+}
+
+TEST_F(RememberingSessionTest, ScenesBookmarksAndPastedCamerasTurnNothingOver) {
+    Remembering first = begin();
+    first.open(scene());
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Z);
+    first.session->keepBookmark(1);
+    first.rest();
+    first.session->goToBookmark(1);
+    first.rest();
+    first.session->pasteCamera(cameraToJson(first.session->viewer().camera()));
+    first.rest();
+    EXPECT_EQ(first.session->changes().up, std::nullopt);
+    first.open(ball());
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Y) << "nor what is opened next";
+    EXPECT_TRUE(first.session->viewer().sections().empty());
+    end(first);
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Y);
+    EXPECT_TRUE(second.session->viewer().sections().empty());
+    EXPECT_TRUE(second.session->viewer().shading().lightFollowsCamera);
+}
+
+TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(isSaved());
+    session_->saveTurntable(kSmall, 3);
+    ASSERT_TRUE(session_->saving());
+    EXPECT_EQ(session_->saving()->name, "turntable-1");
+    EXPECT_EQ(session_->saving()->pictures, 3u);
+    session_->saveTurntable(kSmall, 3);
+    // The window goes on, and what it shows by now is not what is saved.
+    orbit(1);
+    session_->viewer().act(ViewerAction::NextShading);
+    const uint64_t drawn = session_->viewer().framesDrawn();
+    ASSERT_TRUE(isSaved());
+    EXPECT_GT(session_->viewer().framesDrawn(), drawn);
+    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"picture-0001.png", "picture-0002.png", "picture-0003.png"}));
+    EXPECT_EQ(picture("turntable-1/picture-0001.png"), picture("picture-1.png")) << "it begins with the view as it was";
+    EXPECT_NE(picture("turntable-1/picture-0002.png"), picture("turntable-1/picture-0001.png"));
+    EXPECT_NE(picture("turntable-1/picture-0003.png"), picture("turntable-1/picture-0002.png"));
+    EXPECT_FALSE(fs::exists("turntable-2")) << "one at a time";
+    session_->saveTurntable(kSmall, 2);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("turntable-2").size(), 2u);
+    EXPECT_NE(session_->note().find("turntable-2"), std::string::npos) << session_->note();
+}
+
+TEST_F(ViewSessionTest, APathGoesThroughTheBookmarks) {
+    session_->keepBookmark(4);
+    session_->savePath(kSmall, 3);
+    EXPECT_FALSE(session_->saving());
+    EXPECT_NE(session_->note().find("bookmarks"), std::string::npos) << session_->note();
+    orbit(0.8);
+    session_->keepBookmark(2);
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(isSaved());
+    orbit(2);
+    session_->savePath(kSmall, 3);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("path-1").size(), 3u);
+    EXPECT_EQ(picture("path-1/picture-0001.png"), picture("picture-1.png")) << "from the bookmark with the lower number";
+    EXPECT_NE(picture("path-1/picture-0002.png"), picture("path-1/picture-0001.png"));
+    EXPECT_NE(picture("path-1/picture-0003.png"), picture("path-1/picture-0002.png"));
+}
+
+TEST_F(ViewSessionTest, DepthAndTransparencyAreChosen) {
+    session_->savePicture({.size = {64, 48}, .transparent = true, .depth = true});
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("."), (std::set<std::string>{"picture-1.png", "picture-1-depth.pfm"}));
+    EXPECT_EQ(picture("picture-1.png").rgba[3], 0);
+    EXPECT_EQ(contentOf("picture-1-depth.pfm").size(), std::string("Pf\n64 48\n-1.0\n").size() + 4 * 64 * 48);
+    fs::remove("picture-1.png");
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(picture("picture-2.png").rgba[3], 255) << "what belongs to the depth that is left has another number";
+    session_->saveTurntable({.size = {64, 48}, .depth = true}, 2);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"depth-0001.pfm", "depth-0002.pfm", "picture-0001.png", "picture-0002.png"}));
+}
+
+TEST_F(ViewSessionTest, WhatIsCancelledLeavesWhatIsFinished) {
+    session_->saveTurntable(kTwoTiles, 5);
+    ASSERT_TRUE(turnUntil([&] { return !session_->saving() || fs::exists("turntable-1/picture-0003.png.partial"); }));
+    ASSERT_TRUE(session_->saving());
+    EXPECT_EQ(session_->saving()->finished, 2u);
+    EXPECT_GT(session_->saving()->fraction, 0.4);
+    EXPECT_LT(session_->saving()->fraction, 0.6);
+    session_->cancelSaving();
+    EXPECT_FALSE(session_->saving());
+    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"picture-0001.png", "picture-0002.png"}));
+    EXPECT_NE(session_->note().find("2 of 5"), std::string::npos) << session_->note();
+
+    session_->saveTurntable(kTwoTiles, 5);
+    ASSERT_TRUE(turnUntil([&] { return fs::exists("turntable-2/picture-0001.png.partial"); }));
+    session_->cancelSaving();
+    EXPECT_FALSE(fs::exists("turntable-2")) << "an empty folder is of no use";
+
+    session_->savePicture(kTwoTiles);
+    ASSERT_TRUE(turnUntil([&] { return fs::exists("picture-1.png.partial"); }));
+    session_.reset();
+    EXPECT_EQ(filesIn("."), (std::set<std::string>{"turntable-1"}));
+}
+
+TEST_F(ViewSessionTest, WhatIsOpenedNextCancels) {
+    session_->saveTurntable(kTwoTiles, 100);
+    session_->open({(*folder_ / "ball.vcp").string()});
+    ASSERT_TRUE(turnUntil([&] { return !session_->opening(); }));
+    EXPECT_FALSE(session_->saving());
+    turn();
+    EXPECT_EQ(session_->problem(), "");
+}
+
+TEST_F(ViewSessionTest, AFolderThatIsGoneIsSaid) {
+    fs::create_directory("gone");
+    fs::current_path("gone");
+    fs::remove(*folder_ / "work" / "gone");
+    session_->saveTurntable(kSmall, 3);
+    EXPECT_FALSE(session_->saving());
+    EXPECT_NE(session_->problem().find("turntable-1"), std::string::npos) << session_->problem();
+    session_->dismissProblem();
+    session_->savePicture(kSmall);
+    ASSERT_TRUE(turnUntil([&] { return !session_->saving(); }));
+    EXPECT_NE(session_->problem().find("picture-1.png"), std::string::npos) << session_->problem();
+    fs::current_path(*folder_ / "work");
+}
+
+}  // namespace
+}  // namespace vcp

@@ -1,0 +1,28 @@
+// Meshes of shapes whose answer is known: what the ray benchmark measures where no model is named.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "builder/measure/indexed_mesh.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+/// About 2 world units across; measured with cells of this edge, 128 of them go across the sphere.
+inline constexpr double kAnalyticModelCell = 1.0 / 64;
+
+struct AnalyticModel {
+    std::string name;
+    IndexedMesh mesh;
+};
+
+/// `sphere`, `torus` (both so finely tessellated that they err by less than 0.002 cell), and `plate`: a box turned
+/// against the axes and 0.4 cell thick. Closed, oriented outwards.
+std::vector<AnalyticModel> analyticModels();
+
+/// Binary PLY with double coordinates. Errors: Io.
+Result<void> writePly(const IndexedMesh& mesh, const std::filesystem::path& path);
+
+}  // namespace vcp

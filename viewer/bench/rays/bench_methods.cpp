@@ -1,0 +1,153 @@
+#include "viewer/bench/rays/bench_methods.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "viewer/bench/peers/distance_octree.h"
+#include "viewer/bench/peers/paper_dataset.h"
+#include "viewer/bench/peers/voxel_octree.h"
+#include "viewer/bench/rays/peer_tracer.h"
+
+namespace vcp {
+
+namespace {
+
+struct RayMethod {
+    std::string name;
+    double knob = 0;
+    std::vector<double> swept = {};
+};
+
+const std::vector<RayMethod> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
+                                      {"reference"},
+                                      {"paper", 0.25, {0.5, 0.25, 0.1}},
+                                      {"paper-gpu", 0.25, {0.5, 0.25, 0.1}},
+                                      {"paper-rules"},
+                                      {"sdf", 1, {2, 1, 0.5}},
+                                      {"sdf-analytic", 1, {2, 1, 0.5}},
+                                      {"voxel", 1, {1, 0.5, 0.25}},
+                                      {"svo-contours", 1, {2, 1, 0.5}},
+                                      {"embree"},
+                                      {"embree-single"}};
+
+/// One rule of the paper's method changed. Those of the march first: they need no other octree.
+struct PaperRule {
+    const char* name;
+    void (*change)(PaperOptions&);
+};
+constexpr PaperRule kPaperRules[] = {
+    {"as published", [](PaperOptions&) {}},
+    {"scheme trilinear", [](PaperOptions& o) { o.march.scheme = PaperScheme::Trilinear; }},
+    {"scheme min-plane", [](PaperOptions& o) { o.march.scheme = PaperScheme::MinPlane; }},
+    {"step distance", [](PaperOptions& o) { o.march.step = PaperStep::Distance; }},
+    {"back off", [](PaperOptions& o) { o.march.back = false; }},
+    {"cache off", [](PaperOptions& o) { o.march.cached = false; }},
+    {"packing octahedral", [](PaperOptions& o) { o.packing = PaperPacking::Octahedral; }},
+    {"k 1", [](PaperOptions& o) { o.growRounds = 1; }},
+    {"k 2", [](PaperOptions& o) { o.growRounds = 2; }},
+    {"k exact", [](PaperOptions& o) { o.growRounds = CornerOctreeOptions::kExactPoints; }},
+    {"band halved", [](PaperOptions& o) { o.band *= 0.5f; }},
+    {"merge never", [](PaperOptions& o) { o.mergeThreshold = -1; }},
+    {"merge 0.2", [](PaperOptions& o) { o.mergeThreshold = 0.2f; }},
+    {"empty safe", [](PaperOptions& o) { o.safeEmpty = true; }},
+};
+
+template <class Caster>
+std::unique_ptr<RayTracer> tracerOf(Caster caster, std::string knob, unsigned threads) {
+    return std::make_unique<PeerTracer<Caster>>(std::make_shared<const Caster>(std::move(caster)), std::move(knob),
+                                                threads);
+}
+
+std::string cellKnob(double cells) { return fmt::format("cell {:g}", cells); }
+
+}  // namespace
+
+const std::vector<std::string>& rayMethodNames() {
+    static const std::vector<std::string> names = [] {
+        std::vector<std::string> all;
+        for (const RayMethod& method : kMethods) all.push_back(method.name);
+        return all;
+    }();
+    return names;
+}
+
+std::vector<double> rayMethodKnobs(const std::string& method, bool sweep) {
+    const auto found = std::ranges::find(kMethods, method, &RayMethod::name);
+    if (found == kMethods.end()) return {};
+    if (method != "paper-rules") return sweep && !found->swept.empty() ? found->swept : std::vector<double>{found->knob};
+    std::vector<double> rules;
+    for (size_t i = 0; i < std::size(kPaperRules); ++i) rules.push_back(static_cast<double>(i));
+    return rules;
+}
+
+const MeshSides& RayMethods::sides() {
+    if (!sides_) sides_.emplace(in_.mesh);
+    return *sides_;
+}
+
+Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, double knob) {
+    if (method == "certified") return makeCertifiedTracer(in_.vcp, in_.device, knob);
+    if (method == "reference") return makeReferenceTracer(in_.cache, in_.threads);
+    PaperOptions paper = in_.paper;
+    if (method == "paper-rules") {
+        const PaperRule& rule = kPaperRules[static_cast<size_t>(knob)];
+        rule.change(paper);
+        return makePaper(paper, rule.name);
+    }
+    paper.march.epsilon = static_cast<float>(knob);
+    if (method == "paper") return makePaper(paper, fmt::format("eps {:g}", knob));
+    if (method == "paper-gpu") return makePaperGpu(paper);
+    if (method == "sdf" || method == "sdf-analytic") return makeDistances(method == "sdf-analytic", knob);
+    if (method == "voxel" || method == "svo-contours") return makeVoxels(method == "svo-contours", knob);
+    return makeEmbreeTracer(in_.mesh, method == "embree", in_.threads);
+}
+
+/// The octree is built anew only where another one is needed.
+Result<const PaperCaster*> RayMethods::paperOf(const PaperOptions& options) {
+    PaperOptions structure = options;
+    if (paper_) structure.march = paper_->options().march;
+    if (!paper_ || structure != paper_->options()) {
+        paper_.reset();
+        auto made = PaperCaster::create(in_.bvh, options, {.cell = in_.cell, .threads = in_.threads});
+        if (!made) return made.error();
+        paper_ = std::move(*made);
+    }
+    return &*paper_;
+}
+
+Result<std::unique_ptr<RayTracer>> RayMethods::makePaper(const PaperOptions& options, std::string knob) {
+    const auto made = paperOf(options);
+    if (!made) return made.error();
+    PaperCaster caster = **made;
+    caster.setMarch(options.march);
+    return tracerOf(std::move(caster), std::move(knob), in_.threads);
+}
+
+Result<std::unique_ptr<RayTracer>> RayMethods::makePaperGpu(const PaperOptions& options) {
+    const auto made = paperOf(options);
+    if (!made) return made.error();
+    const auto dataset = paperDataset(**made, in_.mesh);
+    if (!dataset) return dataset.error();
+    return makePaperGpuTracer(dataset->dataset, dataset->source, in_.device, options.march);
+}
+
+Result<std::unique_ptr<RayTracer>> RayMethods::makeDistances(bool analytic, double cells) {
+    const CornerOctreeOptions build{.cell = in_.cell * cells, .threads = in_.threads};
+    if (analytic) {
+        auto made = AnalyticCaster::create(in_.bvh, sides(), build);
+        if (!made) return made.error();
+        return tracerOf(std::move(*made), cellKnob(cells), in_.threads);
+    }
+    auto made = DistanceCaster::create(in_.bvh, sides(), {}, build);
+    if (!made) return made.error();
+    return tracerOf(std::move(*made), cellKnob(cells), in_.threads);
+}
+
+Result<std::unique_ptr<RayTracer>> RayMethods::makeVoxels(bool contours, double cells) const {
+    auto made = buildVoxelOctree(in_.mesh, in_.cell * cells, contours, in_.threads);
+    if (!made) return made.error();
+    return tracerOf(VoxelCaster(std::move(*made)), cellKnob(cells), in_.threads);
+}
+
+}  // namespace vcp

@@ -1,0 +1,265 @@
+#include "viewer/bench/rays/bench_rays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include <fmt/format.h>
+
+#include "builder/build.h"
+#include "builder/paper/parallel_rows.h"
+#include "viewer/bench/rays/analytic_models.h"
+#include "viewer/bench/rays/bench_cameras.h"
+#include "viewer/bench/rays/bench_methods.h"
+#include "viewer/bench/report/bench_folder.h"
+
+namespace vcp {
+
+namespace {
+
+/// The mesh of a model and its .vcp.
+struct ModelFiles {
+    std::filesystem::path mesh, vcp;
+    std::string name;
+};
+
+/// What is built of one mesh with several cells has several names. `cell` 0: chosen from the mesh.
+Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder, double cell) {
+    if (model.extension() != ".vcp") {
+        const std::string name = model.stem().string();
+        return ModelFiles{model, folder / (cell > 0 ? fmt::format("{}-cell-{}.vcp", name, cell) : name + ".vcp"), name};
+    }
+    for (const char* extension : {".ply", ".obj", ".stl"}) {
+        std::filesystem::path mesh = model;
+        mesh.replace_extension(extension);
+        if (std::filesystem::exists(mesh)) return ModelFiles{mesh, model, model.stem().string()};
+    }
+    return Error{.code = ErrorCode::Usage,
+                 .message = "no mesh of the same name lies beside it (.ply, .obj, .stl)",
+                 .file = model.string()};
+}
+
+/// Everything about one model that the methods share.
+struct BenchModel {
+    ModelFiles files;
+    IndexedMesh mesh;
+    std::unique_ptr<MeshBvh> bvh;
+    std::unique_ptr<PageCache> cache;
+};
+
+class RaysBench {
+public:
+    explicit RaysBench(const BenchRaysOptions& options) : options_(options), folder_(options.out) {
+        if (options_.methods.empty())
+            for (const std::string& method : rayMethodNames())
+                if ((benchHasEmbree() || !method.starts_with("embree")) && method != "paper-rules")
+                    options_.methods.push_back(method);
+    }
+
+    Result<BenchRaysReport> run() {
+        VCP_TRY(checkNames());
+        VCP_TRY(folder_.make());
+        if (options_.models.empty()) VCP_TRY(writeAnalyticModels());
+        for (size_t i = 0; i < options_.models.size(); ++i) {
+            modelFrom_ = static_cast<double>(i) / static_cast<double>(options_.models.size());
+            modelShare_ = 1.0 / static_cast<double>(options_.models.size());
+            VCP_TRY(runModel(options_.models[i]));
+        }
+        if (options_.stability) VCP_TRY(runStability());
+        return std::move(report_);
+    }
+
+private:
+    Result<void> checkNames() const {
+        const auto& methods = rayMethodNames();
+        for (const std::string& method : options_.methods)
+            if (std::find(methods.begin(), methods.end(), method) == methods.end())
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(methods, ", "))};
+        const auto& cameras = benchCameraNames();
+        for (const std::string& camera : options_.cameras)
+            if (std::find(cameras.begin(), cameras.end(), camera) == cameras.end())
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = fmt::format("unknown camera \"{}\"; there are {}", camera, fmt::join(cameras, ", "))};
+        return {};
+    }
+
+    Result<void> writeAnalyticModels() {
+        for (const AnalyticModel& model : analyticModels()) {
+            options_.models.push_back(folder_.path() / (model.name + ".ply"));
+            VCP_TRY(writePly(model.mesh, options_.models.back()));
+        }
+        if (!(options_.cell > 0)) options_.cell = kAnalyticModelCell;
+        return {};
+    }
+
+    Result<void> runStability() {
+        StabilityOptions options;
+        options.device = options_.device;
+        options.threads = options_.threads;
+        options.folder = folder_.path();
+        options.progress = options_.progress;
+        auto rows = benchStability(options);
+        if (!rows) return rows.error();
+        report_.stability = std::move(*rows);
+        return {};
+    }
+
+    Result<void> report(const std::string& what, double fractionOfModel) const {
+        if (!options_.progress || options_.progress(what, modelFrom_ + modelShare_ * fractionOfModel)) return {};
+        return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+    }
+
+    Result<BenchModel> loadModel(const std::filesystem::path& path) const {
+        auto files = filesOf(path, folder_.path(), options_.cell);
+        if (!files) return files.error();
+        BenchModel model;
+        model.files = *files;
+        VCP_TRY(report(fmt::format("{}: reading the mesh", files->name), 0));
+        auto mesh = loadMesh(files->mesh);
+        if (!mesh) return mesh.error();
+        model.mesh = std::move(*mesh);
+        if (!std::filesystem::exists(files->vcp)) {
+            VCP_TRY(report(fmt::format("{}: building", files->name), 0.02));
+            BuildOptions build;
+            build.inputs = {files->mesh};
+            build.output = files->vcp;
+            build.cell = options_.cell;
+            build.threads = options_.threads;
+            const auto built = buildOctree(build);
+            if (!built) return built.error();
+        }
+        auto cache = PageCache::open(files->vcp);
+        if (!cache) return cache.error();
+        model.cache = std::make_unique<PageCache>(std::move(*cache));
+        return model;
+    }
+
+    Result<void> runModel(const std::filesystem::path& path) {
+        auto model = loadModel(path);
+        if (!model) return model.error();
+        // Moved into its place: the tree points at it.
+        BenchModel& m = *model;
+        m.bvh = std::make_unique<MeshBvh>(m.mesh);
+        VCP_TRY(m.cache->loadLevel(m.cache->dataset().header.levels - 1));
+        std::unique_ptr<RayTracer> peer;
+        if (benchHasEmbree()) {
+            auto made = makeEmbreeTracer(m.mesh, true, options_.threads);
+            if (!made) return made.error();
+            peer = std::move(*made);
+        }
+        RayMethods methods({m.mesh, *m.bvh, *m.cache, m.files.vcp, options_.device, options_.threads,
+                            m.cache->dataset().header.cell, options_.paper});
+        size_t runs = 0, done = 0;
+        for (const std::string& method : options_.methods)
+            runs += knobsOf(method).size() * options_.cameras.size();
+        const auto fraction = [&] { return 0.1 + 0.9 * static_cast<double>(done) / static_cast<double>(runs); };
+        for (const std::string& method : options_.methods)
+            for (const double knob : knobsOf(method)) {
+                VCP_TRY(report(fmt::format("{}: making {}", m.files.name, method), fraction()));
+                auto tracer = methods.make(method, knob);
+                if (!tracer) return tracer.error();
+                for (const std::string& camera : options_.cameras) {
+                    VCP_TRY(report(fmt::format("{}: {} {}, {}", m.files.name, method, (*tracer)->knob(), camera), fraction()));
+                    VCP_TRY(runCamera(m, method, camera, **tracer, peer.get()));
+                    ++done;
+                }
+            }
+        return {};
+    }
+
+    [[nodiscard]] std::vector<double> knobsOf(const std::string& method) const {
+        if ((method == "paper" || method == "paper-gpu") && !options_.sweep) return {options_.paper.march.epsilon};
+        return rayMethodKnobs(method, options_.sweep);
+    }
+
+    Result<void> runCamera(const BenchModel& model, const std::string& method, const std::string& name,
+                           RayTracer& tracer, RayTracer* peer) {
+        const FileHeader& header = model.cache->dataset().header;
+        BenchRaysRow row;
+        row.model = model.files.name;
+        row.camera = name;
+        row.method = method;
+        row.knob = tracer.knob();
+        row.device = tracer.device();
+        row.cell = header.cell;
+        RayClassTable classes;
+        double seconds = 0, peerSeconds = 0;
+        for (int view = 0; view < options_.views; ++view) {
+            const Camera camera = *benchCamera(name, *model.bvh, {glm::dvec3(header.origin[0], header.origin[1], header.origin[2]), header.cell}, options_.size, view, options_.views);
+            const auto traced = tracer.trace(camera, options_.size, options_.repetitions);
+            if (!traced) return traced.error();
+            seconds += traced->seconds;
+            row.rays += traced->hits.size();
+            row.work.merge(traced->work);
+            if (peer) {
+                const auto ofPeer = peer->trace(camera, options_.size, options_.repetitions);
+                if (!ofPeer) return ofPeer.error();
+                peerSeconds += ofPeer->seconds;
+            }
+            judge(model, camera, *traced, classes);
+        }
+        row.nsPerRay = 1e9 * seconds / static_cast<double>(row.rays);
+        row.ratioToEmbree = peer ? peerSeconds / seconds : 0;
+        row.bytes = tracer.bytes();
+        row.classes = RaySummary(classes, row.cell);
+        report_.rows.push_back(std::move(row));
+        return {};
+    }
+
+    void judge(const BenchModel& model, const Camera& camera, const TracedPicture& traced,
+               RayClassTable& classes) const {
+        // Of a picture with coarser pages, what is excused near silhouettes is the largest error allowed.
+        double error = model.cache->dataset().header.certifiedErrorMax;
+        // Peers promise nothing; they are excused as much as ours.
+        for (const auto& hit : traced.hits)
+            if (hit && std::isfinite(hit->certifiedError)) error = std::max(error, hit->certifiedError);
+        const RayJudge judge(*model.bvh, model.cache->dataset().header.cell, error);
+        std::mutex mutex;
+        const int every = std::max(options_.judgeEvery, 1);
+        forEachRow((options_.size.y + every - 1) / every, options_.threads, [&](int row) {
+            RayClassTable mine;
+            const int y = row * every;
+            for (int x = 0; x < options_.size.x; x += every) {
+                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(options_.size.x),
+                                                static_cast<uint32_t>(options_.size.y), x + 0.5, y + 0.5);
+                mine.add(
+                    judge.judge(ray.origin, ray.direction, traced.hits[static_cast<size_t>(y) * options_.size.x + x]));
+            }
+            const std::lock_guard lock(mutex);
+            classes.merge(mine);
+        });
+    }
+
+    BenchRaysOptions options_;
+    BenchFolder folder_;
+    BenchRaysReport report_;
+    double modelFrom_ = 0, modelShare_ = 1;
+};
+
+}  // namespace
+
+RaySummary::RaySummary(const RayClassTable& table, double cell)
+    : judged(table.rays()),
+      holes(table.holes()),
+      beyondCertified(table.tooFar()),
+      maxOverCertified(table.overCertifiedMax()),
+      distanceCells(table.distanceCells(cell)),
+      depthCells(table.depthCells(cell)),
+      normalDegrees(table.normalDegrees()) {
+    for (size_t i = 0; i < fractions.size(); ++i) fractions[i] = table.fraction(static_cast<RayClass>(i));
+}
+
+bool benchHasEmbree() {
+#ifdef VCP_HAVE_EMBREE
+    return true;
+#else
+    return false;
+#endif
+}
+
+Result<BenchRaysReport> benchRays(const BenchRaysOptions& options) { return RaysBench(options).run(); }
+
+}  // namespace vcp

@@ -1,0 +1,318 @@
+#include "viewer/bench/stress/stress.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "render/frame_setup.h"
+#include "streaming/residency_policy.h"
+#include "viewer/bench/stress/stress_path.h"
+#include "viewer/camera/camera_path.h"
+
+namespace vcp {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A view that brings nothing new for so long does not settle.
+constexpr double kHopelessSeconds = 60;
+// Pictures of an order of arrival.
+constexpr int kOrderDraws = 100;
+
+double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Counts what is read of a file.
+class CountingReader final : public ByteReader {
+public:
+    explicit CountingReader(std::shared_ptr<const ByteReader> reader) : reader_(std::move(reader)) {}
+    Result<void> read(uint64_t offset, std::span<std::byte> to) const override {
+        ++requests;
+        bytes += to.size();
+        return reader_->read(offset, to);
+    }
+    [[nodiscard]] uint64_t size() const override { return reader_->size(); }
+    [[nodiscard]] const std::string& name() const override { return reader_->name(); }
+    void interrupt() const override { reader_->interrupt(); }
+    void distrust(uint64_t offset, uint64_t count) const override { reader_->distrust(offset, count); }
+
+    mutable std::atomic<uint64_t> requests{0}, bytes{0};
+
+private:
+    std::shared_ptr<const ByteReader> reader_;
+};
+
+/// What must hold after each update; what does not is noted once.
+class Invariants {
+public:
+    Invariants(uint64_t budgetBytes, uint64_t ramBytes, std::vector<std::string>& violations)
+        : budgetBytes_(budgetBytes), ramBytes_(ramBytes), violations_(violations) {}
+
+    void check(const UpdateResult& update) {
+        require(update.residentBytes <= budgetBytes_, "more bytes are resident than the budget allows");
+        require(update.heldBytesMax <= ramBytes_, "pages on their way and kept take more memory than --ram allows");
+        require(update.settled == (update.pagesMissing == 0), "settled is not what it says");
+        require(update.reloads == 0, "a page was loaded twice in a still view");
+        for (const Error& problem : update.problems) {
+            require(reported_.insert(problem.line()).second, "a page that cannot be read was reported twice");
+            ++pagesGivenUp;
+        }
+    }
+    void check(const FrameStats& stats) { require(stats.poolBytes <= budgetBytes_, "the pool is larger than the budget"); }
+    void require(bool holds, const std::string& otherwise) {
+        if (!holds && noted_.insert(otherwise).second) violations_.push_back(otherwise);
+    }
+
+    uint64_t pagesGivenUp = 0;
+
+private:
+    uint64_t budgetBytes_, ramBytes_;
+    std::vector<std::string>& violations_;
+    std::set<std::string> reported_, noted_;
+};
+
+class StressRun {
+public:
+    StressRun(const OpenDataset& open, const StressOptions& options)
+        : open_(open), o_(options), invariants_(options.renderer.budgetBytes, options.renderer.ramBytes, report_.violations) {}
+
+    Result<StressReport> run() {
+        start_ = Clock::now();
+        counted_ = std::make_shared<CountingReader>(open_.reader);
+        VCP_TRY(openRenderer(renderer_, std::make_shared<FaultyReader>(counted_, o_.faults)));
+        describe();
+        VCP_TRY(firstView());
+        VCP_TRY(choosePath());
+        VCP_TRY(alongPath());
+        VCP_TRY(withoutLoads());
+        VCP_TRY(compareWithFaultless());
+        VCP_TRY(compareOrdersOfArrival());
+        VCP_TRY(severalViews());
+        return std::move(report_);
+    }
+
+private:
+    Result<void> openRenderer(std::unique_ptr<Renderer>& renderer, std::shared_ptr<const ByteReader> reader) const {
+        auto made = Renderer::create(o_.renderer);
+        if (!made) return made.error();
+        renderer = std::move(*made);
+        return renderer->open(open_.dataset, std::make_shared<FilePageSource>(std::move(reader), open_.dataset, open_.runBytes()));
+    }
+
+    void describe() {
+        report_.name = o_.name;
+        report_.path = o_.path;
+        report_.device = renderer_->device().name;
+        report_.seed = o_.seed;
+        report_.frames = o_.frames;
+        report_.budgetBytes = o_.renderer.budgetBytes;
+        report_.ramBytes = o_.renderer.ramBytes;
+    }
+
+    [[nodiscard]] FrameRequest requestFor(const Camera& camera) const {
+        FrameRequest request;
+        request.camera = camera;
+        request.width = static_cast<uint32_t>(o_.size.x);
+        request.height = static_cast<uint32_t>(o_.size.y);
+        request.errorPixels = o_.errorPixels;
+        return request;
+    }
+
+    /// One round: what it took in milliseconds is in `frameMs`.
+    Result<UpdateResult> frame(const FrameRequest& request, double& frameMs) {
+        const auto began = Clock::now();
+        auto update = renderer_->update(request);
+        if (!update) return update;
+        auto stats = renderer_->render(request);
+        if (!stats) return stats.error();
+        frameMs = 1e3 * secondsSince(began);
+        note(*update);
+        invariants_.check(*stats);
+        return update;
+    }
+
+    void note(const UpdateResult& update) {
+        invariants_.check(update);
+        report_.residentBytesMax = std::max(report_.residentBytesMax, update.residentBytes);
+        report_.heldBytesMax = update.heldBytesMax;
+        report_.failures = update.failures;
+        report_.loads = update.loads;
+        report_.evictions = update.evictions;
+        report_.relaxed = report_.relaxed || update.relaxed;
+        report_.pagesGivenUp = invariants_.pagesGivenUp;
+    }
+
+    Result<void> ask(const std::string& what, double fraction) const {
+        if (o_.progress && !o_.progress(what, fraction)) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        return {};
+    }
+
+    /// Updates until the view has settled; `each` sees every one.
+    Result<UpdateResult> settle(const FrameRequest& request, const std::function<void(const UpdateResult&)>& each = {}) {
+        auto changedAt = Clock::now();
+        uint64_t seen = 0;
+        for (;;) {
+            auto update = renderer_->update(request);
+            if (!update) return update;
+            note(*update);
+            if (each) each(*update);
+            if (update->settled) return update;
+            if (update->loads + update->failures != seen) changedAt = Clock::now();
+            seen = update->loads + update->failures;
+            invariants_.require(secondsSince(changedAt) < kHopelessSeconds, "a view does not settle");
+            if (!report_.violations.empty() && secondsSince(changedAt) >= kHopelessSeconds) return update;
+            VCP_TRY(ask("settling", 0));
+            renderer_->waitForPage(std::chrono::milliseconds(20));
+        }
+    }
+
+    /// Draws what there is as soon as there is something, then refines.
+    Result<void> firstView() {
+        const Camera whole = fitCamera(open_.bounds().low, open_.bounds().high, {0, -0.35, -1}, {0, 1, 0}, 0.6, double(o_.size.x) / o_.size.y);
+        const FrameRequest request = requestFor(whole);
+        const auto settled = settle(request, [&](const UpdateResult& update) {
+            const auto now = [&] { return o_.openSeconds + secondsSince(start_); };
+            if (update.drawable && report_.firstPictureSeconds == 0 && renderer_->render(request)) report_.firstPictureSeconds = now();
+            if (update.drawable && report_.detail90Seconds == 0 && update.pagesMissing * 10 <= update.pagesWanted) report_.detail90Seconds = now();
+        });
+        if (!settled) return settled.error();
+        auto drawn = renderer_->render(request);
+        if (!drawn) return drawn.error();
+        report_.settledSeconds = o_.openSeconds + secondsSince(start_);
+        const auto hit = renderer_->pick(request.width / 2, request.height / 2);
+        target_ = hit && *hit ? (*hit)->position : open_.bounds().centre();
+        return {};
+    }
+
+    Result<void> choosePath() {
+        StressPathOptions path{o_.path, open_.bounds(), target_, open_.dataset->header.cell, o_.size, o_.frames, o_.seed};
+        if (auto known = stressPath(path)) {
+            cameras_ = *std::move(known);
+            return {};
+        }
+        const auto keys = readCameras(o_.path);
+        if (!keys && keys.error().code == ErrorCode::Io) return Error{ErrorCode::Io, "is neither a path's name nor a file that can be read", o_.path};
+        if (!keys) return keys.error();
+        for (const OrbitCamera& camera : cameraPath(*keys, o_.frames)) cameras_.push_back(camera.current());
+        return {};
+    }
+
+    Result<void> alongPath() {
+        std::vector<float> times;
+        uint64_t loads = report_.loads, evictions = report_.evictions;
+        for (size_t i = 0; i < cameras_.size(); ++i) {
+            VCP_TRY(ask("flying", double(i) / double(cameras_.size())));
+            StressSample sample;
+            const auto update = frame(requestFor(cameras_[i]), sample.frameMs);
+            if (!update) return update.error();
+            sample.seconds = secondsSince(start_);
+            sample.errorPixels = update->errorPixels;
+            sample.residentBytes = update->residentBytes;
+            sample.pending = update->pagesPending;
+            sample.loads = update->loads - loads;
+            sample.evictions = update->evictions - evictions;
+            sample.missing = update->pagesWanted > 0 ? double(update->pagesMissing) / update->pagesWanted : 0;
+            loads = update->loads, evictions = update->evictions;
+            times.push_back(static_cast<float>(sample.frameMs));
+            report_.samples.push_back(sample);
+        }
+        report_.frameMs = quantilesOf(std::move(times));
+        const auto began = Clock::now();
+        const auto settled = settle(requestFor(cameras_.back()));
+        if (!settled) return settled.error();
+        report_.pathSettledSeconds = secondsSince(began);
+        report_.errorPixels = settled->errorPixels;
+        auto drawn = renderer_->render(requestFor(cameras_.back()));
+        if (!drawn) return drawn.error();
+        auto picture = renderer_->readPicture();
+        if (!picture) return picture.error();
+        picture_ = *std::move(picture);
+        return {};
+    }
+
+    /// The same frames, each with all it wants; and what that is.
+    Result<void> withoutLoads() {
+        const bool colour = o_.renderer.colour && open_.dataset->hasColour();
+        ResidencyPolicy wants(open_.dataset, colour, poolShapeFor(*open_.dataset, colour, o_.renderer.budgetBytes, uint64_t{1} << 40));
+        std::set<uint64_t> needed;
+        std::vector<float> times;
+        for (size_t i = 0; i < cameras_.size(); ++i) {
+            VCP_TRY(ask("flying without loads", double(i) / double(cameras_.size())));
+            const FrameRequest request = requestFor(cameras_[i]);
+            if (const auto settled = settle(request); !settled) return settled.error();
+            double ms = 0;
+            if (const auto update = frame(request, ms); !update) return update.error();
+            times.push_back(static_cast<float>(ms));
+            // Twice: a still view looks at nothing ahead. Nothing is ever placed, so all it wants is wished for.
+            for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
+            for (const PageRequest& wish : wants.finish().wishes)
+                if (!isBlock(wish.page)) needed.insert(wish.page);
+        }
+        report_.frameMsNoLoads = quantilesOf(std::move(times));
+        report_.bytesRead = counted_->bytes;
+        report_.requests = counted_->requests;
+        for (const uint64_t page : needed) {
+            const PageEntry& entry = open_.dataset->pages[page];
+            report_.bytesNeeded += entry.storedBytes + (colour ? entry.colourStoredBytes : 0);
+        }
+        return {};
+    }
+
+    Result<void> compareWithFaultless() {
+        renderer_.reset();
+        VCP_TRY(ask("comparing", 1));
+        VCP_TRY(openRenderer(renderer_, open_.reader));
+        const FrameRequest request = requestFor(cameras_.back());
+        auto settled = renderer_->settle(request, [&] { return !ask("comparing", 1); });
+        if (!settled) return settled.error();
+        if (auto drawn = renderer_->render(request); !drawn) return drawn.error();
+        const auto picture = renderer_->readPicture();
+        if (!picture) return picture.error();
+        // A page given up by bad luck is drawn from its parent, and said so.
+        invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0, "the settled picture is not that of a run without faults");
+        return {};
+    }
+
+    Result<void> compareOrdersOfArrival() {
+        if (o_.orders.size() < 2) return {};
+        renderer_.reset();
+        auto curves = compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders, kOrderDraws, o_.progress);
+        if (!curves) return curves.error();
+        report_.orders = *std::move(curves);
+        for (const OrderCurve& curve : report_.orders)
+            invariants_.require(curve.settled == report_.orders[0].settled, "the settled picture depends on the order of arrival");
+        return {};
+    }
+
+    Result<void> severalViews() {
+        if (o_.views < 2) return {};
+        renderer_.reset();
+        std::vector<FrameRequest> path;
+        for (const Camera& camera : cameras_) path.push_back(requestFor(camera));
+        auto together = flyTogether(open_, o_.renderer, path, o_.views, o_.progress);
+        if (!together) return together.error();
+        for (const std::string& violation : together->violations) invariants_.require(false, violation);
+        report_.views = *std::move(together);
+        return {};
+    }
+
+    const OpenDataset& open_;
+    const StressOptions& o_;
+    StressReport report_;
+    Invariants invariants_;
+    Clock::time_point start_;
+    std::shared_ptr<CountingReader> counted_;
+    std::unique_ptr<Renderer> renderer_;
+    std::vector<Camera> cameras_;
+    glm::dvec3 target_{0};
+    Picture picture_;
+};
+
+}  // namespace
+
+Result<StressReport> runStress(const OpenDataset& open, const StressOptions& options) { return StressRun(open, options).run(); }
+
+}  // namespace vcp

@@ -1,0 +1,179 @@
+// vcp build: meshes in, one .vcp out.
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "builder/build.h"
+#include "builder/estimate.h"
+#include "builder/paper/paper_file.h"
+#include "viewer/command/build_arguments.h"
+#include "viewer/command/commands.h"
+#include "viewer/command/interrupt.h"
+#include "viewer/command/paper_arguments.h"
+#include "viewer/scene/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+struct BuildCommand {
+    std::vector<std::string> inputs;
+    std::string output;
+    bool resume = false;
+    bool dryRun = false;
+    bool overwrite = false;
+    double checkpointSeconds = BuildOptions().checkpointSeconds;
+    std::string method = "certified";
+    PaperOptions paper;
+    bool paperOptionsGiven = false;
+    BuildSettings settings;
+
+    [[nodiscard]] bool isPaper() const { return method == "paper"; }
+    ReportOptions report;
+};
+
+Json toJson(const BuildReport& report) {
+    return {{"triangles", report.triangles},
+            {"degenerate_triangles", report.degenerateTriangles},
+            {"vertices", report.vertices},
+            {"seconds", report.seconds},
+            {"peak_rss_bytes", report.peakRssBytes},
+            {"temp_bytes", report.tempBytes},
+            {"file_bytes", report.fileBytes},
+            {"levels", report.levels},
+            {"subvolumes", report.subvolumes},
+            {"leaves", report.leaves},
+            {"hard_leaves", report.hardLeaves},
+            {"cell", report.cell},
+            {"error_target", report.errorTarget},
+            {"certified_error_max", report.certifiedErrorMax},
+            {"warnings", report.warnings}};
+}
+
+std::string summary(const std::string& output, const BuildReport& report) {
+    const double triangles = static_cast<double>(std::max<uint64_t>(report.triangles, 1));
+    std::string text = fmt::format("{}: {} triangles in {} ({:.2f} M/s), peak memory {}\n", output,
+                                   formatCount(report.triangles), formatSeconds(report.seconds),
+                                   1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
+    if (report.degenerateTriangles > 0)
+        text += fmt::format("  {} triangles without area were left out\n", formatCount(report.degenerateTriangles));
+    for (const std::string& warning : report.warnings) text += fmt::format("  {}\n", warning);
+    text += fmt::format("  {} ({:.1f} bytes a triangle), {} levels, {} subvolumes, {} leaves, {} of them hard\n",
+                        formatBytes(report.fileBytes), static_cast<double>(report.fileBytes) / triangles, report.levels,
+                        formatCount(report.subvolumes), formatCount(report.leaves), formatCount(report.hardLeaves));
+    text += fmt::format("  cell {}, ", formatLength(report.cell));
+    if (std::isnan(report.certifiedErrorMax)) return text + "no certified error";
+    return text + fmt::format("certified error {} ({:.3f} cells)", formatLength(report.certifiedErrorMax),
+                              report.certifiedErrorMax / report.cell);
+}
+
+Json toJson(const BuildEstimate& estimate) {
+    const SoupMeasures& m = estimate.measures;
+    return {{"triangles", m.triangles},
+            {"degenerate_triangles", m.degenerateTriangles},
+            {"vertices", m.vertices},
+            {"vertex_colours", m.hasVertexColours},
+            {"materials", m.hasMaterials},
+            {"bounds_min", {m.boundsMin.x, m.boundsMin.y, m.boundsMin.z}},
+            {"bounds_max", {m.boundsMax.x, m.boundsMax.y, m.boundsMax.z}},
+            {"cell", estimate.frame.cell},
+            {"levels", estimate.frame.levels},
+            {"memory_bytes", estimate.memoryBytes},
+            {"temp_bytes", estimate.tempBytes},
+            {"free_temp_bytes", estimate.freeTempBytes},
+            {"file_bytes", estimate.fileBytes},
+            {"free_output_bytes", estimate.freeOutputBytes},
+            {"seconds", estimate.seconds}};
+}
+
+std::string summary(const BuildEstimate& estimate) {
+    const SoupMeasures& m = estimate.measures;
+    std::string text = fmt::format("{} triangles ({} without area), {} vertices, {}\n", formatCount(m.triangles), formatCount(m.degenerateTriangles), formatCount(m.vertices),
+                                   m.hasVertexColours ? "with colours" : m.hasMaterials ? "with materials" : "no colour");
+    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", m.boundsMin.x, m.boundsMin.y, m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
+    text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ", formatLength(estimate.frame.cell), estimate.frame.levels);
+    text += fmt::format("  memory      at most {}\n", formatBytes(estimate.memoryBytes));
+    text += estimate.tempBytes == 0 ? std::string("  temporary   nothing: it fits memory\n")
+                                    : fmt::format("  temporary   about {} of {} free\n", formatBytes(estimate.tempBytes), formatBytes(estimate.freeTempBytes));
+    text += fmt::format("  file        about {} of {} free\n", formatBytes(estimate.fileBytes), formatBytes(estimate.freeOutputBytes));
+    text += fmt::format("  time        about {}", formatSeconds(estimate.seconds));
+    return text;
+}
+
+/// What the build would need; nothing is written.
+Result<int> tell(const BuildOptions& options, bool asJson) {
+    const auto estimate = estimateBuild(options);
+    if (!estimate) return estimate.error();
+    if (asJson) VCP_TRY(printJson(toJson(*estimate)));
+    else VCP_TRY(printLine(summary(*estimate)));
+    return 0;
+}
+
+/// Options that do not go with the method.
+Result<void> checkMethod(const BuildCommand& command) {
+    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const BuildSettings& s = command.settings;
+    if (!command.isPaper() && command.paperOptionsGiven) return usage("the options --paper-... go with --method paper");
+    if (!command.isPaper()) return {};
+    if (!s.error.empty() || s.colour == "vertex" || s.colour == "texture") return usage("--method paper has neither a tolerance (--error) nor colour");
+    if (!s.memory.empty() || !s.temp.empty() || command.resume || command.dryRun)
+        return usage("--method paper builds in memory: without --memory, --temp, --resume and --dry-run");
+    return {};
+}
+
+Result<int> run(const BuildCommand& command) {
+    VCP_TRY(checkMethod(command));
+    BuildOptions options = command.settings.optionsFor(command.inputs);
+    if (command.output.empty() && !command.dryRun) return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
+    options.output = command.output.empty() ? "." : command.output;
+    options.resume = command.resume;
+    options.overwrite = command.overwrite;
+    options.checkpointSeconds = command.checkpointSeconds;
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    const InterruptScope catching;
+    options.progress = [&](const BuildProgress& at) {
+        display.update(at.stage, at.fraction, detailsOf(at));
+        return !interrupted();
+    };
+    if (command.dryRun) return tell(options, command.report.json);
+    const auto report = command.isPaper() ? buildPaperFile(options, command.paper) : buildOctree(options);
+    display.finish();
+    if (!report) return report.error();
+    if (command.report.json)
+        VCP_TRY(printJson(toJson(*report)));
+    else
+        VCP_TRY(printLine(summary(command.output, *report)));
+    return 0;
+}
+
+}  // namespace
+
+Command addBuild(CLI::App& vcp) {
+    auto command = std::make_shared<BuildCommand>();
+    CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
+    app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder stands for those in it, - for standard input")->type_name("")->required();
+    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
+    addOverwriteOption(*app, command->overwrite);
+    addBuildSettings(*app, command->settings);
+    app->add_option("--method", command->method, "certified, or paper: the octree of Demir and Westermann 2015, for comparison (in memory, no colour, nothing certified)")
+        ->type_name("certified|paper")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"certified", "paper"}));
+    addPaperStructureOptions(*app, command->paper);
+    addPaperSchemeOption(*app, command->paper.mergeScheme);
+    app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
+    app->add_option("--checkpoint", command->checkpointSeconds, "What is done is made durable at most so often")
+        ->type_name("SECONDS")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    app->add_flag("--dry-run", command->dryRun, "Say what is in the meshes and what the build would need; write nothing");
+    addProgressOption(*app, command->report);
+    addJsonOption(*app, command->report);
+    return {app, [command, app] {
+                for (const CLI::Option* option : app->get_options())
+                    command->paperOptionsGiven = command->paperOptionsGiven || (option->count() > 0 && option->get_name().starts_with("--paper-"));
+                return run(*command);
+            }};
+}
+
+}  // namespace vcp

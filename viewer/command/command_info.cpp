@@ -1,0 +1,135 @@
+// vcp info: what is in a .vcp, from its header and directory alone.
+#include <fmt/format.h>
+
+#include "octree/vcp_file.h"
+#include "viewer/command/commands.h"
+#include "viewer/command/interrupt.h"
+#include "viewer/command/source_arguments.h"
+#include "viewer/scene/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+struct InfoCommand {
+    std::string file;
+    SourceSettings source;
+    ReportOptions report;
+};
+
+/// Sums over the pages of a level.
+struct LevelSums {
+    uint64_t storedBytes = 0, pageBytes = 0, leaves = 0, hardLeaves = 0;
+};
+
+LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
+    LevelSums sums;
+    const LevelRow& row = dataset.header.level[level];
+    for (uint64_t i = row.firstEntry; i < row.firstEntry + row.pages; ++i) {
+        const PageEntry& page = dataset.pages[i];
+        sums.storedBytes += uint64_t(page.storedBytes) + page.colourStoredBytes;
+        sums.pageBytes += uint64_t(page.pageBytes) + page.colourBytes;
+        sums.leaves += page.leaves;
+        sums.hardLeaves += page.hardLeaves;
+    }
+    return sums;
+}
+
+const char* methodName(Method method) { return method == Method::Paper ? "paper" : "certified"; }
+
+Json toJson(const std::string& file, const Dataset& dataset) {
+    const FileHeader& h = dataset.header;
+    Json levels = Json::array();
+    for (uint32_t level = 0; level < h.levels; ++level) {
+        const LevelSums sums = sumsOf(dataset, level);
+        levels.push_back({{"level", level},
+                          {"cell", dataset.cellOf(level)},
+                          {"subvolumes", h.level[level].pages},
+                          {"stored_bytes", sums.storedBytes},
+                          {"page_bytes", sums.pageBytes},
+                          {"leaves", sums.leaves},
+                          {"hard_leaves", sums.hardLeaves},
+                          {"certified_error_max", h.level[level].certifiedError}});
+    }
+    return {{"file", file},
+            {"version", h.version},
+            {"method", methodName(h.method)},
+            {"file_bytes", h.fileBytes},
+            {"triangles", h.triangles},
+            {"degenerate_triangles", h.degenerateTriangles},
+            {"vertices", h.vertices},
+            {"colour", dataset.hasColour()},
+            {"bounds_min", Json::array({h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]})},
+            {"bounds_max", Json::array({h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]})},
+            {"origin", Json::array({h.origin[0], h.origin[1], h.origin[2]})},
+            {"cell", h.cell},
+            {"cells_per_edge", 1u << h.log2Cells},
+            {"levels", h.levels},
+            {"subvolumes", h.pages},
+            {"leaves", h.leaves},
+            {"hard_leaves", h.hardLeaves},
+            {"error_target", h.errorTarget},
+            {"certified_error_max", h.method == Method::Certified ? Json(h.certifiedErrorMax) : Json()},
+            {"level", levels}};
+}
+
+std::string paperLine(const PaperParameters& p) {
+    return fmt::format("  method      paper: band {:g} cells, {}, {}, {} vectors, {} empty nodes\n", p.band,
+                       p.mergeThreshold < 0 ? std::string("not merged") : fmt::format("merged below {:g} cells", p.mergeThreshold),
+                       p.growRounds < 0 ? std::string("exact points") : fmt::format("{} rounds of region growing", p.growRounds),
+                       p.packing == static_cast<uint32_t>(PaperPacking::Spherical) ? "spherical" : "octahedral", p.safeEmpty != 0 ? "safe" : "published");
+}
+
+std::string summary(const std::string& file, const Dataset& dataset) {
+    const FileHeader& h = dataset.header;
+    std::string text = fmt::format("{}: .vcp version {}, {}\n", file, h.version, formatBytes(h.fileBytes));
+    text += fmt::format("  mesh        {} triangles ({} without area), {} vertices, {}\n", formatCount(h.triangles),
+                        formatCount(h.degenerateTriangles), formatCount(h.vertices),
+                        dataset.hasColour() ? "with colour" : "no colour");
+    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", h.boundsMin[0], h.boundsMin[1],
+                        h.boundsMin[2], h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);
+    text += fmt::format("  origin      {:.9g} {:.9g} {:.9g}\n", h.origin[0], h.origin[1], h.origin[2]);
+    text += fmt::format("  cell        {}, subvolumes of {}^3 cells\n", formatLength(h.cell), 1u << h.log2Cells);
+    if (h.method == Method::Paper)
+        text += paperLine(h.paper) + "  error       nothing is certified\n";
+    else
+        text += fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
+                            h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
+    text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>15}\n", "level", "cell", "subvolumes",
+                        "stored", "in memory", "leaves", "hard", "certified error");
+    for (uint32_t level = 0; level < h.levels; ++level) {
+        const LevelSums sums = sumsOf(dataset, level);
+        text += fmt::format("  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>15}\n", level,
+                            formatLength(dataset.cellOf(level)), formatCount(h.level[level].pages),
+                            formatBytes(sums.storedBytes), formatBytes(sums.pageBytes), formatCount(sums.leaves),
+                            formatCount(sums.hardLeaves), formatLength(h.level[level].certifiedError));
+    }
+    text.pop_back();
+    return text;
+}
+
+Result<int> run(const InfoCommand& command) {
+    const InterruptScope catching;
+    const auto reader = openReader(command.file, command.source);
+    if (!reader) return reader.error();
+    const auto dataset = readDataset(**reader);
+    if (!dataset) return dataset.error();
+    if (command.report.json)
+        VCP_TRY(printJson(toJson((*reader)->name(), *dataset)));
+    else
+        VCP_TRY(printLine(summary((*reader)->name(), *dataset)));
+    return 0;
+}
+
+}  // namespace
+
+Command addInfo(CLI::App& vcp) {
+    auto command = std::make_shared<InfoCommand>();
+    CLI::App* app = vcp.add_subcommand("info", "Say what is in a .vcp file");
+    app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
+    addSourceSettings(*app, command->source);
+    addJsonOption(*app, command->report);
+    return {app, [command] { return run(*command); }};
+}
+
+}  // namespace vcp

@@ -1,0 +1,337 @@
+// vcp render: pictures without a window: one, one larger than the device draws at once, or a sequence.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "render/renderer.h"
+#include "viewer/bench/report/quantile.h"
+#include "viewer/camera/camera_path.h"
+#include "viewer/command/build_arguments.h"
+#include "viewer/command/commands.h"
+#include "viewer/command/interrupt.h"
+#include "viewer/command/render_arguments.h"
+#include "viewer/picture/image_files.h"
+#include "viewer/picture/picture_sequence.h"
+#include "viewer/scene/dataset_opening.h"
+#include "viewer/scene/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+// Pictures of more pixels are drawn in tiles: devices limit how many a buffer may hold.
+constexpr uint64_t kMostPixelsAtOnce = 8 << 20;
+constexpr uint32_t kTile = 2048;
+constexpr int kPathFrames = 120;
+constexpr std::chrono::milliseconds kWait(100);
+
+struct RenderCommand {
+    std::vector<std::string> inputs;
+    std::string output;
+    std::string size = "1920x1200";
+    std::string depth, normals;
+    bool overwrite = false;
+    int frames = 0;  // 0: not given
+    bool settle = true;
+    uint32_t tile = 0;  // 0: not given
+    bool transparent = false;
+    int turntable = 0;
+    std::string path;
+    BuildSettings build;
+    RenderSettings render;
+    ReportOptions report;
+
+    /// With --json somebody wants figures, and the first frame, which compiles, would not be one.
+    [[nodiscard]] int framesToTime() const { return frames > 0 ? frames : report.json ? 5 : 0; }
+    [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty(); }
+    [[nodiscard]] bool isTiled(const FrameRequest& request) const {
+        return tile > 0 || isSequence() || uint64_t{request.width} * request.height > kMostPixelsAtOnce;
+    }
+};
+
+/// What the frames cost and showed.
+struct Drawing {
+    UpdateResult update;
+    FrameStats stats;         ///< of the last frame
+    double firstFrameMs = 0;  ///< with what is compiled on first use
+    std::vector<double> frameMs;
+
+    /// Of the timed frames; of the first when none was timed.
+    [[nodiscard]] double medianMs() const {
+        return frameMs.empty() ? firstFrameMs : quantile(frameMs, 0.5);
+    }
+    [[nodiscard]] double raysPerSecond() const { return static_cast<double>(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
+};
+
+/// Without --settle: what is there as soon as the coarsest page is.
+Result<UpdateResult> updateUntilDrawable(Renderer& renderer, const FrameRequest& request) {
+    for (;;) {
+        auto update = renderer.update(request);
+        if (!update || update->drawable || !update->problems.empty() || update->settled) return update;
+        if (interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+}
+
+Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const RenderCommand& command) {
+    auto update = command.settle ? renderer.settle(request, interrupted) : updateUntilDrawable(renderer, request);
+    if (!update) return update.error();
+    if (!update->problems.empty()) return update->problems.front();
+    Drawing drawing;
+    drawing.update = *std::move(update);
+    for (int i = 0; i <= command.framesToTime(); ++i) {
+        if (interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        auto stats = renderer.render(request);
+        if (!stats) return stats.error();
+        drawing.stats = *stats;
+        if (i == 0) drawing.firstFrameMs = stats->msFrame;
+        else drawing.frameMs.push_back(stats->msFrame);
+    }
+    return drawing;
+}
+
+Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command, const OutputRules& rules) {
+    if (!command.depth.empty()) {
+        const auto depth = renderer.readDepth();
+        if (!depth) return depth.error();
+        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth, rules));
+    }
+    if (!command.normals.empty()) {
+        const auto normals = renderer.readNormals();
+        if (!normals) return normals.error();
+        VCP_TRY(writeNormals(*normals, request.width, request.height, command.normals, rules));
+    }
+    const auto picture = renderer.readPicture();
+    if (!picture) return picture.error();
+    return writePng(*picture, command.output, rules);
+}
+
+Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
+    const FrameStats& stats = drawing.stats;
+    return {{"width", request.width},
+            {"height", request.height},
+            {"frames", std::max<size_t>(drawing.frameMs.size(), 1)},
+            {"ms_per_frame", drawing.medianMs()},
+            {"first_frame_ms", drawing.firstFrameMs},
+            {"ms_beam", stats.msBeam},
+            {"ms_trace", stats.msTrace},
+            {"ms_light", stats.msLight},
+            {"ms_shade", stats.msShade},
+            {"ms_surfaces", stats.msSurfaces},
+            {"rays_per_second", drawing.raysPerSecond()},
+            {"rays", stats.rays},
+            {"traced_rays", stats.tracedRays},
+            {"hit_pixels", stats.hitPixels},
+            {"unresolved_rays", stats.unresolvedRays},
+            {"far_hits", stats.farHits},
+            {"surface_bytes", stats.surfaceBytes},
+            {"device", device.name},
+            {"software", device.software},
+            {"settled", drawing.update.settled},
+            {"error_pixels", drawing.update.errorPixels},
+            {"subvolumes_in_cut", stats.pagesInCut},
+            {"resident_bytes", drawing.update.residentBytes},
+            {"bytes_read", drawing.update.bytesRead},
+            {"pipelines", stats.pipelines},
+            {"camera", Json::parse(cameraToJson(camera))}};
+}
+
+std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device) {
+    const UpdateResult& update = drawing.update;
+    const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels) : "no certified error";
+    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s) on {}{}\n  {} subvolumes, {} resident, {}, {}",
+                       command.output, command.size, drawing.frameMs.empty() ? "first frame" : "a frame",
+                       drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), device.name,
+                       device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
+                       error, update.settled ? "settled" : "not settled");
+}
+
+/// The cameras of a sequence, or the one camera.
+Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
+    std::vector<OrbitCamera> cameras{camera};
+    if (command.turntable > 0) {
+        cameras = turntable(camera, bounds.centre(), command.turntable);
+    } else if (!command.path.empty()) {
+        const auto keys = readCameras(command.path);
+        if (!keys) return keys.error();
+        cameras = cameraPath(*keys, command.frames > 0 ? command.frames : kPathFrames);
+    }
+    std::vector<Camera> current;
+    for (const OrbitCamera& each : cameras) current.push_back(each.current());
+    return current;
+}
+
+Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& device, const FrameRequest& request) {
+    return {{"width", request.width},
+            {"height", request.height},
+            {"pictures", pictures},
+            {"tiles", total.tiles},
+            {"ms_per_frame", total.ms / static_cast<double>(pictures)},
+            {"rays_per_second", static_cast<double>(total.rays) / std::max(1e-3 * total.ms, 1e-9)},
+            {"rays", total.rays},
+            {"hit_pixels", total.hitPixels},
+            {"device", device.name},
+            {"software", device.software},
+            {"settled", total.update.settled},
+            {"error_pixels", total.errorPixels},
+            {"resident_bytes", total.update.residentBytes},
+            {"bytes_read", total.update.bytesRead}};
+}
+
+/// Pictures in tiles and sequences, with progress; what is finished when it is cancelled stays.
+Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras, const RenderCommand& command, const OutputRules& rules) {
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    PictureSequence sequence(renderer, {.request = request,
+                                        .cameras = cameras,
+                                        .files = {command.output, command.depth, command.normals},
+                                        .isNumbered = command.isSequence(),
+                                        .tile = command.tile > 0 ? command.tile : kTile,
+                                        .rules = rules,
+                                        .problem = {}});
+    for (bool isDone = false; !isDone;) {
+        const auto step = sequence.step();
+        if (!step) return step.error();
+        isDone = *step;
+        display.update("drawing", sequence.fraction());
+        if (!isDone && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        if (sequence.isWaiting()) renderer.waitForPage(kWait);
+    }
+    display.finish();
+    const TiledPictureStats& total = sequence.stats();
+    if (command.report.json) return printJson(toJson(total, cameras.size(), renderer.device(), request));
+    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(), numbered(command.output, cameras.size()).string()) : command.output;
+    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles, formatSeconds(1e-3 * total.ms)));
+}
+
+/// Options of the output that do not go together.
+Result<void> checkOptions(const RenderCommand& command) {
+    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    if (command.output == kStandardOutput && command.isSequence()) return usage("several pictures cannot go to standard output; give a file name");
+    if (command.output == kStandardOutput && command.report.json) return usage("--json and -o - both want standard output");
+    const std::filesystem::path output = command.output, depth = command.depth, normals = command.normals;
+    if (depth == output || normals == output || (!command.depth.empty() && depth == normals)) return usage("picture, --depth and --normals must be different files");
+    return {};
+}
+
+/// What the files may replace: nothing that is read, and not each other.
+OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
+    OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
+    for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
+    for (const std::string& name : {command.path, command.render.camera, command.render.source.caFile})
+        if (!name.empty()) rules.inputs.emplace_back(name);
+    return rules;
+}
+
+/// Finds what would be refused before anything is built or drawn.
+Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules, size_t pictures) {
+    for (const std::string& name : {command.output, command.depth, command.normals})
+        for (size_t i = 1; !name.empty() && i <= pictures; ++i) VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name), *outputKindOf(name == kStandardOutput ? "-.png" : name), rules));
+    return {};
+}
+
+Result<int> run(const RenderCommand& command) {
+    VCP_TRY(checkOptions(command));
+    VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
+    const glm::ivec2 size = parseSize(command.size).value();
+    const auto open = openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle());
+    if (!open) return open.error();
+    if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
+    const SceneFile& scene = open->file;
+    for (const std::string& warning : open->surfaces.warnings) warnOnTerminal(warning);
+    const Box bounds = open->bounds();
+    const auto camera = command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size);
+    if (!camera) return camera.error();
+    const auto cameras = camerasOf(command, *camera, bounds);
+    if (!cameras) return cameras.error();
+    const OutputRules rules = rulesOf(command, open->filesRead);
+    VCP_TRY(checkOutputs(command, rules, cameras->size()));
+    auto renderer = Renderer::create(command.render.rendererOptions());
+    if (!renderer) return renderer.error();
+    VCP_TRY((*renderer)->open(open->placed(), open->surfaces.surfaces));
+
+    FrameRequest request;
+    request.camera = camera->current();
+    request.width = static_cast<uint32_t>(size.x);
+    request.height = static_cast<uint32_t>(size.y);
+    request.errorPixels = command.render.errorPixels;
+    request.shading = command.render.shadingChosen();
+    request.shading.transparent = command.transparent;
+    request.sections = command.render.sectionPlanes(bounds);
+    request.sectionCaps = command.render.caps;
+    if (request.sections.empty()) {
+        request.sections = scene.sections;
+        request.sectionCaps = command.render.caps || scene.sectionCaps;
+    }
+    if (scene.light) {
+        request.shading.lightFollowsCamera = scene.light->followsCamera;
+        request.shading.lightDirection = scene.light->direction;
+    }
+    request.march = command.render.march;
+    const InterruptScope catching;
+    if (command.isTiled(request)) {
+        VCP_TRY(makeTiled(**renderer, request, *cameras, command, rules));
+        return 0;
+    }
+    const auto drawing = draw(**renderer, request, command);
+    if (!drawing) return drawing.error();
+    VCP_TRY(writeFiles(**renderer, request, command, rules));
+    if (drawing->stats.unresolvedRays > 0)
+        warnOnTerminal(fmt::format("{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them", drawing->stats.unresolvedRays));
+    if (command.report.json)
+        VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
+    else
+        VCP_TRY(printLineAbout(command.output, summary(command, *drawing, (*renderer)->device())));
+    return 0;
+}
+
+std::string checkSize(const std::string& text) {
+    return parseSize(text) ? std::string() : "must be like 1920x1200, at most 16384 each way, not \"" + text + "\"";
+}
+
+std::string checkPlane(const std::string& text) {
+    return isImagePlanePath(text) ? std::string() : "must end in .pfm or .png, not \"" + text + "\"";
+}
+
+}  // namespace
+
+Command addRender(CLI::App& vcp) {
+    auto command = std::make_shared<RenderCommand>();
+    CLI::App* app = vcp.add_subcommand("render", "Render .vcp files, a scene or meshes into a picture, without a window");
+    app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
+        ->type_name("")
+        ->required();
+    app->add_option("-o,--output", command->output, "The PNG file to write; - for standard output")->type_name("OUT.png")->required()->check([](const std::string& name) { return extensionProblem(name, ".png", true); });
+    addOverwriteOption(*app, command->overwrite);
+    app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check(checkSize);
+    addRenderSettings(*app, command->render);
+    app->add_flag("--transparent", command->transparent, "No background: alpha 0 where nothing is hit");
+    CLI::Option* turntable = app->add_option("--turntable", command->turntable, "So many pictures once around the up axis: OUT-0001.png and so on")
+                                 ->type_name("N")
+                                 ->check(CLI::Range(1, 9999));
+    app->add_option("--path", command->path, "Pictures along a smooth path through the cameras of a JSON array, --frames of them [120]: OUT-0001.png and so on")
+        ->type_name("FILE")
+        ->excludes(turntable);
+    app->add_option("--tile", command->tile, fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
+        ->type_name("PIXELS")
+        ->check(CLI::Range(16, 8192));
+    app->add_option("--depth", command->depth, "Write also the distance along each ray: .pfm (float, world units) or .png "
+                                               "(16-bit, 0 no hit, 1 nearest to 65535 farthest)")
+        ->type_name("FILE")
+        ->check(checkPlane);
+    app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
+        ->type_name("FILE")
+        ->check(checkPlane);
+    app->add_option("--frames", command->frames, "Draw so many frames after the first and report their median time [0; 5 with --json]")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1'000'000));
+    app->add_flag("--settle,!--no-settle", command->settle, "Wait until all that the view wants is loaded [on]");
+    addBuildSettings(*app, command->build);
+    addProgressOption(*app, command->report);
+    addJsonOption(*app, command->report);
+    return {app, [command] { return run(*command); }};
+}
+
+}  // namespace vcp

@@ -1,0 +1,180 @@
+// vcp verify: is every byte of a .vcp intact; with --against, how far are its surface and the mesh apart.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "builder/measure/surface_distance.h"
+#include "octree/vcp_file.h"
+#include "streaming/http_reader.h"
+#include "streaming/read_ahead.h"
+#include "viewer/command/commands.h"
+#include "viewer/command/interrupt.h"
+#include "viewer/command/source_arguments.h"
+#include "viewer/scene/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+struct VerifyCommand {
+    std::string file;
+    std::vector<std::string> against;
+    uint64_t samples = 200'000;
+    uint32_t level = UINT32_MAX;
+    unsigned threads = 0;
+    SourceSettings source;
+    ReportOptions report;
+};
+
+struct ByteProgress {
+    ProgressDisplay* display;
+    uint64_t size;
+};
+
+bool showBytes(void* user, uint64_t done) {
+    const auto* progress = static_cast<const ByteProgress*>(user);
+    progress->display->update("checking", static_cast<double>(done) / static_cast<double>(std::max<uint64_t>(progress->size, 1)));
+    return !interrupted();
+}
+
+/// Header, directory and every byte of the file.
+Result<Dataset> checkBytes(const ByteReader& reader, ProgressStyle style) {
+    auto dataset = readDataset(reader);
+    if (!dataset) return dataset;
+    ProgressDisplay display(style, stderr);
+    ByteProgress progress{&display, reader.size()};
+    VCP_TRY(verifyFile(reader, showBytes, &progress));
+    return dataset;
+}
+
+Result<SurfaceDistance> measure(const VerifyCommand& command) {
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    display.update("reading the mesh", 0);
+    const std::vector<std::filesystem::path> meshes(command.against.begin(), command.against.end());
+    const auto mesh = loadMesh(meshes);
+    if (!mesh) return mesh.error();
+    display.update("sorting the mesh", 0.1);
+    const MeshBvh bvh(*mesh);
+    display.update("reading the level", 0.2);
+    auto cache = PageCache::open(command.file);
+    if (!cache) return cache.error();
+    const uint32_t levels = cache->dataset().header.levels;
+    if (command.level != UINT32_MAX && command.level >= levels)
+        return Error{ErrorCode::Usage, fmt::format("has no level {}, only 0 to {}", command.level, levels - 1), command.file};
+    VCP_TRY(cache->loadLevel(std::min(command.level, levels - 1)));
+
+    SurfaceDistanceOptions options;
+    options.samples = command.samples;
+    options.level = command.level;
+    options.threads = command.threads;
+    options.progress = [&](double fraction) {
+        display.update("measuring", 0.3 + 0.7 * fraction);
+        return !interrupted();
+    };
+    return measureSurfaceDistance(*cache, bvh, options);
+}
+
+/// Measured distances are kept in single precision; no more than that is forgiven.
+bool isWithin(const SurfaceDistance& distance) {
+    const double bound = distance.certifiedErrorMax * (1 + 1e-6);
+    return distance.meshToSurface.max <= bound && distance.surfaceToMesh.max <= bound;
+}
+
+Json toJson(const Quantiles& q) { return {{"p50", q.p50}, {"p95", q.p95}, {"p99", q.p99}, {"max", q.max}}; }
+
+Quantiles inCells(const Quantiles& q, double cell) { return {q.p50 / cell, q.p95 / cell, q.p99 / cell, q.max / cell}; }
+
+void addDistances(Json& json, const SurfaceDistance& distance) {
+    json["mesh_to_surface"] = toJson(distance.meshToSurface);
+    json["surface_to_mesh"] = toJson(distance.surfaceToMesh);
+    json["mesh_to_surface_cells"] = toJson(inCells(distance.meshToSurface, distance.cell));
+    json["surface_to_mesh_cells"] = toJson(inCells(distance.surfaceToMesh, distance.cell));
+    json["cell"] = distance.cell;
+    json["certified_error_max"] = distance.certifiedErrorMax;
+    json["samples"] = distance.samples;
+}
+
+std::string row(const char* name, const Quantiles& world, double cell) {
+    const Quantiles cells = inCells(world, cell);
+    return fmt::format("  {:<16} {:>11} {:>11} {:>11} {:>11}\n  {:<16} {:>11.5f} {:>11.5f} {:>11.5f} {:>11.5f}\n", name,
+                       formatLength(world.p50), formatLength(world.p95), formatLength(world.p99), formatLength(world.max),
+                       "  in cells", cells.p50, cells.p95, cells.p99, cells.max);
+}
+
+std::string distanceTable(const SurfaceDistance& distance) {
+    std::string text = fmt::format("\n  {:<16} {:>11} {:>11} {:>11} {:>11}   ({} samples)\n", "distance", "p50", "p95",
+                                   "p99", "max", formatCount(distance.samples));
+    text += row("mesh to surface", distance.meshToSurface, distance.cell);
+    text += row("surface to mesh", distance.surfaceToMesh, distance.cell);
+    text += fmt::format("  {:<16} {:>47}\n  {:<16} {:>47.5f}", "certified", formatLength(distance.certifiedErrorMax),
+                        "  in cells", distance.certifiedErrorMax / distance.cell);
+    return text;
+}
+
+Error exceeds(const VerifyCommand& command, const SurfaceDistance& distance) {
+    return {ErrorCode::InvalidInput,
+            fmt::format("the surface and the mesh are {} apart, more than the certified {}; is it the mesh the file was built from?",
+                        formatLength(std::max(distance.meshToSurface.max, distance.surfaceToMesh.max)),
+                        formatLength(distance.certifiedErrorMax)),
+            command.file};
+}
+
+/// With --json a program learns from `ok` that the file is broken, and a person from stderr.
+Result<int> broken(const VerifyCommand& command, const Error& error) {
+    if (command.report.json && error.code != ErrorCode::Cancelled)
+        VCP_TRY(printJson({{"ok", false}, {"error", error.line()}}));
+    return error;
+}
+
+Result<int> run(const VerifyCommand& command) {
+    if (isHttpUrl(command.file) && !command.against.empty())
+        return Error{ErrorCode::Usage, "--against needs a local file"};
+    const InterruptScope catching;
+    const auto reader = openReader(command.file, command.source);
+    if (!reader) return reader.error();
+    const ReadAhead ahead(*reader);
+    const auto dataset = checkBytes(ahead, command.report.progressStyle());
+    if (!dataset) return broken(command, dataset.error());
+
+    Json json = {{"ok", true}, {"pages", dataset->header.pages}, {"bytes", dataset->header.fileBytes}};
+    std::string text = fmt::format("{}: intact, {} subvolumes, {}", ahead.name(), formatCount(dataset->header.pages),
+                                   formatBytes(dataset->header.fileBytes));
+    bool within = true;
+    std::optional<SurfaceDistance> distance;
+    if (!command.against.empty()) {
+        auto measured = measure(command);
+        if (!measured) return measured.error();
+        distance = *measured;
+        within = isWithin(*distance);
+        json["ok"] = within;
+        addDistances(json, *distance);
+        text += distanceTable(*distance);
+    }
+    if (command.report.json)
+        VCP_TRY(printJson(json));
+    else
+        VCP_TRY(printLine(text));
+    if (!within) return exceeds(command, *distance);
+    return 0;
+}
+
+}  // namespace
+
+Command addVerify(CLI::App& vcp) {
+    auto command = std::make_shared<VerifyCommand>();
+    CLI::App* app = vcp.add_subcommand("verify", "Check every byte of a .vcp file, and its surface against the mesh");
+    app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
+    addSourceSettings(*app, command->source);
+    app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
+        ->type_name("MESH");
+    app->add_option("--samples", command->samples, "Samples, each way")->type_name("N")->capture_default_str()->check(
+        CLI::Range(1, 1'000'000'000));
+    app->add_option("--level", command->level, "Level to measure, 0 the coarsest [the finest]")->type_name("N");
+    app->add_option("--threads", command->threads, "Threads that measure [one a processor]")->type_name("N")->check(
+        CLI::Range(1, 1024));
+    addProgressOption(*app, command->report);
+    addJsonOption(*app, command->report);
+    return {app, [command] { return run(*command); }};
+}
+
+}  // namespace vcp

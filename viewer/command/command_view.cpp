@@ -1,0 +1,125 @@
+// vcp view: the window.
+#include <cstdio>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "streaming/http_reader.h"
+#include "viewer/command/build_arguments.h"
+#include "viewer/command/commands.h"
+#include "viewer/command/interrupt.h"
+#include "viewer/command/render_arguments.h"
+#include "viewer/key_map.h"
+#include "viewer/scene/mesh_cache.h"
+#include "viewer/scene/option_values.h"
+#include "viewer/window/window.h"
+
+namespace vcp {
+
+namespace {
+
+struct ViewCommand {
+    std::vector<std::string> inputs;
+    std::string size;
+    BuildSettings build;
+    RenderSettings render;
+    ReportOptions report;
+};
+
+Json secondsOrNull(const std::optional<double>& seconds) { return seconds ? Json(*seconds) : Json(nullptr); }
+
+Json toJson(const WindowReport& report) {
+    const ViewerStatus& status = report.status;
+    return {{"window_seconds", secondsOrNull(report.windowSeconds)},
+            {"first_picture_seconds", secondsOrNull(report.firstPictureSeconds)},
+            {"settled_seconds", secondsOrNull(report.settledSeconds)},
+            {"frames", report.framesDrawn},
+            {"ms_per_frame", status.frame.msFrame},
+            {"device", status.device},
+            {"software", status.software},
+            {"settled", status.update.settled},
+            {"error_pixels", status.update.errorPixels},
+            {"resident_bytes", status.update.residentBytes},
+            {"bytes_read", status.update.bytesRead},
+            {"hit_pixels", status.frame.hitPixels},
+            {"problem", report.problem}};
+}
+
+/// What can be said before a window is opened: a mesh that is not there, a .vcp that is none.
+Result<void> checkInputs(const ViewCommand& command) {
+    std::vector<std::string> inputs = command.inputs;
+    const auto kind = kindOf(inputs);
+    if (!kind) return kind.error();
+    if (*kind == InputKind::Scene) {
+        const auto scene = readScene(inputs.front());
+        if (!scene) return scene.error();
+        inputs.clear();
+        for (const SceneDataset& each : scene->datasets) inputs.push_back(each.file);
+    }
+    for (const std::string& input : inputs) {
+        if (isHttpUrl(input)) continue;
+        if (looksLikeDataset(input)) {
+            const auto open = openDataset(input, command.render.source);
+            if (!open) return open.error();
+            if (inputs.size() == 1) VCP_TRY(command.render.checkFor(*open->dataset));
+        } else if (std::error_code failed; !std::filesystem::exists(input, failed)) {
+            return Error{ErrorCode::Io, "cannot be opened: there is no such file", input};
+        }
+    }
+    return {};
+}
+
+void warn(const std::string& line) { fmt::print(stderr, "warning: {}\n", line); }
+
+Result<int> run(ViewCommand command, const CLI::App& app) {
+    VCP_TRY(checkInputs(command));
+    const auto settingsPath = userSettingsPath();
+    WindowOptions options;
+    // Settings that cannot be read are those of the first time.
+    if (settingsPath) {
+        const auto user = readUserSettings(*settingsPath);
+        if (user) options.session.user = *user;
+        else warn(user.error().line());
+    }
+    applyRemembered(command.render, options.session.user, [&](const char* option) { return app.count(option) > 0; });
+    options.session.inputs = command.inputs;
+    options.session.build = command.build;
+    options.session.render = command.render;
+    options.session.makeProgress = [style = command.report.progressStyle()] { return shownProgress(style); };
+    options.catchInterrupts = [] { return std::make_shared<InterruptScope>(); };
+    options.interrupted = interrupted;
+    if (!command.size.empty()) options.size = parseSize(command.size).value();
+    const auto report = showWindow(options);
+    if (!report) return report.error();
+    if (settingsPath) {
+        // What was seen was seen: it is no failure that it cannot be remembered.
+        const auto saved = saveChanges(report->changes, *settingsPath);
+        if (!saved || !saved->empty()) warn(saved ? *saved : saved.error().line());
+    }
+    if (command.report.json) VCP_TRY(printJson(toJson(*report)));
+    if (!report->firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+    if (!report->firstPictureSeconds && !report->problem.empty()) return Error{ErrorCode::InvalidInput, report->problem};
+    return 0;
+}
+
+}  // namespace
+
+Command addView(CLI::App& vcp) {
+    auto command = std::make_shared<ViewCommand>();
+    CLI::App* app = vcp.add_subcommand("view", "Open a window, on .vcp files, a scene or meshes");
+    app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
+        ->type_name("");
+    app->add_option("--size", command->size, "Width and height of the window [1280x800, then as it was left]")
+        ->type_name("WxH")
+        ->check([](const std::string& text) {
+            return parseSize(text) ? std::string() : "must be like 1280x800, not \"" + text + "\"";
+        });
+    addRenderSettings(*app, command->render);
+    addBuildSettings(*app, command->build);
+    addProgressOption(*app, command->report);
+    addJsonOption(*app, command->report);
+    app->footer("Files may also be dropped into the window. Looks, limits, bookmarks and recent files are remembered as they are changed in the window; options hold for one run.\n\n" + keyMapText());
+    return {app, [command, app] { return run(*command, *app); }};
+}
+
+}  // namespace vcp

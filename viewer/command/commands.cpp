@@ -1,0 +1,61 @@
+#include "viewer/command/commands.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "octree/output_file.h"
+#include "viewer/command/terminal_text.h"
+
+namespace vcp {
+
+namespace {
+
+Result<void> print(const std::string& text) {
+    if (std::fprintf(stdout, "%s\n", text.c_str()) < 0 || std::fflush(stdout) != 0)
+        return Error{ErrorCode::Io, std::string("cannot be written: ") + std::strerror(errno), "standard output"};
+    return {};
+}
+
+}  // namespace
+
+void addJsonOption(CLI::App& app, ReportOptions& options) {
+    app.add_flag("--json", options.json, "Print one JSON object on stdout at the end");
+}
+
+void addProgressOption(CLI::App& app, ReportOptions& options) {
+    app.add_option("--progress", options.progress, "Progress on stderr: bar, plain, json or none [a bar on a terminal]")
+        ->type_name("STYLE")
+        ->check([](const std::string& name) {
+            return progressStyleNamed(name) ? std::string() : "must be bar, plain, json or none, not \"" + name + "\"";
+        });
+}
+
+void addOverwriteOption(CLI::App& app, bool& overwrite) {
+    app.add_flag("--overwrite", overwrite, "Replace also an output that is of another kind or write-protected; never an input");
+}
+
+std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe) {
+    const auto wanted = outputKindOf("x" + extension);
+    if (outputKindOf(name) == wanted || (mayBePipe && name == kStandardOutput)) return {};
+    return "must end in " + extension + (mayBePipe ? ", or be - for standard output" : "") + ", not \"" + name + "\"";
+}
+
+Result<void> printLineAbout(const std::string& output, const std::string& text) {
+    if (output != kStandardOutput) return printLine(text);
+    std::fprintf(stderr, "%s\n", terminalLines(text).c_str());
+    return {};
+}
+
+Result<void> printLine(const std::string& text) { return print(terminalLines(text)); }
+
+Result<void> printJsonText(const std::string& json) { return print(terminalJson(json)); }
+
+void warnOnTerminal(const std::string& warning) { std::fprintf(stderr, "warning: %s\n", terminalText(warning).c_str()); }
+
+Result<void> printJson(const Json& json) {
+    // File names need not be UTF-8; JSON must.
+    return printJsonText(json.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+}  // namespace vcp

@@ -1,0 +1,117 @@
+// vcp: the command line. Exit status 0: done; 1: failed, with one line on stderr; 2: wrong usage.
+#include <algorithm>
+#include <cstdio>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "streaming/web_address.h"
+#include "viewer/command/commands.h"
+#include "viewer/command/terminal_text.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+/// One line on stderr, whatever the message contains; what was typed wrongly may be an address with a password.
+void complain(const std::string& what) {
+    std::string message = shownAddress(what);
+    std::replace(message.begin(), message.end(), '\n', ' ');
+    std::fprintf(stderr, "vcp: %s\n", terminalText(message).c_str());
+}
+
+/// `vcp help`, `vcp help CMD`, `vcp help bench rays`.
+Command addHelp(CLI::App& vcp) {
+    auto words = std::make_shared<std::vector<std::string>>();
+    CLI::App* app = vcp.add_subcommand("help", "Say how a command is used");
+    app->add_option("CMD", *words, "The command")->type_name("");
+    const auto run = [words, &vcp]() -> Result<int> {
+        const CLI::App* about = &vcp;
+        std::string path = vcp.get_name();
+        for (const std::string& word : *words) {
+            const auto found = about->get_subcommands([&](const CLI::App* sub) { return sub->check_name(word); });
+            if (found.empty()) return Error{ErrorCode::Usage, "there is no command \"" + word + "\""};
+            about = found.front();
+            path += " " + word;
+        }
+        VCP_TRY(printLine(about->get_formatter()->make_help(about, path, CLI::AppFormatMode::Normal)));
+        return 0;
+    };
+    return {app, run};
+}
+
+std::string commandPath(const CLI::App& vcp) {
+    std::string path;
+    const CLI::App* at = &vcp;
+    while (!at->get_subcommands().empty()) {
+        at = at->get_subcommands().front();
+        path += (path.empty() ? "" : " ") + at->get_name();
+    }
+    return path;
+}
+
+/// The files that a command was given, shortened; empty without any.
+std::string inputsOf(const CLI::App& vcp) {
+    const CLI::App* at = &vcp;
+    while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+    std::vector<std::string> inputs;
+    for (const CLI::Option* option : at->get_options())
+        if (option->get_positional()) inputs.insert(inputs.end(), option->results().begin(), option->results().end());
+    if (inputs.empty()) return {};
+    return inputs.size() == 1 ? inputs.front() : inputs.front() + " and " + std::to_string(inputs.size() - 1) + " more";
+}
+
+int complainOfUsage(const CLI::App& vcp, const std::string& message) {
+    const std::string path = commandPath(vcp);
+    complain((path.empty() ? "" : path + ": ") + message + "; see `vcp help" + (path.empty() ? "`" : " " + path + "`"));
+    return kWrongUsage;
+}
+
+int runParsed(const CLI::App& vcp, const std::vector<Command>& commands) {
+    const auto parsed = std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
+    const Result<int> status = [&]() -> Result<int> {
+        try {
+            return parsed->run();
+        } catch (const std::bad_alloc&) {
+            return Error{ErrorCode::Limit, "needs more memory than there is; close other programs, or give less at once", inputsOf(vcp)};
+        }
+    }();
+    if (status) return *status;
+    if (status.error().code == ErrorCode::Usage) return complainOfUsage(vcp, status.error().line());
+    complain(status.error().line());
+    return kFailed;
+}
+
+int runCommandLine(int argc, char** argv) {
+    CLI::App vcp("Views massive scans: builds meshes into octrees of vectors to the closest point, and ray-casts them.",
+                 "vcp");
+    vcp.require_subcommand(0, 1);
+    vcp.set_version_flag("--version", "vcp " VCP_VERSION);
+    vcp.get_formatter()->column_width(28);
+    vcp.footer("`vcp help CMD` says how a command is used.");
+    const std::vector<Command> commands = {addBuild(vcp),  addInfo(vcp),    addVerify(vcp), addRender(vcp),
+                                           addView(vcp),   addStress(vcp),  addBench(vcp),  addMeso(vcp),
+                                           addDevices(vcp), addHelp(vcp)};
+    try {
+        vcp.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        return printLine(vcp.help()) ? 0 : kFailed;
+    } catch (const CLI::CallForVersion& version) {
+        return printLine(version.what()) ? 0 : kFailed;
+    } catch (const CLI::ParseError& wrong) {
+        return complainOfUsage(vcp, wrong.what());
+    }
+    if (vcp.get_subcommands().empty()) return complainOfUsage(vcp, "a command is needed");
+    return runParsed(vcp, commands);
+}
+
+}  // namespace
+
+}  // namespace vcp
+
+int main(int argc, char** argv) {
+    return vcp::runCommandLine(argc, argv);
+}

@@ -1,0 +1,104 @@
+#include "viewer/command/progress_display.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "viewer/command/terminal_text.h"
+#include "viewer/scene/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+int terminalColumns(std::FILE* out) {
+    winsize size{};
+    if (ioctl(fileno(out), TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+    return size.ws_col;
+}
+
+// What stands still is said again after so long, with its new counts.
+constexpr double kJsonSeconds = 2, kPlainSeconds = 30, kBarSeconds = 0.5;
+
+}  // namespace
+
+std::optional<ProgressStyle> progressStyleNamed(std::string_view name) {
+    if (name == "bar") return ProgressStyle::Bar;
+    if (name == "plain") return ProgressStyle::Plain;
+    if (name == "json") return ProgressStyle::Json;
+    if (name == "none") return ProgressStyle::None;
+    return std::nullopt;
+}
+
+ProgressStyle defaultProgressStyle() { return isatty(STDERR_FILENO) ? ProgressStyle::Bar : ProgressStyle::None; }
+
+void ProgressDisplay::update(std::string_view stage, double fraction, const ProgressDetails& details) {
+    if (style_ == ProgressStyle::None) return;
+    fraction = std::clamp(fraction, 0.0, 1.0);
+    const double elapsed = seconds();
+    // A moment's work says little about the rest.
+    const bool isKnown = elapsed > 1 && fraction > 0.01;
+    const double left = isKnown ? elapsed * (1 - fraction) / fraction : 0;
+    std::string facts;
+    if (details.triangles > 0) facts += fmt::format(", {} triangles", formatCount(details.triangles));
+    if (details.tempBytes > 0) facts += fmt::format(", {} temporary", formatBytes(details.tempBytes));
+    if (isKnown) facts += fmt::format(", {} left", formatSeconds(left));
+    if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction, facts);
+
+    const int steps = style_ == ProgressStyle::Json ? 100 : 10;
+    const int step = static_cast<int>(std::floor(fraction * steps));
+    const bool isDue = elapsed - lastSeconds_ >= (style_ == ProgressStyle::Json ? kJsonSeconds : kPlainSeconds);
+    if (stage == lastStage_ && step == lastStep_ && !isDue) return;
+    lastSeconds_ = elapsed;
+    lastStage_ = stage;
+    lastStep_ = step;
+    std::string line;
+    if (style_ == ProgressStyle::Json) {
+        nlohmann::ordered_json json = {{"stage", stage}, {"fraction", fraction}, {"seconds", elapsed}};
+        if (isKnown) json["seconds_left"] = left;
+        if (details.triangles > 0) {
+            json["triangles"] = details.triangles;
+            json["triangles_per_second"] = fraction * static_cast<double>(details.triangles) / std::max(elapsed, 1e-9);
+            json["temp_bytes"] = details.tempBytes;
+        }
+        line = terminalJson(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    } else {
+        line = fmt::format("{:3.0f} % {} ({}{})", 100 * fraction, terminalText(stage), formatSeconds(elapsed), facts);
+    }
+    std::fprintf(out_, "%s\n", line.c_str());
+    std::fflush(out_);
+}
+
+void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std::string& facts) {
+    const int perMille = static_cast<int>(1000 * fraction);
+    const bool isDue = seconds() - lastSeconds_ >= kBarSeconds;
+    if (stage == lastStage_ && perMille == lastPerMille_ && !isDue) return;
+    lastSeconds_ = seconds();
+    lastStage_ = stage;
+    lastPerMille_ = perMille;
+    const int columns = std::max(20, terminalColumns(out_) - 1);
+    const std::string head = fmt::format("{:3.0f} % ", 100 * fraction);
+    const std::string tail = fmt::format(" {}{}", terminalText(stage), facts);
+    const int room = std::clamp(columns - static_cast<int>(head.size() + tail.size()) - 2, 0, 40);
+    const int filled = static_cast<int>(std::lround(fraction * room));
+    const std::string bar = head + "[" + std::string(static_cast<size_t>(filled), '=') +
+                            std::string(static_cast<size_t>(room - filled), ' ') + "]" + tail;
+    lastBar_ = bar.substr(0, static_cast<size_t>(columns));
+    // A character of several bytes is cut off whole.
+    while (lastBar_.size() < bar.size() && (static_cast<uint8_t>(bar[lastBar_.size()]) & 0xc0) == 0x80) lastBar_.pop_back();
+    std::fprintf(out_, "\r%s\x1b[K", lastBar_.c_str());
+    std::fflush(out_);
+}
+
+void ProgressDisplay::finish() {
+    if (lastBar_.empty()) return;
+    std::fputs("\r\x1b[K", out_);
+    std::fflush(out_);
+    lastBar_.clear();
+}
+
+}  // namespace vcp

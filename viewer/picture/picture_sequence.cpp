@@ -1,0 +1,66 @@
+#include "viewer/picture/picture_sequence.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "viewer/picture/image_files.h"
+
+namespace vcp {
+
+std::filesystem::path numbered(const std::filesystem::path& path, size_t number) {
+    return path.parent_path() / fmt::format("{}-{:04}{}", path.stem().string(), number, path.extension().string());
+}
+
+double PictureSequence::fraction() const {
+    const double begun = picture_ ? picture_->fraction() : 0;
+    return (static_cast<double>(finished_) + begun) / static_cast<double>(o_.cameras.size());
+}
+
+Result<bool> PictureSequence::step() {
+    if (finished_ == o_.cameras.size()) return true;
+    if (!picture_) VCP_TRY(begin());
+    const auto drawn = picture_->step();
+    if (!drawn || !*drawn) return drawn;
+    VCP_TRY(finish());
+    return finished_ == o_.cameras.size();
+}
+
+Result<void> PictureSequence::begin() {
+    FrameRequest request = o_.request;
+    request.camera = o_.cameras[finished_];
+    auto png = PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules);
+    if (!png) return png.error();
+    png_ = *std::move(png);
+    const TiledPictureOptions options{.tile = o_.tile, .depth = !o_.files.depth.empty(), .normals = !o_.files.normals.empty(), .problem = o_.problem};
+    picture_ = std::make_unique<TiledPicture>(*renderer_, request, options, [this](const PictureBand& band) { return take(band); });
+    return {};
+}
+
+Result<void> PictureSequence::take(const PictureBand& band) {
+    depth_.insert(depth_.end(), band.depth.begin(), band.depth.end());
+    normals_.insert(normals_.end(), band.normals.begin(), band.normals.end());
+    return png_->add(band.picture.rgba);
+}
+
+Result<void> PictureSequence::finish() {
+    const auto [width, height] = std::pair(o_.request.width, o_.request.height);
+    if (!o_.files.depth.empty()) VCP_TRY(writeDepth(depth_, width, height, fileOf(o_.files.depth), o_.rules));
+    if (!o_.files.normals.empty()) VCP_TRY(writeNormals(normals_, width, height, fileOf(o_.files.normals), o_.rules));
+    VCP_TRY(png_->finish());
+    const TiledPictureStats& drawn = picture_->stats();
+    stats_.tiles += drawn.tiles;
+    stats_.rays += drawn.rays;
+    stats_.hitPixels += drawn.hitPixels;
+    stats_.ms += drawn.ms;
+    stats_.errorPixels = std::max(stats_.errorPixels, drawn.errorPixels);
+    stats_.update = drawn.update;
+    depth_.clear();
+    normals_.clear();
+    picture_.reset();
+    png_.reset();
+    ++finished_;
+    return {};
+}
+
+}  // namespace vcp

@@ -1,0 +1,76 @@
+// Pictures as files, drawn tile by tile: one, or a numbered sequence. What `vcp render` and the window write.
+//
+// Each file is written beside itself and renamed when it is whole: of a sequence that ends early there are the pictures
+// that were finished, and nothing else.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "octree/result.h"
+#include "render/renderer.h"
+#include "viewer/picture/png_rows.h"
+#include "viewer/picture/tiled_picture.h"
+
+namespace vcp {
+
+struct PictureFiles {
+    std::filesystem::path picture;         ///< .png
+    std::filesystem::path depth, normals;  ///< .pfm or .png (image_files.h); empty: not written
+};
+
+struct PictureSequenceOptions {
+    FrameRequest request;         ///< of each picture, but for the camera
+    std::vector<Camera> cameras;  ///< a picture each; at least one
+    PictureFiles files;
+    bool isNumbered = false;      ///< turn.png stands for turn-0001.png and so on
+    uint32_t tile = 2048;         ///< edge in pixels, at least 16
+    OutputRules rules = {};       ///< what the files may replace
+    /// As TiledPicture's.
+    std::function<void(const Error& problem)> problem;
+};
+
+/// "turn.png" and 7: "turn-0007.png".
+std::filesystem::path numbered(const std::filesystem::path& path, size_t number);
+
+/// Pictures in the making; without the last step the one that was begun leaves nothing. Rows are written as they are drawn; depth
+/// and normals are kept until their picture is whole, 4 and 12 bytes a pixel. One thread.
+class PictureSequence {
+public:
+    PictureSequence(Renderer& renderer, PictureSequenceOptions options) : renderer_(&renderer), o_(std::move(options)) {}
+    PictureSequence(const PictureSequence&) = delete;
+    PictureSequence& operator=(const PictureSequence&) = delete;
+
+    /// Draws the next tile where all that it wants is there; never waits for reads. True when the last file is
+    /// written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; nothing more is to be asked of it then.
+    Result<bool> step();
+    /// Whether the last step() missed pages.
+    [[nodiscard]] bool isWaiting() const { return picture_ && picture_->isWaiting(); }
+    /// Of the whole sequence, 0 to 1.
+    [[nodiscard]] double fraction() const;
+    /// Pictures whose files are written.
+    [[nodiscard]] size_t finished() const { return finished_; }
+    [[nodiscard]] size_t pictures() const { return o_.cameras.size(); }
+    /// Of the pictures that are finished, together.
+    [[nodiscard]] const TiledPictureStats& stats() const { return stats_; }
+
+private:
+    [[nodiscard]] std::filesystem::path fileOf(const std::filesystem::path& path) const { return o_.isNumbered ? numbered(path, finished_ + 1) : path; }
+    Result<void> begin();
+    Result<void> take(const PictureBand& band);
+    Result<void> finish();
+
+    Renderer* renderer_;
+    PictureSequenceOptions o_;
+    size_t finished_ = 0;
+    TiledPictureStats stats_;
+    // Of the picture in the making.
+    std::unique_ptr<TiledPicture> picture_;
+    std::unique_ptr<PngRows> png_;
+    std::vector<float> depth_;
+    std::vector<glm::vec3> normals_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,102 @@
+#include "viewer/picture/tiled_picture.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace vcp {
+
+namespace {
+
+// What the shade pass averages over reaches 2 pixels far; squares of 4 x 4 pixels and tiles of 8 x 8 stay in step.
+constexpr uint32_t kOverlap = 8;
+
+/// Copies what `inner` covers of a tile's pixels, `words` values each, into a band.
+template <class Value, class Rect>
+void copyInto(std::vector<Value>& band, uint32_t bandWidth, const std::vector<Value>& pixels, const Rect& outer, const Rect& inner, uint32_t words) {
+    for (uint32_t row = 0; row < inner.height; ++row) {
+        const uint64_t from = uint64_t{inner.y - outer.y + row} * outer.width + (inner.x - outer.x);
+        const auto* begin = pixels.data() + from * words;
+        std::copy(begin, begin + uint64_t{inner.width} * words, band.data() + (uint64_t{row} * bandWidth + inner.x) * words);
+    }
+}
+
+}  // namespace
+
+TiledPicture::Rect TiledPicture::inner() const {
+    return {x_, y_, std::min(options_.tile, whole_.width - x_), std::min(options_.tile, whole_.height - y_)};
+}
+
+/// The tile and what is averaged over about it, within the whole.
+TiledPicture::Rect TiledPicture::outer() const {
+    const uint32_t by = whole_.shading.occlusionRays > 0 ? kOverlap : 0;
+    const Rect r = inner();
+    const uint32_t x = r.x - std::min(r.x, by), y = r.y - std::min(r.y, by);
+    return {x, y, std::min(whole_.width, r.x + r.width + by) - x, std::min(whole_.height, r.y + r.height + by) - y};
+}
+
+double TiledPicture::fraction() const {
+    const double rows = static_cast<double>(y_) * whole_.width;
+    const double inRow = y_ < whole_.height ? static_cast<double>(x_) * inner().height : 0;
+    return (rows + inRow) / (static_cast<double>(whole_.width) * whole_.height);
+}
+
+Result<bool> TiledPicture::step() {
+    if (y_ >= whole_.height) return true;
+    const Rect tile = inner(), with = outer();
+    FrameRequest request = whole_;
+    request.width = with.width;
+    request.height = with.height;
+    if (with.width != whole_.width || with.height != whole_.height) request.tile = {with.x, with.y, whole_.width, whole_.height};
+    auto update = renderer_->update(request);
+    if (!update) return update.error();
+    if (!update->problems.empty() && !options_.problem) return update->problems.front();
+    for (const Error& problem : update->problems) options_.problem(problem);
+    isWaiting_ = !update->settled;
+    if (isWaiting_) return false;
+    stats_.errorPixels = std::max(stats_.errorPixels, update->errorPixels);
+    stats_.update = *std::move(update);
+    VCP_TRY(draw(request));
+    VCP_TRY(copyTile(with, tile));
+    x_ += tile.width;
+    if (x_ < whole_.width) return false;
+    VCP_TRY(take_(band_));
+    band_ = {};
+    x_ = 0;
+    y_ += tile.height;
+    return y_ >= whole_.height;
+}
+
+Result<void> TiledPicture::draw(const FrameRequest& request) {
+    const auto stats = renderer_->render(request);
+    if (!stats) return stats.error();
+    ++stats_.tiles;
+    stats_.rays += stats->rays;
+    stats_.hitPixels += stats->hitPixels;
+    stats_.ms += stats->msFrame;
+    return {};
+}
+
+Result<void> TiledPicture::copyTile(const Rect& outer, const Rect& inner) {
+    if (inner.x == 0) {
+        const uint64_t pixels = uint64_t{whole_.width} * inner.height;
+        band_.picture = {whole_.width, inner.height, std::vector<uint8_t>(4 * pixels)};
+        band_.depth.resize(options_.depth ? pixels : 0);
+        band_.normals.resize(options_.normals ? pixels : 0);
+    }
+    const auto picture = renderer_->readPicture();
+    if (!picture) return picture.error();
+    copyInto(band_.picture.rgba, whole_.width, picture->rgba, outer, inner, 4);
+    if (options_.depth) {
+        const auto depth = renderer_->readDepth();
+        if (!depth) return depth.error();
+        copyInto(band_.depth, whole_.width, *depth, outer, inner, 1);
+    }
+    if (options_.normals) {
+        const auto normals = renderer_->readNormals();
+        if (!normals) return normals.error();
+        copyInto(band_.normals, whole_.width, *normals, outer, inner, 1);
+    }
+    return {};
+}
+
+}  // namespace vcp

@@ -1,0 +1,155 @@
+#include "viewer/scene/meso_scene.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "mesostructure/solids.h"
+#include "viewer/scene/base_mesh.h"
+#include "viewer/scene/tile_texture.h"
+
+namespace vcp {
+
+using namespace meso;
+
+namespace {
+
+constexpr int kTexels = 256;
+
+Result<std::shared_ptr<const MesoArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    const auto method = buildMethod(asset, **shape, options);
+    if (!method) return method.error();
+    auto arrays = packMesoArrays(*method);
+    if (!arrays) return arrays.error();
+    return std::make_shared<const MesoArrays>(*std::move(arrays));
+}
+
+Result<std::shared_ptr<const Appearance>> farOf(const Asset& asset, double heightScale) {
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    return std::make_shared<const Appearance>(appearanceOf(**shape, heightScale));
+}
+
+bool isFile(const MesoSurfaceDescription& d) {
+    const auto names = baseSurfaceNames();
+    return std::ranges::find(names, d.base) == names.end() && d.base.find('.') != std::string::npos;
+}
+
+Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
+    auto base = isFile(d) ? readBaseMesh(d.base, d.tiles) : makeBaseSurface(d.base, d.tiles);
+    if (!base) return base;
+    for (glm::dvec3& p : base->positions) p = d.place + d.scale * (isFile(d) ? p : turnedUp(p, d.up));
+    return base;
+}
+
+using Texture = std::shared_ptr<const MesoTexture>;
+
+/// Pictures that several surfaces name are read once.
+class Textures {
+public:
+    Result<Texture> colours(const std::string& file) { return read(file, colours_, readColourTexture); }
+    Result<Texture> normals(const std::string& file) { return read(file, normals_, readNormalTexture); }
+
+private:
+    using Known = std::map<std::string, Texture>;
+    template <class Read>
+    static Result<Texture> read(const std::string& file, Known& known, Read readTexture) {
+        if (file.empty()) return Texture();
+        Texture& texture = known[file];
+        if (texture) return texture;
+        auto made = readTexture(file);
+        if (!made) return made.error();
+        return texture = std::make_shared<const MesoTexture>(*std::move(made));
+    }
+    Known colours_, normals_;
+};
+
+void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::string>& warnings) {
+    const auto say = [&](uint64_t count, const char* what) {
+        if (count > 0) warnings.push_back(fmt::format("{}: {} {}", d.base, count, what));
+    };
+    say(shell.withoutArea, "triangles without area are left out");
+    say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
+    say(shell.flat, "pieces of the shell have no volume and are left out: faces on their own backs have no outside");
+    say(shell.inverted, "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
+}
+
+}  // namespace
+
+Error ScenePlace::blamed(Error error) const {
+    if (file.empty() || error.code != ErrorCode::Usage) return error;
+    const std::string about = error.file.empty() ? std::string() : error.file + ": ";
+    return {.code = ErrorCode::InvalidInput, .message = (key.empty() ? "" : fmt::format("\"{}\": ", key)) + about + error.message, .file = file, .element = fmt::format("line {}", line)};
+}
+
+Result<Asset> openMesoAsset(const std::string& name) {
+    Asset asset;
+    const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
+    asset.name = name;
+    if (isIn(heightFieldNames())) {
+        auto map = makeHeightField(name, kTexels, 1);
+        if (!map) return map.error();
+        asset.heights = *std::move(map);
+    } else if (isIn(solidNames())) {
+        asset.solid = name, asset.seed = 1;
+    } else {
+        if (!name.ends_with(".meso"))
+            return Error{.code = ErrorCode::Usage, .message = fmt::format("\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
+        return readAsset(name);
+    }
+    const auto shape = shapeOf(asset);
+    if (!shape) return shape.error();
+    asset.extent = (*shape)->extent();
+    return asset;
+}
+
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
+    MesoScene scene;
+    Textures textures;
+    std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
+    for (const MesoSurfaceDescription& d : descriptions) {
+        const auto asset = openMesoAsset(d.asset);
+        if (!asset) return d.from.blamed(asset.error());
+        const auto base = baseOf(d);
+        if (!base) return d.from.blamed(base.error());
+        auto arrays = arraysOf(*asset, d.method);
+        if (!arrays) {
+            Error error = arrays.error();
+            if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
+            return d.from.blamed(std::move(error));
+        }
+        const double edge = tileEdge(*base);
+        auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
+        if (!shell) {
+            Error error = shell.error();
+            if (isFile(d)) error.file = d.base;
+            return d.from.blamed(std::move(error));
+        }
+        warn(d, *shell, scene.warnings);
+        scene.bounds = scene.bounds.joined({shell->low, shell->high});
+        MesoSurface surface;
+        auto colours = textures.colours(d.colourTexture), normals = textures.normals(d.normalTexture);
+        for (const auto* texture : {&colours, &normals})
+            if (!*texture) return texture->error();
+        surface.colours = *std::move(colours), surface.normals = *std::move(normals);
+        surface.lift = shadowLift(**arrays, edge);
+        if (d.withFar) {
+            auto& far = appearances[{d.asset, d.heightScale}];
+            if (!far) {
+                auto made = farOf(*asset, d.heightScale);
+                if (!made) return made.error();
+                far = *std::move(made);
+            }
+            surface.far = far;
+        }
+        surface.arrays = *std::move(arrays), surface.shell = *std::move(shell), surface.colour = d.colour, surface.withBase = d.withBase;
+        scene.surfaces.push_back(std::move(surface));
+    }
+    return scene;
+}
+
+}  // namespace vcp

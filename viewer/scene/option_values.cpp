@@ -1,0 +1,158 @@
+#include "viewer/scene/option_values.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include <fast_float/fast_float.h>
+#include <fmt/format.h>
+
+namespace vcp {
+
+namespace {
+
+/// Parses a number at the start of `text` and removes it.
+template <class Number>
+bool takeNumber(std::string_view& text, Number& number) {
+    const char* end = text.data() + text.size();
+    const char* stop = nullptr;
+    if constexpr (std::is_floating_point_v<Number>) {
+        const auto parsed = fast_float::from_chars(text.data(), end, number);
+        if (parsed.ec != std::errc()) return false;
+        stop = parsed.ptr;
+    } else {
+        const auto parsed = std::from_chars(text.data(), end, number);
+        if (parsed.ec != std::errc()) return false;
+        stop = parsed.ptr;
+    }
+    text.remove_prefix(static_cast<size_t>(stop - text.data()));
+    return true;
+}
+
+/// Numbers between commas: all of `text`, `count` of them.
+template <size_t count>
+std::optional<std::array<double, count>> takeList(std::string_view text) {
+    std::array<double, count> list{};
+    for (size_t i = 0; i < count; ++i) {
+        if (!takeNumber(text, list[i]) || !std::isfinite(list[i])) return std::nullopt;
+        if (i + 1 == count) break;
+        if (!text.starts_with(',')) return std::nullopt;
+        text.remove_prefix(1);
+    }
+    return text.empty() ? std::optional(list) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<PlaneText> parsePlane(std::string_view text) {
+    PlaneText plane;
+    if (const auto list = takeList<4>(text)) {
+        plane.normal = {(*list)[0], (*list)[1], (*list)[2]};
+        plane.offset = (*list)[3];
+        return plane.normal == glm::dvec3(0) ? std::nullopt : std::optional(plane);
+    }
+    if (text.size() < 3 || text[0] < 'x' || text[0] > 'z' || (text[1] != '<' && text[1] != '>')) return std::nullopt;
+    const double sign = text[1] == '>' ? 1 : -1;
+    plane.normal[text[0] - 'x'] = sign;
+    text.remove_prefix(2);
+    if (!takeNumber(text, plane.offset) || !std::isfinite(plane.offset)) return std::nullopt;
+    plane.isRelative = text == "%";
+    if (!plane.isRelative && !text.empty()) return std::nullopt;
+    plane.offset *= plane.isRelative ? sign / 100 : sign;
+    return plane;
+}
+
+std::optional<glm::dvec3> parseDirection(std::string_view text) {
+    const auto list = takeList<3>(text);
+    if (!list) return std::nullopt;
+    const glm::dvec3 direction((*list)[0], (*list)[1], (*list)[2]);
+    return direction == glm::dvec3(0) ? std::nullopt : std::optional(direction);
+}
+
+std::optional<Length> parseLength(std::string_view text) {
+    Length length;
+    if (!takeNumber(text, length.value)) return std::nullopt;
+    length.isRelative = text == "%";
+    if (!length.isRelative && !text.empty()) return std::nullopt;
+    if (length.isRelative) length.value /= 100;
+    if (!(length.value > 0) || !std::isfinite(length.value)) return std::nullopt;
+    return length;
+}
+
+std::optional<uint64_t> parseBytes(std::string_view text) {
+    double number = 0;
+    if (!takeNumber(text, number) || !(number > 0) || !std::isfinite(number)) return std::nullopt;
+    if (!text.empty()) {
+        constexpr std::string_view kPrefixes = "KMGT";
+        const size_t power = kPrefixes.find(text.front() & ~0x20);
+        if (power != std::string_view::npos) {
+            number = std::ldexp(number, static_cast<int>(10 * (power + 1)));
+            text.remove_prefix(1);
+            if (text == "iB") text = {};
+        }
+        if (text == "B") text = {};
+    }
+    if (!text.empty() || number > 0x1p60 || number < 1) return std::nullopt;
+    return static_cast<uint64_t>(number);
+}
+
+std::string budgetProblem(const std::string& text) {
+    const auto bytes = parseBytes(text);
+    return bytes && *bytes >= 1 << 20 ? std::string() : fmt::format("must be at least 1M, like 64M or 1G, not \"{}\"", text);
+}
+
+std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {
+    if (!text.ends_with('%')) return parseBytes(text);
+    double percent = 0;
+    if (!takeNumber(text, percent) || text != "%" || !(percent > 0) || percent > 100) return std::nullopt;
+    return static_cast<uint64_t>(percent / 100 * static_cast<double>(whole));
+}
+
+std::optional<uint64_t> parseCount(std::string_view text) {
+    double number = 0;
+    if (!takeNumber(text, number)) return std::nullopt;
+    if (!text.empty()) {
+        constexpr std::string_view kPrefixes = "KMG";
+        const size_t power = kPrefixes.find(text.front() & ~0x20);
+        if (power == std::string_view::npos || text.size() > 1) return std::nullopt;
+        // One product, rounded once: 1.1M is whole.
+        constexpr double kFactors[] = {1e3, 1e6, 1e9};
+        number *= kFactors[power];
+    }
+    if (!(number >= 1) || number > 1e15 || number != std::floor(number)) return std::nullopt;
+    return static_cast<uint64_t>(number);
+}
+
+std::optional<glm::ivec2> parseSize(std::string_view text) {
+    constexpr int kLargest = 16384;
+    glm::ivec2 size(0);
+    if (!takeNumber(text, size.x) || text.empty() || (text.front() != 'x' && text.front() != 'X')) return std::nullopt;
+    text.remove_prefix(1);
+    if (!takeNumber(text, size.y) || !text.empty()) return std::nullopt;
+    if (size.x < 1 || size.y < 1 || size.x > kLargest || size.y > kLargest) return std::nullopt;
+    return size;
+}
+
+std::string formatCount(uint64_t count) {
+    if (count < 1000) return std::to_string(count);
+    return formatCount(count / 1000) + fmt::format(" {:03}", count % 1000);
+}
+
+std::string formatBytes(uint64_t bytes) {
+    constexpr const char* kUnits[] = {"B", "kB", "MB", "GB", "TB", "PB", "EB"};
+    double value = static_cast<double>(bytes);
+    size_t unit = 0;
+    while (value >= 999.95 && unit + 1 < std::size(kUnits)) value /= 1000, ++unit;
+    return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, kUnits[unit]);
+}
+
+std::string formatLength(double length) { return fmt::format("{:.4g}", length); }
+
+std::string formatSeconds(double seconds) {
+    if (seconds < 60) return fmt::format("{:.2f} s", seconds);
+    const auto whole = static_cast<int64_t>(seconds);
+    if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace vcp

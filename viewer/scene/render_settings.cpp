@@ -1,0 +1,86 @@
+#include "viewer/scene/render_settings.h"
+
+#include <algorithm>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "viewer/scene/option_values.h"
+
+namespace vcp {
+
+namespace {
+
+struct NamedShading {
+    const char* name;
+    ShadingMode mode;
+};
+constexpr NamedShading kShadings[] = {
+    {"lit", ShadingMode::Lit},         {"unlit", ShadingMode::Unlit}, {"clay", ShadingMode::Clay},
+    {"normals", ShadingMode::Normals}, {"steps", ShadingMode::Steps}, {"cells", ShadingMode::Cells},
+    {"fetches", ShadingMode::Fetches},
+    {"level", ShadingMode::Level},     {"error", ShadingMode::Error},
+};
+
+// From the left, almost along a surface that faces the camera: relief of a millimetre casts its shade.
+constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
+
+}  // namespace
+
+std::vector<std::string> shadingNames() {
+    std::vector<std::string> names;
+    for (const NamedShading& each : kShadings) names.emplace_back(each.name);
+    return names;
+}
+
+RendererOptions RenderSettings::rendererOptions() const {
+    RendererOptions options;
+    options.device = device;
+    options.budgetBytes = parseBytes(budget).value_or(options.budgetBytes);
+    options.ramBytes = parseBytes(ram).value_or(options.ramBytes);
+    // Colour pages are neither read nor kept when nothing would show them.
+    options.colour = shading == "lit" || shading == "unlit";
+    return options;
+}
+
+Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
+    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const bool isPaper = dataset.header.method == Method::Paper;
+    if (!isPaper && march != PaperMarch{}) return usage("the options --paper-... are for files built with --method paper");
+    if (isPaper && (shadows || occlusionRays > 0 || caps)) return usage("files built with --method paper have no --shadows, --occlusion or --caps");
+    return {};
+}
+
+Shading RenderSettings::shadingChosen() const {
+    Shading chosen;
+    chosen.mode = std::find_if(std::begin(kShadings), std::end(kShadings), [&](const auto& each) { return shading == each.name; })->mode;
+    chosen.lightFollowsCamera = light != "fixed";
+    if (light == "raking") chosen.lightDirection = kRakingLight;
+    if (!lightDirection.empty()) chosen.lightDirection = parseDirection(lightDirection).value();
+    chosen.shadows = shadows;
+    chosen.occlusionRays = occlusionRays;
+    return chosen;
+}
+
+std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const {
+    std::vector<SectionPlane> planes;
+    for (const std::string& text : sections) {
+        const PlaneText plane = parsePlane(text).value();
+        // An axis' own offset: from the box's lower side on, whichever side is kept.
+        const glm::dvec3 axis = glm::abs(plane.normal);
+        const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) + plane.offset * glm::dot(axis, bounds.high - bounds.low) : plane.offset;
+        planes.push_back({plane.normal, offset});
+    }
+    return planes;
+}
+
+Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered) const {
+    const auto view = viewNamed(camera);
+    if (!view) return readCamera(camera);
+    OrbitCamera fitted;
+    fitted.up = upAxis();
+    fitted.look(*view, bounds, size, covered);
+    return fitted;
+}
+
+}  // namespace vcp

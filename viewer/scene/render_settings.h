@@ -1,0 +1,48 @@
+// How a dataset is shown: the settings of `vcp render` and `vcp view`.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "octree/paper_page.h"
+#include "octree/result.h"
+#include "render/renderer.h"
+#include "viewer/camera/orbit_camera.h"
+#include "viewer/scene/source_settings.h"
+
+namespace vcp {
+
+struct RenderSettings {
+    std::string device;
+    std::string budget = "512M";
+    std::string ram = "256M";
+    double errorPixels = 0.5;
+    std::string camera = "fit";
+    std::string up = "y";
+    std::string light = "camera";
+    std::string lightDirection;
+    std::string shading = "lit";
+    bool shadows = false;
+    uint32_t occlusionRays = 0;
+    std::vector<std::string> sections;
+    bool caps = false;
+    PaperMarch march;
+    SourceSettings source;
+
+    /// Errors: Usage, where options do not go with the dataset's method.
+    [[nodiscard]] Result<void> checkFor(const Dataset& dataset) const;
+
+    /// For a local file; a server wants more loader threads.
+    [[nodiscard]] RendererOptions rendererOptions() const;
+    [[nodiscard]] Shading shadingChosen() const;
+    [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
+    [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
+
+    /// The view, or the camera file. Errors: those of readCamera.
+    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered = {}) const;
+};
+
+/// What RenderSettings::shading may say.
+std::vector<std::string> shadingNames();
+
+}  // namespace vcp

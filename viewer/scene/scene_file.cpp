@@ -1,0 +1,338 @@
+#include "viewer/scene/scene_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include "mesostructure/solids.h"
+#include "streaming/http_reader.h"
+#include "viewer/camera/json_lines.h"
+#include "viewer/camera/text_file.h"
+
+namespace vcp {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr size_t kLargestFile = 1 << 20;
+constexpr size_t kMostSurfaces = 64;
+constexpr int kDeepest = 16;
+// So far apart that double precision resolves a millimetre where units are metres, and further.
+constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
+
+bool isDeeperThan(const Json& json, int depth) {
+    if (!json.is_structured()) return false;
+    if (depth == 0) return true;
+    return std::any_of(json.begin(), json.end(), [&](const Json& each) { return isDeeperThan(each, depth - 1); });
+}
+
+/// Takes a scene apart and remembers the first thing that is wrong.
+class SceneReader {
+public:
+    SceneReader(const LinesOf& lines, const std::string& name, std::filesystem::path folder) : lines_(lines), name_(name), folder_(std::move(folder)) {}
+
+    SceneFile scene(const Json& json) {
+        SceneFile scene;
+        if (!json.is_object()) return wrong("", "a scene must be a JSON object"), scene;
+        onlyKeys(json, "", {"datasets", "lights", "camera", "sections", "caps", "mesostructure"});
+        if (json.contains("mesostructure")) scene.surfaces = surfaces(json["mesostructure"]);
+        if (!json.contains("datasets") && scene.surfaces.empty()) wrong("", "\"datasets\" is missing");
+        const Json& datasets = json.value("datasets", Json::array());
+        if (!datasets.is_array() || (datasets.empty() && scene.surfaces.empty()) || datasets.size() > kMostSceneDatasets)
+            wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostSceneDatasets));
+        for (size_t i = 0; i < datasets.size() && !error_; ++i) scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
+        if (json.contains("lights")) scene.light = light(json["lights"]);
+        if (json.contains("camera")) scene.camera = camera(json["camera"]);
+        if (json.contains("sections")) scene.sections = sections(json["sections"]);
+        if (json.contains("caps")) scene.sectionCaps = flag(json["caps"], "/caps");
+        return scene;
+    }
+
+    [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+private:
+    void wrong(const std::string& at, const std::string& what) {
+        if (error_) return;
+        const std::string key = at.substr(at.rfind('/') + 1);
+        const bool isKey = !key.empty() && !std::all_of(key.begin(), key.end(), [](char c) { return c >= '0' && c <= '9'; });
+        error_ = Error{ErrorCode::InvalidInput, isKey ? fmt::format("\"{}\" {}", key, what) : what, name_, fmt::format("line {}", lines_(at))};
+    }
+
+    void onlyKeys(const Json& object, const std::string& at, std::initializer_list<std::string_view> keys) {
+        for (const auto& [key, value] : object.items())
+            if (std::find(keys.begin(), keys.end(), key) == keys.end()) wrong(at + "/" + key, fmt::format("is no key here; there are {}", fmt::join(keys, ", ")));
+    }
+
+    double number(const Json& value, const std::string& at) {
+        if (!value.is_number()) return wrong(at, "must be a number"), 0;
+        if (!(std::abs(value.get<double>()) <= kLargestNumber)) return wrong(at, fmt::format("must be between -{0:g} and {0:g}", kLargestNumber)), 0;
+        return value.get<double>();
+    }
+
+    bool flag(const Json& value, const std::string& at) {
+        if (!value.is_boolean()) return wrong(at, "must be true or false"), false;
+        return value.get<bool>();
+    }
+
+    glm::dvec3 triple(const Json& value, const std::string& at) {
+        glm::dvec3 v(0);
+        if (!value.is_array() || value.size() != 3) return wrong(at, "must be three numbers"), v;
+        for (int i = 0; i < 3; ++i) {
+            if (!value[size_t(i)].is_number()) return wrong(at, "must be three numbers"), v;
+            v[i] = number(value[size_t(i)], at);
+        }
+        return v;
+    }
+
+    glm::dvec3 direction(const Json& object, const char* key, const std::string& at) {
+        if (!object.contains(key)) return wrong(at, fmt::format("\"{}\" is missing", key)), glm::dvec3(1, 0, 0);
+        const std::string there = at + "/" + key;
+        const glm::dvec3 v = triple(object[key], there);
+        const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+        if (!(largest > 0)) return wrong(there, "must not be zero"), glm::dvec3(1, 0, 0);
+        return v;
+    }
+
+    /// Of any length above zero.
+    static glm::dvec3 unit(glm::dvec3 v) { return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)})); }
+
+    bool isObject(const Json& value, const std::string& at) {
+        if (!value.is_object()) wrong(at, "must be an object");
+        return value.is_object();
+    }
+
+    SceneDataset dataset(const Json& json, const std::string& at) {
+        SceneDataset made;
+        if (!isObject(json, at)) return made;
+        onlyKeys(json, at, {"file", "transform", "translate", "rotate", "scale"});
+        made.from = {name_, lines_(at + "/file"), "file"};
+        if (!json.contains("file")) wrong(at, "\"file\" is missing");
+        else if (!json["file"].is_string() || json["file"].get<std::string>().empty()) wrong(at + "/file", "must be a file's name");
+        else made.file = fileNamed(json["file"].get<std::string>());
+        if (json.contains("transform")) {
+            for (const char* other : {"translate", "rotate", "scale"})
+                if (json.contains(other)) wrong(at + "/" + other, "does not go with \"transform\"");
+            made.placement = matrix(json["transform"], at + "/transform");
+            return made;
+        }
+        if (json.contains("translate")) made.placement.translation = triple(json["translate"], at + "/translate");
+        if (json.contains("rotate")) made.placement.rotation = rotation(json["rotate"], at + "/rotate");
+        if (json.contains("scale")) made.placement.scale = scale(json["scale"], at + "/scale");
+        return made;
+    }
+
+    std::vector<MesoSurfaceDescription> surfaces(const Json& json) {
+        std::vector<MesoSurfaceDescription> all;
+        if (!json.is_array() || json.empty() || json.size() > kMostSurfaces) return wrong("/mesostructure", fmt::format("must be a list of 1 to {} surfaces", kMostSurfaces)), all;
+        for (size_t i = 0; i < json.size() && !error_; ++i) all.push_back(surface(json[i], fmt::format("/mesostructure/{}", i)));
+        return all;
+    }
+
+    MesoSurfaceDescription surface(const Json& json, const std::string& at) {
+        MesoSurfaceDescription made;
+        made.method.name = "boxes";
+        if (!isObject(json, at)) return made;
+        onlyKeys(json, at, {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "texture", "normal_texture", "method", "base"});
+        if (!json.contains("asset")) wrong(at, "\"asset\" is missing");
+        else made.asset = assetNamed(json["asset"], at + "/asset");
+        made.from = {name_, lines_(at), {}};
+        // A base that is none by name is a mesh.
+        const auto bases = meso::baseSurfaceNames();
+        const auto isMesh = [&](const std::string& name) { return std::ranges::find(bases, name) == bases.end(); };
+        if (json.contains("surface")) made.base = named(json["surface"], at + "/surface", isMesh);
+        if (json.contains("tiles")) made.tiles = scale(json["tiles"], at + "/tiles");
+        if (json.contains("height")) made.heightScale = scale(json["height"], at + "/height");
+        if (json.contains("translate")) made.place = triple(json["translate"], at + "/translate");
+        if (json.contains("scale")) made.scale = scale(json["scale"], at + "/scale");
+        if (json.contains("up")) made.up = upAxis(json["up"], at + "/up");
+        if (json.contains("colour")) made.colour = colour(json["colour"], at + "/colour");
+        const auto isPicture = [](const std::string&) { return true; };
+        if (json.contains("texture")) made.colourTexture = named(json["texture"], at + "/texture", isPicture);
+        if (json.contains("normal_texture")) made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
+        if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
+        if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
+        return made;
+    }
+
+    /// A name, or a file, which is taken from the scene's folder.
+    template <class IsFile>
+    std::string named(const Json& json, const std::string& at, IsFile isFile) {
+        if (!json.is_string() || json.get<std::string>().empty()) return wrong(at, "must be a name or a file's name"), std::string();
+        const std::string name = json.get<std::string>();
+        return isFile(name) ? fileNamed(name) : name;
+    }
+
+    std::string assetNamed(const Json& json, const std::string& at) {
+        const std::string name = named(json, at, [](const std::string& file) { return file.ends_with(".meso"); });
+        const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
+        if (!error_ && !name.ends_with(".meso") && !isIn(meso::heightFieldNames()) && !isIn(meso::solidNames()))
+            wrong(at, fmt::format("must be an asset (.meso), a height field ({}) or a solid ({})", fmt::join(meso::heightFieldNames(), ", "), fmt::join(meso::solidNames(), ", ")));
+        return name;
+    }
+
+    UpAxis upAxis(const Json& json, const std::string& at) {
+        if (json != "y" && json != "z") wrong(at, "must be \"y\" or \"z\"");
+        return json == "y" ? UpAxis::Y : UpAxis::Z;
+    }
+
+    glm::vec3 colour(const Json& json, const std::string& at) {
+        const glm::dvec3 rgb = triple(json, at);
+        if (glm::clamp(rgb, 0.0, 1.0) != rgb) wrong(at, "must be red, green and blue from 0 to 1");
+        return rgb;
+    }
+
+    std::string methodNamed(const Json& json, const std::string& at) {
+        const auto names = meso::methodNames();
+        const std::string name = json.is_string() ? json.get<std::string>() : std::string();
+        if (std::ranges::find(names, name) == names.end()) wrong(at, fmt::format("must be one of {}", fmt::join(names, ", ")));
+        return name;
+    }
+
+    [[nodiscard]] std::string fileNamed(const std::string& file) const {
+        return isHttpUrl(file) || std::filesystem::path(file).is_absolute() ? file : (folder_ / file).lexically_normal().string();
+    }
+
+    double scale(const Json& value, const std::string& at) {
+        if (value.is_array()) return wrong(at, "must be one number: other scales along other axes are not supported"), 1;
+        const double s = number(value, at);
+        if (!error_ && !(s >= 1 / kLargestScale && s <= kLargestScale)) return wrong(at, fmt::format("must be above 0, from {:g} to {:g}", 1 / kLargestScale, kLargestScale)), 1;
+        return s;
+    }
+
+    glm::dquat rotation(const Json& json, const std::string& at) {
+        if (!isObject(json, at)) return {1, 0, 0, 0};
+        onlyKeys(json, at, {"axis", "degrees"});
+        if (!json.contains("degrees")) wrong(at, "needs \"degrees\"");
+        const glm::dvec3 axis = direction(json, "axis", at);
+        const double degrees = json.contains("degrees") ? number(json["degrees"], at + "/degrees") : 0;
+        return glm::angleAxis(std::remainder(degrees, 360) * std::numbers::pi / 180, unit(axis));
+    }
+
+    Similarity matrix(const Json& json, const std::string& at) {
+        std::array<double, 16> rows{};
+        bool good = json.is_array() && json.size() == 4;
+        for (size_t i = 0; good && i < 16; ++i) {
+            good = json[i / 4].is_array() && json[i / 4].size() == 4 && json[i / 4][i % 4].is_number();
+            if (good) rows[i] = json[i / 4][i % 4].get<double>();
+        }
+        if (!good) return wrong(at, "must be four rows of four numbers"), Similarity{};
+        const auto placement = scenePlacement(rows);
+        if (!placement) return wrong(at, placement.error().message), Similarity{};
+        return *placement;
+    }
+
+    std::optional<SceneLight> light(const Json& json) {
+        if (!json.is_array() || json.size() > 1) return wrong("/lights", "must be a list of at most one light; more are not supported"), std::nullopt;
+        if (json.empty() || !isObject(json[0], "/lights/0")) return std::nullopt;
+        onlyKeys(json[0], "/lights/0", {"direction", "follows_camera"});
+        SceneLight made;
+        made.direction = glm::vec3(unit(direction(json[0], "direction", "/lights/0")));
+        made.followsCamera = json[0].contains("follows_camera") && flag(json[0]["follows_camera"], "/lights/0/follows_camera");
+        return made;
+    }
+
+    std::optional<OrbitCamera> camera(const Json& json) {
+        if (!isObject(json, "/camera")) return std::nullopt;
+        const auto made = cameraFromJson(json.dump(), name_);
+        if (made) return *made;
+        // The field is named by the error: "\"target\"".
+        std::string field = made.error().element;
+        std::erase(field, '"');
+        wrong(json.contains(field) ? "/camera/" + field : "/camera", json.contains(field) ? made.error().message : fmt::format("\"{}\" {}", field, made.error().message));
+        return std::nullopt;
+    }
+
+    std::vector<SectionPlane> sections(const Json& json) {
+        std::vector<SectionPlane> planes;
+        if (!json.is_array() || json.size() > kMostSections) return wrong("/sections", fmt::format("must be a list of at most {} planes", kMostSections)), planes;
+        for (size_t i = 0; i < json.size() && !error_; ++i) {
+            const std::string at = fmt::format("/sections/{}", i);
+            if (!isObject(json[i], at)) return planes;
+            onlyKeys(json[i], at, {"normal", "offset"});
+            if (!json[i].contains("offset")) wrong(at, "\"offset\" is missing");
+            const glm::dvec3 normal = direction(json[i], "normal", at);
+            if (!error_ && !(glm::length(normal) > 0)) wrong(at + "/normal", "is too short");
+            planes.push_back({normal, json[i].contains("offset") ? number(json[i]["offset"], at + "/offset") : 0});
+        }
+        return planes;
+    }
+
+    const LinesOf& lines_;
+    const std::string& name_;
+    std::filesystem::path folder_;
+    std::optional<Error> error_;
+};
+
+/// Where a text stops being JSON, numbers that no double holds among it.
+class FirstMistake : public nlohmann::detail::json_sax_acceptor<Json> {
+public:
+    bool parse_error(size_t byte, const std::string&, const Json::exception& e) {
+        at = byte > 0 ? byte - 1 : 0;
+        isNumber = dynamic_cast<const Json::out_of_range*>(&e) != nullptr;
+        return false;
+    }
+    size_t at = 0;
+    bool isNumber = false;
+};
+
+/// Nothing: it is JSON.
+std::optional<Error> notJson(std::string_view text, const std::string& name) {
+    FirstMistake mistake;
+    if (Json::sax_parse(text, &mistake)) return std::nullopt;
+    const size_t at = std::min(mistake.at, text.size());
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    const char* what = mistake.isNumber ? "a number is out of range" : "the JSON breaks off or goes wrong here";
+    return Error{ErrorCode::InvalidInput, what, name, fmt::format("line {}", line), at};
+}
+
+}  // namespace
+
+Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
+    auto placement = similarityFromMatrix(rows);
+    if (!placement) return placement;
+    const glm::dvec3 far = glm::abs(placement->translation);
+    if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale || placement->scale < 1 / kLargestScale)
+        return Error{ErrorCode::Usage, fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}", kLargestNumber, kLargestScale, 1 / kLargestScale)};
+    return placement;
+}
+
+std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {
+    std::vector<std::filesystem::path> files;
+    for (const SceneDataset& dataset : scene.datasets) files.emplace_back(dataset.file);
+    for (const MesoSurfaceDescription& surface : scene.surfaces)
+        for (const std::string& name : {surface.asset, surface.base, surface.colourTexture, surface.normalTexture})
+            if (!name.empty()) files.emplace_back(name);
+    return files;
+}
+
+bool isSceneName(const std::string& name) { return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json"; }
+
+Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+    if (auto error = notJson(text, name)) return *std::move(error);
+    const Json json = Json::parse(text);
+    if (isDeeperThan(json, kDeepest)) return Error{ErrorCode::InvalidInput, "not a scene: nested too deeply", name};
+    const LinesOf lines(text);
+    if (lines.twice()) {
+        const std::string& at = lines.twice()->first;
+        return Error{ErrorCode::InvalidInput, fmt::format("\"{}\" is there twice", at.substr(at.rfind('/') + 1)), name, fmt::format("line {}", lines.twice()->second)};
+    }
+    SceneReader reader(lines, name, folder);
+    SceneFile scene = reader.scene(json);
+    if (reader.error()) return *reader.error();
+    return scene;
+}
+
+Result<SceneFile> readScene(const std::filesystem::path& path) {
+    const auto text = readText(path, kLargestFile, "a scene file");
+    if (!text) return text.error();
+    return sceneFromJson(*text, path.string(), path.parent_path());
+}
+
+}  // namespace vcp

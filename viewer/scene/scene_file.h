@@ -1,0 +1,59 @@
+// Scene files: several datasets and surfaces with mesostructure, each in its place, light, camera and section planes, in JSON. docs/scenes.md has the
+// schema and an example.
+//
+// Unknown keys are errors, so that a misspelt one is not passed over. Errors name the file, the line and the key.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "octree/result.h"
+#include "render/renderer.h"
+#include "viewer/camera/orbit_camera.h"
+#include "viewer/scene/meso_scene.h"
+
+namespace vcp {
+
+struct SceneDataset {
+    std::string file;  ///< a .vcp or its address, or a mesh
+    Similarity placement;
+    ScenePlace from = {};
+};
+
+struct SceneLight {
+    bool followsCamera = true;
+    glm::vec3 direction{0};  ///< as Shading::lightDirection
+};
+
+struct SceneFile {
+    std::vector<SceneDataset> datasets;  ///< at least one, or a surface
+    std::vector<MesoSurfaceDescription> surfaces;
+    std::optional<SceneLight> light;
+    std::optional<OrbitCamera> camera;
+    std::vector<SectionPlane> sections;  ///< at most kMostSections
+    bool sectionCaps = false;
+};
+
+/// At most so many datasets in one scene.
+constexpr size_t kMostSceneDatasets = 256;
+
+/// The files that a scene names: datasets and meshes but for addresses, assets, bases and textures.
+std::vector<std::filesystem::path> filesOf(const SceneFile& scene);
+
+/// similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9. Errors: Usage.
+Result<Similarity> scenePlacement(std::span<const double, 16> rows);
+
+/// Whether a name stands for a scene file: it ends in .json.
+bool isSceneName(const std::string& name);
+
+/// Relative files are taken from `folder`. `name` stands for the file in errors. May be hostile. Errors: InvalidInput.
+Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+
+/// sceneFromJson of a file of at most 1 MiB. Errors: also Io, Limit.
+Result<SceneFile> readScene(const std::filesystem::path& path);
+
+}  // namespace vcp

@@ -1,0 +1,21 @@
+// Settings for datasets on servers.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "viewer/scene/open_dataset.h"
+
+namespace vcp {
+
+struct SourceSettings {
+    std::string caFile;
+    std::string cache;
+    std::string cacheLimit = "4G";
+
+    std::function<bool()> cancelled;  ///< asked during exchanges with a server; may be empty
+
+    operator SourceAccess() const;
+};
+
+}  // namespace vcp

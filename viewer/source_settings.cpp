@@ -1,9 +1,0 @@
-#include "viewer/source_settings.h"
-
-#include "viewer/option_values.h"
-
-namespace vcp {
-
-SourceSettings::operator SourceAccess() const { return {caFile, cache, *parseBytes(cacheLimit), cancelled}; }
-
-}  // namespace vcp

@@ -1,0 +1,130 @@
+#include "viewer/window/measurement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+namespace vcp {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Digits after the point that an error leaves: one beyond its own first digit.
+int digitsFor(double error) {
+    if (!(error > 0)) return 9;
+    return static_cast<int>(std::clamp(1 - std::floor(std::log10(error)), 0.0, 15.0));
+}
+
+std::string rounded(double value, double error) { return fmt::format("{:.{}f}", value, digitsFor(error)); }
+
+bool hasAngle(const MeasuredLine& line, size_t i) {
+    return i > 0 && i + 1 < line.size() && line[i].position != line[i - 1].position && line[i].position != line[i + 1].position;
+}
+
+std::string textOf(const MeasuredLine& line, size_t number) {
+    std::string text;
+    for (size_t i = 0; i < line.size(); ++i) {
+        const MeasuredPoint& p = line[i];
+        text += fmt::format("{}.{}  {}  {}  {}  +-{:.2g} (level {})", number, i + 1, rounded(p.position.x, p.error), rounded(p.position.y, p.error),
+                            rounded(p.position.z, p.error), p.error, p.level);
+        if (i > 0) text += fmt::format("\n     distance {} +-{:.2g}", rounded(segmentLength(line, i - 1), segmentError(line, i - 1)), segmentError(line, i - 1));
+        if (hasAngle(line, i)) text += fmt::format("\n     angle {:.2f} degrees", angleAt(line, i));
+        text += '\n';
+    }
+    if (line.size() > 2) text += fmt::format("{}  length {} +-{:.2g}\n", number, rounded(lineLength(line), lineError(line)), lineError(line));
+    return text;
+}
+
+Json toJson(const MeasuredLine& line) {
+    Json json;
+    json["points"] = Json::array();
+    Json segments = Json::array(), angles = Json::array();
+    for (size_t i = 0; i < line.size(); ++i) {
+        const MeasuredPoint& p = line[i];
+        json["points"].push_back({{"position", {p.position.x, p.position.y, p.position.z}}, {"error", p.error}, {"level", p.level}});
+        if (i + 1 < line.size()) segments.push_back(segmentLength(line, i));
+        if (i > 0 && i + 1 < line.size()) angles.push_back(hasAngle(line, i) ? Json(angleAt(line, i)) : Json(nullptr));
+    }
+    json["segments"] = segments;
+    json["length"] = lineLength(line);
+    json["length_error"] = lineError(line);
+    json["angles_degrees"] = angles;
+    return json;
+}
+
+}  // namespace
+
+double segmentLength(const MeasuredLine& line, size_t i) { return glm::distance(line[i].position, line[i + 1].position); }
+double segmentError(const MeasuredLine& line, size_t i) { return line[i].error + line[i + 1].error; }
+
+double lineLength(const MeasuredLine& line) {
+    double length = 0;
+    for (size_t i = 0; i + 1 < line.size(); ++i) length += segmentLength(line, i);
+    return length;
+}
+
+double lineError(const MeasuredLine& line) {
+    double error = 0;
+    for (size_t i = 0; i + 1 < line.size(); ++i) error += segmentError(line, i);
+    return error;
+}
+
+double angleAt(const MeasuredLine& line, size_t i) {
+    const glm::dvec3 a = line[i - 1].position - line[i].position, b = line[i + 1].position - line[i].position;
+    // Well-conditioned at all angles, unlike the arc cosine.
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 180 / std::numbers::pi;
+}
+
+void Measurement::add(const MeasuredPoint& point) {
+    if (!lineIsOpen_) lines_.emplace_back();
+    lineIsOpen_ = true;
+    lines_.back().push_back(point);
+}
+
+void Measurement::takeBack() {
+    if (lines_.empty()) return;
+    lines_.back().pop_back();
+    lineIsOpen_ = !lines_.back().empty();
+    if (lines_.back().empty()) lines_.pop_back();
+}
+
+std::string measurementText(const Measurement& measurement) {
+    std::string text;
+    for (size_t i = 0; i < measurement.lines().size(); ++i) text += textOf(measurement.lines()[i], i + 1);
+    return text;
+}
+
+std::string measurementCsv(const Measurement& measurement) {
+    std::string csv = "line,point,x,y,z,error,level,segment,segment_error,total,angle_degrees\n";
+    for (size_t n = 0; n < measurement.lines().size(); ++n) {
+        const MeasuredLine& line = measurement.lines()[n];
+        double total = 0;
+        for (size_t i = 0; i < line.size(); ++i) {
+            const MeasuredPoint& p = line[i];
+            csv += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.9g},{},", n + 1, i + 1, p.position.x, p.position.y, p.position.z, p.error, p.level);
+            if (i > 0) {
+                total += segmentLength(line, i - 1);
+                csv += fmt::format("{:.17g},{:.9g},{:.17g},", segmentLength(line, i - 1), segmentError(line, i - 1), total);
+            } else {
+                csv += ",,,";
+            }
+            if (hasAngle(line, i)) csv += fmt::format("{:.17g}", angleAt(line, i));
+            csv += '\n';
+        }
+    }
+    return csv;
+}
+
+std::string measurementJson(const Measurement& measurement) {
+    Json json;
+    json["lines"] = Json::array();
+    for (const MeasuredLine& line : measurement.lines()) json["lines"].push_back(toJson(line));
+    return json.dump(2) + '\n';
+}
+
+}  // namespace vcp

@@ -1,0 +1,349 @@
+#include "viewer/window/user_settings.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <nlohmann/json.hpp>
+
+#include "streaming/web_address.h"
+
+namespace vcp {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kLargestFile = 1 << 20;
+constexpr int kMostLinks = 40;
+constexpr int kMostDamaged = 100;
+// Half a minute.
+constexpr int kLockTries = 3000;
+constexpr std::chrono::milliseconds kLockPause{10};
+
+/// Reads fields of an object; what is wrong leaves the value as it is.
+class Fields {
+public:
+    explicit Fields(const Json& json) : json_(json) {}
+
+    void flag(const char* name, bool& value) const {
+        if (const Json* field = find(name); field && field->is_boolean()) value = field->get<bool>();
+    }
+    template <class Number>
+    void number(const char* name, Number& value, double least, double most) const {
+        const Json* field = find(name);
+        if (!field || !field->is_number()) return;
+        const double read = field->get<double>();
+        if (read >= least && read <= most) value = static_cast<Number>(read);
+    }
+    void colour(const char* name, glm::vec3& value) const {
+        const Json* field = find(name);
+        if (!field || !field->is_array() || field->size() != 3) return;
+        for (const Json& part : *field)
+            if (!part.is_number() || !(part.get<double>() >= 0 && part.get<double>() <= 1)) return;
+        for (int i = 0; i < 3; ++i) value[i] = (*field)[static_cast<size_t>(i)].get<float>();
+    }
+    [[nodiscard]] const Json* find(const char* name) const {
+        const auto at = json_.find(name);
+        return at == json_.end() ? nullptr : &*at;
+    }
+
+private:
+    const Json& json_;
+};
+
+void readBookmarks(const Json& json, UserSettings& settings) {
+    for (const auto& [file, views] : json.items()) {
+        if (!views.is_object() || settings.bookmarks.size() >= UserSettings::kMostBookmarkedFiles) continue;
+        for (const auto& [number, camera] : views.items()) {
+            const auto read = cameraFromJson(camera.dump(), file);
+            if (read && number.size() == 1 && number[0] >= '1' && number[0] <= '9')
+                settings.bookmarks[addressWithoutUser(file)][number[0] - '0'] = *read;
+        }
+    }
+}
+
+UserSettings settingsFrom(const Json& json) {
+    UserSettings settings;
+    const Fields fields(json);
+    if (const Json* recent = fields.find("recent"); recent && recent->is_array())
+        for (const Json& each : *recent)
+            if (each.is_string() && settings.recent.size() < UserSettings::kMostRecent)
+                settings.recent.push_back(addressWithoutUser(each.get<std::string>()));
+    if (const Json* bookmarks = fields.find("bookmarks"); bookmarks && bookmarks->is_object())
+        readBookmarks(*bookmarks, settings);
+    fields.number("width", settings.windowSize.x, 64, 16384);
+    fields.number("height", settings.windowSize.y, 64, 16384);
+    fields.flag("panel", settings.panel);
+    if (const Json* up = fields.find("up"); up && *up == "z") settings.up = UpAxis::Z;
+    fields.flag("shadows", settings.shadows);
+    fields.flag("occlusion", settings.occlusion);
+    fields.number("error_pixels", settings.errorPixels, 0.01, 1000);
+    fields.number("budget_bytes", settings.budgetBytes, 1 << 20, std::ldexp(1.0, 60));
+    fields.colour("background_top", settings.backgroundTop);
+    fields.colour("background_bottom", settings.backgroundBottom);
+    return settings;
+}
+
+Json colourJson(glm::vec3 c) { return Json::array({c.x, c.y, c.z}); }
+
+/// The last one first; what is no name stays behind them.
+void addRecent(Json& json, const std::vector<std::string>& opened) {
+    if (!json.is_array()) json = Json::array();
+    for (const std::string& name : opened) {
+        Json recent = Json::array({name});
+        for (const Json& each : json) {
+            const Json kept = each.is_string() ? Json(addressWithoutUser(each.get<std::string>())) : each;
+            if (kept != Json(name) && recent.size() < UserSettings::kMostRecent) recent.push_back(kept);
+        }
+        json = std::move(recent);
+    }
+}
+
+/// Files whose bookmarks were kept longest ago go first where there are too many.
+void addBookmarks(Json& json, const std::map<std::string, std::map<int, OrbitCamera>>& bookmarks) {
+    if (!json.is_object()) json = Json::object();
+    for (const auto& [file, views] : bookmarks) {
+        Json of = json.contains(file) && json[file].is_object() ? json[file] : Json::object();
+        for (const auto& [number, camera] : views) of[std::to_string(number)] = Json::parse(cameraToJson(camera));
+        json.erase(file);
+        json[file] = std::move(of);
+        while (json.size() > UserSettings::kMostBookmarkedFiles) json.erase(json.begin());
+    }
+}
+
+void applyChanges(const SettingsChanges& changes, Json& json) {
+    if (!changes.opened.empty()) addRecent(json["recent"], changes.opened);
+    if (!changes.bookmarks.empty()) addBookmarks(json["bookmarks"], changes.bookmarks);
+    const auto put = [&](const char* name, const auto& value) {
+        if (value) json[name] = *value;
+    };
+    if (changes.windowSize) {
+        json["width"] = changes.windowSize->x;
+        json["height"] = changes.windowSize->y;
+    }
+    put("panel", changes.panel);
+    if (changes.up) json["up"] = *changes.up == UpAxis::Z ? "z" : "y";
+    put("shadows", changes.shadows);
+    put("occlusion", changes.occlusion);
+    put("error_pixels", changes.errorPixels);
+    put("budget_bytes", changes.budgetBytes);
+    if (changes.backgroundTop) json["background_top"] = colourJson(*changes.backgroundTop);
+    if (changes.backgroundBottom) json["background_bottom"] = colourJson(*changes.backgroundBottom);
+}
+
+Error notSaved(const fs::path& path, const std::string& why) {
+    return {ErrorCode::Io, "settings cannot be remembered: " + why, path.string()};
+}
+
+/// With what the system says.
+Error notSaved(const fs::path& path, const char* what, int error) {
+    return notSaved(path, fmt::format("{}: {}", what, std::generic_category().message(error)));
+}
+
+class FileDescriptor {
+public:
+    explicit FileDescriptor(int number = -1) : number_(number) {}
+    FileDescriptor(FileDescriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+    FileDescriptor& operator=(FileDescriptor&& other) noexcept {
+        std::swap(number_, other.number_);
+        return *this;
+    }
+    ~FileDescriptor() {
+        if (isOpen()) ::close(number_);
+    }
+    [[nodiscard]] bool isOpen() const { return number_ >= 0; }
+    [[nodiscard]] int number() const { return number_; }
+
+private:
+    int number_;
+};
+
+struct FileText {
+    bool exists = false;
+    std::string text;
+    mode_t mode = 0600;  // of a file that is made anew
+};
+
+/// Errors: Io (is there and cannot be read), InvalidInput (too large).
+Result<FileText> readText(const fs::path& path) {
+    // A pipe in its place does not wait for a writer.
+    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    if (!file.isOpen() && errno == ENOENT) return FileText{};
+    struct stat status {};
+    if (!file.isOpen() || ::fstat(file.number(), &status) != 0)
+        return Error{ErrorCode::Io, "cannot be read: " + std::generic_category().message(errno), path.string()};
+    if (!S_ISREG(status.st_mode)) return Error{ErrorCode::Io, "is no file of settings", path.string()};
+    FileText read{true, {}, status.st_mode & 0777};
+    char buffer[16384];
+    for (;;) {
+        const ssize_t count = ::read(file.number(), buffer, sizeof(buffer));
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0)
+            return Error{ErrorCode::Io, "cannot be read: " + std::generic_category().message(errno), path.string()};
+        if (count == 0) return read;
+        read.text.append(buffer, static_cast<size_t>(count));
+        if (read.text.size() > kLargestFile)
+            return Error{ErrorCode::InvalidInput, "is larger than 1 MiB, which no file of settings is", path.string()};
+    }
+}
+
+/// The file at the end of the links, whether it is there or not.
+Result<fs::path> linkTarget(fs::path path) {
+    std::error_code failed;
+    for (int links = 0; fs::is_symlink(path, failed); ++links) {
+        if (links == kMostLinks) return notSaved(path, "too many links");
+        const fs::path to = fs::read_symlink(path, failed);
+        if (failed) return notSaved(path, "the link cannot be read");
+        path = to.is_absolute() ? to : path.parent_path() / to;
+    }
+    return path;
+}
+
+/// Holds the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
+/// nothing but files that are open for writing: there it is a file of our own beside them.
+class FolderLock {
+public:
+    static Result<FolderLock> of(const fs::path& settings) {
+        const fs::path folder = settings.parent_path();
+        FolderLock lock;
+        lock.file_ = FileDescriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+        if (!lock.file_.isOpen()) return notSaved(settings, "its folder cannot be opened", errno);
+        int refused = lock.hold();
+        if (refused == 0) return lock;
+        if (refused != EWOULDBLOCK) {
+            lock.file_ = FileDescriptor(
+                ::open(fs::path(settings.string() + ".lock").c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600));
+            refused = lock.file_.isOpen() ? lock.hold() : errno;
+        }
+        if (refused == EWOULDBLOCK) return notSaved(settings, "another process holds them, and does not let go");
+        // What cannot be locked anywhere is written as well as it can be.
+        return lock;
+    }
+
+private:
+    /// 0, or why not. A process that hangs is not waited for for ever.
+    int hold() const {
+        for (int tries = 0; ::flock(file_.number(), LOCK_EX | LOCK_NB) != 0; ++tries) {
+            if (errno != EWOULDBLOCK && errno != EINTR) return errno;
+            if (tries == kLockTries) return EWOULDBLOCK;
+            std::this_thread::sleep_for(kLockPause);
+        }
+        return 0;
+    }
+
+    FileDescriptor file_;
+};
+
+/// Under a name that nobody else has, then renamed.
+Result<void> replaceFile(const fs::path& path, const std::string& text, mode_t mode) {
+    std::string name = path.string() + ".XXXXXX";
+    FileDescriptor file(::mkostemp(name.data(), O_CLOEXEC));
+    if (!file.isOpen()) return notSaved(path, "no file can be made beside it", errno);
+    int failed = 0;
+    for (size_t done = 0; failed == 0 && done < text.size();) {
+        const ssize_t count = ::write(file.number(), text.data() + done, text.size() - done);
+        if (count > 0)
+            done += static_cast<size_t>(count);
+        else if (errno != EINTR)
+            failed = errno;
+    }
+    if (failed == 0 && (::fchmod(file.number(), mode) != 0 || ::fsync(file.number()) != 0)) failed = errno;
+    if (failed == 0 && ::rename(name.c_str(), path.c_str()) != 0) failed = errno;
+    if (failed == 0) return {};
+    ::unlink(name.c_str());
+    return notSaved(path, "cannot be written", failed);
+}
+
+/// Returns the name that it has now.
+Result<fs::path> putAside(const fs::path& path) {
+    fs::path aside = path;
+    aside += ".damaged";
+    std::error_code failed;
+    for (int number = 2; fs::symlink_status(aside, failed).type() != fs::file_type::not_found; ++number) {
+        if (number > kMostDamaged) return notSaved(path, "it is damaged, as are many beside it");
+        aside = path;
+        aside += fmt::format(".damaged-{}", number);
+    }
+    if (::rename(path.c_str(), aside.c_str()) != 0)
+        return notSaved(path, "it is damaged, and cannot be put aside", errno);
+    return aside;
+}
+
+}  // namespace
+
+std::string rememberedName(const std::string& input) {
+    if (isHttpUrl(input)) return addressWithoutUser(input);
+    std::error_code failed;
+    const fs::path absolute = fs::absolute(input, failed);
+    return failed ? input : absolute.lexically_normal().string();
+}
+
+void UserSettings::remember(const std::string& name) {
+    std::erase(recent, name);
+    recent.insert(recent.begin(), name);
+    if (recent.size() > kMostRecent) recent.resize(kMostRecent);
+}
+
+bool SettingsChanges::empty() const {
+    return opened.empty() && bookmarks.empty() && !windowSize && !panel && !shadows && !occlusion && !up &&
+           !errorPixels && !budgetBytes && !backgroundTop && !backgroundBottom;
+}
+
+Result<fs::path> userSettingsPath() {
+    const char* config = std::getenv("XDG_CONFIG_HOME");
+    if (config && fs::path(config).is_absolute()) return fs::path(config) / "vcp" / "view.json";
+    const char* home = std::getenv("HOME");
+    if (home && *home) return fs::path(home) / ".config" / "vcp" / "view.json";
+    return Error{ErrorCode::Io, "no folder for settings: set XDG_CONFIG_HOME or HOME"};
+}
+
+Result<UserSettings> readUserSettings(const fs::path& path) {
+    const auto file = readText(path);
+    if (!file) return file.error();
+    if (!file->exists) return UserSettings{};
+    const Json json = Json::parse(file->text, nullptr, false);
+    if (!json.is_object()) return Error{ErrorCode::InvalidInput, "is no JSON object", path.string()};
+    return settingsFrom(json);
+}
+
+Result<std::string> saveChanges(const SettingsChanges& changes, const fs::path& where) {
+    if (changes.empty()) return std::string();
+    std::error_code failed;
+    const fs::path path = fs::absolute(where, failed);
+    fs::create_directories(path.parent_path(), failed);
+    if (failed) return notSaved(path, failed.message());
+    const auto target = linkTarget(path);
+    if (!target) return target.error();
+    const auto lock = FolderLock::of(*target);
+    if (!lock) return lock.error();
+    const auto before = readText(*target);
+    if (!before && before.error().code != ErrorCode::InvalidInput) return notSaved(path, before.error().message);
+    Json json = !before ? Json() : before->exists ? Json::parse(before->text, nullptr, false) : Json::object();
+    std::string warning;
+    if (!json.is_object()) {
+        const auto aside = putAside(*target);
+        if (!aside) return aside.error();
+        warning = fmt::format("{}: was no file of settings; it is kept as {}, and a new one is begun", path.string(),
+                              aside->string());
+        json = Json::object();
+    }
+    applyChanges(changes, json);
+    VCP_TRY(replaceFile(*target, json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n',
+                        before ? before->mode : 0600));
+    return warning;
+}
+
+}  // namespace vcp

@@ -1,0 +1,71 @@
+// What `vcp view` remembers: recent files, bookmarks, looks. A small JSON file, which several windows share: each saves
+// what was changed in it by hand, into the file as it is by then, and leaves the rest, also what this version does not
+// know.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "octree/result.h"
+#include "viewer/camera/orbit_camera.h"
+
+namespace vcp {
+
+struct UserSettings {
+    static constexpr size_t kMostRecent = 12;
+    static constexpr size_t kMostBookmarks = 9;
+    static constexpr size_t kMostBookmarkedFiles = 50;
+
+    std::vector<std::string> recent;                              ///< absolute paths and addresses without passwords, the last one first
+    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< of a path or address; numbers 1 to 9
+    glm::ivec2 windowSize{1280, 800};
+    bool panel = false;
+    UpAxis up = UpAxis::Y;
+    bool shadows = false, occlusion = false;
+    double errorPixels = 0.5;
+    uint64_t budgetBytes = 512ull << 20;
+    glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
+    glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
+
+    /// Puts a remembered name to the front of `recent`.
+    void remember(const std::string& name);
+};
+
+/// What was done by hand in one window. What options, scene files and bookmarks set is none of it.
+struct SettingsChanges {
+    std::vector<std::string> opened;                              ///< remembered names, in order
+    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< that were kept: UserSettings::bookmarks
+    std::optional<glm::ivec2> windowSize;
+    std::optional<bool> panel, shadows, occlusion;
+    std::optional<UpAxis> up;
+    std::optional<double> errorPixels;
+    std::optional<uint64_t> budgetBytes;
+    std::optional<glm::vec3> backgroundTop, backgroundBottom;
+
+    [[nodiscard]] bool empty() const;
+};
+
+/// What a file is remembered as: an address without user and password, a path made absolute.
+std::string rememberedName(const std::string& input);
+
+/// $XDG_CONFIG_HOME/vcp/view.json, else $HOME/.config/vcp/view.json. Errors: Io when neither is set.
+Result<std::filesystem::path> userSettingsPath();
+
+/// Defaults for what is missing, of a wrong type or out of range; may be hostile. Errors: Io (exists and cannot be
+/// read, is no regular file), InvalidInput (not JSON, larger than 1 MiB). A file that is not there gives the defaults.
+Result<UserSettings> readUserSettings(const std::filesystem::path& path);
+
+/// Puts the changes into the file; makes it and its folder where needed; any number of processes at once. The file is
+/// replaced whole; where it is a symbolic link, its target is. One that is damaged is kept beside it, as
+/// view.json.damaged or with the next free number behind. Without changes nothing is done. Returns a warning, empty
+/// where there is none. Errors: Io.
+Result<std::string> saveChanges(const SettingsChanges& changes, const std::filesystem::path& path);
+
+}  // namespace vcp

@@ -1,0 +1,356 @@
+#include "viewer/window/view_session.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+
+#include "viewer/camera/camera_path.h"
+
+namespace vcp {
+
+namespace {
+
+// How often what goes on in other threads is looked at.
+constexpr double kOpeningPollSeconds = 0.1;
+constexpr double kPickPollSeconds = 0.01;
+
+constexpr int kMostExports = 10000;
+constexpr uint32_t kRememberedOcclusionRays = 8;
+constexpr uint32_t kSavedTile = 512;  // small: the window goes on between tiles
+
+/// The first number from 1 on that is free; of too many the last.
+template <class IsTaken>
+int freeNumber(IsTaken isTaken) {
+    int number = 1;
+    while (number < kMostExports && isTaken(number)) ++number;
+    return number;
+}
+
+bool isThere(const std::filesystem::path& path) {
+    std::error_code failed;
+    return std::filesystem::exists(path, failed);
+}
+
+std::string workingFolder() {
+    std::error_code failed;
+    return std::filesystem::current_path(failed).string();
+}
+
+bool writeText(const std::filesystem::path& path, const std::string& text) {
+    std::ofstream file(path, std::ios::binary);
+    return static_cast<bool>((file << text).flush());
+}
+
+}  // namespace
+
+void applyRemembered(RenderSettings& render, const UserSettings& user, const std::function<bool(const char* option)>& isGiven) {
+    if (!isGiven("--error-pixels")) render.errorPixels = user.errorPixels;
+    if (!isGiven("--budget")) render.budget = std::to_string(user.budgetBytes);
+    if (!isGiven("--shadows")) render.shadows = user.shadows;
+    if (!isGiven("--occlusion") && user.occlusion) render.occlusionRays = kRememberedOcclusionRays;
+    if (!isGiven("--up")) render.up = user.up == UpAxis::Z ? "z" : "y";
+}
+
+Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options, std::optional<SurfaceSource> surface) {
+    ViewerOptions viewerOptions;
+    viewerOptions.renderer = options.render.rendererOptions();
+    // Any shading may be chosen later.
+    viewerOptions.renderer.colour = true;
+    viewerOptions.renderer.surface = std::move(surface);
+    viewerOptions.errorPixels = options.render.errorPixels;
+    viewerOptions.shading = options.render.shadingChosen();
+    viewerOptions.shading.backgroundTop = options.user.backgroundTop;
+    viewerOptions.shading.backgroundBottom = options.user.backgroundBottom;
+    viewerOptions.sectionCaps = options.render.caps;
+    viewerOptions.march = options.render.march;
+    auto viewer = Viewer::create(viewerOptions);
+    if (!viewer) return viewer.error();
+    return std::unique_ptr<ViewSession>(new ViewSession(options, *std::move(viewer)));
+}
+
+ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.upAxis()) {}
+
+ViewSession::~ViewSession() {
+    cancelSaving();
+    endPick();
+}
+
+/// A server may take long; a cast may be about to read again.
+void ViewSession::endPick() {
+    while (pick_.valid() && pick_.wait_for(std::chrono::milliseconds(10)) != std::future_status::ready) finest_->interrupt();
+    pick_ = {};
+}
+
+void ViewSession::open(std::vector<std::string> inputs) {
+    if (inputs.empty()) return;
+    dismissProblem();
+    opening_.reset();
+    opening_ = std::make_unique<DatasetOpening>(std::move(inputs), options_.build, options_.render.source,
+                                                options_.makeProgress ? options_.makeProgress() : nullptr);
+}
+
+void ViewSession::takeOpened() {
+    if (!opening_ || !opening_->isDone()) return;
+    const auto opened = opening_->take();
+    const std::vector<std::string> inputs = opening_->inputs();
+    opening_.reset();
+    const auto shown = opened ? show(*opened, inputs) : Result<void>(opened.error());
+    if (shown) return;
+    if (shown.error().code == ErrorCode::Cancelled)
+        note("cancelled");
+    else
+        say(shown.error().line());
+}
+
+Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::string>& inputs) {
+    const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
+    OrbitCamera camera;
+    camera.up = up_;
+    camera.look(View::Fit, open.bounds(), size, viewer_->covered());
+    // What the command line says is for what it opens.
+    if (!std::exchange(wasShown_, true)) {
+        const auto asked = options_.render.cameraFor(open.bounds(), size, viewer_->covered());
+        if (asked)
+            camera = *asked;
+        else
+            say(asked.error().line());
+        viewer_->setSections(options_.render.sectionPlanes(open.bounds()));
+        if (options_.render.camera == "fit" && open.file.camera) camera = *open.file.camera;
+    } else {
+        viewer_->setSections({});
+        if (open.file.camera) camera = *open.file.camera;
+    }
+    const bool hasOwnSections = viewer_->sections().empty() && !open.file.sections.empty();
+    if (hasOwnSections) viewer_->setSections(open.file.sections);
+    viewer_->setSectionCaps(options_.render.caps || (hasOwnSections && open.file.sectionCaps));
+    if (open.file.light || std::exchange(hasSceneLight_, false)) {
+        // What lit one scene does not light the next.
+        Shading shading = viewer_->shading();
+        const Shading chosen = options_.render.shadingChosen();
+        shading.lightFollowsCamera = open.file.light ? open.file.light->followsCamera : chosen.lightFollowsCamera;
+        shading.lightDirection = open.file.light ? open.file.light->direction : chosen.lightDirection;
+        viewer_->setShading(shading);
+        hasSceneLight_ = open.file.light.has_value();
+    }
+    cancelSaving();
+    endPick();
+    measurement_.clear();
+    finest_ = std::make_shared<ScenePick>();
+    for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
+    VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
+    if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
+    shown_ = rememberedName(inputs.front());
+    for (const std::string& input : inputs) {
+        changes_.opened.push_back(rememberedName(input));
+        user_.remember(changes_.opened.back());
+    }
+    return {};
+}
+
+Result<NextStep> ViewSession::update(double now) {
+    takeOpened();
+    takePicked();
+    goOnSaving();
+    noteChanges();
+    auto next = viewer_->update(now);
+    if (!next) return next;
+    if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
+    if (saving_) next->waitSeconds = saving_->pictures->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
+    if (pick_.valid()) next->waitSeconds = std::min(next->waitSeconds, kPickPollSeconds);
+    return next;
+}
+
+void ViewSession::act(ViewerAction action) {
+    // A camera of a scene or a bookmark brings its own axis: this alone is by hand.
+    if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen()) changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
+    viewer_->act(action);
+    if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
+}
+
+void ViewSession::showFeedback(bool show) {
+    showsFeedback_ = show;
+    viewer_->renderer().keepFeedback(show);
+}
+
+std::string ViewSession::problem() const { return problem_.empty() ? viewer_->status().problem : problem_; }
+
+void ViewSession::dismissProblem() {
+    problem_.clear();
+    viewer_->dismissProblem();
+}
+
+void ViewSession::keepBookmark(int number) {
+    if (shown_.empty()) return;
+    user_.bookmarks[shown_][number] = changes_.bookmarks[shown_][number] = viewer_->camera();
+    note(fmt::format("bookmark {} kept; Shift+{} goes back to it", number, number));
+}
+
+void ViewSession::goToBookmark(int number) {
+    const auto* kept = bookmarks();
+    const auto bookmark = kept ? kept->find(number) : std::map<int, OrbitCamera>::const_iterator{};
+    if (!kept || bookmark == kept->end()) return note(fmt::format("there is no bookmark {}; Ctrl+{} makes one", number, number));
+    viewer_->moveTo(bookmark->second);
+}
+
+const std::map<int, OrbitCamera>* ViewSession::bookmarks() const {
+    const auto of = user_.bookmarks.find(shown_);
+    return of == user_.bookmarks.end() ? nullptr : &of->second;
+}
+
+void ViewSession::pasteCamera(const std::string& json) {
+    const auto camera = cameraFromJson(json, "clipboard");
+    if (!camera) return say(camera.error().line());
+    viewer_->moveTo(*camera);
+}
+
+void ViewSession::measureAt(glm::dvec2 pixel) {
+    if (!finest_ || pick_.valid()) return;
+    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface) return note("mesostructure is not measured: it has no certified error");
+    // A cap is the section plane itself: its points are exact.
+    if (const auto cap = viewer_->capAt(pixel)) {
+        measurement_.add({*cap, 0, viewer_->status().levels - 1});
+        return;
+    }
+    const CameraRay through = viewer_->camera().rayThrough(pixel, viewer_->size());
+    const Ray ray{through.origin, through.direction};
+    pick_ = std::async(std::launch::async, [finest = finest_, ray, sections = viewer_->sections()] { return finest->cast(ray, sections); });
+}
+
+void ViewSession::takePicked() {
+    if (!pick_.valid() || pick_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    const Picked picked = pick_.get();
+    if (!picked) return say(picked.error().line());
+    if (!*picked) return note("there is no surface under the cursor");
+    measurement_.add({(*picked)->position, (*picked)->certifiedError, (*picked)->level});
+}
+
+void ViewSession::exportMeasurement() {
+    if (measurement_.empty()) return note("nothing is measured yet: D, then click");
+    const auto nameOf = [](int number) { return fmt::format("measurement-{}", number); };
+    const std::string name = nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
+    std::error_code failed;
+    if (!writeText(name + ".csv", measurementCsv(measurement_)) || !writeText(name + ".json", measurementJson(measurement_)))
+        return say(std::filesystem::absolute(name + ".csv", failed).string() + ": cannot be written");
+    note(fmt::format("written: {}.csv and .json in {}", name, workingFolder()));
+}
+
+void ViewSession::savePicture(const PictureChoice& choice) {
+    if (saving_ || !viewer_->isOpen()) return;
+    const auto filesOf = [&](int number) {
+        PictureFiles files{fmt::format("picture-{}.png", number), {}, {}};
+        if (choice.depth) files.depth = fmt::format("picture-{}-depth.pfm", number);
+        return files;
+    };
+    const PictureFiles files = filesOf(freeNumber([&](int i) { return isThere(filesOf(i).picture) || isThere(fmt::format("picture-{}-depth.pfm", i)); }));
+    beginSaving(choice, files.picture, files, {viewer_->camera()}, false);
+}
+
+void ViewSession::saveTurntable(const PictureChoice& choice, int pictures) {
+    if (saving_ || !viewer_->isOpen()) return;
+    saveSequence(choice, "turntable", turntable(viewer_->camera(), viewer_->bounds().centre(), pictures));
+}
+
+void ViewSession::savePath(const PictureChoice& choice, int pictures) {
+    if (saving_ || !viewer_->isOpen()) return;
+    std::vector<OrbitCamera> keys;
+    if (const auto* kept = bookmarks())
+        for (const auto& [number, camera] : *kept) keys.push_back(camera);
+    if (keys.size() < 2) return note("a path goes through bookmarks: keep two or more, with Ctrl+1, Ctrl+2, ...");
+    saveSequence(choice, "path", cameraPath(keys, pictures));
+}
+
+void ViewSession::saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras) {
+    const auto folderOf = [&](int number) { return std::filesystem::path(fmt::format("{}-{}", name, number)); };
+    const std::filesystem::path folder = folderOf(freeNumber([&](int i) { return isThere(folderOf(i)); }));
+    std::error_code failed;
+    if (!std::filesystem::create_directory(folder, failed)) return say(fmt::format("{}: no such folder can be made in {}", folder.string(), workingFolder()));
+    PictureFiles files{folder / "picture.png", {}, {}};
+    if (choice.depth) files.depth = folder / "depth.pfm";
+    beginSaving(choice, folder, files, cameras, true);
+}
+
+void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence) {
+    auto view = viewer_->renderer().addView();
+    if (!view) {
+        std::error_code failed;
+        if (isSequence) std::filesystem::remove(name, failed);
+        return say(view.error().line());
+    }
+    FrameRequest request = viewer_->pictureOf(choice.size);
+    request.shading.transparent = choice.transparent;
+    PictureSequenceOptions options{.request = request, .cameras = {}, .files = std::move(files), .isNumbered = isSequence, .tile = kSavedTile,
+                                   .problem = [this](const Error& problem) { say(problem.line()); }};
+    for (const OrbitCamera& camera : cameras) options.cameras.push_back(camera.current());
+    auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
+    saving_ = Saving{std::move(name), *std::move(view), std::move(pictures), isSequence};
+}
+
+std::optional<ViewSession::SavingProgress> ViewSession::saving() const {
+    if (!saving_) return std::nullopt;
+    const PictureSequence& pictures = *saving_->pictures;
+    return SavingProgress{saving_->name.string(), pictures.fraction(), pictures.finished(), pictures.pictures()};
+}
+
+/// What is there of it, in words.
+std::string ViewSession::endSaving() {
+    Saving saving = *std::exchange(saving_, std::nullopt);
+    const auto [finished, pictures] = std::pair(saving.pictures->finished(), saving.pictures->pictures());
+    saving.pictures.reset();  // with it goes what is half-written
+    std::error_code failed;
+    if (saving.isSequence && finished == 0) std::filesystem::remove(saving.name, failed);
+    if (finished == 0) return fmt::format("{}: nothing is written", saving.name.string());
+    return fmt::format("written: {}{} in {}", saving.isSequence ? fmt::format("{} of {} pictures, ", finished, pictures) : "", saving.name.string(), workingFolder());
+}
+
+void ViewSession::cancelSaving() {
+    if (saving_) note("cancelled; " + endSaving());
+}
+
+void ViewSession::goOnSaving() {
+    if (!saving_) return;
+    if (saving_->turnsBefore > 0) {
+        --saving_->turnsBefore;
+        return;
+    }
+    const auto done = saving_->pictures->step();
+    if (done && !*done) return;
+    if (!done) say(done.error().line());
+    note(endSaving());
+}
+
+const SettingsChanges& ViewSession::changes() {
+    noteChanges();
+    return changes_;
+}
+
+void ViewSession::togglePanel() {
+    user_.panel = !user_.panel;
+    changes_.panel = user_.panel;
+}
+
+ViewSession::Looks ViewSession::looks() const {
+    const Shading& shading = viewer_->shading();
+    return {shading.shadows, shading.occlusionRays > 0, viewer_->errorPixels(), viewer_->status().budgetBytes, shading.backgroundTop, shading.backgroundBottom};
+}
+
+/// What options and scenes set is there when they are set; what differs from the last update is by hand.
+void ViewSession::noteChanges() {
+    const Looks now = looks();
+    const auto compare = [](const auto& value, const auto& before, auto& changed) {
+        if (value != before) changed = value;
+    };
+    compare(now.shadows, seenLooks_.shadows, changes_.shadows);
+    compare(now.occlusion, seenLooks_.occlusion, changes_.occlusion);
+    compare(now.errorPixels, seenLooks_.errorPixels, changes_.errorPixels);
+    compare(now.budgetBytes, seenLooks_.budgetBytes, changes_.budgetBytes);
+    compare(now.backgroundTop, seenLooks_.backgroundTop, changes_.backgroundTop);
+    compare(now.backgroundBottom, seenLooks_.backgroundBottom, changes_.backgroundBottom);
+    seenLooks_ = now;
+}
+
+}  // namespace vcp

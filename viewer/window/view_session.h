@@ -1,0 +1,163 @@
+// What the window of `vcp view` shows and does, without the window: a Viewer, what is being opened into it, what is
+// measured, what is remembered. window.h turns events into calls, interface.h draws the panels.
+//
+// Errors of files end nothing: they stand in problem() until the next thing is opened or they are dismissed.
+// One thread; times as in viewer.h.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/finest_pick.h"
+#include "viewer/picture/picture_sequence.h"
+#include "viewer/scene/dataset_opening.h"
+#include "viewer/scene/render_settings.h"
+#include "viewer/viewer.h"
+#include "viewer/window/measurement.h"
+#include "viewer/window/user_settings.h"
+
+namespace vcp {
+
+/// What is remembered stands in for options that were not given: `isGiven("--up")`.
+void applyRemembered(RenderSettings& render, const UserSettings& user, const std::function<bool(const char* option)>& isGiven);
+
+struct SessionOptions {
+    std::vector<std::string> inputs;  ///< what the window opens first
+    BuildSettings build;
+    RenderSettings render;
+    UserSettings user;  ///< as they are remembered; `render` goes before them
+    /// Gives each opening what is told of its progress (DatasetOpening). May be empty.
+    std::function<std::function<bool(const BuildProgress&)>()> makeProgress;
+};
+
+/// Pictures to be saved: the switches of the panel.
+struct PictureChoice {
+    glm::ivec2 size{1920, 1080};  ///< up to 16384 each
+    bool transparent = false;     ///< no background
+    bool depth = false;           ///< also the distance along each ray, as .pfm
+};
+
+class ViewSession {
+public:
+    /// `surface`: of the window; without one nothing may be presented. Errors: those of Renderer::create.
+    static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options, std::optional<SurfaceSource> surface);
+    ~ViewSession();
+
+    [[nodiscard]] Viewer& viewer() { return *viewer_; }
+    [[nodiscard]] const Viewer& viewer() const { return *viewer_; }
+    /// As they are remembered, with what was changed since.
+    [[nodiscard]] const UserSettings& user() const { return user_; }
+    /// What was changed by hand, to be saved when the window closes.
+    [[nodiscard]] const SettingsChanges& changes();
+    void togglePanel();
+    /// By hand, not by the window system.
+    void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
+
+    /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
+    void open(std::vector<std::string> inputs);
+    /// Null when nothing is being opened.
+    [[nodiscard]] DatasetOpening* opening() { return opening_.get(); }
+
+    /// Viewer::update, and takes in what was opened or picked meanwhile.
+    Result<NextStep> update(double now);
+
+    /// Viewer::act, by hand; says so where that shows nothing.
+    void act(ViewerAction action);
+
+    /// What went wrong last, in one line; empty: nothing.
+    [[nodiscard]] std::string problem() const;
+    void say(std::string problem) { problem_ = std::move(problem); }
+    void dismissProblem();
+    /// A word about what was done ("copied"); it goes at the next press of a key or button.
+    [[nodiscard]] const std::string& note() const { return note_; }
+    void note(std::string text) { note_ = std::move(text); }
+
+    void keepBookmark(int number);
+    void goToBookmark(int number);
+    /// Null without any.
+    [[nodiscard]] const std::map<int, OrbitCamera>* bookmarks() const;
+    /// Goes to a camera in JSON, as cameraToJson writes it.
+    void pasteCamera(const std::string& json);
+
+    bool isMeasuring = false;
+    /// Overlays of streaming; nothing is asked of the renderer for them while they are off.
+    bool showsPages = false;
+    [[nodiscard]] bool showsFeedback() const { return showsFeedback_; }
+    void showFeedback(bool show);
+    [[nodiscard]] Measurement& measurement() { return measurement_; }
+    [[nodiscard]] bool isPicking() const { return pick_.valid(); }
+    /// Picks on the finest level and adds the point; later, where it has to be read first.
+    void measureAt(glm::dvec2 pixel);
+    /// measurement-1.csv and .json in the working folder, or the next free number; says so.
+    void exportMeasurement();
+
+    /// What is shown, into the working folder, tile by tile between frames of the window: one at a time, and what is chosen
+    /// later changes nothing of it. picture-1.png, or the next free number, and picture-1-depth.pfm.
+    void savePicture(const PictureChoice& choice);
+    /// Once around the middle of all, about the up axis, from the view as it is: turntable-1/picture-0001.png and so on, a new folder.
+    void saveTurntable(const PictureChoice& choice, int pictures);
+    /// From the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on. Says so where there are
+    /// fewer than two.
+    void savePath(const PictureChoice& choice, int pictures);
+    struct SavingProgress {
+        std::string name;  ///< of the file or folder
+        double fraction;   ///< 0 to 1
+        size_t finished, pictures;
+    };
+    /// Nothing where nothing is being saved.
+    [[nodiscard]] std::optional<SavingProgress> saving() const;
+    /// Pictures of a sequence that are finished stay; nothing half-written does.
+    void cancelSaving();
+
+private:
+    /// What hands may change in the viewer, and what is remembered.
+    struct Looks {
+        bool shadows, occlusion;
+        double errorPixels;
+        uint64_t budgetBytes;
+        glm::vec3 backgroundTop, backgroundBottom;
+    };
+
+    using Picked = Result<std::optional<SceneHit>>;
+
+    ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
+    [[nodiscard]] Looks looks() const;
+    void noteChanges();
+    void takeOpened();
+    Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
+    void takePicked();
+    void endPick();
+    void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
+    void beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence);
+    void goOnSaving();
+    [[nodiscard]] std::string endSaving();
+
+    SessionOptions options_;
+    UserSettings user_;
+    SettingsChanges changes_;
+    std::unique_ptr<Viewer> viewer_;
+    Looks seenLooks_;  // of the last update
+    UpAxis up_;        // of what is opened next
+    std::unique_ptr<DatasetOpening> opening_;
+    std::string shown_;  // rememberedName of what is shown; empty: nothing
+    bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
+    std::string problem_, note_;
+    Measurement measurement_;
+    std::shared_ptr<ScenePick> finest_;
+    std::future<Picked> pick_;
+    struct Saving {
+        std::filesystem::path name;  // of the file; of the folder of a sequence
+        std::unique_ptr<Renderer> view;
+        std::unique_ptr<PictureSequence> pictures;  // by that view
+        bool isSequence = false;
+        int turnsBefore = 2;  // updates without a tile: the window lays its progress out, then shows it
+    };
+    std::optional<Saving> saving_;
+};
+
+}  // namespace vcp

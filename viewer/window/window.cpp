@@ -1,0 +1,370 @@
+#include "viewer/window/window.h"
+
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#define GLFW_INCLUDE_NONE
+#define GLFW_INCLUDE_VULKAN
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+
+#include "viewer/key_map.h"
+#include "viewer/window/interface.h"
+#include "viewer/window/interface_painter.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr double kDoubleClickSeconds = 0.4;
+constexpr double kClickPixels = 4;  // a press that moves less is a click
+
+Error displayError(const std::string& what) {
+    const char* why = nullptr;
+    glfwGetError(&why);
+    return {ErrorCode::Device, what + (why ? std::string(": ") + why : "") + "; `vcp render` makes a picture without a window"};
+}
+
+/// GLFW for as long as it lives, and its one window.
+class WindowSystem {
+public:
+    WindowSystem() = default;
+    WindowSystem(const WindowSystem&) = delete;
+    WindowSystem& operator=(const WindowSystem&) = delete;
+    ~WindowSystem() {
+        if (window_) glfwDestroyWindow(window_);
+        if (started_) glfwTerminate();
+    }
+
+    Result<void> open(glm::ivec2 size, const std::string& title) {
+        if (!glfwInit()) return displayError("no display to open a window on");
+        started_ = true;
+        if (!glfwVulkanSupported()) return displayError("Vulkan cannot draw into windows here");
+        glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+        glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+        window_ = glfwCreateWindow(size.x, size.y, title.c_str(), nullptr, nullptr);
+        if (!window_) return displayError("the window cannot be opened");
+        return {};
+    }
+
+    [[nodiscard]] GLFWwindow* window() const { return window_; }
+
+    [[nodiscard]] SurfaceSource surfaceSource() const {
+        SurfaceSource source;
+        uint32_t count = 0;
+        const char** names = glfwGetRequiredInstanceExtensions(&count);
+        source.instanceExtensions.assign(names, names + count);
+        source.createSurface = [window = window_](VkInstance instance, VkSurfaceKHR* surface) {
+            return glfwCreateWindowSurface(instance, window, nullptr, surface);
+        };
+        return source;
+    }
+
+    /// As open() takes it.
+    [[nodiscard]] glm::ivec2 size() const {
+        glm::ivec2 window(0), framebuffer(0);
+        glm::vec2 scale(1);
+        glfwGetWindowSize(window_, &window.x, &window.y);
+        glfwGetFramebufferSize(window_, &framebuffer.x, &framebuffer.y);
+        glfwGetWindowContentScale(window_, &scale.x, &scale.y);
+        return unscaledSize(window, framebuffer, scale);
+    }
+
+    [[nodiscard]] float contentScale() const {
+        float x = 1, y = 1;
+        glfwGetWindowContentScale(window_, &x, &y);
+        return y;
+    }
+
+private:
+    bool started_ = false;
+    GLFWwindow* window_ = nullptr;
+};
+
+/// The session in its window: what the callbacks reach.
+class ViewWindow {
+public:
+    ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter, const WindowOptions& options)
+        : system_(&system), window_(system.window()), session_(&session), painter_(std::move(painter)), interface_(session, host()), options_(&options) {
+        session.viewer().renderer().onDeviceLoss([this] { painter_.reset(); });
+        glfwSetWindowUserPointer(window_, this);
+        glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
+        glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).mustPresent_ = true; });
+        glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int b, int action, int mods) { of(w).button(b, action, mods); });
+        glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).moveCursor({x, y}); });
+        glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double steps) { of(w).scroll(steps); });
+        glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
+        glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { of(w).letGo(); });
+        glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) { of(w).session_->open({paths, paths + count}); });
+        glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float, float) { of(w).isRescaled_ = true; });
+        int width = 0, height = 0;
+        glfwGetFramebufferSize(window_, &width, &height);
+        resize({width, height});
+        layOut();
+        glfwGetCursorPos(window_, &cursor_.x, &cursor_.y);
+    }
+
+    /// Until the window is closed.
+    Result<WindowReport> run(std::chrono::steady_clock::time_point start) {
+        const auto seconds = [start] {
+            return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        };
+        WindowReport report;
+        std::optional<glm::ivec2> shownSize;
+        while (!glfwWindowShouldClose(window_)) {
+            // While something is built Ctrl-C is to clean up; the loop looks often enough then.
+            if (!session_->opening()) catching_.reset();
+            else if (!catching_ && options_->catchInterrupts) catching_ = options_->catchInterrupts();
+            const auto next = session_->update(seconds());
+            if (!next) return next.error();
+            Viewer& viewer = session_->viewer();
+            if (next->draw) VCP_TRY(viewer.draw());
+            if (!painter_) VCP_TRY(makePainter());
+            VCP_TRY(present(next->draw));
+            if (!report.windowSeconds) report.windowSeconds = seconds();
+            const bool isShown = viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);
+            if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
+            if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
+            wait(*next);
+            // By now the window system has made it as large as it wants it.
+            if (!shownSize) shownSize = system_->size();
+            if (options_->interrupted && options_->interrupted()) break;
+        }
+        report.framesDrawn = session_->viewer().framesDrawn();
+        report.status = session_->viewer().status();
+        report.problem = session_->problem();
+        if (const glm::ivec2 size = system_->size(); shownSize && size != *shownSize) session_->keepWindowSize(size);
+        report.changes = session_->changes();
+        return report;
+    }
+
+private:
+    static ViewWindow& of(GLFWwindow* window) { return *static_cast<ViewWindow*>(glfwGetWindowUserPointer(window)); }
+
+    InterfaceHost host() {
+        return {[this](const std::string& text) { glfwSetClipboardString(window_, text.c_str()); },
+                [this] {
+                    const char* text = glfwGetClipboardString(window_);
+                    return std::string(text ? text : "");
+                }};
+    }
+
+    /// Anew, on the device that stands in for a lost one.
+    Result<void> makePainter() {
+        const auto drawing = session_->viewer().renderer().windowDrawing();
+        if (!drawing) return drawing.error();
+        auto made = InterfacePainter::create(*drawing, system_->contentScale());
+        if (!made) return made.error();
+        painter_ = std::move(*made);
+        mustPresent_ = true;
+        return {};
+    }
+
+    void resize(glm::ivec2 size) {
+        framebuffer_ = size;
+        session_->viewer().resize(size);
+        mustPresent_ = true;
+    }
+
+    /// Cursor positions are in the window's units; pixels may be smaller.
+    [[nodiscard]] glm::dvec2 pixelAt(glm::dvec2 cursor) const {
+        int width = 1, height = 1;
+        glfwGetWindowSize(window_, &width, &height);
+        return cursor * glm::dvec2(framebuffer_) / glm::max(glm::dvec2(width, height), glm::dvec2(1));
+    }
+
+    /// Lays the panels out anew: after every event, so that quick clicks are not lost between frames.
+    void layOut() {
+        if (framebuffer_.x == 0 || framebuffer_.y == 0) return;
+        painter_->begin(framebuffer_);
+        session_->viewer().showSectionHandles(static_cast<double>(painter_->scale()));
+        interface_.layOut(framebuffer_, painter_->scale());
+        mustPresent_ = painter_->end() || mustPresent_;
+    }
+
+    void moveCursor(glm::dvec2 cursor) {
+        cursor_ = cursor;
+        const glm::dvec2 pixel = pixelAt(cursor);
+        ImGui::GetIO().MousePos = ImVec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y));
+        if (glm::distance(pixel, pressedAt_) > kClickPixels) isClick_ = false;
+        session_->viewer().move(pixel);
+        if (!isDragging_) layOut();
+    }
+
+    void button(int glfwButton, int action, int mods) {
+        if (glfwButton > GLFW_MOUSE_BUTTON_MIDDLE) return;
+        const glm::dvec2 pixel = pixelAt(cursor_);
+        moveCursor(cursor_);
+        const bool isPress = action == GLFW_PRESS;
+        const bool isPanels = ImGui::GetIO().WantCaptureMouse && !isDragging_;
+        if (isPress) session_->note("");
+        if (isPanels || !isPress) ImGui::GetIO().MouseDown[glfwButton] = isPress;
+        layOut();
+        const MouseButton which = glfwButton == GLFW_MOUSE_BUTTON_LEFT    ? MouseButton::Left
+                                  : glfwButton == GLFW_MOUSE_BUTTON_RIGHT ? MouseButton::Right
+                                                                          : MouseButton::Middle;
+        if (isPress && !isPanels)
+            press(which, pixel, {(mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
+        else if (!isPress)
+            release(which, pixel);
+    }
+
+    void press(MouseButton which, glm::dvec2 pixel, Modifiers modifiers) {
+        const double now = glfwGetTime();
+        const bool plain = which == MouseButton::Left && !modifiers.shift && !modifiers.control;
+        const bool again = plain && now - pressedTime_ < kDoubleClickSeconds && glm::distance(pixel, pressedAt_) <= kClickPixels;
+        pressedAt_ = pixel;
+        pressedTime_ = again ? 0 : now;
+        isClick_ = plain;
+        isDragging_ = true;
+        session_->viewer().press(which, pixel, modifiers);
+        if (again && !session_->isMeasuring) session_->viewer().centreOn(pixel);
+    }
+
+    void release(MouseButton which, glm::dvec2 pixel) {
+        session_->viewer().release(which);
+        if (!std::exchange(isDragging_, false)) return;
+        if (isClick_ && which == MouseButton::Left && session_->isMeasuring) session_->measureAt(pixel);
+    }
+
+    void scroll(double steps) {
+        const bool shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS || glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+        if (ImGui::GetIO().WantCaptureMouse) {
+            ImGui::GetIO().MouseWheel += static_cast<float>(steps);
+            layOut();
+        } else {
+            session_->viewer().scroll(pixelAt(cursor_), steps, shift);
+        }
+    }
+
+    void letGo() {
+        held_ = {};
+        session_->viewer().fly({});
+    }
+
+    void key(int key, int action, int mods) {
+        if (action == GLFW_REPEAT) return;
+        const bool mayFly = (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE);
+        if (mayFly && holdFlyKey(held_, static_cast<uint32_t>(key), action == GLFW_PRESS)) {
+            session_->viewer().fly(session_->viewer().isFlying() ? held_ : glm::dvec3(0));
+            return;
+        }
+        if (action != GLFW_PRESS) return;
+        session_->note("");
+        const bool isDigit = key >= GLFW_KEY_1 && key <= GLFW_KEY_9;
+        if (isDigit && (mods & GLFW_MOD_CONTROL) != 0) session_->keepBookmark(key - GLFW_KEY_0);
+        else if (isDigit && (mods & GLFW_MOD_SHIFT) != 0) session_->goToBookmark(key - GLFW_KEY_0);
+        else if ((mods & GLFW_MOD_CONTROL) != 0) controlKey(key);
+        else plainKey(key);
+    }
+
+    void controlKey(int key) {
+        if (key == GLFW_KEY_C) interface_.copyCamera();
+        if (key == GLFW_KEY_V) interface_.pasteCamera();
+        if (key == GLFW_KEY_E) session_->exportMeasurement();
+        if (key == GLFW_KEY_S) interface_.savePicture();
+        if (key == GLFW_KEY_T) interface_.saveTurntable();
+        if (key == GLFW_KEY_B) interface_.savePath();
+        if (key == GLFW_KEY_Q) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+    }
+
+    void plainKey(int key) {
+        switch (key) {
+            case GLFW_KEY_ESCAPE: escape(); break;
+            case GLFW_KEY_F1: interface_.showsHelp = !interface_.showsHelp; break;
+            case GLFW_KEY_TAB: togglePanel(); break;
+            case GLFW_KEY_D: session_->isMeasuring = !session_->isMeasuring; break;
+            case GLFW_KEY_ENTER: session_->measurement().finishLine(); break;
+            case GLFW_KEY_BACKSPACE: session_->measurement().takeBack(); break;
+            case GLFW_KEY_HOME: session_->act(ViewerAction::Reset); break;
+            case GLFW_KEY_G: toggleFly(); break;
+            case GLFW_KEY_B: session_->showsPages = !session_->showsPages; break;
+            case GLFW_KEY_I: session_->showFeedback(!session_->showsFeedback()); break;
+            default:
+                // GLFW names keys by the capitals on them.
+                if (const auto action = actionOf(static_cast<uint32_t>(key))) session_->act(*action);
+        }
+    }
+
+    void togglePanel() {
+        session_->togglePanel();
+        layOut();  // what is fitted next keeps clear of it
+    }
+
+    void toggleFly() {
+        letGo();
+        session_->act(ViewerAction::ToggleFly);
+    }
+
+    void escape() {
+        if (session_->viewer().cancelSectionDrag()) return;
+        if (interface_.showsHelp) interface_.showsHelp = false;
+        else if (session_->opening()) session_->opening()->cancel();
+        else if (session_->saving()) session_->cancelSaving();
+        else if (session_->viewer().isFlying()) toggleFly();
+        else if (session_->isMeasuring) session_->isMeasuring = false;
+        else glfwSetWindowShouldClose(window_, GLFW_TRUE);
+    }
+
+    /// Shows the last picture and the panels when either is new or the window was uncovered.
+    Result<void> present(bool drawn) {
+        if (std::exchange(isRescaled_, false)) VCP_TRY(painter_->setScale(system_->contentScale()));
+        layOut();
+        if (session_->viewer().framesDrawn() == 0 || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
+        if (!drawn && !mustPresent_) return {};
+        mustPresent_ = false;
+        return session_->viewer().renderer().present(static_cast<uint32_t>(framebuffer_.x), static_cast<uint32_t>(framebuffer_.y), painter_->drawOver());
+    }
+
+    void wait(const NextStep& next) {
+        // Some panels take a second layout to find their size.
+        layOut();
+        if (mustPresent_ || next.waitSeconds <= 0)
+            glfwPollEvents();
+        else if (std::isinf(next.waitSeconds))
+            glfwWaitEvents();
+        else
+            glfwWaitEventsTimeout(next.waitSeconds);
+    }
+
+    const WindowSystem* system_;
+    GLFWwindow* window_;
+    ViewSession* session_;
+    std::unique_ptr<InterfacePainter> painter_;
+    Interface interface_;
+    const WindowOptions* options_;
+    std::shared_ptr<void> catching_;
+    glm::ivec2 framebuffer_{0};
+    // Where the cursor was at the event in hand: asked for, it would be where it is by now, and a quick drag be lost.
+    glm::dvec2 cursor_{0};
+    glm::dvec2 pressedAt_{0};
+    double pressedTime_ = 0;
+    bool isClick_ = false, isDragging_ = false;
+    glm::dvec3 held_{0};
+    bool mustPresent_ = true, isRescaled_ = false;
+};
+
+}  // namespace
+
+glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale) {
+    if (window != framebuffer || !(scale.x > 0 && scale.y > 0)) return window;
+    return glm::ivec2(glm::round(glm::dvec2(window) / scale));
+}
+
+Result<WindowReport> showWindow(const WindowOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<std::string>& inputs = options.session.inputs;
+    WindowSystem system;
+    VCP_TRY(system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
+    auto session = ViewSession::create(options.session, system.surfaceSource());
+    if (!session) return session.error();
+    (*session)->open(inputs);
+    const auto drawing = (*session)->viewer().renderer().windowDrawing();
+    if (!drawing) return drawing.error();
+    auto painter = InterfacePainter::create(*drawing, system.contentScale());
+    if (!painter) return painter.error();
+    return ViewWindow(system, **session, std::move(*painter), options).run(start);
+}
+
+}  // namespace vcp

@@ -1,0 +1,45 @@
+// The window of `vcp view`: GLFW around a ViewSession and its panels. It turns events into calls, waits while nothing
+// happens, and draws when the session says so. What keys and the mouse do: key_map.cpp.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "octree/result.h"
+#include "viewer/window/view_session.h"
+
+namespace vcp {
+
+struct WindowOptions {
+    SessionOptions session;
+    std::optional<glm::ivec2> size;  ///< in the window system's units; absent: as it was last time
+    /// Ctrl-C is caught while what it gives is held: as long as something is being built. May be empty.
+    std::function<std::shared_ptr<void>()> catchInterrupts;
+    std::function<bool()> interrupted;  ///< true ends the window; may be empty
+};
+
+/// What happened while the window was open; times from the call of showWindow.
+struct WindowReport {
+    std::optional<double> windowSeconds;        ///< something was on the screen
+    std::optional<double> firstPictureSeconds;  ///< of a dataset; absent when it was closed before
+    std::optional<double> settledSeconds;       ///< the first settled picture
+    uint64_t framesDrawn = 0;
+    ViewerStatus status;
+    std::string problem;  ///< what stood in the window when it was closed
+    SettingsChanges changes;  ///< to be remembered
+};
+
+/// A window's size in units of a display that is not scaled, as it is made from (GLFW_SCALE_TO_MONITOR): where the window system counts
+/// pixels, `window` has grown by `scale`.
+glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale);
+
+/// Opens the window at once, the inputs in it as soon as they are built, and returns when it is closed. Main thread
+/// only, one at a time (GLFW). Errors: Device (no display, no Vulkan for it, and what the renderer says).
+Result<WindowReport> showWindow(const WindowOptions& options);
+
+}  // namespace vcp
