@@ -115,7 +115,7 @@ private:
     /// Temporary files are removed by their names, so that no input may lie among them.
     [[nodiscard]] Result<void> checkTempFolder() const {
         for (const auto& input : options_.inputs)
-            if (isSameFile(input.parent_path().empty() ? "." : input.parent_path(), space_.folder()))
+            if (isSameFile(input.parent_path().empty() ? "." : input.parent_path(), space_.folder().path()))
                 return Error{.code = ErrorCode::Usage, .message = "lies in the folder of this build's temporary files; move it, or choose another output", .file = input.string()};
         return {};
     }
