@@ -25,7 +25,11 @@ protected:
         EXPECT_TRUE(saved) << saved.error().line();
         return saved ? *saved : "";
     }
-    static SettingsChanges opening(const std::string& name) { return {.opened = {name}}; }
+    static SettingsChanges opening(const std::string& name) {
+        SettingsChanges changes;
+        changes.opened = {name};
+        return changes;
+    }
     static std::set<std::string> filesIn(const std::filesystem::path& path) {
         std::set<std::string> names;
         for (const auto& each : std::filesystem::directory_iterator(path))
@@ -136,9 +140,13 @@ TEST_F(UserSettingsTest, RecentFilesAreDistinctAndFew) {
 }
 
 TEST_F(UserSettingsTest, WindowsThatWereOpenTogetherLoseNothing) {
-    save({.opened = {"/before"}, .panel = true}, file_);
-    SettingsChanges first{.opened = {"/a", "/b"}, .shadows = true}, second{.opened = {"/c"}, .errorPixels = 3},
-        third{.opened = {"/a"}, .up = UpAxis::Z};
+    SettingsChanges before = opening("/before"), first = opening("/a"), second = opening("/c"), third = opening("/a");
+    before.panel = true;
+    save(before, file_);
+    first.opened.push_back("/b");
+    first.shadows = true;
+    second.errorPixels = 3;
+    third.up = UpAxis::Z;
     first.bookmarks["/a"][1].position = {1, 0, 0};
     second.bookmarks["/a"][2].position = {2, 0, 0};
     third.bookmarks["/a"][1].position = {3, 0, 0};
