@@ -1,9 +1,9 @@
 #include "builder/build.h"
 
+#include <sys/resource.h>
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <sys/resource.h>
 #if defined(__GLIBC__)
 #include <malloc.h>
 #endif
@@ -34,9 +34,14 @@ constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.
 class Builder {
 public:
     Builder(const BuildOptions& options, const MemoryPlan& plan, unsigned threads)
-        : options_(options), memory_(plan), meter_(options.progress), space_(tempFolderOf(options), plan.tempBytes), arena_(static_cast<int>(threads)) {
+        : options_(options),
+          memory_(plan),
+          meter_(options.progress),
+          space_(tempFolderOf(options), plan.tempBytes),
+          arena_(static_cast<int>(threads)) {
         // Without it TBB gives no more threads than processors, and says so.
-        if (threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)) more_.emplace(tbb::global_control::max_allowed_parallelism, threads);
+        if (threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))
+            more_.emplace(tbb::global_control::max_allowed_parallelism, threads);
     }
 
     Result<BuildReport> run() {
@@ -47,7 +52,8 @@ public:
             return report_;
         }
         Error error = built.error();
-        const bool mayPass = error.code == ErrorCode::Cancelled || error.code == ErrorCode::Io, needsMore = error.code == ErrorCode::Limit && files_.current;
+        const bool mayPass = error.code == ErrorCode::Cancelled || error.code == ErrorCode::Io,
+                   needsMore = error.code == ErrorCode::Limit && files_.current;
         const bool hasWork = journal_.active() || isResumed_;
         if (hasWork && isOfTempFiles(error)) {
             // A disk that is mended may give back what was written after all.
@@ -56,7 +62,8 @@ public:
             if (error.code != ErrorCode::Usage) space_.folder().remove();
             if (error.code == ErrorCode::Cancelled) error.message = "cancelled; nothing was written";
         } else {
-            error.message += fmt::format("; the same command with --resume{} goes on from here, or delete {}", needsMore ? " and the memory" : "", space_.folder().path().string());
+            error.message += fmt::format("; the same command with --resume{} goes on from here, or delete {}",
+                                         needsMore ? " and the memory" : "", space_.folder().path().string());
         }
         if (error.file.empty()) error.file = options_.output.string();
         return error;
@@ -65,14 +72,17 @@ public:
 private:
     /// Whether the error is that a temporary file is damaged.
     bool isOfTempFiles(const Error& error) const {
-        return error.code == ErrorCode::InvalidInput && std::filesystem::path(error.file).parent_path() == space_.folder().path();
+        return error.code == ErrorCode::InvalidInput &&
+               std::filesystem::path(error.file).parent_path() == space_.folder().path();
     }
 
     Result<void> caught() {
         try {
             return stages();
         } catch (const std::bad_alloc&) {
-            return Error{.code = ErrorCode::Limit, .message = "the system has no more memory to give; use a smaller --memory, or fewer --threads"};
+            return Error{
+                .code = ErrorCode::Limit,
+                .message = "the system has no more memory to give; use a smaller --memory, or fewer --threads"};
         }
     }
 
@@ -82,8 +92,10 @@ private:
         VCP_TRY(checkTempFolder());
         VCP_TRY(openJournal());
         const std::string& stage = done_.stage;
-        if (stage.empty()) VCP_TRY(read());
-        else VCP_TRY(resumeMeasures());
+        if (stage.empty())
+            VCP_TRY(read());
+        else
+            VCP_TRY(resumeMeasures());
         auto frame = chooseFrame(options_, measures_);
         if (!frame) return frame.error();
         auto error = chooseError(options_, measures_, *frame);
@@ -91,8 +103,10 @@ private:
         plan_.frame = *frame;
         plan_.errorTarget = *error;
         plan_.pageBytes = memory_.pageBytes;
-        if (stage.empty() || stage == "read") VCP_TRY(deal());
-        else VCP_TRY(resumeBins());
+        if (stage.empty() || stage == "read")
+            VCP_TRY(deal());
+        else
+            VCP_TRY(resumeBins());
         for (; pass_ >= 0; --pass_) VCP_TRY(runPass());
         return write();
     }
@@ -100,10 +114,13 @@ private:
     // Progress and time
 
     bool progress(const std::string& stage, double fraction) {
-        return meter_.report(stage, {.fraction = fraction, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
+        return meter_.report(stage,
+                             {.fraction = fraction, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
     }
 
-    Error cancelled() const { return {.code = ErrorCode::Cancelled, .message = "cancelled", .file = options_.output.string()}; }
+    Error cancelled() const {
+        return {.code = ErrorCode::Cancelled, .message = "cancelled", .file = options_.output.string()};
+    }
 
     /// What the output may replace: nothing that is read.
     [[nodiscard]] OutputRules rules() const {
@@ -116,7 +133,10 @@ private:
     [[nodiscard]] Result<void> checkTempFolder() const {
         for (const auto& input : options_.inputs)
             if (isSameFile(input.parent_path().empty() ? "." : input.parent_path(), space_.folder().path()))
-                return Error{.code = ErrorCode::Usage, .message = "lies in the folder of this build's temporary files; move it, or choose another output", .file = input.string()};
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = "lies in the folder of this build's temporary files; move it, or choose another output",
+                    .file = input.string()};
         return {};
     }
 
@@ -140,7 +160,11 @@ private:
             return {};
         }
         if (done_.build != buildFingerprint(options_))
-            return Error{.code = ErrorCode::Usage, .message = "the unfinished build here is of other inputs or options; without --resume it is started again", .file = folder.path().string()};
+            return Error{
+                .code = ErrorCode::Usage,
+                .message =
+                    "the unfinished build here is of other inputs or options; without --resume it is started again",
+                .file = folder.path().string()};
         return {};
     }
 
@@ -152,7 +176,8 @@ private:
         auto fields = files_.sync();
         if (!fields) return fields.error();
         fields->update({{"stage", stage}, {"pass", pass_}, {"bin", bin}});
-        if (!journal_.active()) fields->update({{"build", buildFingerprint(options_)}, {"measures", jsonOf(measures_)}});
+        if (!journal_.active())
+            fields->update({{"build", buildFingerprint(options_)}, {"measures", jsonOf(measures_)}});
         if (!partitionRecorded_ && files_.current) {
             (*fields)["partition"] = plan_.finest.first();
             partitionRecorded_ = true;
@@ -182,7 +207,9 @@ private:
         if (pass_ >= 0) openPass();
         VCP_TRY(files_.reopen(done_, space_));
         if (pass_ >= 0 && firstBin_ >= plan_.partitionOf(plan_.levelOf(pass_)).bins())
-            return Error{.code = ErrorCode::InvalidInput, .message = "names a bin that there is not; build again without --resume", .file = (space_.folder().path() / kJournalName).string()};
+            return Error{.code = ErrorCode::InvalidInput,
+                         .message = "names a bin that there is not; build again without --resume",
+                         .file = (space_.folder().path() / kJournalName).string()};
         return reactivate();
     }
 
@@ -191,10 +218,13 @@ private:
     Result<void> read() {
         if (!progress("reading", 0)) return cancelled();
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
-        auto measures = readInputs(options_, space_, memory_.vertexBytes, *files_.soup, [this](double fraction, uint64_t triangles) {
-            measures_.triangles = triangles;
-            return progress("reading", kReadingShare * fraction);
-        }, report_.warnings, report_.sideFiles);
+        auto measures = readInputs(
+            options_, space_, memory_.vertexBytes, *files_.soup,
+            [this](double fraction, uint64_t triangles) {
+                measures_.triangles = triangles;
+                return progress("reading", kReadingShare * fraction);
+            },
+            report_.warnings, report_.sideFiles);
         if (!measures) return measures.error();
         measures_ = *measures;
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
@@ -211,8 +241,12 @@ private:
             if (needed <= free) return {};
             // Rounded apart, so that the two are never the same number.
             return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("about {} MB are needed in the folder {} and {} MB are free there; free some space or choose another folder{}", needed / 1000000 + 1,
-                                                at.has_filename() && !std::filesystem::is_directory(at) ? std::filesystem::absolute(at).parent_path().string() : at.string(),
+                         .message = fmt::format("about {} MB are needed in the folder {} and {} MB are free there; "
+                                                "free some space or choose another folder{}",
+                                                needed / 1000000 + 1,
+                                                at.has_filename() && !std::filesystem::is_directory(at)
+                                                    ? std::filesystem::absolute(at).parent_path().string()
+                                                    : at.string(),
                                                 free / 1000000, option),
                          .file = options_.output.string()};
         };
@@ -221,8 +255,14 @@ private:
         return check(options_.output, expectedFileBytes(measures_.triangles), "");
     }
 
-    [[nodiscard]] bool usesVertexColours() const { return measures_.hasVertexColours && (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Vertex); }
-    [[nodiscard]] bool usesMaterials() const { return measures_.hasMaterials && (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Texture); }
+    [[nodiscard]] bool usesVertexColours() const {
+        return measures_.hasVertexColours &&
+               (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Vertex);
+    }
+    [[nodiscard]] bool usesMaterials() const {
+        return measures_.hasMaterials &&
+               (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Texture);
+    }
     [[nodiscard]] bool hasColour() const { return usesVertexColours() || usesMaterials(); }
 
     void setUpLevels() {
@@ -234,14 +274,16 @@ private:
         if (usesMaterials()) colours.emplace(files_.soup->materials, memory_.vertexBytes);
         const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, usesVertexColours());
         double begins = kReadingShare;
-        const Dealing dealing{*files_.soup, snapper, plan_.gridOf(pass_ - 1), [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
+        const Dealing dealing{*files_.soup, snapper, plan_.gridOf(pass_ - 1),
+                              [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
         auto partition = arena_.execute([&] { return choosePartition(dealing, memory_.binTriangles); });
         if (!partition) return partition.error();
         plan_.finest = std::move(*partition);
         begins += kDealingShare / 2;
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
-        if (colours) report_.warnings.insert(report_.warnings.end(), colours->warnings().begin(), colours->warnings().end());
+        if (colours)
+            report_.warnings.insert(report_.warnings.end(), colours->warnings().begin(), colours->warnings().end());
         return {};
     }
 
@@ -262,12 +304,16 @@ private:
     /// Makes the bins of a pass and of the one after it.
     void openPass() {
         const auto bins = [&](int pass) {
-            return std::make_unique<RecordBins<LatticeTriangle>>(space_, fmt::format("level{}", pass), plan_.partitionOf(plan_.levelOf(pass)).bins(), memory_.bufferBytes);
+            return std::make_unique<RecordBins<LatticeTriangle>>(space_, fmt::format("level{}", pass),
+                                                                 plan_.partitionOf(plan_.levelOf(pass)).bins(),
+                                                                 memory_.bufferBytes);
         };
         if (!files_.current) files_.current = bins(pass_);
         if (pass_ == 0) return;
         files_.next = bins(pass_ - 1);
-        files_.waiting = std::make_unique<RecordBins<WaitingTriangle>>(space_, fmt::format("waiting{}", pass_), plan_.partitionOf(plan_.levelOf(pass_)).bins(), memory_.bufferBytes / 4);
+        files_.waiting = std::make_unique<RecordBins<WaitingTriangle>>(space_, fmt::format("waiting{}", pass_),
+                                                                       plan_.partitionOf(plan_.levelOf(pass_)).bins(),
+                                                                       memory_.bufferBytes / 4);
     }
 
     /// Of the pass's pages.
@@ -302,9 +348,12 @@ private:
         uint64_t done = 0;
         for (size_t bin = 0; bin < partition.bins(); ++bin) {
             const uint64_t count = files_.current->count(bin);
-            const auto at = [&](double part) { return begins + (ends - begins) * (double(done) + part * double(count)) / double(total); };
+            const auto at = [&](double part) {
+                return begins + (ends - begins) * (double(done) + part * double(count)) / double(total);
+            };
             if (bin >= firstBin_) {
-                VCP_TRY(runBin(bin, partition.first()[bin], LevelPlan::endOf(partition, bin, level), step ? &*step : nullptr, at));
+                VCP_TRY(runBin(bin, partition.first()[bin], LevelPlan::endOf(partition, bin, level),
+                               step ? &*step : nullptr, at));
                 releaseMemory();
                 if (bin + 1 < partition.bins()) VCP_TRY(checkpoint("levels", bin + 1));
             }
@@ -316,7 +365,8 @@ private:
     template <class At>
     Result<void> runBin(size_t bin, uint64_t first, uint64_t end, LevelStep* step, At&& at) {
         const bool vertices = pass_ == plan_.levels();
-        const std::string stage = vertices ? std::string("sorting") : fmt::format("level {} of {}", plan_.levels() - pass_, plan_.frame.levels);
+        const std::string stage = vertices ? std::string("sorting")
+                                           : fmt::format("level {} of {}", plan_.levels() - pass_, plan_.frame.levels);
         if (!progress(stage, at(0))) return cancelled();
         auto soup = files_.current->load(bin);
         if (!soup) return soup.error();
@@ -328,7 +378,9 @@ private:
             LatticeMesh mesh = meshOf(*soup, hasColour());
             std::vector<LatticeTriangle>().swap(*soup);
             if (vertices) computeNormals(mesh);
-            if (!vertices) result = buildPages(settings(), mesh, first, end, files_.spools[static_cast<size_t>(pass_)], [&](double part) { return progress(stage, at(part)); });
+            if (!vertices)
+                result = buildPages(settings(), mesh, first, end, files_.spools[static_cast<size_t>(pass_)],
+                                    [&](double part) { return progress(stage, at(part)); });
             if (result && step) result = step->run(bin, mesh);
         });
         return result;
@@ -367,7 +419,9 @@ private:
 
     Result<void> write() {
         FileHeader header = headerOf(measures_, plan_.frame, plan_.errorTarget, hasColour());
-        auto bytes = assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) { return progress("writing", 1 - kWritingShare + kWritingShare * part); });
+        auto bytes = assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
+            return progress("writing", 1 - kWritingShare + kWritingShare * part);
+        });
         if (!bytes) return bytes.error();
         report_.fileBytes = *bytes;
         report_.triangles = header.triangles;
@@ -421,7 +475,9 @@ std::filesystem::path tempFolderOf(const BuildOptions& options) {
 
 Result<BuildReport> buildOctree(const BuildOptions& options) {
     if (options.inputs.empty()) return Error{.code = ErrorCode::Usage, .message = "no input mesh given"};
-    const unsigned threads = options.threads > 0 ? options.threads : static_cast<unsigned>(std::max(1, tbb::this_task_arena::max_concurrency()));
+    const unsigned threads = options.threads > 0
+                                 ? options.threads
+                                 : static_cast<unsigned>(std::max(1, tbb::this_task_arena::max_concurrency()));
     auto plan = planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads);
     if (!plan) return plan.error();
     BuildOptions expanded = options;

@@ -36,21 +36,22 @@ struct BuildProgress {
 };
 
 struct BuildOptions {
-    std::vector<std::filesystem::path> inputs;  ///< files, folders of them, "-" for standard input; joined into one dataset
-    std::string format;          ///< of inputs whose content does not tell it (meshFormats())
+    std::vector<std::filesystem::path>
+        inputs;          ///< files, folders of them, "-" for standard input; joined into one dataset
+    std::string format;  ///< of inputs whose content does not tell it (meshFormats())
     std::filesystem::path output;
-    bool overwrite = false;      ///< replaces also an output that is no dataset (octree/output_file.h); never an input
-    double cell = 0;             ///< finest cell edge, world units; 0: chosen from the mesh
-    double error = 0;            ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
+    bool overwrite = false;  ///< replaces also an output that is no dataset (octree/output_file.h); never an input
+    double cell = 0;         ///< finest cell edge, world units; 0: chosen from the mesh
+    double error = 0;        ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
     bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal
-    unsigned threads = 0;        ///< 0: one a processor
-    uint64_t memoryBytes = 0;    ///< cap on what the build allocates; 0: defaultMemoryBytes()
-    std::filesystem::path temp;  ///< folder for temporary files; empty: beside the output
-    bool resume = false;         ///< go on where an interrupted build of the same output was
+    unsigned threads = 0;          ///< 0: one a processor
+    uint64_t memoryBytes = 0;      ///< cap on what the build allocates; 0: defaultMemoryBytes()
+    std::filesystem::path temp;    ///< folder for temporary files; empty: beside the output
+    bool resume = false;           ///< go on where an interrupted build of the same output was
     double checkpointSeconds = 5;  ///< what is done is made durable at most so often
     ColourChoice colour = ColourChoice::Auto;
-    /// Called from one thread at a time, about ten times a second and whenever a stage begins; false cancels, and then it is
-    /// not called again. May be empty.
+    /// Called from one thread at a time, about ten times a second and whenever a stage begins; false cancels, and then
+    /// it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;
 };
 
@@ -67,16 +68,17 @@ struct BuildFigures {
     uint64_t fileBytes = 0;
     uint32_t levels = 0;
     uint64_t subvolumes = 0;
-    uint64_t leaves = 0;      ///< of the finest level, soft and hard
-    uint64_t hardLeaves = 0;  ///< of the finest level
-    double cell = 0;          ///< finest cell edge, world units
-    double errorTarget = 0;   ///< world units
+    uint64_t leaves = 0;           ///< of the finest level, soft and hard
+    uint64_t hardLeaves = 0;       ///< of the finest level
+    double cell = 0;               ///< finest cell edge, world units
+    double errorTarget = 0;        ///< world units
     double certifiedErrorMax = 0;  ///< of the finest level, world units
 };
 
 struct BuildReport : BuildFigures {
     std::vector<std::string> warnings;  ///< what was left out of the inputs, one line each
-    std::vector<SideFile> sideFiles;    ///< that the inputs name, each once; of a build that was resumed they may not be known
+    std::vector<SideFile>
+        sideFiles;  ///< that the inputs name, each once; of a build that was resumed they may not be known
 };
 
 /// Where a build keeps its temporary files.

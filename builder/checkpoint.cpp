@@ -131,18 +131,27 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
 }  // namespace
 
 std::string buildFingerprint(const BuildOptions& options) {
-    std::string text = fmt::format("{} {} {:a} {:a} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error, options.errorIsRelative, static_cast<int>(options.colour), options.format);
+    std::string text = fmt::format("{} {} {:a} {:a} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
+                                   options.errorIsRelative, static_cast<int>(options.colour), options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);
         const auto time = std::filesystem::last_write_time(input, ignored);
-        text += fmt::format("|{} {} {}", std::filesystem::absolute(input, ignored).string(), size, time.time_since_epoch().count());
+        text += fmt::format("|{} {} {}", std::filesystem::absolute(input, ignored).string(), size,
+                            time.time_since_epoch().count());
     }
     return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size()));
 }
 
 json jsonOf(const SoupMeasures& m) {
-    return {{"min", jsonOf(m.boundsMin)}, {"max", jsonOf(m.boundsMax)}, {"area", m.area}, {"triangles", m.triangles}, {"degenerate", m.degenerateTriangles}, {"vertices", m.vertices}, {"vertex colours", m.hasVertexColours}, {"materials", m.hasMaterials}};
+    return {{"min", jsonOf(m.boundsMin)},
+            {"max", jsonOf(m.boundsMax)},
+            {"area", m.area},
+            {"triangles", m.triangles},
+            {"degenerate", m.degenerateTriangles},
+            {"vertices", m.vertices},
+            {"vertex colours", m.hasVertexColours},
+            {"materials", m.hasMaterials}};
 }
 
 Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& file) {

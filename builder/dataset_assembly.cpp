@@ -59,7 +59,8 @@ void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
         LevelRow& row = header.level[level];
         row.firstEntry = header.pages;
         row.pages = levels[level].entries().size();
-        for (const PageEntry& page : levels[level].entries()) row.certifiedError = std::max(row.certifiedError, double(page.certifiedError));
+        for (const PageEntry& page : levels[level].entries())
+            row.certifiedError = std::max(row.certifiedError, double(page.certifiedError));
         header.pages += row.pages;
     }
     header.certifiedErrorMax = header.level[levels.size() - 1].certifiedError;
@@ -88,8 +89,8 @@ FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double
     return header;
 }
 
-Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output, const OutputRules& rules,
-                                 const std::function<bool(double)>& progress) {
+Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output,
+                                 const OutputRules& rules, const std::function<bool(double)>& progress) {
     addPassages(levels);
     linkChildren(levels);
     describeLevels(levels, header);
@@ -101,7 +102,8 @@ Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& head
             auto page = entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passagePage(header.log2Cells));
             if (!page) return page.error();
             VCP_TRY((*writer)->append(entry, *page));
-            if (!progress(double(++done) / double(header.pages + 1))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = output.string()};
+            if (!progress(double(++done) / double(header.pages + 1)))
+                return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = output.string()};
         }
     return (*writer)->commit(header);
 }

@@ -20,7 +20,7 @@ FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double
 /// `levels`: pages of each level, coarse first, in Morton order; entries are completed. `header`: that of headerOf;
 /// levels, pages, leaves and certified errors are filled in. `progress` is given the part done; false cancels.
 /// Returns the file's bytes. Errors: Io, Cancelled.
-Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output, const OutputRules& rules,
-                                 const std::function<bool(double)>& progress);
+Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output,
+                                 const OutputRules& rules, const std::function<bool(double)>& progress);
 
 }  // namespace vcp

@@ -34,7 +34,13 @@ Result<void> forLatticeTriangles(const Dealing& dealing, bool painted, MakeVisit
             auto records = bins.read(blocks[i]);
             Result<void> here = records ? Result<void>() : Result<void>(records.error());
             if (records)
-                for (const auto& t : *records) dealing.snapper.add(t, [&](const LatticeTriangle& piece) { if (here) here = visit(piece); }, painted);
+                for (const auto& t : *records)
+                    dealing.snapper.add(
+                        t,
+                        [&](const LatticeTriangle& piece) {
+                            if (here) here = visit(piece);
+                        },
+                        painted);
             if (here) here = visit.finish();
             if (!dealing.progress(double(done += blocks[i].records) / double(total))) cancelled = true;
             if (here) return;

@@ -26,8 +26,10 @@ public:
     Measurer(SoupMeasures& measures, uint64_t maxVertices) : measures_(measures), maxVertices_(maxVertices) {}
 
     void add(const MeshChunk& chunk) {
-        const size_t room = static_cast<size_t>(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
-        positions_.insert(positions_.end(), chunk.positions.begin(), chunk.positions.begin() + static_cast<ptrdiff_t>(room));
+        const size_t room =
+            static_cast<size_t>(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
+        positions_.insert(positions_.end(), chunk.positions.begin(),
+                          chunk.positions.begin() + static_cast<ptrdiff_t>(room));
         for (const glm::dvec3& p : chunk.positions) {
             measures_.boundsMin = glm::min(measures_.boundsMin, p);
             measures_.boundsMax = glm::max(measures_.boundsMax, p);
@@ -41,8 +43,10 @@ public:
             const glm::dvec3 &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
             const double twice = glm::length(glm::cross(b - a, c - a));
             ++measured_;
-            if (twice > 0 && std::isfinite(twice)) area_.add(twice / 2);
-            else ++measures_.degenerateTriangles;
+            if (twice > 0 && std::isfinite(twice))
+                area_.add(twice / 2);
+            else
+                ++measures_.degenerateTriangles;
         }
     }
     [[nodiscard]] double area() const { return area_.value(); }
@@ -63,7 +67,9 @@ uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory) {
     return bytes > heldInMemory ? bytes : 0;
 }
 
-uint64_t expectedFileBytes(uint64_t triangles) { return static_cast<uint64_t>(kFileBytesPerTriangle * static_cast<double>(triangles)); }
+uint64_t expectedFileBytes(uint64_t triangles) {
+    return static_cast<uint64_t>(kFileBytesPerTriangle * static_cast<double>(triangles));
+}
 
 uint64_t freeBytesAt(const std::filesystem::path& path) {
     std::error_code failed;
@@ -95,14 +101,20 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
             if (!more) return more.error();
             if (!*more) break;
             measurer.add(chunk);
-            if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles})) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles}))
+                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         }
         measured += measurer.measured();
         m.area += measurer.area();
     }
-    if (m.triangles == 0) return Error{.code = ErrorCode::InvalidInput, .message = "has no triangles", .file = options.inputs.front().string()};
+    if (m.triangles == 0)
+        return Error{
+            .code = ErrorCode::InvalidInput, .message = "has no triangles", .file = options.inputs.front().string()};
     estimate.isAreaComplete = measured == m.triangles;
-    if (m.area == 0) return Error{.code = ErrorCode::InvalidInput, .message = "its triangles have no area", .file = options.inputs.front().string()};
+    if (m.area == 0)
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "its triangles have no area",
+                     .file = options.inputs.front().string()};
     m.area *= static_cast<double>(m.triangles) / static_cast<double>(measured);
     auto frame = chooseFrame(options, m);
     if (!frame) return frame.error();

@@ -10,11 +10,11 @@
 namespace vcp {
 
 struct BuildEstimate {
-    SoupMeasures measures;   ///< area from the triangles whose vertices fit memory
+    SoupMeasures measures;  ///< area from the triangles whose vertices fit memory
     bool isAreaComplete = true;
     GridFrame frame;
-    uint64_t memoryBytes = 0;     ///< the cap that would hold
-    uint64_t tempBytes = 0;       ///< most on the temporary disk at one time; 0: everything fits memory
+    uint64_t memoryBytes = 0;  ///< the cap that would hold
+    uint64_t tempBytes = 0;    ///< most on the temporary disk at one time; 0: everything fits memory
     uint64_t fileBytes = 0;
     double seconds = 0;
     uint64_t freeTempBytes = 0, freeOutputBytes = 0;  ///< on the disks they would go to

@@ -31,7 +31,9 @@ constexpr double kMaxExtent = 1e150;
 
 constexpr uint32_t kLog2Cells = 5;
 
-std::string nameOf(const BuildOptions& options) { return options.inputs.empty() ? "" : options.inputs.front().string(); }
+std::string nameOf(const BuildOptions& options) {
+    return options.inputs.empty() ? "" : options.inputs.front().string();
+}
 
 Error badInput(const BuildOptions& options, std::string message) {
     return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = nameOf(options)};
@@ -55,8 +57,10 @@ public:
             ++measures_.degenerateTriangles;
             return {};
         }
-        if (std::isfinite(twice)) area_.add(twice / 2);
-        else tooLarge_ = true;
+        if (std::isfinite(twice))
+            area_.add(twice / 2);
+        else
+            tooLarge_ = true;
         return store(t);
     }
 
@@ -108,8 +112,8 @@ private:
 }  // namespace
 
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double, uint64_t)>& progress, std::vector<std::string>& warnings,
-                                std::vector<SideFile>& sideFiles) {
+                                const std::function<bool(double, uint64_t)>& progress,
+                                std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles) {
     uint64_t totalBytes = 0, doneBytes = 0, vertices = 0;
     bool hasVertexColours = false;
     std::set<std::filesystem::path> named;
@@ -133,7 +137,8 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             const uint64_t bytes = doneBytes + (*stream)->bytesRead();
             // A pipe does not say how much is to come.
             const double fraction = totalBytes > 0 ? std::min(double(bytes) / double(totalBytes), 1.0) : 0;
-            if (!progress(fraction, writer.triangles())) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            if (!progress(fraction, writer.triangles()))
+                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         }
         doneBytes += (*stream)->bytesRead();
         soup.materials.insert(soup.materials.end(), (*stream)->materials().begin(), (*stream)->materials().end());
@@ -150,13 +155,18 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     SoupMeasures m = writer.measures();
     m.vertices = vertices;
     m.hasVertexColours = hasVertexColours;
-    m.hasMaterials = std::any_of(soup.materials.begin(), soup.materials.end(), [](const Material& material) { return material.factor != kWhite || material.image.exists(); });
+    m.hasMaterials = std::any_of(soup.materials.begin(), soup.materials.end(), [](const Material& material) {
+        return material.factor != kWhite || material.image.exists();
+    });
     if (m.triangles == 0) return badInput(options, "has no triangles");
     if (writer.tooLarge() || !(glm::length(m.boundsMax - m.boundsMin) < kMaxExtent) || !std::isfinite(m.area))
         return badInput(options, "its coordinates are too large to measure lengths; scale the mesh down");
-    if (m.triangles == m.degenerateTriangles || m.area == 0) return badInput(options, fmt::format("none of its {} triangles has an area", m.triangles));
-    if (options.colour == ColourChoice::Vertex && !hasVertexColours) return badInput(options, "has no vertex colours; leave out --colour vertex");
-    if (options.colour == ColourChoice::Texture && !m.hasMaterials) return badInput(options, "has no materials with a colour or a texture; leave out --colour texture");
+    if (m.triangles == m.degenerateTriangles || m.area == 0)
+        return badInput(options, fmt::format("none of its {} triangles has an area", m.triangles));
+    if (options.colour == ColourChoice::Vertex && !hasVertexColours)
+        return badInput(options, "has no vertex colours; leave out --colour vertex");
+    if (options.colour == ColourChoice::Texture && !m.hasMaterials)
+        return badInput(options, "has no materials with a colour or a texture; leave out --colour texture");
     return m;
 }
 
@@ -175,14 +185,18 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
     const double useful = static_cast<double>(m.triangles - m.degenerateTriangles);
     frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
     // Doubles far from zero have few digits left for the cell.
-    const double resolution = std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon();
+    const double resolution =
+        std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon();
     if (options.cell <= 0) frame.cell = std::max(frame.cell, std::max(longest / kMaxExtentCells, resolution * 1e4));
     if (longest / frame.cell > kMaxExtentCells)
         return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; use --cell {:g} or larger", frame.cell, longest,
-                                            longest / kMaxExtentCells),
+                     .message = fmt::format(
+                         "a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; use --cell {:g} or larger",
+                         frame.cell, longest, longest / kMaxExtentCells),
                      .file = nameOf(options)};
-    if (longest * kLatticePerCell < frame.cell) return badInput(options, fmt::format("all of it is smaller than 1/{} cell; use a smaller --cell", kLatticePerCell));
+    if (longest * kLatticePerCell < frame.cell)
+        return badInput(options,
+                        fmt::format("all of it is smaller than 1/{} cell; use a smaller --cell", kLatticePerCell));
     const double cellsAcross = longest / frame.cell + 2;
     while (std::ldexp(1.0, static_cast<int>(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
     frame.origin = m.boundsMin - glm::dvec3(frame.cell);
@@ -197,7 +211,8 @@ Result<double> chooseError(const BuildOptions& options, const SoupMeasures& meas
     const double least = 8 * kLatticeRounding * frame.cell;
     if (error < least)
         return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("an error of {:g} needs a finer cell than {:g}; use --cell {:g} or smaller", error, frame.cell, error / (8 * kLatticeRounding))};
+                     .message = fmt::format("an error of {:g} needs a finer cell than {:g}; use --cell {:g} or smaller",
+                                            error, frame.cell, error / (8 * kLatticeRounding))};
     return error;
 }
 

@@ -36,7 +36,8 @@ struct SoupMeasures {
 
 /// The triangles of all inputs. Most files hold floats: those take half the room.
 struct Soup {
-    Soup(TempSpace& space, uint64_t bufferBytes) : floats(space, "floats", 1, bufferBytes / 2), doubles(space, "doubles", 1, bufferBytes / 2) {}
+    Soup(TempSpace& space, uint64_t bufferBytes)
+        : floats(space, "floats", 1, bufferBytes / 2), doubles(space, "doubles", 1, bufferBytes / 2) {}
 
     RecordBins<WorldTriangle<float>> floats;
     RecordBins<WorldTriangle<double>> doubles;
@@ -47,8 +48,8 @@ struct Soup {
 /// given the fraction read; false cancels. Triangles without area are counted and left out. `warnings`: what the
 /// readers left out. `sideFiles`: what the inputs name, each once.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double fraction, uint64_t triangles)>& progress, std::vector<std::string>& warnings,
-                                std::vector<SideFile>& sideFiles);
+                                const std::function<bool(double fraction, uint64_t triangles)>& progress,
+                                std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
 
 /// How the inputs are opened.
 MeshOpenOptions meshOptionsOf(const BuildOptions& options);

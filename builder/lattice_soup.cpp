@@ -30,8 +30,11 @@ float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
 }  // namespace
 
 LatticeSnapper::LatticeSnapper(const GridFrame& frame, MaterialColours* colours, bool vertexColours)
-    : origin_(frame.origin), scale_(double(kLatticePerCell) / frame.cell),
-      longest_((colours && colours->hasImages() ? kPaintedEdgeCells : double(kMaxEdgeCells)) * kLatticePerCell), colours_(colours), vertexColours_(vertexColours) {}
+    : origin_(frame.origin),
+      scale_(double(kLatticePerCell) / frame.cell),
+      longest_((colours && colours->hasImages() ? kPaintedEdgeCells : double(kMaxEdgeCells)) * kLatticePerCell),
+      colours_(colours),
+      vertexColours_(vertexColours) {}
 
 bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
     const glm::dvec3 d = glm::dvec3(a) - glm::dvec3(b);
@@ -41,7 +44,8 @@ bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
 // Whether an edge is cut does not depend on the triangle.
 int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
     const auto& corner = piece.triangle.corner;
-    const bool isLong[3] = {tooLong(corner[0], corner[1]), tooLong(corner[1], corner[2]), tooLong(corner[2], corner[0])};
+    const bool isLong[3] = {tooLong(corner[0], corner[1]), tooLong(corner[1], corner[2]),
+                            tooLong(corner[2], corner[0])};
     const int cuts = isLong[0] + isLong[1] + isLong[2];
     if (cuts == 0) return 0;
     // Turned so that the cut edges come first: (01), (01, 12) or all.
@@ -58,7 +62,8 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
             const int k = (from[i] + turn) % 3, next = (k + 1) % 3;
             const bool isMiddle = from[i] >= 3;
             p.triangle.corner[i] = isMiddle ? middle(corner[k], corner[next]) : corner[k];
-            p.triangle.colour[i] = isMiddle ? middleColour(piece.triangle.colour[k], piece.triangle.colour[next]) : piece.triangle.colour[k];
+            p.triangle.colour[i] = isMiddle ? middleColour(piece.triangle.colour[k], piece.triangle.colour[next])
+                                            : piece.triangle.colour[k];
             p.uv[i] = isMiddle ? (piece.uv[k] + piece.uv[next]) * 0.5f : piece.uv[k];
         }
     };
@@ -90,7 +95,8 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
     Piece piece{};
     LatticeTriangle& t = piece.triangle;
     for (int i = 0; i < 3; ++i) {
-        const glm::dvec3 q = glm::clamp((glm::dvec3(triangle.corner[i]) - origin_) * scale_, glm::dvec3(0), glm::dvec3(2147483647.0));
+        const glm::dvec3 q =
+            glm::clamp((glm::dvec3(triangle.corner[i]) - origin_) * scale_, glm::dvec3(0), glm::dvec3(2147483647.0));
         t.corner[i] = glm::i32vec3(std::lround(q.x), std::lround(q.y), std::lround(q.z));
         t.colour[i] = triangle.colour[i];
         piece.uv[i] = triangle.uv[i];

@@ -21,8 +21,8 @@ public:
     explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true);
 
     /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; some may have no area on the
-    /// lattice (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no crack opens.
-    /// `painted`: with the materials' colours.
+    /// lattice (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no
+    /// crack opens. `painted`: with the materials' colours.
     template <class Real, class Sink>
     void add(const WorldTriangle<Real>& triangle, Sink&& sink, bool painted = true) const {
         cutInto(snap(triangle), sink, painted && colours_);

@@ -26,30 +26,37 @@ struct BuiltPage {
 };
 
 /// A page's bytes; what they were made of is gone when they are coded.
-EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
+EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
+                          std::span<const uint32_t> triangles) {
     PageGeometry geometry(mesh, triangles, mortonDecode(code), settings.grid.log2Cells);
     const double tolerance = settings.finest ? settings.tolerance - geometry.stray() : settings.tolerance;
     PageTree tree = buildPageTree(geometry, tolerance);
     return encodePage(tree, geometry, mesh);
 }
 
-Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code, std::span<const uint32_t> triangles) {
+Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
+                            std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
     // A page that cannot be read back must not cost the whole file.
     if (const auto view = parsePage(encoded.geometry); encoded.leaves > 0 && !view)
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller --cell", triangles.size(), encoded.leaves)};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format(
+                         "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller --cell",
+                         triangles.size(), encoded.leaves)};
     BuiltPage page;
     page.entry.morton = code;
     page.entry.level = static_cast<uint8_t>(settings.grid.level);
     page.entry.leaves = encoded.leaves;
     page.entry.hardLeaves = encoded.hardLeaves;
-    page.entry.certifiedError = std::nextafter(static_cast<float>(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
+    page.entry.certifiedError = std::nextafter(static_cast<float>(encoded.certifiedError * settings.cell),
+                                               std::numeric_limits<float>::infinity());
     if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
     return page;
 }
 
 uint64_t bytesOf(const LatticeMesh& mesh) {
-    return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) + mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float));
+    return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) +
+           mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float));
 }
 
 /// Memory to build a page of these triangles.
@@ -109,7 +116,8 @@ private:
 
 }  // namespace
 
-Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end, PageSpool& spool, const std::function<bool(double)>& progress) {
+Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
+                        PageSpool& spool, const std::function<bool(double)>& progress) {
     const TriangleBins bins = binTriangles(mesh, settings.grid, first, end);
     std::vector<uint64_t> work(bins.pages.size());
     tbb::parallel_for(size_t{0}, work.size(), [&](size_t i) { work[i] = workOf(mesh, bins.of(i)); });
@@ -122,8 +130,9 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
         if (work[i] <= left(settings.pageBytes)) continue;
         if (const uint64_t most = left(settings.pageBytes + settings.roomBytes); work[i] > most)
             return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a smaller --cell or a larger --memory", bins.of(i).size(),
-                                                ((work[i] - most) * 3 / 2 >> 20) + 1)};
+                         .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a "
+                                                "smaller --cell or a larger --memory",
+                                                bins.of(i).size(), ((work[i] - most) * 3 / 2 >> 20) + 1)};
         VCP_TRY(settings.makeRoom());
         auto page = buildPage(settings, mesh, bins.pages[i], bins.of(i));
         if (!page) return page.error();
@@ -143,18 +152,22 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
             put = page ? inOrder.put(i, std::move(*page)) : Result<void>(page.error());
             admission.leave(work[i]);
         }
-        if (put && !progress(double(++done) / double(bins.pages.size()))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        if (put && !progress(double(++done) / double(bins.pages.size())))
+            return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         return put;
     };
     // Pages differ in weight, so they are taken one by one, in order: few have to wait for one before them.
-    tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), [&](int) {
-        for (size_t i; !stopped && (i = next++) < bins.pages.size();) {
-            auto built = buildOne(i);
-            if (built) continue;
-            const std::scoped_lock lock(mutex);
-            if (!stopped.exchange(true)) result = built;
-        }
-    }, tbb::simple_partitioner());
+    tbb::parallel_for(
+        0, tbb::this_task_arena::max_concurrency(),
+        [&](int) {
+            for (size_t i; !stopped && (i = next++) < bins.pages.size();) {
+                auto built = buildOne(i);
+                if (built) continue;
+                const std::scoped_lock lock(mutex);
+                if (!stopped.exchange(true)) result = built;
+            }
+        },
+        tbb::simple_partitioner());
     return result;
 }
 

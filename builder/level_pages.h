@@ -23,7 +23,9 @@ struct LevelSettings {
 
 /// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface
 /// to `spool`. `progress` is given the part done; false stops. Uses the calling arena's threads.
-/// Errors: Limit (a page alone needs more memory than pageBytes and roomBytes, or holds more than a page can name), Io, Cancelled.
-Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end, PageSpool& spool, const std::function<bool(double)>& progress);
+/// Errors: Limit (a page alone needs more memory than pageBytes and roomBytes, or holds more than a page can name), Io,
+/// Cancelled.
+Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
+                        PageSpool& spool, const std::function<bool(double)>& progress);
 
 }  // namespace vcp

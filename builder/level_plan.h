@@ -12,9 +12,9 @@ namespace vcp {
 
 struct LevelPlan {
     GridFrame frame;
-    PagePartition finest;     ///< bins of the finest level
-    double errorTarget = 0;   ///< of the finest level, world units
-    uint64_t pageBytes = 0;   ///< memory for a bin's mesh and its pages
+    PagePartition finest;    ///< bins of the finest level
+    double errorTarget = 0;  ///< of the finest level, world units
+    uint64_t pageBytes = 0;  ///< memory for a bin's mesh and its pages
 
     [[nodiscard]] int levels() const { return static_cast<int>(frame.levels); }
     /// Level whose grid and bins a pass works on.

@@ -33,7 +33,8 @@ uint64_t groupLimit() {
 }  // namespace
 
 uint64_t defaultMemoryBytes() {
-    const uint64_t machine = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+    const uint64_t machine =
+        static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
     return std::min(machine, groupLimit()) / 2;
 }
 
@@ -41,7 +42,8 @@ Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
     const uint64_t fixed = kBaseBytes + threads * kThreadBytes;
     if (memoryBytes < fixed + kLeastUsable)
         return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("{} MiB of memory are too little for {} threads; give --memory {}M or more", memoryBytes / kMiB, threads, (fixed + kLeastUsable) / kMiB + 1)};
+                     .message = fmt::format("{} MiB of memory are too little for {} threads; give --memory {}M or more",
+                                            memoryBytes / kMiB, threads, (fixed + kLeastUsable) / kMiB + 1)};
     const uint64_t usable = memoryBytes - fixed;
     MemoryPlan plan;
     plan.vertexBytes = usable / 2;

@@ -33,7 +33,9 @@ public:
     }
 
     /// Since the build began.
-    [[nodiscard]] double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    [[nodiscard]] double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
 private:
     const std::function<bool(const BuildProgress&)>& callback_;

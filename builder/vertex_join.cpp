@@ -18,7 +18,10 @@ constexpr uint64_t kWaitingBufferBytes = 4 << 20;
 }  // namespace
 
 VertexJoin::VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit)
-    : space_(space), emit_(std::move(emit)), chunkVertices_(std::max(vertexBytes / sizeof(Vertex), kMinChunkVertices)), later_(space, "vertices.spill"),
+    : space_(space),
+      emit_(std::move(emit)),
+      chunkVertices_(std::max(vertexBytes / sizeof(Vertex), kMinChunkVertices)),
+      later_(space, "vertices.spill"),
       hash_(XXH3_createState(), XXH3_freeState),
       waiting_(space, "waiting", kExpectedChunks, kWaitingBufferBytes) {}
 
@@ -28,7 +31,9 @@ Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
         const Vertex vertex{chunk.positions[i], chunk.colours.empty() ? kWhite : chunk.colours[i]};
         if (resident_.size() < chunkVertices_) {
             // Doubling would overshoot the memory by half.
-            if (resident_.size() == resident_.capacity()) resident_.reserve(std::min<uint64_t>(chunkVertices_, std::max<size_t>(resident_.capacity() * 3 / 2, 1 << 16)));
+            if (resident_.size() == resident_.capacity())
+                resident_.reserve(
+                    std::min<uint64_t>(chunkVertices_, std::max<size_t>(resident_.capacity() * 3 / 2, 1 << 16)));
             resident_.push_back(vertex);
         } else {
             rest.push_back(vertex);
@@ -70,10 +75,12 @@ Result<void> VertexJoin::add(const MeshChunk& chunk, uint32_t materialBase) {
         Waiting w{};
         for (int i = 0; i < 3; ++i) w.vertex[i] = chunk.triangles[k][i];
         if (std::max({w.vertex[0], w.vertex[1], w.vertex[2]}) >= kMaxVertices)
-            return Error{.code = ErrorCode::InvalidInput, .message = "a triangle names a vertex that the file does not have"};
+            return Error{.code = ErrorCode::InvalidInput,
+                         .message = "a triangle names a vertex that the file does not have"};
         if (!chunk.uvs.empty())
             for (int i = 0; i < 3; ++i) w.triangle.uv[i] = chunk.uvs[k][i];
-        if (!chunk.materials.empty() && chunk.materials[k] != kNoMaterial) w.triangle.material = materialBase + chunk.materials[k] + 1;
+        if (!chunk.materials.empty() && chunk.materials[k] != kNoMaterial)
+            w.triangle.material = materialBase + chunk.materials[k] + 1;
         VCP_TRY(resolve(w));
     }
     return {};
@@ -109,7 +116,10 @@ Result<void> VertexJoin::process(uint64_t chunk) {
 Result<void> VertexJoin::finish(const std::string& file) {
     const uint64_t chunks = (vertices_ + chunkVertices_ - 1) / chunkVertices_;
     const auto missing = [&] {
-        return Error{.code = ErrorCode::InvalidInput, .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_), .file = file};
+        return Error{
+            .code = ErrorCode::InvalidInput,
+            .message = fmt::format("a triangle names a vertex that the file does not have; it has {}", vertices_),
+            .file = file};
     };
     const auto anyBeyond = [&] {
         for (uint64_t chunk = chunks; chunk < waiting_.raw().bins(); ++chunk)

@@ -16,8 +16,8 @@ using glm::dvec2, glm::dvec3, glm::ivec3;
 
 // Square metres; surface nets have 3 triangles for each square of the grid's edge of surface, on average.
 constexpr double kSurface = 2.64, kTrianglesASquare = 3.0;
-constexpr double kUnit = 0.1;        // of texture coordinates
-constexpr double kFlatEnd = 0.72;    // cosine to the axis from which on a limb's end is mapped flat
+constexpr double kUnit = 0.1;      // of texture coordinates
+constexpr double kFlatEnd = 0.72;  // cosine to the axis from which on a limb's end is mapped flat
 constexpr double kMargin = 0.06;
 constexpr size_t kPiece = 1 << 16;
 
@@ -29,11 +29,11 @@ struct Limb {
 
 std::vector<Limb> makeLimbs() {
     std::vector<Limb> limbs = {
-        {{0, 0.60, -0.36}, {0, 0.63, 0.30}, 0.165, 0.215, 0},          // torso
-        {{0, 0.66, 0.33}, {0, 0.93, 0.57}, 0.17, 0.115, 0.12},         // neck
-        {{0, 0.985, 0.60}, {0, 0.985, 0.66}, 0.135, 0.125, 0.05},      // skull
-        {{0, 0.95, 0.69}, {0, 0.92, 0.85}, 0.085, 0.06, 0.08},        // snout
-        {{0, 0.71, -0.47}, {0, 0.86, -0.70}, 0.055, 0.042, 0.07},      // tail
+        {{0, 0.60, -0.36}, {0, 0.63, 0.30}, 0.165, 0.215, 0},      // torso
+        {{0, 0.66, 0.33}, {0, 0.93, 0.57}, 0.17, 0.115, 0.12},     // neck
+        {{0, 0.985, 0.60}, {0, 0.985, 0.66}, 0.135, 0.125, 0.05},  // skull
+        {{0, 0.95, 0.69}, {0, 0.92, 0.85}, 0.085, 0.06, 0.08},     // snout
+        {{0, 0.71, -0.47}, {0, 0.86, -0.70}, 0.055, 0.042, 0.07},  // tail
         {{0, 0.86, -0.70}, {0, 1.04, -0.76}, 0.042, 0.028, 0.05},
     };
     for (const double side : {-1.0, 1.0}) {
@@ -41,14 +41,14 @@ std::vector<Limb> makeLimbs() {
             from.x *= side, to.x *= side;
             limbs.push_back({from, to, fromRadius, toRadius, blend});
         };
-        add({0.09, 1.06, 0.56}, {0.155, 0.93, 0.555}, 0.05, 0.036, 0.035);       // ear
-        add({0.115, 0.55, 0.30}, {0.135, 0.30, 0.25}, 0.115, 0.062, 0.10);   // front leg
+        add({0.09, 1.06, 0.56}, {0.155, 0.93, 0.555}, 0.05, 0.036, 0.035);  // ear
+        add({0.115, 0.55, 0.30}, {0.135, 0.30, 0.25}, 0.115, 0.062, 0.10);  // front leg
         add({0.135, 0.30, 0.25}, {0.135, 0.06, 0.29}, 0.060, 0.050, 0.05);
-        add({0.135, 0.055, 0.29}, {0.135, 0.050, 0.36}, 0.054, 0.050, 0.03); // paw
-        add({0.11, 0.56, -0.34}, {0.14, 0.34, -0.27}, 0.15, 0.078, 0.11);    // hind leg
+        add({0.135, 0.055, 0.29}, {0.135, 0.050, 0.36}, 0.054, 0.050, 0.03);  // paw
+        add({0.11, 0.56, -0.34}, {0.14, 0.34, -0.27}, 0.15, 0.078, 0.11);     // hind leg
         add({0.14, 0.34, -0.27}, {0.14, 0.19, -0.44}, 0.072, 0.050, 0.05);
         add({0.14, 0.19, -0.44}, {0.14, 0.06, -0.40}, 0.048, 0.048, 0.05);
-        add({0.14, 0.055, -0.40}, {0.14, 0.050, -0.32}, 0.054, 0.050, 0.03); // paw
+        add({0.14, 0.055, -0.40}, {0.14, 0.050, -0.32}, 0.054, 0.050, 0.03);  // paw
     }
     return limbs;
 }
@@ -64,7 +64,8 @@ public:
     [[nodiscard]] double field(dvec3 p) const {
         double d = distanceTo(limbs_[0], p);
         for (size_t i = 1; i < limbs_.size(); ++i) {
-            const double other = distanceTo(limbs_[i], p), k = limbs_[i].blend, h = std::max(k - std::abs(d - other), 0.0) / k;
+            const double other = distanceTo(limbs_[i], p), k = limbs_[i].blend,
+                         h = std::max(k - std::abs(d - other), 0.0) / k;
             d = std::min(d, other) - h * h * h * k / 6;
         }
         return d;
@@ -106,7 +107,8 @@ public:
         dvec3 high(-INFINITY);
         for (const Limb& limb : body.limbs()) {
             const double reach = std::max(limb.fromRadius, limb.toRadius) + kMargin;
-            low_ = glm::min(low_, glm::min(limb.from, limb.to) - reach), high = glm::max(high, glm::max(limb.from, limb.to) + reach);
+            low_ = glm::min(low_, glm::min(limb.from, limb.to) - reach),
+            high = glm::max(high, glm::max(limb.from, limb.to) + reach);
         }
         count_ = ivec3(glm::ceil((high - low_) / edge)) + 1;
         values_.resize(size_t(count_.x) * size_t(count_.y) * size_t(count_.z));
@@ -122,8 +124,13 @@ public:
 private:
     static constexpr uint32_t kNone = 0xffffffff;
 
-    [[nodiscard]] ivec3 placeOf(size_t i) const { return {int(i % size_t(count_.x)), int(i / size_t(count_.x) % size_t(count_.y)), int(i / size_t(count_.x) / size_t(count_.y))}; }
-    [[nodiscard]] size_t at(ivec3 p) const { return size_t(p.x) + size_t(count_.x) * (size_t(p.y) + size_t(count_.y) * size_t(p.z)); }
+    [[nodiscard]] ivec3 placeOf(size_t i) const {
+        return {int(i % size_t(count_.x)), int(i / size_t(count_.x) % size_t(count_.y)),
+                int(i / size_t(count_.x) / size_t(count_.y))};
+    }
+    [[nodiscard]] size_t at(ivec3 p) const {
+        return size_t(p.x) + size_t(count_.x) * (size_t(p.y) + size_t(count_.y) * size_t(p.z));
+    }
 
     void addVertex(size_t cell, DogMesh& made) {
         const ivec3 p = placeOf(cell);
@@ -151,7 +158,8 @@ private:
             if (p[axis] + 1 == count_[axis] || p[(axis + 1) % 3] == 0 || p[(axis + 2) % 3] == 0) continue;
             const bool inside = values_[corner] < 0;
             if (inside == (values_[at(p + step)] < 0)) continue;
-            std::array<uint32_t, 4> quad = {vertexOf_[at(p - back - left)], vertexOf_[at(p - left)], vertexOf_[corner], vertexOf_[at(p - back)]};
+            std::array<uint32_t, 4> quad = {vertexOf_[at(p - back - left)], vertexOf_[at(p - left)], vertexOf_[corner],
+                                            vertexOf_[at(p - back)]};
             if (!inside) std::swap(quad[1], quad[3]);
             made.triangles.push_back({quad[0], quad[1], quad[2]});
             made.triangles.push_back({quad[0], quad[2], quad[3]});
@@ -172,9 +180,11 @@ void even(const Body& body, DogMesh& mesh) {
         std::vector<dvec3> sums(mesh.positions.size(), dvec3(0));
         std::vector<int> counts(mesh.positions.size(), 0);
         for (const auto& t : mesh.triangles)
-            for (int k = 0; k < 3; ++k) sums[t[size_t(k)]] += mesh.positions[t[size_t(k + 1) % 3]], ++counts[t[size_t(k)]];
+            for (int k = 0; k < 3; ++k)
+                sums[t[size_t(k)]] += mesh.positions[t[size_t(k + 1) % 3]], ++counts[t[size_t(k)]];
         for (size_t i = 0; i < sums.size(); ++i)
-            if (counts[i] > 0) mesh.positions[i] = body.onSurface(0.5 * (mesh.positions[i] + sums[i] / double(counts[i])));
+            if (counts[i] > 0)
+                mesh.positions[i] = body.onSurface(0.5 * (mesh.positions[i] + sums[i] / double(counts[i])));
     }
 }
 
@@ -189,7 +199,9 @@ struct Chart {
         turns = std::max(1.0, std::round(std::numbers::pi * (limb.fromRadius + limb.toRadius) / kUnit));
     }
     /// From -1/2 to 1/2, the seam where x is.
-    [[nodiscard]] double turnOf(dvec3 p) const { return std::atan2(-glm::dot(p - from, y), -glm::dot(p - from, x)) / (2 * std::numbers::pi); }
+    [[nodiscard]] double turnOf(dvec3 p) const {
+        return std::atan2(-glm::dot(p - from, y), -glm::dot(p - from, x)) / (2 * std::numbers::pi);
+    }
     [[nodiscard]] std::array<dvec2, 3> around(const std::array<dvec3, 3>& p) const {
         std::array<dvec2, 3> uv;
         const double first = turnOf(p[0]);
@@ -202,7 +214,8 @@ struct Chart {
     }
     [[nodiscard]] std::array<dvec2, 3> flat(const std::array<dvec3, 3>& p, bool isFar) const {
         std::array<dvec2, 3> uv;
-        for (size_t k = 0; k < 3; ++k) uv[k] = dvec2(glm::dot(p[k] - from, x) * (isFar ? 1 : -1), glm::dot(p[k] - from, y)) / kUnit;
+        for (size_t k = 0; k < 3; ++k)
+            uv[k] = dvec2(glm::dot(p[k] - from, x) * (isFar ? 1 : -1), glm::dot(p[k] - from, y)) / kUnit;
         return uv;
     }
 };
@@ -213,8 +226,10 @@ void map(const Body& body, DogMesh& mesh) {
         const dvec3 middle = (p[0] + p[1] + p[2]) / 3.0;
         const Limb& limb = body.limbs()[body.nearestLimb(middle)];
         const Chart chart(limb);
-        const double along = glm::dot(middle - limb.from, chart.z), end = glm::dot(glm::normalize(body.gradient(middle)), chart.z);
-        const bool isFar = along > glm::length(limb.to - limb.from), isEnd = isFar ? end > kFlatEnd : along < 0 && end < -kFlatEnd;
+        const double along = glm::dot(middle - limb.from, chart.z),
+                     end = glm::dot(glm::normalize(body.gradient(middle)), chart.z);
+        const bool isFar = along > glm::length(limb.to - limb.from),
+                   isEnd = isFar ? end > kFlatEnd : along < 0 && end < -kFlatEnd;
         mesh.uvs.push_back(isEnd ? chart.flat(p, isFar) : chart.around(p));
     }
 }
@@ -240,12 +255,14 @@ Result<void> writeObj(const DogMesh& mesh, const std::function<Result<void>(std:
         text.clear();
         return written;
     };
-    for (const dvec3 p : mesh.positions) VCP_TRY(put(std::snprintf(line, sizeof line, "v %.6f %.6f %.6f\n", p.x, p.y, p.z)));
+    for (const dvec3 p : mesh.positions)
+        VCP_TRY(put(std::snprintf(line, sizeof line, "v %.6f %.6f %.6f\n", p.x, p.y, p.z)));
     for (const auto& corners : mesh.uvs)
         for (const dvec2 uv : corners) VCP_TRY(put(std::snprintf(line, sizeof line, "vt %.6f %.6f\n", uv.x, uv.y)));
     for (size_t i = 0; i < mesh.triangles.size(); ++i) {
         const auto& t = mesh.triangles[i];
-        VCP_TRY(put(std::snprintf(line, sizeof line, "f %u/%zu %u/%zu %u/%zu\n", t[0] + 1, 3 * i + 1, t[1] + 1, 3 * i + 2, t[2] + 1, 3 * i + 3)));
+        VCP_TRY(put(std::snprintf(line, sizeof line, "f %u/%zu %u/%zu %u/%zu\n", t[0] + 1, 3 * i + 1, t[1] + 1,
+                                  3 * i + 2, t[2] + 1, 3 * i + 3)));
     }
     return write(text);
 }

@@ -1,9 +1,10 @@
 // The procedural dog: a smooth body with texture coordinates, to lay mesostructure on.
 //
-// Metres, y up, standing on y = 0 and facing +z, about 1.1 m high: tapered limbs, blended (Quilez's polynomial minimum) and
-// meshed by surface nets (Gibson 1998), closed. A triangle is mapped round the axis of the limb that it is nearest to, or
-// flat over the limb's end: charts that are cut between limbs. One unit of the coordinates is a tenth of a metre, more or less as a limb
-// is thinner or thicker than on average; round a limb there are whole units, so what has whole tiles a unit closes there.
+// Metres, y up, standing on y = 0 and facing +z, about 1.1 m high: tapered limbs, blended (Quilez's polynomial minimum)
+// and meshed by surface nets (Gibson 1998), closed. A triangle is mapped round the axis of the limb that it is nearest
+// to, or flat over the limb's end: charts that are cut between limbs. One unit of the coordinates is a tenth of a
+// metre, more or less as a limb is thinner or thicker than on average; round a limb there are whole units, so what has
+// whole tiles a unit closes there.
 #pragma once
 
 #include <array>

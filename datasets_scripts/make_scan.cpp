@@ -30,7 +30,8 @@ constexpr std::string_view kHelp =
     "\n"
     "usage: make_scan [--shape statue|dog] [--triangles N] [--seed S] [--colour] [--utm] [--parts] -o FILE|-\n"
     "\n"
-    "  --shape dog    a dog as an OBJ with texture coordinates, to lay mesostructure on: about N triangles, 10k to 200k,\n"
+    "  --shape dog    a dog as an OBJ with texture coordinates, to lay mesostructure on: about N triangles, 10k to "
+    "200k,\n"
     "                 always the same one\n"
     "  --triangles N  exactly so many triangles, 10k to 1G (500k)\n"
     "  --seed S       another pose, other folds, other stone (1); the same seed gives the same bytes\n"
@@ -45,7 +46,8 @@ constexpr std::string_view kHelp =
 struct Arguments {
     ScanOptions scan;
     std::string out;
-    bool help = false, parts = false, isDog = false, isStatueOnly = false;  ///< isStatueOnly: an option of the statue was given
+    bool help = false, parts = false, isDog = false,
+         isStatueOnly = false;  ///< isStatueOnly: an option of the statue was given
 };
 
 Result<uint64_t> number(std::string_view option, std::string_view text, uint64_t least, uint64_t most) {
@@ -67,7 +69,8 @@ Result<Arguments> parse(int argc, char** argv) {
         const std::string_view option = argv[i];
         const bool takesValue = option == "--shape" || option == "--triangles" || option == "--seed" || option == "-o";
         if (takesValue && i + 1 == argc) return Error{ErrorCode::Usage, std::string(option) + " wants a value"};
-        arguments.isStatueOnly = arguments.isStatueOnly || option == "--seed" || option == "--colour" || option == "--utm" || option == "--parts";
+        arguments.isStatueOnly = arguments.isStatueOnly || option == "--seed" || option == "--colour" ||
+                                 option == "--utm" || option == "--parts";
         if (option == "--help" || option == "-h")
             arguments.help = true;
         else if (option == "--colour")
@@ -80,10 +83,10 @@ Result<Arguments> parse(int argc, char** argv) {
             arguments.out = argv[++i];
         else if (option == "--shape") {
             const std::string_view shape = argv[++i];
-            if (shape != "statue" && shape != "dog") return Error{ErrorCode::Usage, "--shape is statue or dog, not '" + std::string(shape) + "'"};
+            if (shape != "statue" && shape != "dog")
+                return Error{ErrorCode::Usage, "--shape is statue or dog, not '" + std::string(shape) + "'"};
             arguments.isDog = shape == "dog";
-        }
-        else if (option == "--triangles") {
+        } else if (option == "--triangles") {
             const auto value = number(option, argv[++i], kMinTriangles, kMaxTriangles);
             if (!value) return value.error();
             arguments.scan.triangles = *value;
@@ -96,7 +99,8 @@ Result<Arguments> parse(int argc, char** argv) {
     }
     if (!arguments.help && arguments.out.empty())
         return Error{ErrorCode::Usage, "-o FILE is missing (or -o - for a pipe)"};
-    if (arguments.isDog && arguments.isStatueOnly) return Error{ErrorCode::Usage, "--seed, --colour, --utm and --parts are of the statue"};
+    if (arguments.isDog && arguments.isStatueOnly)
+        return Error{ErrorCode::Usage, "--seed, --colour, --utm and --parts are of the statue"};
     if (arguments.isDog && arguments.scan.triangles > kMostDogTriangles)
         return Error{ErrorCode::Usage, "a dog has at most " + std::to_string(kMostDogTriangles) + " triangles"};
     return arguments;
@@ -127,7 +131,9 @@ public:
         return output;
     }
 
-    Result<void> write(std::span<const std::byte> bytes) const { return file_ ? file_->append(bytes) : appendAll(descriptor_, bytes, path_); }
+    Result<void> write(std::span<const std::byte> bytes) const {
+        return file_ ? file_->append(bytes) : appendAll(descriptor_, bytes, path_);
+    }
 
     /// Gives the file its name.
     Result<void> finish() const {
@@ -158,11 +164,16 @@ Result<void> writeStatue(const Arguments& arguments, const Output& output) {
 Result<void> run(const Arguments& arguments) {
     const OutputKind kind = arguments.isDog ? OutputKind::Obj : OutputKind::Ply;
     if (const auto named = outputKindOf(arguments.out); named && *named != kind)
-        return Error{ErrorCode::Usage, std::string("what is written is ") + (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") + ", or be - for a pipe"};
+        return Error{ErrorCode::Usage,
+                     std::string("what is written is ") +
+                         (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") +
+                         ", or be - for a pipe"};
     auto output = Output::open(arguments.out, kind);
     if (!output) return output.error();
-    auto result = arguments.isDog ? writeObj(dog(arguments.scan.triangles), [&](std::string_view text) { return output->write(std::as_bytes(std::span(text))); })
-                                  : writeStatue(arguments, *output);
+    auto result = arguments.isDog
+                      ? writeObj(dog(arguments.scan.triangles),
+                                 [&](std::string_view text) { return output->write(std::as_bytes(std::span(text))); })
+                      : writeStatue(arguments, *output);
     if (result) result = output->finish();
     return result;
 }

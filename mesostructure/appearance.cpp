@@ -36,7 +36,8 @@ double cosineBand(int i) { return i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4; 
 
 /// The unit vector of a view.
 dvec3 viewOf(uint32_t i, uint32_t j) {
-    const double u = 2.0 * i / (Appearance::kViews - 1) - 1, v = 2.0 * j / (Appearance::kViews - 1) - 1, x = (u + v) / 2, y = (u - v) / 2;
+    const double u = 2.0 * i / (Appearance::kViews - 1) - 1, v = 2.0 * j / (Appearance::kViews - 1) - 1,
+                 x = (u + v) / 2, y = (u - v) / 2;
     const dvec3 d = glm::normalize(dvec3(x, y, 1 - std::abs(x) - std::abs(y)));
     return glm::normalize(dvec3(d.x, d.y, std::max(d.z, std::sin(kPi / 60))));
 }
@@ -49,7 +50,8 @@ dvec2 spread(uint64_t i) {
 
 /// About z by the cosine, turned to n (Duff et al. 2017).
 dvec3 byCosine(dvec3 n, dvec2 p) {
-    const double sign = n.z >= 0 ? 1 : -1, a = -1 / (sign + n.z), b = n.x * n.y * a, r = std::sqrt(p.x), turn = 2 * kPi * p.y;
+    const double sign = n.z >= 0 ? 1 : -1, a = -1 / (sign + n.z), b = n.x * n.y * a, r = std::sqrt(p.x),
+                 turn = 2 * kPi * p.y;
     const dvec3 x(1 + sign * n.x * n.x * a, sign * b, -sign * n.x), y(b, sign + n.y * n.y * a, -n.y);
     return glm::normalize(x * (r * std::cos(turn)) + y * (r * std::sin(turn)) + n * std::sqrt(std::max(0.0, 1 - p.x)));
 }
@@ -67,7 +69,9 @@ public:
         const dvec3 origin(place.x * extent_.x, place.y * extent_.y, extent_.z), d = inTile(-view);
         const double through = extent_.z / -d.z;
         const TruthHit hit = shape_.trace(origin, d, through);
-        if (hit.hit) return {origin + hit.t * d, glm::normalize(dvec3(hit.normal.x, hit.normal.y, hit.normal.z / scale_)), false, true};
+        if (hit.hit)
+            return {origin + hit.t * d, glm::normalize(dvec3(hit.normal.x, hit.normal.y, hit.normal.z / scale_)), false,
+                    true};
         return {dvec3(origin.x + through * d.x, origin.y + through * d.y, 0), {0, 0, 1}, true, hit.resolved};
     }
     [[nodiscard]] bool isLit(const Seen& seen, dvec3 light) const {
@@ -95,7 +99,8 @@ struct Sums {
         ++count, bottoms += seen.isBottom;
         normal += seen.normal;
         const Harmonics at = harmonicsOf(seen.normal);
-        for (int i = 0; i < 9; ++i) plain[size_t(i)] += cosineBand(i) * at[size_t(i)], shadowed[size_t(i)] += cosineBand(i) * at[size_t(i)];
+        for (int i = 0; i < 9; ++i)
+            plain[size_t(i)] += cosineBand(i) * at[size_t(i)], shadowed[size_t(i)] += cosineBand(i) * at[size_t(i)];
         // What is lost, which is less than what is left, so its noise is less.
         for (int k = 0; k < kShadowRays; ++k) {
             const dvec3 light = byCosine(seen.normal, spread(number * kShadowRays + uint64_t(k)));

@@ -1,11 +1,11 @@
 #include "mesostructure/asset_file.h"
 
+#include <unistd.h>
 #include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -26,9 +26,13 @@ using Bytes = std::vector<std::byte>;
 class Out {
 public:
     template <class T>
-    void one(const T& value) { raw(&value, sizeof value); }
+    void one(const T& value) {
+        raw(&value, sizeof value);
+    }
     template <class T>
-    void all(const std::vector<T>& values) { raw(values.data(), values.size() * sizeof(T)); }
+    void all(const std::vector<T>& values) {
+        raw(values.data(), values.size() * sizeof(T));
+    }
     void grid(const TileGrid& g) { one(g.cells); }
     Bytes bytes;
 
@@ -46,8 +50,10 @@ public:
     template <class T>
     T one() {
         T value{};
-        if (left_.size() < sizeof value) ok_ = false;
-        else std::memcpy(&value, left_.data(), sizeof value), left_ = left_.subspan(sizeof value);
+        if (left_.size() < sizeof value)
+            ok_ = false;
+        else
+            std::memcpy(&value, left_.data(), sizeof value), left_ = left_.subspan(sizeof value);
         return value;
     }
     template <class T>
@@ -85,22 +91,30 @@ std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
         write(out);
         chunks.emplace_back(kind, std::move(out.bytes));
     };
-    if (a.heights) add(ChunkKind::Heights, [&](Out& o) { o.one(a.heights->size), o.one(a.heights->range), o.all(a.heights->texels); });
+    if (a.heights)
+        add(ChunkKind::Heights,
+            [&](Out& o) { o.one(a.heights->size), o.one(a.heights->range), o.all(a.heights->texels); });
     if (!a.solid.empty())
-        add(ChunkKind::Solid, [&](Out& o) { o.one(a.seed), o.one(uint32_t(a.solid.size())), o.all(std::vector<char>(a.solid.begin(), a.solid.end())); });
+        add(ChunkKind::Solid, [&](Out& o) {
+            o.one(a.seed), o.one(uint32_t(a.solid.size())), o.all(std::vector<char>(a.solid.begin(), a.solid.end()));
+        });
     if (!a.triangles.empty()) add(ChunkKind::Triangles, [&](Out& o) { o.all(a.triangles); });
-    if (a.field) add(ChunkKind::Field, [&](Out& o) { o.grid(a.field->grid), o.one(a.field->unit), o.all(a.field->steps); });
+    if (a.field)
+        add(ChunkKind::Field, [&](Out& o) { o.grid(a.field->grid), o.one(a.field->unit), o.all(a.field->steps); });
     if (a.occupancy) add(ChunkKind::Occupancy, [&](Out& o) { o.grid(a.occupancy->grid), o.all(a.occupancy->cells); });
     if (a.distances)
         add(ChunkKind::Distances, [&](Out& o) {
-            o.grid(a.distances->grid), o.one(a.distances->cones.azimuth), o.one(a.distances->cones.elevation), o.one(a.distances->unit), o.all(a.distances->steps);
+            o.grid(a.distances->grid), o.one(a.distances->cones.azimuth), o.one(a.distances->cones.elevation),
+                o.one(a.distances->unit), o.all(a.distances->steps);
         });
-    if (!a.factors.empty()) add(ChunkKind::Compressed, [&](Out& o) { o.one(int32_t(a.factors.size())), o.all(a.factors); });
+    if (!a.factors.empty())
+        add(ChunkKind::Compressed, [&](Out& o) { o.one(int32_t(a.factors.size())), o.all(a.factors); });
     if (a.boxes) add(ChunkKind::Boxes, [&](Out& o) { o.grid(a.boxes->grid), o.all(a.boxes->boxes); });
     if (a.patches)
         add(ChunkKind::Patches, [&](Out& o) {
             const PatchSet& p = *a.patches;
-            o.grid(p.grid), o.one(uint32_t(p.ranks.size())), o.one(uint32_t(p.rows.size())), o.one(uint32_t(p.patches.size())), o.one(p.cellsWithout);
+            o.grid(p.grid), o.one(uint32_t(p.ranks.size())), o.one(uint32_t(p.rows.size())),
+                o.one(uint32_t(p.patches.size())), o.one(p.cellsWithout);
             o.all(p.ranks), o.all(p.rows), o.all(p.patches);
         });
     return chunks;
@@ -112,7 +126,8 @@ bool arePatchesSound(const PatchSet& p) {
     for (size_t i = 0; i < p.ranks.size(); ++i) {
         if (p.ranks[i].base != rows) return false;
         rows += uint32_t(std::popcount(p.ranks[i].mask));
-        if (i + 1 == p.ranks.size() && p.grid.count() % 32 != 0 && p.ranks[i].mask >> (p.grid.count() % 32) != 0) return false;
+        if (i + 1 == p.ranks.size() && p.grid.count() % 32 != 0 && p.ranks[i].mask >> (p.grid.count() % 32) != 0)
+            return false;
     }
     if (rows != p.rows.size()) return false;
     for (const uint32_t row : p.rows)
@@ -135,7 +150,8 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             a.heights.emplace();
             a.heights->size = in.one<glm::ivec2>(), a.heights->range = in.one<double>();
             const glm::ivec2 size = a.heights->size;
-            in.require(size.x >= 1 && size.y >= 1 && size.x <= kMaxGridEdge && size.y <= kMaxGridEdge && a.heights->extent() == extent);
+            in.require(size.x >= 1 && size.y >= 1 && size.x <= kMaxGridEdge && size.y <= kMaxGridEdge &&
+                       a.heights->extent() == extent);
             a.heights->texels = in.all<uint16_t>(in.ok() ? uint64_t(size.x) * uint64_t(size.y) : 0);
             break;
         }
@@ -149,7 +165,8 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
         case ChunkKind::Triangles:
             while (in.ok() && !in.done()) a.triangles.push_back(in.one<TileTriangle>());
             for (const TileTriangle& triangle : a.triangles)
-                for (const glm::dvec3& p : triangle) in.require(std::abs(p.x) <= 64 && std::abs(p.y) <= 64 && p.z >= 0 && p.z <= extent.z);
+                for (const glm::dvec3& p : triangle)
+                    in.require(std::abs(p.x) <= 64 && std::abs(p.y) <= 64 && p.z >= 0 && p.z <= extent.z);
             break;
         case ChunkKind::Field: {
             a.field.emplace();
@@ -167,9 +184,11 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
         case ChunkKind::Distances: {
             a.distances.emplace();
             a.distances->grid = in.grid(extent);
-            a.distances->cones.azimuth = in.one<int>(), a.distances->cones.elevation = in.one<int>(), a.distances->unit = in.one<float>();
+            a.distances->cones.azimuth = in.one<int>(), a.distances->cones.elevation = in.one<int>(),
+            a.distances->unit = in.one<float>();
             const Cones cones = a.distances->cones;
-            in.require(cones.azimuth >= 1 && cones.azimuth <= 32 && cones.elevation >= 1 && cones.elevation <= 16 && a.distances->unit > 0 && std::isfinite(a.distances->unit));
+            in.require(cones.azimuth >= 1 && cones.azimuth <= 32 && cones.elevation >= 1 && cones.elevation <= 16 &&
+                       a.distances->unit > 0 && std::isfinite(a.distances->unit));
             a.distances->steps = in.all<uint8_t>(in.ok() ? a.distances->grid.count() * uint64_t(cones.count()) : 0);
             break;
         }
@@ -189,11 +208,13 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             a.patches->grid = in.grid(extent);
             const auto ranks = in.one<uint32_t>(), rows = in.one<uint32_t>(), patches = in.one<uint32_t>();
             a.patches->cellsWithout = in.one<uint32_t>();
-            a.patches->ranks = in.all<PatchSet::Rank>(ranks), a.patches->rows = in.all<uint32_t>(rows), a.patches->patches = in.all<Patch>(patches);
+            a.patches->ranks = in.all<PatchSet::Rank>(ranks), a.patches->rows = in.all<uint32_t>(rows),
+            a.patches->patches = in.all<Patch>(patches);
             in.require(in.ok() && arePatchesSound(*a.patches));
             break;
         }
-        default: return false;
+        default:
+            return false;
     }
     return in.done();
 }
@@ -203,11 +224,15 @@ bool belongTogether(Asset& a) {
     if (a.heights.has_value() + !a.solid.empty() + !a.triangles.empty() != 1) return false;
     if (!a.solid.empty() && makeSolid(a.solid, a.seed)->extent != a.extent) return false;
     const glm::ivec3 cells = a.occupancy ? a.occupancy->grid.cells : glm::ivec3(0);
-    for (const TileGrid* grid : {a.distances ? &a.distances->grid : nullptr, a.boxes ? &a.boxes->grid : nullptr, a.patches ? &a.patches->grid : nullptr})
+    for (const TileGrid* grid : {a.distances ? &a.distances->grid : nullptr, a.boxes ? &a.boxes->grid : nullptr,
+                                 a.patches ? &a.patches->grid : nullptr})
         if (grid != nullptr && grid->cells != cells) return false;
-    if (a.occupancy && a.heights && (a.heights->size.x % cells.x != 0 || a.heights->size.y % cells.y != 0)) return false;
+    if (a.occupancy && a.heights && (a.heights->size.x % cells.x != 0 || a.heights->size.y % cells.y != 0))
+        return false;
     if (a.occupancy && a.field && a.field->grid.cells % cells != glm::ivec3(0)) return false;
-    const auto agrees = [&](size_t i, bool marked) { return marked == (a.occupancy->cells[i % a.occupancy->cells.size()] != 0); };
+    const auto agrees = [&](size_t i, bool marked) {
+        return marked == (a.occupancy->cells[i % a.occupancy->cells.size()] != 0);
+    };
     if (a.distances)
         for (size_t i = 0; i < a.distances->steps.size(); ++i)
             if (!agrees(i, a.distances->steps[i] == kOccupied)) return false;
@@ -251,8 +276,10 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
     const glm::ivec3 cells = gridFor(asset, options.cells);
     if (asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
         return Error{.code = ErrorCode::Usage,
-                     .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels", cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
-    if (options.samples < 1 || options.samples > 16) return Error{.code = ErrorCode::Usage, .message = "samples a cell must be from 1 to 16"};
+                     .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels",
+                                            cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
+    if (options.samples < 1 || options.samples > 16)
+        return Error{.code = ErrorCode::Usage, .message = "samples a cell must be from 1 to 16"};
     auto occupancy = occupy(**shape, cells);
     if (!occupancy) return occupancy.error();
     if (!asset.heights) {
@@ -301,7 +328,8 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
 
     auto file = OutputFile::create(path, OutputKind::Asset, rules);
     if (!file) return file.error();
-    if (::ftruncate(file->descriptor(), static_cast<off_t>(header.fileBytes)) != 0) return systemError(path, "cannot write here", errno);
+    if (::ftruncate(file->descriptor(), static_cast<off_t>(header.fileBytes)) != 0)
+        return systemError(path, "cannot write here", errno);
     VCP_TRY(file->write(sizeof header, std::as_bytes(std::span(table))));
     for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(file->write(table[i].offset, chunks[i].second));
     VCP_TRY(file->sync());
@@ -314,13 +342,18 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
 Result<Asset> readAsset(const std::filesystem::path& path) {
     const auto reader = openFile(path);
     if (!reader) return reader.error();
-    if ((*reader)->size() > kMaxFileBytes) return Error{.code = ErrorCode::Limit, .message = "is larger than any mesostructure asset", .file = path.string()};
+    if ((*reader)->size() > kMaxFileBytes)
+        return Error{
+            .code = ErrorCode::Limit, .message = "is larger than any mesostructure asset", .file = path.string()};
     // A header first, so that a large file of another kind is not read.
     if ((*reader)->size() >= sizeof(AssetHeader)) {
         AssetHeader header;
         VCP_TRY((*reader)->read(0, std::as_writable_bytes(std::span(&header, 1))));
         if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0)
-            return Error{.message = "not a mesostructure asset; make one with `vcp meso build`", .file = path.string(), .element = "header", .byte = 0};
+            return Error{.message = "not a mesostructure asset; make one with `vcp meso build`",
+                         .file = path.string(),
+                         .element = "header",
+                         .byte = 0};
     }
     Bytes bytes((*reader)->size());
     VCP_TRY((*reader)->read(0, bytes));
@@ -329,21 +362,34 @@ Result<Asset> readAsset(const std::filesystem::path& path) {
 
 Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& name) {
     const auto fail = [&](const char* element, uint64_t byte, std::string message) {
-        return Error{.code = ErrorCode::InvalidInput, .message = std::move(message), .file = name, .element = element, .byte = byte};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = std::move(message),
+                     .file = name,
+                     .element = element,
+                     .byte = byte};
     };
     AssetHeader header;
-    if (bytes.size() < sizeof header + sizeof(AssetCommit)) return fail("header", bytes.size(), bytes.empty() ? "the file is empty" : "the file is too short for a mesostructure asset");
+    if (bytes.size() < sizeof header + sizeof(AssetCommit))
+        return fail("header", bytes.size(),
+                    bytes.empty() ? "the file is empty" : "the file is too short for a mesostructure asset");
     std::memcpy(&header, bytes.data(), sizeof header);
-    if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0) return fail("header", 0, "not a mesostructure asset; make one with `vcp meso build`");
+    if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0)
+        return fail("header", 0, "not a mesostructure asset; make one with `vcp meso build`");
     if (header.version != kAssetVersion)
         return Error{.code = ErrorCode::Unsupported,
-                     .message = fmt::format("asset version {} is not known; this program reads version {}", header.version, kAssetVersion),
+                     .message = fmt::format("asset version {} is not known; this program reads version {}",
+                                            header.version, kAssetVersion),
                      .file = name,
                      .element = "header",
                      .byte = 8};
-    if (hashBytes(bytes.first(offsetof(AssetHeader, hash))) != header.hash || header.padding != 0) return fail("header", 0, "the header's hash does not match: the file was changed or damaged");
-    if (header.fileBytes != bytes.size()) return fail("header", 16, fmt::format("the file should have {} bytes, it has {}", header.fileBytes, bytes.size()));
-    if (header.chunks > kMaxChunks || sizeof header + header.chunks * sizeof(AssetChunk) + sizeof(AssetCommit) > bytes.size()) return fail("header", 12, "chunk count out of range");
+    if (hashBytes(bytes.first(offsetof(AssetHeader, hash))) != header.hash || header.padding != 0)
+        return fail("header", 0, "the header's hash does not match: the file was changed or damaged");
+    if (header.fileBytes != bytes.size())
+        return fail("header", 16,
+                    fmt::format("the file should have {} bytes, it has {}", header.fileBytes, bytes.size()));
+    if (header.chunks > kMaxChunks ||
+        sizeof header + header.chunks * sizeof(AssetChunk) + sizeof(AssetCommit) > bytes.size())
+        return fail("header", 12, "chunk count out of range");
     for (const double edge : header.extent)
         if (!(edge > 0) || !(edge <= 64)) return fail("header", 24, "the tile's extent is out of range");
     if (header.name[sizeof header.name - 1] != 0) return fail("header", 56, "the name does not end");
@@ -351,32 +397,41 @@ Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& na
     AssetCommit commit;
     const uint64_t commitAt = bytes.size() - sizeof commit;
     std::memcpy(&commit, bytes.data() + commitAt, sizeof commit);
-    if (std::memcmp(commit.magic, AssetCommit{}.magic, 8) != 0 || commit.fileBytes != bytes.size() || commit.headerHash != header.hash ||
+    if (std::memcmp(commit.magic, AssetCommit{}.magic, 8) != 0 || commit.fileBytes != bytes.size() ||
+        commit.headerHash != header.hash ||
         commit.hash != hashBytes(bytes.subspan(commitAt, offsetof(AssetCommit, hash))))
         return fail("commit record", commitAt, "does not match the file: it was not finished, changed or damaged");
 
     std::vector<AssetChunk> table(header.chunks);
     const auto stored = bytes.subspan(sizeof header, table.size() * sizeof(AssetChunk));
-    if (hashBytes(stored) != header.tableHash) return fail("chunk table", sizeof header, "hash does not match: the file was changed or damaged");
+    if (hashBytes(stored) != header.tableHash)
+        return fail("chunk table", sizeof header, "hash does not match: the file was changed or damaged");
     if (!table.empty()) std::memcpy(table.data(), stored.data(), stored.size());
     Asset asset;
     asset.name = header.name;
     asset.extent = {header.extent[0], header.extent[1], header.extent[2]};
     uint64_t end = sizeof header + stored.size(), known = 0;
     for (const AssetChunk& chunk : table) {
-        if (chunk.offset < end || chunk.offset - end >= kAlignment || chunk.offset % kAlignment != 0 || chunk.bytes > commitAt || chunk.offset > commitAt - chunk.bytes)
+        if (chunk.offset < end || chunk.offset - end >= kAlignment || chunk.offset % kAlignment != 0 ||
+            chunk.bytes > commitAt || chunk.offset > commitAt - chunk.bytes)
             return fail("chunk table", sizeof header, "a chunk lies outside the file or overlaps another");
         for (uint64_t i = end; i < chunk.offset; ++i)
             if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
         const auto content = bytes.subspan(chunk.offset, chunk.bytes);
-        if (hashBytes(content) != chunk.hash) return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
+        if (hashBytes(content) != chunk.hash)
+            return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
         const auto kind = uint32_t(chunk.kind);
         if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Compressed))
-            return Error{.code = ErrorCode::Unsupported, .message = fmt::format("chunk kind {} is not known: use a newer program", kind), .file = name, .element = "chunk table", .byte = chunk.offset};
+            return Error{.code = ErrorCode::Unsupported,
+                         .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
+                         .file = name,
+                         .element = "chunk table",
+                         .byte = chunk.offset};
         if (known >> kind & 1) return fail("chunk table", chunk.offset, "two chunks of one kind");
         known |= uint64_t{1} << kind;
         In in(content);
-        if (!readChunk(chunk.kind, in, asset)) return fail("chunk", chunk.offset, fmt::format("chunk of kind {} is not what it says", kind));
+        if (!readChunk(chunk.kind, in, asset))
+            return fail("chunk", chunk.offset, fmt::format("chunk of kind {} is not what it says", kind));
         end = chunk.offset + chunk.bytes;
     }
     for (uint64_t i = end; i < commitAt; ++i)

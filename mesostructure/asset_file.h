@@ -27,15 +27,15 @@ inline constexpr uint32_t kAssetVersion = 1;
 
 /// What a chunk holds; new methods add kinds.
 enum class ChunkKind : uint32_t {
-    Heights = 1,    ///< HeightMap: 2 x i32 size, f64 range, u16 texels
-    Solid = 2,      ///< u32 seed, u32 length, the name's bytes
-    Triangles = 3,  ///< 9 doubles a triangle, tile space
-    Field = 4,      ///< SampledField: grid, f32 unit, i16 steps
-    Occupancy = 5,  ///< grid, u8 cells
-    Distances = 6,  ///< DistanceMap: grid, 2 x i32 cones, f32 unit, u8 steps
-    Boxes = 7,      ///< OctantBoxes: grid, u16 boxes
-    Patches = 8,    ///< PatchSet: grid, 3 x u32 counts, u32 cells without, ranks, rows, patches
-    Compressed = 9, ///< i32 number of factors and the factors; made again from Distances when read
+    Heights = 1,     ///< HeightMap: 2 x i32 size, f64 range, u16 texels
+    Solid = 2,       ///< u32 seed, u32 length, the name's bytes
+    Triangles = 3,   ///< 9 doubles a triangle, tile space
+    Field = 4,       ///< SampledField: grid, f32 unit, i16 steps
+    Occupancy = 5,   ///< grid, u8 cells
+    Distances = 6,   ///< DistanceMap: grid, 2 x i32 cones, f32 unit, u8 steps
+    Boxes = 7,       ///< OctantBoxes: grid, u16 boxes
+    Patches = 8,     ///< PatchSet: grid, 3 x u32 counts, u32 cells without, ranks, rows, patches
+    Compressed = 9,  ///< i32 number of factors and the factors; made again from Distances when read
 };
 
 struct AssetHeader {
@@ -45,12 +45,13 @@ struct AssetHeader {
     uint64_t fileBytes = 0;
     double extent[3] = {};  ///< tile units
     uint64_t tableHash = 0;
-    char name[64] = {};     ///< of what it was made of, ends with 0
+    char name[64] = {};  ///< of what it was made of, ends with 0
     uint8_t reserved[120] = {};
-    uint64_t hash = 0;      ///< XXH3-64 of the bytes before
-    uint64_t padding = 0;   ///< 0
+    uint64_t hash = 0;     ///< XXH3-64 of the bytes before
+    uint64_t padding = 0;  ///< 0
 };
-static_assert(sizeof(AssetHeader) == 256 && offsetof(AssetHeader, extent) == 24 && offsetof(AssetHeader, name) == 56 && offsetof(AssetHeader, hash) == 240);
+static_assert(sizeof(AssetHeader) == 256 && offsetof(AssetHeader, extent) == 24 && offsetof(AssetHeader, name) == 56 &&
+              offsetof(AssetHeader, hash) == 240);
 
 struct AssetChunk {
     ChunkKind kind{};
@@ -81,7 +82,7 @@ struct Asset {
     std::optional<SampledField> field;  ///< of solids and meshes
     std::optional<Occupancy> occupancy;
     std::optional<DistanceMap> distances;
-    std::vector<int> factors;           ///< blocks of the compressed map; empty: none
+    std::vector<int> factors;  ///< blocks of the compressed map; empty: none
     std::optional<CompressedMap> compressed;
     std::optional<OctantBoxes> boxes;
     std::optional<PatchSet> patches;
@@ -91,8 +92,9 @@ struct Asset {
 Result<std::unique_ptr<Shape>> shapeOf(const Asset& asset);
 
 struct AssetOptions {
-    glm::ivec3 cells{0};  ///< of the grid; 0: 64 along x (a height map's edge or a half, third... of it), cubes otherwise
-    int samples = 2;      ///< samples of a solid's field a cell, along each axis: 1 to 16
+    glm::ivec3 cells{
+        0};           ///< of the grid; 0: 64 along x (a height map's edge or a half, third... of it), cubes otherwise
+    int samples = 2;  ///< samples of a solid's field a cell, along each axis: 1 to 16
     DistanceOptions distances = {.cones = {4, 2}};
     std::vector<int> factors = {4};
     CrossingRule crossings = CrossingRule::Direct;

@@ -19,7 +19,8 @@ constexpr double kPi = std::numbers::pi;
 constexpr std::array<std::string_view, 6> kNames = {"quad", "box", "cylinder", "sphere", "torus", "teapot"};
 
 /// A grid of columns x rows cells over [0, 1]^2. `uv` maps the parameters to tiles.
-void addSheet(BaseSurface& to, int columns, int rows, const std::function<dvec3(double, double)>& at, const std::function<dvec2(double, double)>& uv) {
+void addSheet(BaseSurface& to, int columns, int rows, const std::function<dvec3(double, double)>& at,
+              const std::function<dvec2(double, double)>& uv) {
     const auto first = uint32_t(to.positions.size());
     const auto parameter = [](int i, int n) { return double(i) / n; };
     for (int j = 0; j <= rows; ++j)
@@ -62,13 +63,18 @@ BaseSurface cube(int cells, bool isSphere, double tiles) {
 BaseSurface cylinder(double tiles) {
     BaseSurface made;
     constexpr int kAround = 96, kUp = 24;
-    const auto ring = [](double u, double r, double z) { return dvec3(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u), z); };
+    const auto ring = [](double u, double r, double z) {
+        return dvec3(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u), z);
+    };
     addSheet(
-        made, kAround, kUp, [&](double u, double v) { return ring(u, 1, 2 * v - 1); }, [&](double u, double v) { return tiles * dvec2(3 * u, v); });
+        made, kAround, kUp, [&](double u, double v) { return ring(u, 1, 2 * v - 1); },
+        [&](double u, double v) { return tiles * dvec2(3 * u, v); });
     for (const double end : {1.0, -1.0})
         addSheet(
             made, kAround, kUp / 2, [&](double u, double v) { return ring(u * end, 1 - v, end); },
-            [&](double u, double v) { return tiles * 0.5 * (1 - v) * dvec2(std::cos(2 * kPi * u), std::sin(2 * kPi * u)); });
+            [&](double u, double v) {
+                return tiles * 0.5 * (1 - v) * dvec2(std::cos(2 * kPi * u), std::sin(2 * kPi * u));
+            });
     return made;
 }
 
@@ -90,7 +96,7 @@ Point bezier(const std::array<Point, 4>& c, double t) {
     return s * s * s * c[0] + 3 * s * s * t * c[1] + 3 * s * t * t * c[2] + t * t * t * c[3];
 }
 
-using Profile = std::array<dvec2, 4>;               // radius, height
+using Profile = std::array<dvec2, 4>;  // radius, height
 using BicubicPatch = std::array<std::array<dvec3, 4>, 4>;
 
 /// Newell's teapot (1975): its round parts by their profiles, from the rim down and from the lid's knob down, and the
@@ -99,23 +105,26 @@ constexpr std::array<Profile, 4> kBody = {{{{{1.4, 2.4}, {1.3375, 2.53125}, {1.4
                                            {{{1.5, 2.4}, {1.75, 1.875}, {2, 1.35}, {2, 0.9}}},
                                            {{{2, 0.9}, {2, 0.45}, {1.5, 0.225}, {1.5, 0.15}}},
                                            {{{1.5, 0.15}, {1.5, 0.075}, {1.425, 0}, {0, 0}}}}};
-constexpr std::array<Profile, 2> kLid = {{{{{0, 3.15}, {0.8, 3.15}, {0, 2.85}, {0.2, 2.7}}}, {{{0.2, 2.7}, {0.4, 2.55}, {1.3, 2.55}, {1.3, 2.4}}}}};
-const std::array<BicubicPatch, 2> kHandle = {{{{{{{-1.6, 0, 2.025}, {-1.6, -0.3, 2.025}, {-1.5, -0.3, 2.25}, {-1.5, 0, 2.25}}},
-                                                {{{-2.3, 0, 2.025}, {-2.3, -0.3, 2.025}, {-2.5, -0.3, 2.25}, {-2.5, 0, 2.25}}},
-                                                {{{-2.7, 0, 2.025}, {-2.7, -0.3, 2.025}, {-3, -0.3, 2.25}, {-3, 0, 2.25}}},
-                                                {{{-2.7, 0, 1.8}, {-2.7, -0.3, 1.8}, {-3, -0.3, 1.8}, {-3, 0, 1.8}}}}},
-                                              {{{{{-2.7, 0, 1.8}, {-2.7, -0.3, 1.8}, {-3, -0.3, 1.8}, {-3, 0, 1.8}}},
-                                                {{{-2.7, 0, 1.575}, {-2.7, -0.3, 1.575}, {-3, -0.3, 1.35}, {-3, 0, 1.35}}},
-                                                {{{-2.5, 0, 1.125}, {-2.5, -0.3, 1.125}, {-2.65, -0.3, 0.9375}, {-2.65, 0, 0.9375}}},
-                                                {{{-2, 0, 0.9}, {-2, -0.3, 0.9}, {-1.9, -0.3, 0.6}, {-1.9, 0, 0.6}}}}}}};
-const std::array<BicubicPatch, 2> kSpout = {{{{{{{1.7, 0, 1.425}, {1.7, -0.66, 1.425}, {1.7, -0.66, 0.6}, {1.7, 0, 0.6}}},
-                                               {{{2.6, 0, 1.425}, {2.6, -0.66, 1.425}, {3.1, -0.66, 0.825}, {3.1, 0, 0.825}}},
-                                               {{{2.3, 0, 2.1}, {2.3, -0.25, 2.1}, {2.4, -0.25, 2.025}, {2.4, 0, 2.025}}},
-                                               {{{2.7, 0, 2.4}, {2.7, -0.25, 2.4}, {3.3, -0.25, 2.4}, {3.3, 0, 2.4}}}}},
-                                             {{{{{2.7, 0, 2.4}, {2.7, -0.25, 2.4}, {3.3, -0.25, 2.4}, {3.3, 0, 2.4}}},
-                                               {{{2.8, 0, 2.475}, {2.8, -0.25, 2.475}, {3.525, -0.25, 2.49375}, {3.525, 0, 2.49375}}},
-                                               {{{2.9, 0, 2.475}, {2.9, -0.15, 2.475}, {3.45, -0.15, 2.5125}, {3.45, 0, 2.5125}}},
-                                               {{{2.8, 0, 2.4}, {2.8, -0.15, 2.4}, {3.2, -0.15, 2.4}, {3.2, 0, 2.4}}}}}}};
+constexpr std::array<Profile, 2> kLid = {
+    {{{{0, 3.15}, {0.8, 3.15}, {0, 2.85}, {0.2, 2.7}}}, {{{0.2, 2.7}, {0.4, 2.55}, {1.3, 2.55}, {1.3, 2.4}}}}};
+const std::array<BicubicPatch, 2> kHandle = {
+    {{{{{{-1.6, 0, 2.025}, {-1.6, -0.3, 2.025}, {-1.5, -0.3, 2.25}, {-1.5, 0, 2.25}}},
+       {{{-2.3, 0, 2.025}, {-2.3, -0.3, 2.025}, {-2.5, -0.3, 2.25}, {-2.5, 0, 2.25}}},
+       {{{-2.7, 0, 2.025}, {-2.7, -0.3, 2.025}, {-3, -0.3, 2.25}, {-3, 0, 2.25}}},
+       {{{-2.7, 0, 1.8}, {-2.7, -0.3, 1.8}, {-3, -0.3, 1.8}, {-3, 0, 1.8}}}}},
+     {{{{{-2.7, 0, 1.8}, {-2.7, -0.3, 1.8}, {-3, -0.3, 1.8}, {-3, 0, 1.8}}},
+       {{{-2.7, 0, 1.575}, {-2.7, -0.3, 1.575}, {-3, -0.3, 1.35}, {-3, 0, 1.35}}},
+       {{{-2.5, 0, 1.125}, {-2.5, -0.3, 1.125}, {-2.65, -0.3, 0.9375}, {-2.65, 0, 0.9375}}},
+       {{{-2, 0, 0.9}, {-2, -0.3, 0.9}, {-1.9, -0.3, 0.6}, {-1.9, 0, 0.6}}}}}}};
+const std::array<BicubicPatch, 2> kSpout = {
+    {{{{{{1.7, 0, 1.425}, {1.7, -0.66, 1.425}, {1.7, -0.66, 0.6}, {1.7, 0, 0.6}}},
+       {{{2.6, 0, 1.425}, {2.6, -0.66, 1.425}, {3.1, -0.66, 0.825}, {3.1, 0, 0.825}}},
+       {{{2.3, 0, 2.1}, {2.3, -0.25, 2.1}, {2.4, -0.25, 2.025}, {2.4, 0, 2.025}}},
+       {{{2.7, 0, 2.4}, {2.7, -0.25, 2.4}, {3.3, -0.25, 2.4}, {3.3, 0, 2.4}}}}},
+     {{{{{2.7, 0, 2.4}, {2.7, -0.25, 2.4}, {3.3, -0.25, 2.4}, {3.3, 0, 2.4}}},
+       {{{2.8, 0, 2.475}, {2.8, -0.25, 2.475}, {3.525, -0.25, 2.49375}, {3.525, 0, 2.49375}}},
+       {{{2.9, 0, 2.475}, {2.9, -0.15, 2.475}, {3.45, -0.15, 2.5125}, {3.45, 0, 2.5125}}},
+       {{{2.8, 0, 2.4}, {2.8, -0.15, 2.4}, {3.2, -0.15, 2.4}, {3.2, 0, 2.4}}}}}}};
 
 /// A quarter of a turn of the body is one unit of the map.
 void addRound(BaseSurface& to, std::span<const Profile> profiles, double tiles) {
@@ -158,17 +167,29 @@ void addTube(BaseSurface& to, std::span<const BicubicPatch> patches, double tile
 std::span<const std::string_view> baseSurfaceNames() { return kNames; }
 
 Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
-    if (!(tiles > 0) || !(tiles <= 4096)) return Error{.code = ErrorCode::Usage, .message = "tiles along a base surface must be above 0 and at most 4096"};
+    if (!(tiles > 0) || !(tiles <= 4096))
+        return Error{.code = ErrorCode::Usage,
+                     .message = "tiles along a base surface must be above 0 and at most 4096"};
     BaseSurface made;
     if (name == "quad")
         addSheet(
-            made, 1, 1, [](double u, double v) { return dvec3(2 * u - 1, 2 * v - 1, 0); }, [&](double u, double v) { return tiles * dvec2(u, v); });
-    else if (name == "box") made = cube(16, false, tiles);
-    else if (name == "sphere") made = cube(20, true, tiles);
-    else if (name == "cylinder") made = cylinder(tiles);
-    else if (name == "torus") made = torus(tiles);
-    else if (name == "teapot") addRound(made, kBody, tiles), addRound(made, kLid, tiles), addTube(made, kHandle, tiles), addTube(made, kSpout, tiles);
-    else return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no base surface \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
+            made, 1, 1, [](double u, double v) { return dvec3(2 * u - 1, 2 * v - 1, 0); },
+            [&](double u, double v) { return tiles * dvec2(u, v); });
+    else if (name == "box")
+        made = cube(16, false, tiles);
+    else if (name == "sphere")
+        made = cube(20, true, tiles);
+    else if (name == "cylinder")
+        made = cylinder(tiles);
+    else if (name == "torus")
+        made = torus(tiles);
+    else if (name == "teapot")
+        addRound(made, kBody, tiles), addRound(made, kLid, tiles), addTube(made, kHandle, tiles),
+            addTube(made, kSpout, tiles);
+    else
+        return Error{
+            .code = ErrorCode::Usage,
+            .message = fmt::format("there is no base surface \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
     // The two ends of a turn differ in their last bits.
     for (dvec3& p : made.positions)
         for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;
@@ -196,7 +217,8 @@ double tileEdge(const BaseSurface& surface) {
     for (size_t i = 0; i < surface.triangles.size(); ++i) {
         const auto& t = surface.triangles[i];
         const auto& m = surface.uvs[i];
-        world += glm::length(glm::cross(surface.positions[t[1]] - surface.positions[t[0]], surface.positions[t[2]] - surface.positions[t[0]]));
+        world += glm::length(glm::cross(surface.positions[t[1]] - surface.positions[t[0]],
+                                        surface.positions[t[2]] - surface.positions[t[0]]));
         const dvec2 a = m[1] - m[0], b = m[2] - m[0];
         tile += std::abs(a.x * b.y - a.y * b.x);
     }

@@ -1,5 +1,5 @@
-// Base surfaces that mesostructure is laid on: triangles with a texture map in tile units. The shapes are made here; mesh
-// files come from viewer/scene/base_mesh.h.
+// Base surfaces that mesostructure is laid on: triangles with a texture map in tile units. The shapes are made here;
+// mesh files come from viewer/scene/base_mesh.h.
 #pragma once
 
 #include <array>
@@ -16,17 +16,19 @@
 namespace vcp::meso {
 
 struct BaseSurface {
-    std::vector<glm::dvec3> positions;                ///< world
-    std::vector<std::array<uint32_t, 3>> triangles;   ///< counter-clockwise from outside; corners at one place share the number
-    std::vector<std::array<glm::dvec2, 3>> uvs;       ///< of the triangles' corners, tile units
+    std::vector<glm::dvec3> positions;  ///< world
+    std::vector<std::array<uint32_t, 3>>
+        triangles;  ///< counter-clockwise from outside; corners at one place share the number
+    std::vector<std::array<glm::dvec2, 3>> uvs;  ///< of the triangles' corners, tile units
 };
 
 /// "quad", "box", "cylinder", "sphere", "torus", "teapot". All but the teapot, which is in its traditional units, fit
 /// [-1, 1]^3 or are a little larger; z is up.
 std::span<const std::string_view> baseSurfaceNames();
 
-/// `tiles`: tile edges along the edge of the quad, of a side of the box, of a sixth of the sphere, of the cylinder's height
-/// and diameter, once round the torus' tube, and a quarter round the teapot. Errors: Usage (no such name, tiles not above 0).
+/// `tiles`: tile edges along the edge of the quad, of a side of the box, of a sixth of the sphere, of the cylinder's
+/// height and diameter, once round the torus' tube, and a quarter round the teapot. Errors: Usage (no such name, tiles
+/// not above 0).
 Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles);
 
 /// Gives equal positions one number.

@@ -26,8 +26,10 @@ struct CellHit {
 template <class Real>
 CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
     const auto f = [&](Real u) { return ((c3 * u + c2) * u + c1) * u + c0; };
-    if (c0 > 0) outside = true;
-    else if (outside) return {true, 0, false};
+    if (c0 > 0)
+        outside = true;
+    else if (outside)
+        return {true, 0, false};
     // Monotone between 0, the roots of the derivative in [0, 1], and 1.
     Real r0 = 1, r1 = 1;
     const Real a = 3 * c3, b = 2 * c2, disc = b * b - 4 * a * c1;
@@ -39,17 +41,22 @@ CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
     const Real f0 = f(r0), f1 = f(r1), f2 = f(Real(1));
     Real low = 0, high = r0, fLow = c0, fHigh = f0;
     if (!(outside && f0 <= 0)) {
-        if (f0 > 0 && f1 <= 0) low = r0, high = r1, fLow = f0, fHigh = f1;
-        else if (f1 > 0 && f2 <= 0) low = r1, high = 1, fLow = f1, fHigh = f2;
-        else return {false, 0, f2 > 0};
+        if (f0 > 0 && f1 <= 0)
+            low = r0, high = r1, fLow = f0, fHigh = f1;
+        else if (f1 > 0 && f2 <= 0)
+            low = r1, high = 1, fLow = f1, fHigh = f2;
+        else
+            return {false, 0, f2 > 0};
     }
     // Newton, or a bisection where that leaves the bracket.
     Real u = low + (high - low) * (fLow / (fLow - fHigh));
     for (int k = 0; k < 24; ++k) {
         if (!(u > low && u < high)) u = Real(0.5) * (low + high);
         const Real value = f(u);
-        if (value > 0) low = u;
-        else high = u;
+        if (value > 0)
+            low = u;
+        else
+            high = u;
         const Real step = value / ((Real(3) * c3 * u + Real(2) * c2) * u + c1);
         if (std::abs(step) <= Real(2) * std::numeric_limits<Real>::epsilon() * u) break;
         u -= step;
@@ -67,12 +74,15 @@ struct BilinearCell {
         const Real hx = h10 - h00, hy = h01 - h00, hxy = h11 - h10 - h01 + h00;
         const Real x = o.x + ta * d.x, y = o.y + ta * d.y, z = o.z + ta * d.z, span = tb - ta;
         const Real c = z - (h00 + hx * x + hy * y + hxy * x * y);
-        if (c > 0) outside = true;
-        else if (outside) return {true, ta, false};
+        if (c > 0)
+            outside = true;
+        else if (outside)
+            return {true, ta, false};
         const Real b = d.z - hx * d.x - hy * d.y - hxy * (x * d.y + y * d.x), a = -hxy * d.x * d.y;
         const Real end = (a * span + b) * span + c;
         if (!outside) return {false, 0, end > 0};
-        // The first root, without cancellation; behind the interval's end there is none unless the parabola opens upwards.
+        // The first root, without cancellation; behind the interval's end there is none unless the parabola opens
+        // upwards.
         if (end > 0 && !(a > 0 && b < 0 && -b < 2 * a * span)) return {false, 0, true};
         const Real disc = b * b - 4 * a * c;
         if (disc < 0) return end > 0 ? CellHit<Real>{false, 0, true} : CellHit<Real>{true, tb, false};
@@ -104,8 +114,10 @@ struct TrilinearCell {
         const Real x = o.x + ta * d.x, y = o.y + ta * d.y, z = o.z + ta * d.z, span = tb - ta;
         const Real dx = d.x * span, dy = d.y * span, dz = d.z * span;
         const Real c0 = k + kx * x + ky * y + kz * z + kxy * x * y + kyz * y * z + kzx * z * x + kxyz * x * y * z;
-        const Real c1 = dx * (kx + kxy * y + kzx * z + kxyz * y * z) + dy * (ky + kxy * x + kyz * z + kxyz * z * x) + dz * (kz + kyz * y + kzx * x + kxyz * x * y);
-        const Real c2 = kxy * dx * dy + kyz * dy * dz + kzx * dz * dx + kxyz * (dx * dy * z + dy * dz * x + dz * dx * y);
+        const Real c1 = dx * (kx + kxy * y + kzx * z + kxyz * y * z) + dy * (ky + kxy * x + kyz * z + kxyz * z * x) +
+                        dz * (kz + kyz * y + kzx * x + kxyz * x * y);
+        const Real c2 =
+            kxy * dx * dy + kyz * dy * dz + kzx * dz * dx + kxyz * (dx * dy * z + dy * dz * x + dz * dx * y);
         CellHit<Real> found = firstFall(c0, c1, c2, kxyz * dx * dy * dz, outside);
         if (found.hit) found.t = ta + found.t * span;
         return found;

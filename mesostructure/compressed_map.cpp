@@ -23,11 +23,13 @@ uint8_t leastOf(const DistanceMap& map, int cone, glm::ivec3 lower, int edge) {
 }
 
 /// Lowest cells of the entries of a level, bricks in the order of the entries above that have surface.
-std::vector<glm::ivec3> cornersOfBricks(const std::vector<glm::ivec3>& above, const CompressedMap::Level& upper, int edge, int factor) {
+std::vector<glm::ivec3> cornersOfBricks(const std::vector<glm::ivec3>& above, const CompressedMap::Level& upper,
+                                        int edge, int factor) {
     std::vector<glm::ivec3> corners;
     for (uint32_t i = 0; i < upper.entries; ++i) {
         if (upper.steps[i] != kOccupied) continue;
-        for (int k = 0; k < factor * factor * factor; ++k) corners.push_back(above[i] + edge * glm::ivec3(k % factor, k / factor % factor, k / factor / factor));
+        for (int k = 0; k < factor * factor * factor; ++k)
+            corners.push_back(above[i] + edge * glm::ivec3(k % factor, k / factor % factor, k / factor / factor));
     }
     return corners;
 }
@@ -36,7 +38,8 @@ void fill(CompressedMap::Level& level, const DistanceMap& map, const std::vector
     level.entries = uint32_t(corners.size());
     level.steps.resize(size_t(map.cones.count()) * corners.size());
     for (int cone = 0; cone < map.cones.count(); ++cone)
-        for (size_t i = 0; i < corners.size(); ++i) level.steps[cone * corners.size() + i] = leastOf(map, cone, corners[i], level.edge);
+        for (size_t i = 0; i < corners.size(); ++i)
+            level.steps[cone * corners.size() + i] = leastOf(map, cone, corners[i], level.edge);
     if (level.edge == 1) return;
     uint32_t bricks = 0;
     level.brick.resize(corners.size());
@@ -61,7 +64,8 @@ CompressedMap::Found CompressedMap::lookUp(int cone, glm::ivec3 cell) const {
         if (i + 1 == levels.size()) break;
         const Level& below = levels[i + 1];
         const glm::ivec3 local = at % level.edge / below.edge;
-        entry = level.brick[entry] * uint32_t(below.factor * below.factor * below.factor) + uint32_t(local.x + below.factor * (local.y + below.factor * local.z));
+        entry = level.brick[entry] * uint32_t(below.factor * below.factor * below.factor) +
+                uint32_t(local.x + below.factor * (local.y + below.factor * local.z));
         ++found.fetches;
     }
     found.occupied = true;
@@ -83,7 +87,9 @@ double CompressedMap::texelRatio() const {
 Result<CompressedMap> compressMap(const DistanceMap& map, std::span<const int> factors) {
     int edge = 1;
     for (const int factor : factors) edge = factor >= 2 && factor <= 16 && edge <= 64 ? edge * factor : 1 << 20;
-    if (factors.empty() || edge > 64) return Error{.code = ErrorCode::Usage, .message = "block sizes must be from 2 to 16 each, and at most 64 cells together"};
+    if (factors.empty() || edge > 64)
+        return Error{.code = ErrorCode::Usage,
+                     .message = "block sizes must be from 2 to 16 each, and at most 64 cells together"};
     CompressedMap result{map.grid, map.cones, map.unit, (map.grid.cells + edge - 1) / edge, {}};
     std::vector<glm::ivec3> corners;
     for (int z = 0; z < result.top.z; ++z)

@@ -18,11 +18,12 @@ struct CompressedMap {
     /// Entries of one size. Level 0 is a grid over the tile; entries of a lower level are in bricks of factor^3, a
     /// brick after the other, x fastest.
     struct Level {
-        int edge = 1;                ///< cells an entry is wide; the last level's is 1
-        int factor = 1;              ///< entries of this level that an entry of the level above is wide
+        int edge = 1;    ///< cells an entry is wide; the last level's is 1
+        int factor = 1;  ///< entries of this level that an entry of the level above is wide
         uint32_t entries = 0;
         std::vector<uint8_t> steps;  ///< cone by cone; kOccupied: surface within, see the level below
-        std::vector<uint32_t> brick; ///< the entry's brick on the level below, where it has one; empty on the last level
+        std::vector<uint32_t>
+            brick;  ///< the entry's brick on the level below, where it has one; empty on the last level
     };
 
     TileGrid grid;

@@ -55,7 +55,9 @@ private:
     }
     void push(int u, double base, size_t front) {
         const Parabola p{u, base};
-        while (queue_.size() > front + 1 && meeting(queue_[queue_.size() - 2], queue_.back()) <= meeting(queue_.back(), p)) queue_.pop_back();
+        while (queue_.size() > front + 1 &&
+               meeting(queue_[queue_.size() - 2], queue_.back()) <= meeting(queue_.back(), p))
+            queue_.pop_back();
         // One that is never the least: it starts to win no later than it would be passed.
         if (queue_.size() == front + 1 && meeting(queue_.back(), p) >= u) queue_.pop_back();
         queue_.push_back(p);
@@ -68,15 +70,21 @@ private:
 
 }  // namespace
 
-size_t Occupancy::count() const { return size_t(std::count_if(cells.begin(), cells.end(), [](uint8_t c) { return c != 0; })); }
+size_t Occupancy::count() const {
+    return size_t(std::count_if(cells.begin(), cells.end(), [](uint8_t c) { return c != 0; }));
+}
 
 Result<Occupancy> occupy(const Shape& shape, glm::ivec3 cells) {
     for (int axis = 0; axis < 3; ++axis)
         if (cells[axis] < 1 || cells[axis] > kMaxGridEdge)
-            return Error{.code = ErrorCode::Usage, .message = fmt::format("a grid of {} x {} x {} cells; each edge must be from 1 to {}", cells.x, cells.y, cells.z, kMaxGridEdge)};
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format("a grid of {} x {} x {} cells; each edge must be from 1 to {}", cells.x,
+                                                cells.y, cells.z, kMaxGridEdge)};
     Occupancy occupancy{TileGrid(cells, shape.extent()), {}};
     const TileGrid& grid = occupancy.grid;
-    if (grid.count() > kMaxGridCells) return Error{.code = ErrorCode::Limit, .message = fmt::format("a grid of {} cells; at most {}", grid.count(), kMaxGridCells)};
+    if (grid.count() > kMaxGridCells)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("a grid of {} cells; at most {}", grid.count(), kMaxGridCells)};
     occupancy.cells.resize(grid.count());
     const glm::dvec3 slack = kCellSlack * grid.cell;
     for (size_t i = 0; i < grid.count(); ++i) {
@@ -119,7 +127,8 @@ int coneOf(const ConeBorders& borders, glm::vec3 d) {
         azimuth += 2 * k < azimuths ? isLower || along > across : isLower && along >= across;
     }
     const float flat = d.x * d.x + d.y * d.y, height = d.z * std::abs(d.z);
-    for (int k = 1; k < borders.cones.elevation; ++k) elevation += height * borders.elevations[k].x >= borders.elevations[k].y * flat;
+    for (int k = 1; k < borders.cones.elevation; ++k)
+        elevation += height * borders.elevations[k].x >= borders.elevations[k].y * flat;
     return elevation * azimuths + azimuth;
 }
 
@@ -201,24 +210,31 @@ std::vector<Offset> offsetsInCone(const TileGrid& grid, Cones cones, int cone, d
     const double wedge = 2 * kPi / cones.azimuth, band = kPi / cones.elevation;
     const int azimuth = cone % cones.azimuth, elevation = cone / cones.azimuth;
     // At the axes signs decide, and a ray's cone is exact.
-    const auto slackAt = [&](int border) { return cones.azimuth == 2 || (cones.azimuth % 4 == 0 && border % (cones.azimuth / 4) == 0) ? 0 : kConeSlack; };
+    const auto slackAt = [&](int border) {
+        return cones.azimuth == 2 || (cones.azimuth % 4 == 0 && border % (cones.azimuth / 4) == 0) ? 0 : kConeSlack;
+    };
     const double from = azimuth * wedge - slackAt(azimuth), to = (azimuth + 1) * wedge + slackAt(azimuth + 1);
-    const double slackZ = cones.elevation == 2 ? 0 : kConeSlack, low = -kPi / 2 + elevation * band - slackZ, high = low + band + 2 * slackZ;
+    const double slackZ = cones.elevation == 2 ? 0 : kConeSlack, low = -kPi / 2 + elevation * band - slackZ,
+                 high = low + band + 2 * slackZ;
     const glm::ivec3 reach = glm::ivec3(glm::ceil(glm::dvec3(cap) / grid.cell)) + 1;
     std::vector<Offset> offsets;
     // Cells that only touch along a wall are left out: the surface there is in the widened cell on the other side.
     constexpr double kOpen = 1 - 0.5 * kCellSlack;
     for (int j = -reach.y; j <= reach.y; ++j)
         for (int i = -reach.x; i <= reach.x; ++i) {
-            const auto polygon = cutToWedge(glm::dvec2(i - kOpen, j - kOpen) * glm::dvec2(grid.cell), glm::dvec2(i + kOpen, j + kOpen) * glm::dvec2(grid.cell), from, cones.azimuth == 1 ? from + 7 : to);
+            const auto polygon = cutToWedge(glm::dvec2(i - kOpen, j - kOpen) * glm::dvec2(grid.cell),
+                                            glm::dvec2(i + kOpen, j + kOpen) * glm::dvec2(grid.cell), from,
+                                            cones.azimuth == 1 ? from + 7 : to);
             if (polygon.empty()) continue;
-            const double near = std::max(0.0, leastRadius(polygon) - 1.5 * kCellSlack * std::max(grid.cell.x, grid.cell.y));
+            const double near =
+                std::max(0.0, leastRadius(polygon) - 1.5 * kCellSlack * std::max(grid.cell.x, grid.cell.y));
             if (near >= cap) continue;
             double far = 0;
             for (const glm::dvec2 p : polygon) far = std::max(far, glm::length(p));
             for (int k = -std::min(reach.z, grid.cells.z); k <= std::min(reach.z, grid.cells.z); ++k) {
                 const double bottom = (k - kOpen) * grid.cell.z, top = (k + kOpen) * grid.cell.z;
-                const double highest = std::atan2(top, top >= 0 ? near : far), lowest = std::atan2(bottom, bottom >= 0 ? far : near);
+                const double highest = std::atan2(top, top >= 0 ? near : far),
+                             lowest = std::atan2(bottom, bottom >= 0 ? far : near);
                 if (highest < low || lowest > high) continue;
                 const double gap = std::max(0, std::abs(k) - 1) * grid.cell.z, length = std::hypot(near, gap);
                 if (length < cap) offsets.push_back({{i, j, k}, float(length)});
@@ -244,7 +260,8 @@ std::vector<float> searchedDistances(const Occupancy& occupancy, Cones cones, in
 }
 
 /// The paper's way: distances between centres of fine cells, and the least of each coarse cell.
-std::vector<float> leastOfFine(const TileGrid& grid, const Occupancy& fine, glm::ivec3 sign, int refine, double subtract) {
+std::vector<float> leastOfFine(const TileGrid& grid, const Occupancy& fine, glm::ivec3 sign, int refine,
+                               double subtract) {
     const std::vector<float> lengths = signedConeDistances(fine, sign, true);
     std::vector<float> least(grid.count(), std::numeric_limits<float>::infinity());
     for (size_t i = 0; i < lengths.size(); ++i) {
@@ -266,15 +283,21 @@ void roundDown(const std::vector<float>& lengths, const Occupancy& occupancy, fl
 }
 
 Result<void> check(const Occupancy& occupancy, const DistanceOptions& o, const Shape* shape) {
-    const auto fail = [](std::string message) { return Error{.code = ErrorCode::Usage, .message = std::move(message)}; };
-    if (o.cones.azimuth < 1 || o.cones.azimuth > 32 || o.cones.elevation < 1 || o.cones.elevation > 16) return fail("cones must be from 1x1 to 32x16");
+    const auto fail = [](std::string message) {
+        return Error{.code = ErrorCode::Usage, .message = std::move(message)};
+    };
+    if (o.cones.azimuth < 1 || o.cones.azimuth > 32 || o.cones.elevation < 1 || o.cones.elevation > 16)
+        return fail("cones must be from 1x1 to 32x16");
     if (!(o.cap > 0) || o.cap > 16) return fail("the cap of distances must be above 0 and at most 16 tiles");
     if (o.rule != DistanceRule::AnyPoint) {
-        if (shape == nullptr || !o.cones.areSigns()) return fail("the paper's rule is there for cones of 1, 2 or 4 azimuths and 1 or 2 elevations");
+        if (shape == nullptr || !o.cones.areSigns())
+            return fail("the paper's rule is there for cones of 1, 2 or 4 azimuths and 1 or 2 elevations");
         if (o.refine < 2 || o.refine > 8) return fail("the paper's rule refines 2 to 8 times");
     }
     if (double(occupancy.grid.count()) * o.cones.count() > double(kMaxGridCells))
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} cones of {} cells are too many; at most {} together", o.cones.count(), occupancy.grid.count(), kMaxGridCells)};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("{} cones of {} cells are too many; at most {} together", o.cones.count(),
+                                            occupancy.grid.count(), kMaxGridCells)};
     return {};
 }
 

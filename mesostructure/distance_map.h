@@ -33,7 +33,9 @@ struct Occupancy {
     TileGrid grid;
     std::vector<uint8_t> cells;
 
-    [[nodiscard]] bool at(glm::ivec3 cell) const { return cell.z >= 0 && cell.z < grid.cells.z && cells[grid.index(cell)] != 0; }
+    [[nodiscard]] bool at(glm::ivec3 cell) const {
+        return cell.z >= 0 && cell.z < grid.cells.z && cells[grid.index(cell)] != 0;
+    }
     [[nodiscard]] size_t count() const;
 };
 
@@ -62,10 +64,11 @@ struct ConeBorders {
 
 /// The cone of a direction: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as shaders find it.
 ///
-/// By signs and products only, which every device rounds correctly; an atan may be off by 4096 units of the last place there.
-/// Let u be 2^-23, the most that a product or a sum is off, whichever way it is rounded. Against a border of azimuth the
-/// comparison is off by 1.5 u of the direction's length, of elevation by 1.5 u as well (6 u of the tangent's square), and a
-/// shader's direction by 1.5 u: a direction is within 3 u, 4e-7 radians, of the cone that is found. kConeSlack is more.
+/// By signs and products only, which every device rounds correctly; an atan may be off by 4096 units of the last place
+/// there. Let u be 2^-23, the most that a product or a sum is off, whichever way it is rounded. Against a border of
+/// azimuth the comparison is off by 1.5 u of the direction's length, of elevation by 1.5 u as well (6 u of the
+/// tangent's square), and a shader's direction by 1.5 u: a direction is within 3 u, 4e-7 radians, of the cone that is
+/// found. kConeSlack is more.
 int coneOf(const ConeBorders& borders, glm::vec3 direction);
 inline constexpr double kConeSlack = 1e-6;  ///< radians
 
@@ -84,7 +87,9 @@ struct DistanceMap {
     float unit = 0;              ///< tile units of one step
     std::vector<uint8_t> steps;  ///< 0 to kMostSteps, or kOccupied; cone by cone, cells as in the grid
 
-    [[nodiscard]] size_t slot(int cone, glm::ivec3 cell) const { return size_t(cone) * grid.count() + grid.index(cell); }
+    [[nodiscard]] size_t slot(int cone, glm::ivec3 cell) const {
+        return size_t(cone) * grid.count() + grid.index(cell);
+    }
     /// Of a cell that is not occupied.
     [[nodiscard]] float length(int cone, glm::ivec3 cell) const { return float(steps[slot(cone, cell)]) * unit; }
     [[nodiscard]] uint64_t bytes() const { return steps.size(); }
@@ -93,14 +98,15 @@ struct DistanceMap {
 struct DistanceOptions {
     Cones cones;
     DistanceRule rule = DistanceRule::AnyPoint;
-    double cap = 0.25;   ///< tile units; longer ones are cut to it
-    int refine = 2;      ///< of the paper's rules: 2 to 8
-    bool search = false; ///< also search cones that are signs (for tests)
+    double cap = 0.25;    ///< tile units; longer ones are cut to it
+    int refine = 2;       ///< of the paper's rules: 2 to 8
+    bool search = false;  ///< also search cones that are signs (for tests)
 };
 
 /// The maps of all cones. The paper's rules need the shape, for the finer grid. Errors: Usage (cones, cap, refine out
 /// of range), Limit.
-Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceOptions& options, const Shape* shape = nullptr);
+Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceOptions& options,
+                                     const Shape* shape = nullptr);
 
 /// Lengths in tile units before they are cut and rounded; infinity where the cone has no occupied cell. One cone of
 /// signs: `sign` is +1, -1 or 0 (both) for each axis.

@@ -29,7 +29,8 @@ struct GridWalk {
     bool startsAtTop = false;
 
     GridWalk(const MarchRay& ray, const TileGrid& grid) {
-        const glm::dvec3 origin = inFirstTile(ray.origin, grid.extent()) / grid.cell, direction = ray.direction / grid.cell;
+        const glm::dvec3 origin = inFirstTile(ray.origin, grid.extent()) / grid.cell,
+                         direction = ray.direction / grid.cell;
         o = glm::vec3(origin), d = glm::vec3(direction);
         tMax = float(std::min(ray.tMax, 1e6));
         startsAtTop = origin.z >= grid.cells.z && d.z < 0;
@@ -66,8 +67,10 @@ struct GridWalk {
         t = std::max(t, time);
         const glm::vec3 p = at(t);
         for (int axis = 0; axis < 3; ++axis) {
-            if (axis == axisOut) cell[axis] += sign[axis] * (further[axis] + 1);
-            else if (further[axis] != 0) moveTo(axis, p[axis], further[axis]);
+            if (axis == axisOut)
+                cell[axis] += sign[axis] * (further[axis] + 1);
+            else if (further[axis] != 0)
+                moveTo(axis, p[axis], further[axis]);
         }
     }
     /// To a point of the ray that needs not be on a wall.

@@ -64,7 +64,8 @@ double bark(double x, double y, uint32_t seed) {
     const double warp = 0.04 * gradientNoise(x * 4, y * 4, 4, 4, seed + 40);
     double sum = 0, weight = 0.6;
     for (int octave = 0, cells = 2; octave < 5; ++octave, cells *= 2, weight *= 0.5) {
-        const double ridge = 1 - std::abs(1.7 * gradientNoise(x * cells, (y + warp) * cells * 5, cells, cells * 5, seed + octave));
+        const double ridge =
+            1 - std::abs(1.7 * gradientNoise(x * cells, (y + warp) * cells * 5, cells, cells * 5, seed + octave));
         sum += weight * std::max(0.0, ridge);
     }
     return sum / 1.2;
@@ -77,10 +78,13 @@ double cobble(double x, double y, uint32_t seed) {
     for (int dj = -2; dj <= 2; ++dj)
         for (int di = -2; di <= 2; ++di) {
             const int a = wrapped(i + di, cells), b = wrapped(j + dj, cells);
-            const double px = i + di + 0.15 + 0.7 * hashUnit(a, b, seed), py = j + dj + 0.15 + 0.7 * hashUnit(a, b, seed + 1);
+            const double px = i + di + 0.15 + 0.7 * hashUnit(a, b, seed),
+                         py = j + dj + 0.15 + 0.7 * hashUnit(a, b, seed + 1);
             const double r = std::hypot(px - x * cells, py - y * cells);
-            if (r < first) second = first, first = r;
-            else second = std::min(second, r);
+            if (r < first)
+                second = first, first = r;
+            else
+                second = std::min(second, r);
         }
     const double edge = std::clamp((second - first) / 0.7, 0.0, 1.0);
     return std::sqrt(edge * (2 - edge));
@@ -99,7 +103,8 @@ constexpr std::array<Named, 8> kFormulas{{{"fbm", 0.15, fbm},
                                           {"ripple", 0.15, ripple},
                                           {"bark", 0.1, bark},
                                           {"cobble", 0.1, cobble}}};
-constexpr std::array<std::string_view, 11> kNames{"fbm", "ridged", "hemispheres", "maze", "blocks", "bricks", "ripple", "needle", "edge", "bark", "cobble"};
+constexpr std::array<std::string_view, 11> kNames{"fbm",    "ridged", "hemispheres", "maze", "blocks", "bricks",
+                                                  "ripple", "needle", "edge",        "bark", "cobble"};
 
 /// Recursive backtracker on a torus of 8 x 8 rooms; walls are an eighth of a room, or one texel.
 void carveMaze(HeightMap& map, uint32_t seed) {
@@ -110,10 +115,12 @@ void carveMaze(HeightMap& map, uint32_t seed) {
     std::vector<int> path{0};
     seen[0] = true;
     for (uint32_t step = 0; !path.empty(); ++step) {
-        const int x = path.back() % rooms, y = path.back() / rooms, turn = int(hashUnit(int(step), path.back(), seed) * 4);
+        const int x = path.back() % rooms, y = path.back() / rooms,
+                  turn = int(hashUnit(int(step), path.back(), seed) * 4);
         bool moved = false;
         for (int k = 0; k < 4 && !moved; ++k) {
-            const int way = (turn + k) & 3, nx = wrapped(x + (way == 0) - (way == 2), rooms), ny = wrapped(y + (way == 1) - (way == 3), rooms);
+            const int way = (turn + k) & 3, nx = wrapped(x + (way == 0) - (way == 2), rooms),
+                      ny = wrapped(y + (way == 1) - (way == 3), rooms);
             const int next = nx + rooms * ny;
             if (seen[next]) continue;
             seen[next] = moved = true;
@@ -136,9 +143,12 @@ void carveMaze(HeightMap& map, uint32_t seed) {
 std::span<const std::string_view> heightFieldNames() { return kNames; }
 
 Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t seed) {
-    if (std::ranges::find(kNames, name) == kNames.end()) return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no height field \"{}\"", name)};
+    if (std::ranges::find(kNames, name) == kNames.end())
+        return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no height field \"{}\"", name)};
     if (texels < 8 || texels > kMaxGridEdge)
-        return Error{.code = ErrorCode::Usage, .message = fmt::format("a height field of {} texels; it must be from 8 to {}", texels, kMaxGridEdge)};
+        return Error{
+            .code = ErrorCode::Usage,
+            .message = fmt::format("a height field of {} texels; it must be from 8 to {}", texels, kMaxGridEdge)};
     HeightMap map{{texels, texels}, 0.15, std::vector<uint16_t>(size_t(texels) * size_t(texels))};
     if (name == "maze") map.range = 0.06, carveMaze(map, seed);
     if (name == "needle") map.texels[size_t(texels / 2) * texels + texels / 2] = 65535;

@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "mesostructure/shape.h"
 #include "mesostructure/cell_solve.h"
+#include "mesostructure/shape.h"
 
 namespace vcp::meso {
 
@@ -15,12 +15,15 @@ namespace {
 
 class HeightShape final : public Shape {
 public:
-    explicit HeightShape(const HeightMap& map) : Shape(map.extent()), map_(map), scale_(glm::dvec2(map.size.x, map.size.x)) {
+    explicit HeightShape(const HeightMap& map)
+        : Shape(map.extent()), map_(map), scale_(glm::dvec2(map.size.x, map.size.x)) {
         double steepest = 0;
         for (int y = 0; y < map.size.y; ++y)
             for (int x = 0; x < map.size.x; ++x) {
-                const double dx = (map.height(x + 1, y) - map.height(x, y)) * scale_.x, dy = (map.height(x, y + 1) - map.height(x, y)) * scale_.y;
-                const double dx2 = (map.height(x + 1, y + 1) - map.height(x, y + 1)) * scale_.x, dy2 = (map.height(x + 1, y + 1) - map.height(x + 1, y)) * scale_.y;
+                const double dx = (map.height(x + 1, y) - map.height(x, y)) * scale_.x,
+                             dy = (map.height(x, y + 1) - map.height(x, y)) * scale_.y;
+                const double dx2 = (map.height(x + 1, y + 1) - map.height(x, y + 1)) * scale_.x,
+                             dy2 = (map.height(x + 1, y + 1) - map.height(x + 1, y)) * scale_.y;
                 steepest = std::max(steepest, std::max(dx * dx, dx2 * dx2) + std::max(dy * dy, dy2 * dy2));
             }
         lipschitz_ = std::sqrt(1 + steepest);
@@ -59,7 +62,8 @@ public:
 
     TruthHit trace(glm::dvec3 origin, glm::dvec3 direction, double tMax) const override {
         // In texels along x and y; heights stay in tile units.
-        const glm::dvec3 o(origin.x * scale_.x, origin.y * scale_.y, origin.z), d(direction.x * scale_.x, direction.y * scale_.y, direction.z);
+        const glm::dvec3 o(origin.x * scale_.x, origin.y * scale_.y, origin.z),
+            d(direction.x * scale_.x, direction.y * scale_.y, direction.z);
         glm::ivec2 cell(int(std::floor(o.x)), int(std::floor(o.y)));
         for (int axis = 0; axis < 2; ++axis)
             if (d[axis] < 0 && o[axis] == std::floor(o[axis])) --cell[axis];
@@ -70,8 +74,8 @@ public:
         for (double t = 0; t <= tMax;) {
             const double tx = wall(o.x, d.x, cell.x), ty = wall(o.y, d.y, cell.y);
             const double end = std::max(t, std::min({tx, ty, tMax}));
-            const BilinearCell<double> heights{map_.height(cell.x, cell.y), map_.height(cell.x + 1, cell.y), map_.height(cell.x, cell.y + 1),
-                                               map_.height(cell.x + 1, cell.y + 1)};
+            const BilinearCell<double> heights{map_.height(cell.x, cell.y), map_.height(cell.x + 1, cell.y),
+                                               map_.height(cell.x, cell.y + 1), map_.height(cell.x + 1, cell.y + 1)};
             const CellHit<double> found = heights.firstEntry(o - glm::dvec3(cell.x, cell.y, 0), d, t, end, outside);
             if (found.hit) return {true, true, found.t, normalAt(cell, o + found.t * d)};
             outside = found.outside;
@@ -98,8 +102,10 @@ private:
     }
     glm::dvec3 normalAt(glm::ivec2 c, glm::dvec3 p) const {
         const double x = p.x - c.x, y = p.y - c.y;
-        const double dx = (map_.height(c.x + 1, c.y) - map_.height(c.x, c.y)) * (1 - y) + (map_.height(c.x + 1, c.y + 1) - map_.height(c.x, c.y + 1)) * y;
-        const double dy = (map_.height(c.x, c.y + 1) - map_.height(c.x, c.y)) * (1 - x) + (map_.height(c.x + 1, c.y + 1) - map_.height(c.x + 1, c.y)) * x;
+        const double dx = (map_.height(c.x + 1, c.y) - map_.height(c.x, c.y)) * (1 - y) +
+                          (map_.height(c.x + 1, c.y + 1) - map_.height(c.x, c.y + 1)) * y;
+        const double dy = (map_.height(c.x, c.y + 1) - map_.height(c.x, c.y)) * (1 - x) +
+                          (map_.height(c.x + 1, c.y + 1) - map_.height(c.x + 1, c.y)) * x;
         return glm::normalize(glm::dvec3(-dx * scale_.x, -dy * scale_.y, 1));
     }
     /// Distance to the nearest of a cell's points on a 4 x 4 lattice: the cell's surface up to a quarter of a texel.
@@ -121,9 +127,12 @@ private:
 }  // namespace
 
 Result<std::unique_ptr<Shape>> heightShape(const HeightMap& map) {
-    if (map.size.x < 1 || map.size.y < 1 || map.size.x > kMaxGridEdge || map.size.y > kMaxGridEdge || map.texels.size() != size_t(map.size.x) * size_t(map.size.y))
-        return Error{.message = fmt::format("a height map of {} x {} texels; each edge must be from 1 to {}", map.size.x, map.size.y, kMaxGridEdge)};
-    if (!(map.range > 0) || !std::isfinite(map.range)) return Error{.message = "the range of the heights must be above 0"};
+    if (map.size.x < 1 || map.size.y < 1 || map.size.x > kMaxGridEdge || map.size.y > kMaxGridEdge ||
+        map.texels.size() != size_t(map.size.x) * size_t(map.size.y))
+        return Error{.message = fmt::format("a height map of {} x {} texels; each edge must be from 1 to {}",
+                                            map.size.x, map.size.y, kMaxGridEdge)};
+    if (!(map.range > 0) || !std::isfinite(map.range))
+        return Error{.message = "the range of the heights must be above 0"};
     return std::unique_ptr<Shape>(std::make_unique<HeightShape>(map));
 }
 

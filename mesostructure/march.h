@@ -1,9 +1,9 @@
-// Marchers: the methods that find where a ray meets a mesostructure, on the CPU, each as its shader does it: flat arrays,
-// single precision, integer cells, every fetch counted. They are the reference that a port is compared with, ray by
-// ray, and what `vcp bench meso` measures.
+// Marchers: the methods that find where a ray meets a mesostructure, on the CPU, each as its shader does it: flat
+// arrays, single precision, integer cells, every fetch counted. They are the reference that a port is compared with,
+// ray by ray, and what `vcp bench meso` measures.
 //
-// A ray starts in the slab of a tile (mesostructure/tile_grid.h) and travels 0 <= t <= tMax, in tile units. It hits where
-// it enters the solid from outside. A ray that starts inside sees nothing before it has left. Rays leave by the
+// A ray starts in the slab of a tile (mesostructure/tile_grid.h) and travels 0 <= t <= tMax, in tile units. It hits
+// where it enters the solid from outside. A ray that starts inside sees nothing before it has left. Rays leave by the
 // slab's top or bottom and are misses; one that used up its iterations is unresolved, never a hit or a miss.
 //
 // The state of a walk is the cell, in integers: a ray leaves a cell through the wall it meets first, by one cell along
@@ -38,11 +38,11 @@ enum class MarchState : uint8_t { Hit, Miss, Unresolved };
 
 struct MarchResult {
     MarchState state = MarchState::Miss;
-    double t = 0;                   ///< of a hit
-    glm::vec3 normal{0};            ///< unit, of a hit where the method knows it
-    uint32_t iterations = 0;        ///< steps, refinements included
+    double t = 0;             ///< of a hit
+    glm::vec3 normal{0};      ///< unit, of a hit where the method knows it
+    uint32_t iterations = 0;  ///< steps, refinements included
     uint32_t fetches = 0;
-    uint32_t surfaceTests = 0;      ///< cells, texels or patches that were solved; of relief mapping the refinements
+    uint32_t surfaceTests = 0;  ///< cells, texels or patches that were solved; of relief mapping the refinements
 };
 
 class Marcher {
@@ -60,7 +60,7 @@ inline constexpr uint32_t kMostIterations = 8192;
 
 /// How a walk skips empty cells. All refer to what must outlive the marcher.
 struct Skipping {
-    const Occupancy* occupancy = nullptr;       ///< cell by cell
+    const Occupancy* occupancy = nullptr;  ///< cell by cell
     const DistanceMap* distances = nullptr;
     const CompressedMap* compressed = nullptr;
     const OctantBoxes* boxes = nullptr;
@@ -80,13 +80,13 @@ Result<std::unique_ptr<Marcher>> gridMarcher(const Skipping& skipping, const Sur
 enum class Refinement { None, Binary, Secant, SecantAsPrinted, Illinois };
 
 /// Relief mapping: `steps` uniform steps down the height field, then refinement (Policarpo et al. 2005; Risser et al.
-/// 2007). Secant is the bracketed false position that the paper describes; as printed, the listing's branch replaces the
-/// wrong end and the output is the last sample's height over the ray's slope.
+/// 2007). Secant is the bracketed false position that the paper describes; as printed, the listing's branch replaces
+/// the wrong end and the output is the last sample's height over the ray's slope.
 struct ReliefOptions {
-    int steps = 32;       ///< between the top and the bottom of the slab, 1 to 4096
+    int steps = 32;  ///< between the top and the bottom of the slab, 1 to 4096
     Refinement refinement = Refinement::Binary;
-    int refinements = 10;          ///< at most
-    float tolerance = 0.01f;       ///< of |f| over the slab's height, as in the listing; 0: only by count
+    int refinements = 10;     ///< at most
+    float tolerance = 0.01f;  ///< of |f| over the slab's height, as in the listing; 0: only by count
 };
 std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options);
 
@@ -104,7 +104,8 @@ MaxPyramid buildMaxPyramid(const HeightMap& map);
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map);
 
 /// Sphere tracing on a plain distance map: signed distances at the cells' centres, 16 bits each, trilinear between them
-/// (the published ones are 0 inside, which pulls hits into the solid); the hit is where the distance is below `threshold` cells (Donnelly 2005). No bound holds.
+/// (the published ones are 0 inside, which pulls hits into the solid); the hit is where the distance is below
+/// `threshold` cells (Donnelly 2005). No bound holds.
 struct SphereOptions {
     glm::ivec3 cells{64, 64, 16};
     float threshold = 0.05f;  ///< in cells

@@ -122,10 +122,11 @@ struct PatchSurface {
     }
 };
 
-/// The small cells of finer data within a cell of the grid, from wall to wall; where `marks` say so, only those that the surface passes.
-/// `Axes`: 2 or 3.
+/// The small cells of finer data within a cell of the grid, from wall to wall; where `marks` say so, only those that
+/// the surface passes. `Axes`: 2 or 3.
 template <int Axes, class Solve>
-bool eachSmallCell(const Piece& piece, ivec3 ratio, uint32_t marks, Side& side, MarchResult& result, const Solve& solve) {
+bool eachSmallCell(const Piece& piece, ivec3 ratio, uint32_t marks, Side& side, MarchResult& result,
+                   const Solve& solve) {
     const vec3 scale(ratio);
     // From the piece's start, where numbers are small.
     const vec3 o = (piece.walk.at(piece.from) - vec3(piece.walk.cell)) * scale, d = piece.walk.d * scale;
@@ -164,21 +165,25 @@ struct HeightSurface {
     [[nodiscard]] uint64_t bytes() const { return map.texels.size() * 2; }
     [[nodiscard]] bool meet(const Piece& piece, Side& side, MarchResult& result) const {
         const ivec3 first = piece.walk.cell * ratio;
-        const float unit = float(map.range / 65535), cellZ = float(piece.grid.cell.z), bottom = float(piece.walk.cell.z) * cellZ;
-        return eachSmallCell<2>(piece, ratio, 0, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) {
-            ++result.fetches;
-            const int x = first.x + at.x, y = first.y + at.y;
-            const auto height = [&](int i, int j) { return float(map.texel(x + i, y + j)) * unit - bottom; };
-            const BilinearCell<float> cell{height(0, 0), height(1, 0), height(0, 1), height(1, 1)};
-            o.z = (o.z + float(at.z)) * cellZ, d.z *= cellZ;
-            const CellHit<float> found = cell.firstEntry(o, d, from, to, outside);
-            if (found.hit) {
-                const vec3 p = o + found.t * d;
-                const float dx = glm::mix(cell.h10 - cell.h00, cell.h11 - cell.h01, p.y), dy = glm::mix(cell.h01 - cell.h00, cell.h11 - cell.h10, p.x);
-                result.normal = glm::normalize(vec3(-dx * float(ratio.x / piece.grid.cell.x), -dy * float(ratio.y / piece.grid.cell.y), 1));
-            }
-            return found;
-        });
+        const float unit = float(map.range / 65535), cellZ = float(piece.grid.cell.z),
+                    bottom = float(piece.walk.cell.z) * cellZ;
+        return eachSmallCell<2>(
+            piece, ratio, 0, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) {
+                ++result.fetches;
+                const int x = first.x + at.x, y = first.y + at.y;
+                const auto height = [&](int i, int j) { return float(map.texel(x + i, y + j)) * unit - bottom; };
+                const BilinearCell<float> cell{height(0, 0), height(1, 0), height(0, 1), height(1, 1)};
+                o.z = (o.z + float(at.z)) * cellZ, d.z *= cellZ;
+                const CellHit<float> found = cell.firstEntry(o, d, from, to, outside);
+                if (found.hit) {
+                    const vec3 p = o + found.t * d;
+                    const float dx = glm::mix(cell.h10 - cell.h00, cell.h11 - cell.h01, p.y),
+                                dy = glm::mix(cell.h01 - cell.h00, cell.h11 - cell.h10, p.x);
+                    result.normal = glm::normalize(
+                        vec3(-dx * float(ratio.x / piece.grid.cell.x), -dy * float(ratio.y / piece.grid.cell.y), 1));
+                }
+                return found;
+            });
     }
 };
 
@@ -190,17 +195,21 @@ struct FieldSurface {
     [[nodiscard]] bool meet(const Piece& piece, Side& side, MarchResult& result) const {
         const ivec3 first = piece.walk.cell * ratio;
         const uint32_t marks = ratio == ivec3(2) && (piece.marks & OctantBoxes::kSmallCells) != 0 ? piece.marks : 0;
-        return eachSmallCell<3>(piece, ratio, marks, side, result, [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) -> CellHit<float> {
-            result.fetches += 2;
-            TrilinearCell<float> cell;
-            for (int corner = 0; corner < 8; ++corner) cell.value[corner] = float(field.step(first + at + ivec3(corner & 1, corner >> 1 & 1, corner >> 2)));
-            const int which = cell.side();
-            if (which > 0) return {false, 0, true};
-            if (which < 0 && !outside) return {false, 0, false};
-            const CellHit<float> found = cell.firstEntry(o, d, from, to, outside);
-            if (found.hit) result.normal = glm::normalize(cell.gradient(o + found.t * d) / vec3(field.grid.cell));
-            return found;
-        });
+        return eachSmallCell<3>(
+            piece, ratio, marks, side, result,
+            [&](ivec3 at, vec3 o, vec3 d, float from, float to, bool outside) -> CellHit<float> {
+                result.fetches += 2;
+                TrilinearCell<float> cell;
+                for (int corner = 0; corner < 8; ++corner)
+                    cell.value[corner] =
+                        float(field.step(first + at + ivec3(corner & 1, corner >> 1 & 1, corner >> 2)));
+                const int which = cell.side();
+                if (which > 0) return {false, 0, true};
+                if (which < 0 && !outside) return {false, 0, false};
+                const CellHit<float> found = cell.firstEntry(o, d, from, to, outside);
+                if (found.hit) result.normal = glm::normalize(cell.gradient(o + found.t * d) / vec3(field.grid.cell));
+                return found;
+            });
     }
 };
 
@@ -255,17 +264,23 @@ private:
 
 template <class Skip>
 Result<std::unique_ptr<Marcher>> withSurface(Skip skip, const Surface& surface) {
-    const auto fail = [](std::string message) { return Error{.code = ErrorCode::Usage, .message = std::move(message)}; };
-    const auto make = [&](auto found) { return std::unique_ptr<Marcher>(std::make_unique<GridMarcher<Skip, decltype(found)>>(skip, found)); };
+    const auto fail = [](std::string message) {
+        return Error{.code = ErrorCode::Usage, .message = std::move(message)};
+    };
+    const auto make = [&](auto found) {
+        return std::unique_ptr<Marcher>(std::make_unique<GridMarcher<Skip, decltype(found)>>(skip, found));
+    };
     const ivec3 cells = skip.grid().cells;
-    if ((surface.patches != nullptr) + (surface.heights != nullptr) + (surface.field != nullptr) > 1) return fail("a walk has one surface");
+    if ((surface.patches != nullptr) + (surface.heights != nullptr) + (surface.field != nullptr) > 1)
+        return fail("a walk has one surface");
     if (surface.patches != nullptr) {
         if (surface.patches->grid.cells != cells) return fail("the patches are of another grid");
         return make(PatchSurface{*surface.patches});
     }
     if (surface.heights != nullptr) {
         const glm::ivec2 texels = surface.heights->size;
-        if (texels.x % cells.x != 0 || texels.y % cells.y != 0) return fail("the grid's cells must divide the height map's texels");
+        if (texels.x % cells.x != 0 || texels.y % cells.y != 0)
+            return fail("the grid's cells must divide the height map's texels");
         return make(HeightSurface{*surface.heights, ivec3(texels.x / cells.x, texels.y / cells.y, 1)});
     }
     if (surface.field != nullptr) {
@@ -279,7 +294,9 @@ Result<std::unique_ptr<Marcher>> withSurface(Skip skip, const Surface& surface) 
 }  // namespace
 
 Result<std::unique_ptr<Marcher>> gridMarcher(const Skipping& skipping, const Surface& surface) {
-    if ((skipping.occupancy != nullptr) + (skipping.distances != nullptr) + (skipping.compressed != nullptr) + (skipping.boxes != nullptr) != 1)
+    if ((skipping.occupancy != nullptr) + (skipping.distances != nullptr) + (skipping.compressed != nullptr) +
+            (skipping.boxes != nullptr) !=
+        1)
         return Error{.code = ErrorCode::Usage, .message = "a walk skips in one way"};
     if (skipping.distances != nullptr) return withSurface(SkipDistances(*skipping.distances), surface);
     if (skipping.compressed != nullptr) return withSurface(SkipCompressed(*skipping.compressed), surface);

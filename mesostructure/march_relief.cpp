@@ -30,7 +30,9 @@ public:
             if (i == options_.steps && line.bottomIsEnd) fHigh = std::min(fHigh, 0.0f);
             if (fLow > 0 && fHigh <= 0) {
                 result.state = MarchState::Hit;
-                result.t = options_.refinement == Refinement::SecantAsPrinted ? asPrinted(line, low, fLow, high, fHigh, result) : refine(line, low, fLow, high, fHigh, result);
+                result.t = options_.refinement == Refinement::SecantAsPrinted
+                               ? asPrinted(line, low, fLow, high, fHigh, result)
+                               : refine(line, low, fLow, high, fHigh, result);
                 return result;
             }
             low = high, fLow = fHigh;
@@ -72,7 +74,8 @@ private:
         int kept = 0;  // which end the last step kept: -1 low, +1 high
         for (int i = 0; i < options_.refinements; ++i) {
             const float chord = low + (high - low) * (fLow / (fLow - fHigh));
-            t = options_.refinement == Refinement::Binary || !(chord >= low && chord <= high) ? 0.5f * (low + high) : chord;
+            t = options_.refinement == Refinement::Binary || !(chord >= low && chord <= high) ? 0.5f * (low + high)
+                                                                                              : chord;
             ++result.iterations, ++result.surfaceTests;
             const float f = line.f(t, result);
             if (std::abs(f) < options_.tolerance || f == 0) break;
@@ -92,15 +95,19 @@ private:
     float asPrinted(const Line& line, float low, float fLow, float high, float fHigh, MarchResult& result) const {
         const float slope = -line.d.z, depth0 = 1 - line.o.z;
         // depth of the surface = depth of the ray + f
-        float upperD = low, upperH = depth0 + slope * low + fLow, lowerD = high, lowerH = depth0 + slope * high + fHigh, best = upperH;
+        float upperD = low, upperH = depth0 + slope * low + fLow, lowerD = high, lowerH = depth0 + slope * high + fHigh,
+              best = upperH;
         for (int i = 0; i < options_.refinements; ++i) {
-            const float lineSlope = (upperH - lowerH) / (upperD - lowerD), at = (upperH - lineSlope * upperD - depth0) / (slope - lineSlope);
+            const float lineSlope = (upperH - lowerH) / (upperD - lowerD),
+                        at = (upperH - lineSlope * upperD - depth0) / (slope - lineSlope);
             if (!std::isfinite(at)) break;
             ++result.iterations, ++result.surfaceTests;
             const float f = line.f(at, result), depth = depth0 + slope * at, surface = depth + f;
             best = surface;
-            if (surface < depth) upperH = surface, upperD = at;
-            else lowerH = surface, lowerD = at;
+            if (surface < depth)
+                upperH = surface, upperD = at;
+            else
+                lowerH = surface, lowerD = at;
             if (std::abs(f) <= options_.tolerance) break;
         }
         const float t = (best - depth0) / slope;
@@ -130,23 +137,29 @@ public:
             glm::ivec3 further(0);
             const ivec2 home(wrapped(walk.cell.x, map_.size.x), wrapped(walk.cell.y, map_.size.y));
             for (int axis = 0; axis < 2; ++axis) {
-                const int first = home[axis] >> level << level, last = std::min(first + (1 << level), map_.size[axis]) - 1;
+                const int first = home[axis] >> level << level,
+                          last = std::min(first + (1 << level), map_.size[axis]) - 1;
                 further[axis] = walk.sign[axis] > 0 ? last - home[axis] : home[axis] - first;
             }
             int axisOut = 0;
             const float exit = walk.exit(further, axisOut), end = std::max(walk.t, std::min(exit, walk.tMax));
             ++result.fetches;
             const Level& maxima = levels_[size_t(level)];
-            const float most = float(maxima.most[size_t(home.y >> level) * size_t(maxima.size.x) + size_t(home.x >> level)]) * (1.0f / 65535);
+            const float most =
+                float(maxima.most[size_t(home.y >> level) * size_t(maxima.size.x) + size_t(home.x >> level)]) *
+                (1.0f / 65535);
             // Where the ray leaves by the slab's bottom it is at 0, however that rounds: ground at 0 is a tie there.
-            const float atEnd = axisOut == 2 && end == exit ? float(walk.sign.z > 0) : walk.at(end).z, lowest = std::min(walk.at(walk.t).z, atEnd);
+            const float atEnd = axisOut == 2 && end == exit ? float(walk.sign.z > 0) : walk.at(end).z,
+                        lowest = std::min(walk.at(walk.t).z, atEnd);
             const bool isAbove = lowest > most && (outside || level > 0 || walk.t > 0);
             if (!isAbove && level > 0) {
                 --level;
                 continue;
             }
-            if (isAbove) outside = true;
-            else if (solve(walk, end, outside, result)) return result;
+            if (isAbove)
+                outside = true;
+            else if (solve(walk, end, outside, result))
+                return result;
             if (exit >= kFar) break;
             walk.leave(further, exit, axisOut);
             if (isAbove) level = std::min(level + 1, int(levels_.size()) - 1);
@@ -181,7 +194,8 @@ private:
         result.state = MarchState::Hit;
         result.t = entry + found.t;
         const vec3 p = o + found.t * walk.d;
-        const float dx = glm::mix(cell.h10 - cell.h00, cell.h11 - cell.h01, p.y), dy = glm::mix(cell.h01 - cell.h00, cell.h11 - cell.h10, p.x);
+        const float dx = glm::mix(cell.h10 - cell.h00, cell.h11 - cell.h01, p.y),
+                    dy = glm::mix(cell.h01 - cell.h00, cell.h11 - cell.h10, p.x);
         const float texels = float(map_.size.x * map_.range);
         result.normal = glm::normalize(vec3(-dx * texels, -dy * texels, 1));
         return true;
@@ -209,13 +223,17 @@ MaxPyramid buildMaxPyramid(const HeightMap& map) {
     MaxPyramid::Level base{map.size, std::vector<uint16_t>(map.texels.size())};
     for (int y = 0; y < map.size.y; ++y)
         for (int x = 0; x < map.size.x; ++x)
-            base.most[size_t(y) * size_t(map.size.x) + size_t(x)] = std::max({map.texel(x, y), map.texel(x + 1, y), map.texel(x, y + 1), map.texel(x + 1, y + 1)});
+            base.most[size_t(y) * size_t(map.size.x) + size_t(x)] =
+                std::max({map.texel(x, y), map.texel(x + 1, y), map.texel(x, y + 1), map.texel(x + 1, y + 1)});
     pyramid.levels.push_back(std::move(base));
-    while (pyramid.levels.back().size.x > 1 || pyramid.levels.back().size.y > 1) pyramid.levels.push_back(halved(pyramid.levels.back()));
+    while (pyramid.levels.back().size.x > 1 || pyramid.levels.back().size.y > 1)
+        pyramid.levels.push_back(halved(pyramid.levels.back()));
     return pyramid;
 }
 
-std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options) { return std::make_unique<Relief>(map, options); }
+std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options) {
+    return std::make_unique<Relief>(map, options);
+}
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map) { return std::make_unique<Pyramid>(map); }
 
 }  // namespace vcp::meso

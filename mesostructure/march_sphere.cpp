@@ -31,7 +31,8 @@ public:
             }
             const float length = sample(p, result);
             // Inside and on the start's own surface, on by a part of a cell until the distance grows.
-            if (length >= map_.threshold) outside = true;
+            if (length >= map_.threshold)
+                outside = true;
             else if (outside || t == 0) {
                 if (outside || p.z >= float(extent.z)) {
                     result.state = MarchState::Hit, result.t = t;
@@ -69,13 +70,16 @@ Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& option
     SphereMap map{options, TileGrid(options.cells, shape.extent()), 0, 0, {}};
     const TileGrid& grid = map.grid;
     if (std::min({options.cells.x, options.cells.y, options.cells.z}) < 1 || grid.count() > kMaxGridCells)
-        return Error{.code = ErrorCode::Usage, .message = fmt::format("a distance map of {} x {} x {} cells", options.cells.x, options.cells.y, options.cells.z)};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("a distance map of {} x {} x {} cells", options.cells.x, options.cells.y,
+                                            options.cells.z)};
     map.cap = float(16 * std::max({grid.cell.x, grid.cell.y, grid.cell.z}));
     map.threshold = options.threshold * float(std::min({grid.cell.x, grid.cell.y, grid.cell.z}));
     map.steps.resize(grid.count());
     for (size_t i = 0; i < map.steps.size(); ++i) {
         const glm::dvec3 centre = grid.centre(grid.at(i));
-        map.steps[i] = int16_t(std::lround((shape.field(centre) > 0 ? 32767 : -32767) * shape.distance(centre, map.cap) / double(map.cap)));
+        map.steps[i] = int16_t(std::lround((shape.field(centre) > 0 ? 32767 : -32767) *
+                                           shape.distance(centre, map.cap) / double(map.cap)));
     }
     return map;
 }
@@ -99,10 +103,13 @@ TruthHit traceField(const SampledField& field, const MarchRay& ray) {
         }
         const double end = std::max(t, std::min(exit, ray.tMax));
         TrilinearCell<double> corners;
-        for (int corner = 0; corner < 8; ++corner) corners.value[corner] = field.step(cell + ivec3(corner & 1, corner >> 1 & 1, corner >> 2));
+        for (int corner = 0; corner < 8; ++corner)
+            corners.value[corner] = field.step(cell + ivec3(corner & 1, corner >> 1 & 1, corner >> 2));
         if (const int side = corners.side(); side == 0 || (side < 0 && outside)) {
             const CellHit<double> found = corners.firstEntry(o - glm::dvec3(cell), d, t, end, outside);
-            if (found.hit) return {true, true, found.t, glm::normalize(corners.gradient(o + found.t * d - glm::dvec3(cell)) / grid.cell)};
+            if (found.hit)
+                return {true, true, found.t,
+                        glm::normalize(corners.gradient(o + found.t * d - glm::dvec3(cell)) / grid.cell)};
             outside = found.outside;
         } else {
             outside = side > 0;

@@ -32,7 +32,8 @@ double distanceTo(const TileTriangle& tri, dvec3 p) {
     const double vb = d5 * d2 - d1 * d6;
     if (vb <= 0 && d2 >= 0 && d6 <= 0) return glm::length(ap - ac * (d2 / (d2 - d6)));
     const double va = d3 * d6 - d5 * d4;
-    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return glm::length(bp - (tri[2] - tri[1]) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))));
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+        return glm::length(bp - (tri[2] - tri[1]) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))));
     const double sum = va + vb + vc;
     return glm::length(ap - ab * (vb / sum) - ac * (vc / sum));
 }
@@ -41,7 +42,8 @@ double distanceTo(const TileTriangle& tri, dvec3 p) {
 bool overlaps(const TileTriangle& tri, dvec3 centre, dvec3 half) {
     const dvec3 v[3] = {tri[0] - centre, tri[1] - centre, tri[2] - centre};
     const auto apart = [&](dvec3 axis) {
-        const double a = glm::dot(axis, v[0]), b = glm::dot(axis, v[1]), c = glm::dot(axis, v[2]), reach = glm::dot(glm::abs(axis), half) * (1 + 1e-12);
+        const double a = glm::dot(axis, v[0]), b = glm::dot(axis, v[1]), c = glm::dot(axis, v[2]),
+                     reach = glm::dot(glm::abs(axis), half) * (1 + 1e-12);
         return std::min({a, b, c}) > reach || std::max({a, b, c}) < -reach;
     };
     for (int axis = 0; axis < 3; ++axis) {
@@ -69,7 +71,9 @@ public:
     MeshShape(const std::vector<TileTriangle>& triangles, dvec3 extent) : Shape(extent), triangles_(triangles) {
         const double target = std::sqrt(std::max(1.0, double(triangles.size())) / 2);
         const int n = std::clamp(int(target / 2), 8, 128);
-        grid_ = TileGrid({n, std::clamp(int(std::lround(n * extent.y)), 1, 512), std::clamp(int(std::lround(n * extent.z)), 1, 128)}, extent);
+        grid_ = TileGrid(
+            {n, std::clamp(int(std::lround(n * extent.y)), 1, 512), std::clamp(int(std::lround(n * extent.z)), 1, 128)},
+            extent);
         fillLists();
     }
 
@@ -86,10 +90,13 @@ public:
             if (ring > 2 * std::max({grid_.cells.x, grid_.cells.y, grid_.cells.z})) break;
             for (int k = -ring; k <= ring; ++k)
                 for (int j = -ring; j <= ring; ++j)
-                    for (int i = -ring; i <= ring; i += std::abs(k) == ring || std::abs(j) == ring ? 1 : std::max(1, 2 * ring)) {
+                    for (int i = -ring; i <= ring;
+                         i += std::abs(k) == ring || std::abs(j) == ring ? 1 : std::max(1, 2 * ring)) {
                         const ivec3 at = home + ivec3(i, j, k);
                         if (at.z < 0 || at.z >= grid_.cells.z) continue;
-                        eachIn(at, [&](const TileTriangle& tri, dvec3 shift) { best = std::min(best, distanceTo(tri, p - shift)); });
+                        eachIn(at, [&](const TileTriangle& tri, dvec3 shift) {
+                            best = std::min(best, distanceTo(tri, p - shift));
+                        });
                     }
         }
         return best;
@@ -102,7 +109,9 @@ public:
             for (int j = first.y; j <= last.y; ++j)
                 for (int i = first.x; i <= last.x; ++i) {
                     bool touches = false;
-                    eachIn({i, j, k}, [&](const TileTriangle& tri, dvec3 shift) { touches = touches || overlaps(tri, lower + half - shift, half); });
+                    eachIn({i, j, k}, [&](const TileTriangle& tri, dvec3 shift) {
+                        touches = touches || overlaps(tri, lower + half - shift, half);
+                    });
                     if (touches) return true;
                 }
         return false;
@@ -114,7 +123,9 @@ public:
         for (double t = 0; t <= tMax;) {
             if (cell.z < 0 ? direction.z <= 0 : cell.z >= grid_.cells.z && direction.z >= 0) break;
             if (cell.z >= 0 && cell.z < grid_.cells.z)
-                eachIn(cell, [&](const TileTriangle& tri, dvec3 shift) { meet(tri, origin - shift, direction, best.hit ? best.t : tMax, best); });
+                eachIn(cell, [&](const TileTriangle& tri, dvec3 shift) {
+                    meet(tri, origin - shift, direction, best.hit ? best.t : tMax, best);
+                });
             int axis = 0;
             double exit = std::numeric_limits<double>::infinity();
             for (int a = 0; a < 3; ++a) {
@@ -157,13 +168,15 @@ private:
     ivec3 cellOf(dvec3 p) const { return ivec3(glm::floor(p / grid_.cell)); }
     /// What moves an item's triangle to a cell in any tile.
     dvec3 shiftOf(const Item& item, ivec3 cell) const {
-        const int tx = int(std::floor(double(cell.x) / grid_.cells.x)), ty = int(std::floor(double(cell.y) / grid_.cells.y));
+        const int tx = int(std::floor(double(cell.x) / grid_.cells.x)),
+                  ty = int(std::floor(double(cell.y) / grid_.cells.y));
         return {tx - item.tileX, (ty - item.tileY) * extent().y, 0};
     }
     template <class Use>
     void eachIn(ivec3 cell, const Use& use) const {
         const size_t index = grid_.index(cell);
-        for (size_t i = lists_[index]; i < lists_[index + 1]; ++i) use(triangles_[items_[i].triangle], shiftOf(items_[i], cell));
+        for (size_t i = lists_[index]; i < lists_[index + 1]; ++i)
+            use(triangles_[items_[i].triangle], shiftOf(items_[i], cell));
     }
 
     static void meet(const TileTriangle& tri, dvec3 o, dvec3 d, double tMax, TruthHit& best) {
@@ -194,20 +207,28 @@ private:
     }
     void fill(uint32_t n, bool place, std::vector<size_t>& next, std::vector<size_t>& nextColumn) {
         const TileTriangle& tri = triangles_[n];
-        const dvec3 low = glm::min(tri[0], glm::min(tri[1], tri[2])), high = glm::max(tri[0], glm::max(tri[1], tri[2])), slack = grid_.cell * 1e-6;
+        const dvec3 low = glm::min(tri[0], glm::min(tri[1], tri[2])), high = glm::max(tri[0], glm::max(tri[1], tri[2])),
+                    slack = grid_.cell * 1e-6;
         const ivec3 first = cellOf(low - slack), last = cellOf(high + slack);
         for (int j = first.y; j <= last.y; ++j)
             for (int i = first.x; i <= last.x; ++i) {
-                const Item item{n, int16_t(std::floor(double(i) / grid_.cells.x)), int16_t(std::floor(double(j) / grid_.cells.y))};
-                const size_t column = size_t(wrapped(i, grid_.cells.x)) + size_t(grid_.cells.x) * size_t(wrapped(j, grid_.cells.y));
-                if (place) columnItems_[nextColumn[column]++] = item;
-                else ++columns_[column + 1];
-                for (int k = std::clamp(first.z, 0, grid_.cells.z - 1); k <= std::clamp(last.z, 0, grid_.cells.z - 1); ++k) {
+                const Item item{n, int16_t(std::floor(double(i) / grid_.cells.x)),
+                                int16_t(std::floor(double(j) / grid_.cells.y))};
+                const size_t column =
+                    size_t(wrapped(i, grid_.cells.x)) + size_t(grid_.cells.x) * size_t(wrapped(j, grid_.cells.y));
+                if (place)
+                    columnItems_[nextColumn[column]++] = item;
+                else
+                    ++columns_[column + 1];
+                for (int k = std::clamp(first.z, 0, grid_.cells.z - 1); k <= std::clamp(last.z, 0, grid_.cells.z - 1);
+                     ++k) {
                     const dvec3 lower = grid_.lower({i, j, k});
                     if (!overlaps(tri, lower + 0.5 * grid_.cell, 0.5 * grid_.cell + slack)) continue;
                     const size_t index = grid_.index({i, j, k});
-                    if (place) items_[next[index]++] = item;
-                    else ++lists_[index + 1];
+                    if (place)
+                        items_[next[index]++] = item;
+                    else
+                        ++lists_[index + 1];
                 }
             }
     }
@@ -218,16 +239,18 @@ private:
     std::vector<Item> items_, columnItems_;
 };
 
-/// Entered minus left by a horizontal line along x (or y) in one period: each triangle counts once for every tile across
-/// in which the line meets it.
+/// Entered minus left by a horizontal line along x (or y) in one period: each triangle counts once for every tile
+/// across in which the line meets it.
 int crossingsAlong(int axis, const std::vector<TileTriangle>& triangles, double across, double z, double period) {
     const int other = 1 - axis;
     int sum = 0;
     for (const TileTriangle& tri : triangles) {
         if (std::min({tri[0].z, tri[1].z, tri[2].z}) > z || std::max({tri[0].z, tri[1].z, tri[2].z}) < z) continue;
-        const double low = std::min({tri[0][other], tri[1][other], tri[2][other]}), high = std::max({tri[0][other], tri[1][other], tri[2][other]});
+        const double low = std::min({tri[0][other], tri[1][other], tri[2][other]}),
+                     high = std::max({tri[0][other], tri[1][other], tri[2][other]});
         for (double shift = std::ceil((across - high) / period) * period; shift <= across - low; shift += period) {
-            const dvec2 at(across - shift, z), a(tri[0][other], tri[0].z), b(tri[1][other], tri[1].z), c(tri[2][other], tri[2].z);
+            const dvec2 at(across - shift, z), a(tri[0][other], tri[0].z), b(tri[1][other], tri[1].z),
+                c(tri[2][other], tri[2].z);
             const bool ab = edgeSide(a, b, at) > 0, bc = edgeSide(b, c, at) > 0, ca = edgeSide(c, a, at) > 0;
             if (ab == bc && bc == ca) sum += ab ? 1 : -1;
         }
@@ -241,8 +264,10 @@ Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triang
     if (triangles.empty()) return Error{.message = "the mesh has no triangle"};
     for (size_t i = 0; i < triangles.size(); ++i)
         for (const dvec3& corner : triangles[i]) {
-            if (!std::isfinite(corner.x + corner.y + corner.z) || corner.z < 0 || corner.z > extent.z || std::abs(corner.x) > 64 || std::abs(corner.y) > 64)
-                return Error{.message = "a corner lies outside the slab or far outside the tile", .element = fmt::format("triangle {}", i)};
+            if (!std::isfinite(corner.x + corner.y + corner.z) || corner.z < 0 || corner.z > extent.z ||
+                std::abs(corner.x) > 64 || std::abs(corner.y) > 64)
+                return Error{.message = "a corner lies outside the slab or far outside the tile",
+                             .element = fmt::format("triangle {}", i)};
         }
     auto shape = std::make_unique<MeshShape>(triangles, extent);
     // Lines enter as often as they leave where the mesh is closed; at odd places, off its symmetries.
@@ -258,10 +283,12 @@ Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triang
     for (int axis = 0; axis < 2; ++axis)
         for (int i = 0; i < kLines; ++i) {
             const double period = axis == 0 ? extent.y : 1.0;
-            open += crossingsAlong(axis, triangles, (i + 0.4142) / kLines * period, std::fmod((i + 0.7321) * 0.6180339887, 1.0) * extent.z, period) != 0;
+            open += crossingsAlong(axis, triangles, (i + 0.4142) / kLines * period,
+                                   std::fmod((i + 0.7321) * 0.6180339887, 1.0) * extent.z, period) != 0;
         }
     if (open > 0)
-        return Error{.message = fmt::format("the repeated mesh is not closed: {} of {} lines through it leave it more or less often than they enter it; it must enclose "
+        return Error{.message = fmt::format("the repeated mesh is not closed: {} of {} lines through it leave it more "
+                                            "or less often than they enter it; it must enclose "
                                             "solids and, where it crosses the tile's border, go on on the other side",
                                             open, kLines * (kLines + 2))};
     if (inverted > 0) return Error{.message = "the mesh's normals point inwards; reverse its faces"};

@@ -11,9 +11,11 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr std::array<std::string_view, 12> kNames = {"relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois", "pyramid", "sphere",
-                                                     "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells"};
-constexpr std::array<Refinement, 4> kRefinements = {Refinement::Binary, Refinement::Secant, Refinement::SecantAsPrinted, Refinement::Illinois};
+constexpr std::array<std::string_view, 12> kNames = {
+    "relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois", "pyramid", "sphere", "dm",
+    "ddm",           "ddm-quadric",   "ddm-quadric-fitted",    "boxes",           "cells"};
+constexpr std::array<Refinement, 4> kRefinements = {Refinement::Binary, Refinement::Secant, Refinement::SecantAsPrinted,
+                                                    Refinement::Illinois};
 constexpr int kDefaultCells = 64;
 
 template <class T>
@@ -34,8 +36,10 @@ glm::ivec3 cellsOf(const Asset& asset, glm::dvec3 extent, int n) {
 /// The grid, its occupied cells, and for solids the samples that the exact cells solve.
 Result<void> addCells(Method& method, const Asset& asset, const Shape& shape, glm::ivec3 cells, bool isExact) {
     const bool isOwn = asset.occupancy && asset.occupancy->grid.cells == cells;
-    if (isOwn) method.occupancy = std::make_unique<Occupancy>(*asset.occupancy);
-    else VCP_TRY(take(occupy(shape, cells), method.occupancy));
+    if (isOwn)
+        method.occupancy = std::make_unique<Occupancy>(*asset.occupancy);
+    else
+        VCP_TRY(take(occupy(shape, cells), method.occupancy));
     if (!isExact) return {};
     if (asset.heights) {
         method.heights = &*asset.heights;
@@ -61,34 +65,48 @@ Skipping Method::skipping() const {
 
 Result<std::unique_ptr<Marcher>> Method::marcher() const {
     switch (kind) {
-        case WalkKind::Relief: return reliefMarcher(*heights, relief);
-        case WalkKind::Pyramid: return pyramidMarcher(*heights);
-        case WalkKind::Sphere: return sphereMarcher(*sphere);
-        default: return gridMarcher(skipping(), surface());
+        case WalkKind::Relief:
+            return reliefMarcher(*heights, relief);
+        case WalkKind::Pyramid:
+            return pyramidMarcher(*heights);
+        case WalkKind::Sphere:
+            return sphereMarcher(*sphere);
+        default:
+            return gridMarcher(skipping(), surface());
     }
 }
 
 std::span<const std::string_view> methodNames() { return kNames; }
 
-bool methodFits(std::string_view name, const Asset& asset) { return asset.heights.has_value() || !(name.starts_with("relief") || name == "pyramid"); }
+bool methodFits(std::string_view name, const Asset& asset) {
+    return asset.heights.has_value() || !(name.starts_with("relief") || name == "pyramid");
+}
 
 Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodOptions& options) {
     const std::string& name = options.name;
     const auto known = std::ranges::find(kNames, name);
-    if (known == kNames.end()) return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no method \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
-    if (!methodFits(name, asset)) return Error{.code = ErrorCode::Usage, .message = fmt::format("{} is for height fields; {} is a solid", name, asset.name)};
+    if (known == kNames.end())
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("there is no method \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
+    if (!methodFits(name, asset))
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("{} is for height fields; {} is a solid", name, asset.name)};
     Method method;
     if (name.starts_with("relief") || name == "pyramid") {
         method.kind = name == "pyramid" ? WalkKind::Pyramid : WalkKind::Relief;
         method.heights = &*asset.heights;
-        if (name != "pyramid") method.relief = {.steps = options.steps, .refinement = kRefinements[size_t(known - kNames.begin())], .refinements = options.refinements};
+        if (name != "pyramid")
+            method.relief = {.steps = options.steps,
+                             .refinement = kRefinements[size_t(known - kNames.begin())],
+                             .refinements = options.refinements};
         return method;
     }
     const glm::ivec3 cells = cellsOf(asset, shape.extent(), options.cells);
     const bool isExact = name == "boxes" || name == "cells";
     if (isExact && asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
         return Error{.code = ErrorCode::Usage,
-                     .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels", cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
+                     .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels",
+                                            cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
     if (name == "sphere") {
         method.kind = WalkKind::Sphere;
         VCP_TRY(take(buildSphereMap(shape, {.cells = cells}), method.sphere));
@@ -96,15 +114,22 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
     }
     VCP_TRY(addCells(method, asset, shape, cells, isExact));
     const bool isOwn = asset.occupancy && asset.occupancy->grid.cells == cells;
-    if (name == "boxes") method.boxes = std::make_unique<OctantBoxes>(isOwn && asset.boxes ? *asset.boxes : buildOctantBoxes(*method.occupancy));
+    if (name == "boxes")
+        method.boxes =
+            std::make_unique<OctantBoxes>(isOwn && asset.boxes ? *asset.boxes : buildOctantBoxes(*method.occupancy));
     if (method.boxes && method.field) markSmallCells(*method.field, *method.boxes);
     if (isExact) return method;
     const Cones cones = name == "dm" ? Cones{1, 1} : options.cones;
-    if (isOwn && asset.distances && asset.distances->cones.azimuth == cones.azimuth && asset.distances->cones.elevation == cones.elevation)
+    if (isOwn && asset.distances && asset.distances->cones.azimuth == cones.azimuth &&
+        asset.distances->cones.elevation == cones.elevation)
         method.distances = std::make_unique<DistanceMap>(*asset.distances);
-    else VCP_TRY(take(buildDistanceMap(*method.occupancy, {.cones = cones, .cap = cones.areSigns() ? 0.25 : 0.125}), method.distances));
+    else
+        VCP_TRY(take(buildDistanceMap(*method.occupancy, {.cones = cones, .cap = cones.areSigns() ? 0.25 : 0.125}),
+                     method.distances));
     if (name.starts_with("ddm-quadric")) {
-        VCP_TRY(take(buildPatches(shape, *method.occupancy, name == "ddm-quadric" ? CrossingRule::Direct : CrossingRule::Fitted), method.patches));
+        VCP_TRY(take(
+            buildPatches(shape, *method.occupancy, name == "ddm-quadric" ? CrossingRule::Direct : CrossingRule::Fitted),
+            method.patches));
         VCP_TRY(take(compressMap(*method.distances, std::array{4}), method.compressed));
     }
     return method;

@@ -13,24 +13,31 @@ constexpr int kMost = OctantBoxes::kMost;
 /// Occupied cells of any box that starts in the tile and reaches up to kMost + 1 cells beyond it: a summed volume.
 class BoxCount {
 public:
-    explicit BoxCount(const Occupancy& occupancy) : size_(occupancy.grid.cells + 2 * kMargin + 1), sums_(size_t(size_.x) * size_t(size_.y) * size_t(size_.z)) {
+    explicit BoxCount(const Occupancy& occupancy)
+        : size_(occupancy.grid.cells + 2 * kMargin + 1), sums_(size_t(size_.x) * size_t(size_.y) * size_t(size_.z)) {
         for (int z = 1; z < size_.z; ++z)
             for (int y = 1; y < size_.y; ++y)
                 for (int x = 1; x < size_.x; ++x)
-                    sums_[slot(x, y, z)] = uint32_t(occupancy.at(glm::ivec3(x, y, z) - 1 - kMargin)) + sums_[slot(x - 1, y, z)] + sums_[slot(x, y - 1, z)] + sums_[slot(x, y, z - 1)] -
-                                           sums_[slot(x - 1, y - 1, z)] - sums_[slot(x, y - 1, z - 1)] - sums_[slot(x - 1, y, z - 1)] + sums_[slot(x - 1, y - 1, z - 1)];
+                    sums_[slot(x, y, z)] =
+                        uint32_t(occupancy.at(glm::ivec3(x, y, z) - 1 - kMargin)) + sums_[slot(x - 1, y, z)] +
+                        sums_[slot(x, y - 1, z)] + sums_[slot(x, y, z - 1)] - sums_[slot(x - 1, y - 1, z)] -
+                        sums_[slot(x, y - 1, z - 1)] - sums_[slot(x - 1, y, z - 1)] + sums_[slot(x - 1, y - 1, z - 1)];
     }
     /// Of the cells from `a` to `b`, both included, in either order.
     bool isEmpty(glm::ivec3 a, glm::ivec3 b) const {
         const glm::ivec3 low = glm::min(a, b) + kMargin, high = glm::max(a, b) + kMargin + 1;
-        return sums_[slot(high.x, high.y, high.z)] - sums_[slot(low.x, high.y, high.z)] - sums_[slot(high.x, low.y, high.z)] - sums_[slot(high.x, high.y, low.z)] +
-                   sums_[slot(low.x, low.y, high.z)] + sums_[slot(low.x, high.y, low.z)] + sums_[slot(high.x, low.y, low.z)] - sums_[slot(low.x, low.y, low.z)] ==
+        return sums_[slot(high.x, high.y, high.z)] - sums_[slot(low.x, high.y, high.z)] -
+                   sums_[slot(high.x, low.y, high.z)] - sums_[slot(high.x, high.y, low.z)] +
+                   sums_[slot(low.x, low.y, high.z)] + sums_[slot(low.x, high.y, low.z)] +
+                   sums_[slot(high.x, low.y, low.z)] - sums_[slot(low.x, low.y, low.z)] ==
                0;
     }
 
 private:
     static constexpr int kMargin = kMost + 1;
-    size_t slot(int x, int y, int z) const { return size_t(x) + size_t(size_.x) * (size_t(y) + size_t(size_.y) * size_t(z)); }
+    size_t slot(int x, int y, int z) const {
+        return size_t(x) + size_t(size_.x) * (size_t(y) + size_t(size_.y) * size_t(z));
+    }
     glm::ivec3 size_;
     std::vector<uint32_t> sums_;  ///< modulo 2^32: differences are exact
 };
@@ -40,8 +47,10 @@ glm::ivec3 grow(const BoxCount& count, glm::ivec3 at, glm::ivec3 sign) {
     int low = 0, high = kMost;
     while (low < high) {
         const int middle = (low + high + 1) / 2;
-        if (count.isEmpty(at, at + sign * middle)) low = middle;
-        else high = middle - 1;
+        if (count.isEmpty(at, at + sign * middle))
+            low = middle;
+        else
+            high = middle - 1;
     }
     glm::ivec3 extent(low);
     for (bool grows = true; grows;) {
@@ -88,7 +97,8 @@ void markSmallCells(const SampledField& field, OctantBoxes& boxes) {
         for (int small = 0; fits && small < 8; ++small) {
             const glm::ivec3 at = 2 * grid.at(i) + glm::ivec3(small & 1, small >> 1 & 1, small >> 2);
             int inside = 0;
-            for (int corner = 0; corner < 8; ++corner) inside += field.step(at + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)) <= 0;
+            for (int corner = 0; corner < 8; ++corner)
+                inside += field.step(at + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)) <= 0;
             if (inside != 0 && inside != 8) box = uint16_t(box | 1 << small);
         }
         for (int octant = 0; octant < 8; ++octant) boxes.boxes[size_t(octant) * grid.count() + i] = box;

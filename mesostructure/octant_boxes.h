@@ -19,8 +19,8 @@ struct OctantBoxes {
 
     TileGrid grid;
     /// Octant by octant, cells as in the grid. Bits 0-4, 5-9, 10-14: further cells that are empty along x, y, z; a box
-    /// that reaches the slab's top or bottom goes on as if the outside were empty cells. Bit 15: the cell is occupied; the others are 0 then, or what
-    /// markSmallCells put there.
+    /// that reaches the slab's top or bottom goes on as if the outside were empty cells. Bit 15: the cell is occupied;
+    /// the others are 0 then, or what markSmallCells put there.
     std::vector<uint16_t> boxes;
 
     [[nodiscard]] uint64_t bytes() const { return boxes.size() * sizeof(uint16_t); }
@@ -28,8 +28,9 @@ struct OctantBoxes {
 
 OctantBoxes buildOctantBoxes(const Occupancy& occupancy);
 
-/// Says of each occupied cell which of its 2 x 2 x 2 small cells the field's surface passes, so that the others need not be read: kSmallCells,
-/// and bits 0 to 7, x lowest. Takes all marks away where the field has another number of cells in a cell.
+/// Says of each occupied cell which of its 2 x 2 x 2 small cells the field's surface passes, so that the others need
+/// not be read: kSmallCells, and bits 0 to 7, x lowest. Takes all marks away where the field has another number of
+/// cells in a cell.
 void markSmallCells(const SampledField& field, OctantBoxes& boxes);
 
 }  // namespace vcp::meso

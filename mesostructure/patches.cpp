@@ -116,7 +116,10 @@ void appendBilinear(dvec3 p1, dvec3 p2, dvec3 p3, dvec3 p4, std::vector<Patch>& 
 /// The points on the grid's edges: edge along `axis` from a grid point.
 class EdgePoints {
 public:
-    explicit EdgePoints(const TileGrid& grid) : points_({grid.cells.x, grid.cells.y, grid.cells.z + 1}, glm::dvec3(1)), sums_(3 * points_.count()), counts_(3 * points_.count()) {}
+    explicit EdgePoints(const TileGrid& grid)
+        : points_({grid.cells.x, grid.cells.y, grid.cells.z + 1}, glm::dvec3(1)),
+          sums_(3 * points_.count()),
+          counts_(3 * points_.count()) {}
     void add(CellEdge edge, ivec3 cell, double place) {
         const size_t at = slot(edge, cell);
         sums_[at] += place;
@@ -132,7 +135,9 @@ public:
     }
 
 private:
-    size_t slot(CellEdge edge, ivec3 cell) const { return size_t(edge.axis) * points_.count() + points_.index(cell + edge.from); }
+    size_t slot(CellEdge edge, ivec3 cell) const {
+        return size_t(edge.axis) * points_.count() + points_.index(cell + edge.from);
+    }
     TileGrid points_;
     std::vector<double> sums_;
     std::vector<uint16_t> counts_;
@@ -141,10 +146,12 @@ private:
 /// Builds cell by cell; corners' values are asked once.
 class PatchBuilder {
 public:
-    PatchBuilder(const Shape& shape, const Occupancy& occupancy) : shape_(shape), occupancy_(occupancy), grid_(occupancy.grid), edges_(grid_) {}
+    PatchBuilder(const Shape& shape, const Occupancy& occupancy)
+        : shape_(shape), occupancy_(occupancy), grid_(occupancy.grid), edges_(grid_) {}
 
     void findDirect() {
-        values_.resize(size_t(grid_.cells.x) * size_t(grid_.cells.y) * size_t(grid_.cells.z + 1), std::numeric_limits<double>::quiet_NaN());
+        values_.resize(size_t(grid_.cells.x) * size_t(grid_.cells.y) * size_t(grid_.cells.z + 1),
+                       std::numeric_limits<double>::quiet_NaN());
         eachCell([&](ivec3 cell) {
             for (int number = 0; number < 12; ++number) {
                 const CellEdge edge = edgeOf(number);
@@ -172,11 +179,14 @@ public:
             if (i % 32 == 0) rank.base = uint32_t(set.rows.size());
             if (occupancy_.cells[i] == 0) continue;
             const size_t first = set.patches.size();
-            if (rule == CrossingRule::Direct) appendLoops(grid_.at(i), set.patches);
-            else appendOrdered(grid_.at(i), set.patches);
+            if (rule == CrossingRule::Direct)
+                appendLoops(grid_.at(i), set.patches);
+            else
+                appendOrdered(grid_.at(i), set.patches);
             const size_t count = std::min<size_t>(set.patches.size() - first, PatchSet::kMostInCell);
             set.patches.resize(first + count);
-            if (set.patches.size() >= size_t{1} << 28) return Error{.code = ErrorCode::Limit, .message = "more than 2^28 patches; take a coarser grid"};
+            if (set.patches.size() >= size_t{1} << 28)
+                return Error{.code = ErrorCode::Limit, .message = "more than 2^28 patches; take a coarser grid"};
             if (count == 0) {
                 ++set.cellsWithout;
                 continue;
@@ -195,7 +205,9 @@ private:
     }
     dvec3 position(ivec3 cell, dvec3 local) const { return (dvec3(cell) + local) * grid_.cell; }
     double value(ivec3 point) {
-        const size_t at = size_t(wrapped(point.x, grid_.cells.x)) + size_t(grid_.cells.x) * (size_t(wrapped(point.y, grid_.cells.y)) + size_t(grid_.cells.y) * size_t(point.z));
+        const size_t at =
+            size_t(wrapped(point.x, grid_.cells.x)) +
+            size_t(grid_.cells.x) * (size_t(wrapped(point.y, grid_.cells.y)) + size_t(grid_.cells.y) * size_t(point.z));
         if (std::isnan(values_[at])) values_[at] = shape_.field(dvec3(point) * grid_.cell);
         return values_[at];
     }
@@ -218,13 +230,17 @@ private:
             double size = 0;
             for (int step = 0; step < 4; ++step) {
                 const double f = shape_.field(position(cell, p)), e = 1e-4;
-                const dvec3 g = dvec3(shape_.field(position(cell, p + dvec3(e, 0, 0))) - f, shape_.field(position(cell, p + dvec3(0, e, 0))) - f,
-                                      shape_.field(position(cell, p + dvec3(0, 0, e))) - f) / e;
+                const dvec3 g = dvec3(shape_.field(position(cell, p + dvec3(e, 0, 0))) - f,
+                                      shape_.field(position(cell, p + dvec3(0, e, 0))) - f,
+                                      shape_.field(position(cell, p + dvec3(0, 0, e))) - f) /
+                                e;
                 size = glm::dot(g, g);
                 if (size > 0) p -= f * g / size;
             }
             const dvec3 off = glm::abs(p - 0.5);
-            if (size > 0 && std::max({off.x, off.y, off.z}) <= 1 && std::abs(shape_.field(position(cell, p))) < 0.02 * grid_.cell.x) samples.push_back(p);
+            if (size > 0 && std::max({off.x, off.y, off.z}) <= 1 &&
+                std::abs(shape_.field(position(cell, p))) < 0.02 * grid_.cell.x)
+                samples.push_back(p);
         }
         return samples;
     }
@@ -233,10 +249,12 @@ private:
         const auto at = [&](double s) {
             dvec3 p(edge.from);
             p[edge.axis] = s;
-            return q[0] * p.x * p.x + q[1] * p.y * p.y + q[2] * p.z * p.z + q[3] * p.x * p.y + q[4] * p.y * p.z + q[5] * p.z * p.x + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
+            return q[0] * p.x * p.x + q[1] * p.y * p.y + q[2] * p.z * p.z + q[3] * p.x * p.y + q[4] * p.y * p.z +
+                   q[5] * p.z * p.x + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
         };
         // A quadratic along the edge, from three values.
-        const double f0 = at(0), fh = at(0.5), f1 = at(1), a = 2 * (f1 - 2 * fh + f0), b = f1 - f0 - a, disc = b * b - 4 * a * f0;
+        const double f0 = at(0), fh = at(0.5), f1 = at(1), a = 2 * (f1 - 2 * fh + f0), b = f1 - f0 - a,
+                     disc = b * b - 4 * a * f0;
         if (disc < 0) return;
         const double r = -0.5 * (b + (b >= 0 ? std::sqrt(disc) : -std::sqrt(disc)));
         const double roots[2] = {a != 0 ? r / a : -1, r != 0 ? f0 / r : -1};
@@ -286,11 +304,15 @@ private:
         for (const dvec3 p : points) centre += p / double(points.size());
         const dvec3 local = position(cell, centre);
         const double e = 1e-3 * grid_.cell.x, f = shape_.field(local);
-        dvec3 normal = dvec3(shape_.field(local + dvec3(e, 0, 0)) - f, shape_.field(local + dvec3(0, e, 0)) - f, shape_.field(local + dvec3(0, 0, e)) - f) * grid_.cell;
+        dvec3 normal = dvec3(shape_.field(local + dvec3(e, 0, 0)) - f, shape_.field(local + dvec3(0, e, 0)) - f,
+                             shape_.field(local + dvec3(0, 0, e)) - f) *
+                       grid_.cell;
         if (!(glm::length(normal) > 0)) normal = {0, 0, 1};
         normal = glm::normalize(normal);
-        const dvec3 x = glm::normalize(glm::cross(normal, std::abs(normal.x) < 0.7 ? dvec3(1, 0, 0) : dvec3(0, 1, 0))), y = glm::cross(normal, x);
-        std::ranges::sort(points, {}, [&](dvec3 p) { return std::atan2(glm::dot(p - centre, y), glm::dot(p - centre, x)); });
+        const dvec3 x = glm::normalize(glm::cross(normal, std::abs(normal.x) < 0.7 ? dvec3(1, 0, 0) : dvec3(0, 1, 0))),
+                    y = glm::cross(normal, x);
+        std::ranges::sort(points, {},
+                          [&](dvec3 p) { return std::atan2(glm::dot(p - centre, y), glm::dot(p - centre, x)); });
         appendPatches(points, patches);
     }
 
@@ -320,10 +342,13 @@ void appendPatches(std::span<const glm::dvec3> loop, std::vector<Patch>& patches
 
 float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span) {
     const float* q = patch.quadric;
-    const float a = q[0] * d.x * d.x + q[1] * d.y * d.y + q[2] * d.z * d.z + q[3] * d.x * d.y + q[4] * d.y * d.z + q[5] * d.z * d.x;
-    const float b = 2 * (q[0] * o.x * d.x + q[1] * o.y * d.y + q[2] * o.z * d.z) + q[3] * (o.x * d.y + o.y * d.x) + q[4] * (o.y * d.z + o.z * d.y) +
-                    q[5] * (o.z * d.x + o.x * d.z) + q[6] * d.x + q[7] * d.y + q[8] * d.z;
-    const float c = q[0] * o.x * o.x + q[1] * o.y * o.y + q[2] * o.z * o.z + q[3] * o.x * o.y + q[4] * o.y * o.z + q[5] * o.z * o.x + q[6] * o.x + q[7] * o.y + q[8] * o.z + q[9];
+    const float a =
+        q[0] * d.x * d.x + q[1] * d.y * d.y + q[2] * d.z * d.z + q[3] * d.x * d.y + q[4] * d.y * d.z + q[5] * d.z * d.x;
+    const float b = 2 * (q[0] * o.x * d.x + q[1] * o.y * d.y + q[2] * o.z * d.z) + q[3] * (o.x * d.y + o.y * d.x) +
+                    q[4] * (o.y * d.z + o.z * d.y) + q[5] * (o.z * d.x + o.x * d.z) + q[6] * d.x + q[7] * d.y +
+                    q[8] * d.z;
+    const float c = q[0] * o.x * o.x + q[1] * o.y * o.y + q[2] * o.z * o.z + q[3] * o.x * o.y + q[4] * o.y * o.z +
+                    q[5] * o.z * o.x + q[6] * o.x + q[7] * o.y + q[8] * o.z + q[9];
     const float disc = b * b - 4 * a * c;
     if (disc < 0) return -1;
     // Without cancellation; for a = 0, the linear branch, the second root is that of the plane.
@@ -335,7 +360,8 @@ float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span) {
     for (const float s : {near, far}) {
         if (!(s >= -slack && s <= span + slack)) continue;
         const glm::vec3 p = o + s * d;
-        const float u = patch.u[0] * p.x + patch.u[1] * p.y + patch.u[2] * p.z + patch.u[3], v = patch.v[0] * p.x + patch.v[1] * p.y + patch.v[2] * p.z + patch.v[3];
+        const float u = patch.u[0] * p.x + patch.u[1] * p.y + patch.u[2] * p.z + patch.u[3],
+                    v = patch.v[0] * p.x + patch.v[1] * p.y + patch.v[2] * p.z + patch.v[3];
         if (u < -kOn || v < -kOn) continue;
         if (patch.isTriangle != 0 ? u + v <= 1 + kOn : u <= 1 + kOn && v <= 1 + kOn) return std::clamp(s, 0.0f, span);
     }
@@ -344,14 +370,17 @@ float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span) {
 
 glm::vec3 patchGradient(const Patch& patch, glm::vec3 p) {
     const float* q = patch.quadric;
-    return {2 * q[0] * p.x + q[3] * p.y + q[5] * p.z + q[6], 2 * q[1] * p.y + q[3] * p.x + q[4] * p.z + q[7], 2 * q[2] * p.z + q[4] * p.y + q[5] * p.x + q[8]};
+    return {2 * q[0] * p.x + q[3] * p.y + q[5] * p.z + q[6], 2 * q[1] * p.y + q[3] * p.x + q[4] * p.z + q[7],
+            2 * q[2] * p.z + q[4] * p.y + q[5] * p.x + q[8]};
 }
 
 Result<PatchSet> buildPatches(const Shape& shape, const Occupancy& occupancy, CrossingRule rule) {
     PatchBuilder builder(shape, occupancy);
     // Corner values decide nothing in the paper's way.
-    if (rule == CrossingRule::Direct) builder.findDirect();
-    else builder.findFitted();
+    if (rule == CrossingRule::Direct)
+        builder.findDirect();
+    else
+        builder.findFitted();
     return builder.assemble(rule);
 }
 

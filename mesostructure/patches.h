@@ -37,7 +37,8 @@ struct Patch {
     float v[4] = {};
     uint32_t isTriangle = 0;
 };
-static_assert(sizeof(Patch) == 76 && offsetof(Patch, u) == 40 && offsetof(Patch, v) == 56 && offsetof(Patch, isTriangle) == 72);
+static_assert(sizeof(Patch) == 76 && offsetof(Patch, u) == 40 && offsetof(Patch, v) == 56 &&
+              offsetof(Patch, isTriangle) == 72);
 
 enum class CrossingRule { Direct, Fitted };
 
@@ -56,7 +57,9 @@ struct PatchSet {
     uint32_t cellsWithout = 0;  ///< occupied cells without a patch: sheets thinner than a cell, or grazed cells
 
     [[nodiscard]] std::span<const Patch> of(size_t cell) const;
-    [[nodiscard]] uint64_t bytes() const { return ranks.size() * sizeof(Rank) + rows.size() * 4 + patches.size() * sizeof(Patch); }
+    [[nodiscard]] uint64_t bytes() const {
+        return ranks.size() * sizeof(Rank) + rows.size() * 4 + patches.size() * sizeof(Patch);
+    }
 };
 
 /// Errors: Limit (2^28 patches).

@@ -26,7 +26,8 @@ inline double gradientNoise(double x, double y, int nx, int ny, uint32_t seed) {
         return std::cos(angle) * (u - a) + std::sin(angle) * (v - b);
     };
     const auto fade = [](double s) { return s * s * s * (s * (6 * s - 15) + 10); };
-    const double low = corner(0, 0) + fade(u) * (corner(1, 0) - corner(0, 0)), high = corner(0, 1) + fade(u) * (corner(1, 1) - corner(0, 1));
+    const double low = corner(0, 0) + fade(u) * (corner(1, 0) - corner(0, 0)),
+                 high = corner(0, 1) + fade(u) * (corner(1, 1) - corner(0, 1));
     return low + fade(v) * (high - low);
 }
 

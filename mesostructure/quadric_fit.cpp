@@ -15,10 +15,14 @@ constexpr int kSize = 9;  // the constant follows from the rest
 using Matrix = std::array<std::array<double, kSize>, kSize>;
 using Vector = std::array<double, kSize>;
 
-Vector monomials(glm::dvec3 p) { return {p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.y * p.z, p.z * p.x, p.x, p.y, p.z}; }
+Vector monomials(glm::dvec3 p) {
+    return {p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.y * p.z, p.z * p.x, p.x, p.y, p.z};
+}
 
 std::array<Vector, 3> gradients(glm::dvec3 p) {
-    return {{{2 * p.x, 0, 0, p.y, 0, p.z, 1, 0, 0}, {0, 2 * p.y, 0, p.x, p.z, 0, 0, 1, 0}, {0, 0, 2 * p.z, 0, p.y, p.x, 0, 0, 1}}};
+    return {{{2 * p.x, 0, 0, p.y, 0, p.z, 1, 0, 0},
+             {0, 2 * p.y, 0, p.x, p.z, 0, 0, 1, 0},
+             {0, 0, 2 * p.z, 0, p.y, p.x, 0, 0, 1}}};
 }
 
 void addOuter(Matrix& to, const Vector& v, double weight) {
@@ -49,7 +53,8 @@ void diagonalise(Matrix& a, Matrix& v) {
                 off += a[p][q] * a[p][q];
                 if (a[p][q] == 0) continue;
                 const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-                const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1)), c = 1 / std::sqrt(t * t + 1), s = t * c;
+                const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1)),
+                             c = 1 / std::sqrt(t * t + 1), s = t * c;
                 for (int k = 0; k < kSize; ++k) {
                     const double x = a[k][p], y = a[k][q];
                     a[k][p] = c * x - s * y, a[k][q] = s * x + c * y;

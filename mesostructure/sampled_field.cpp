@@ -18,12 +18,14 @@ public:
     double at(glm::ivec3 p) {
         Plane& plane = planes_[size_t(p.z) % planes_.size()];
         if (plane.z != p.z) fill(plane, p.z);
-        return plane.values[size_t(wrapped(p.x, grid_.cells.x)) + size_t(grid_.cells.x) * size_t(wrapped(p.y, grid_.cells.y))];
+        return plane
+            .values[size_t(wrapped(p.x, grid_.cells.x)) + size_t(grid_.cells.x) * size_t(wrapped(p.y, grid_.cells.y))];
     }
     /// Summed over the axes; at the slab's top and bottom that along z is that of the next plane.
     double secondDifferences(glm::ivec3 p) {
         const double twice = 2 * at(p);
-        const double sum = at(p + glm::ivec3(1, 0, 0)) + at(p - glm::ivec3(1, 0, 0)) + at(p + glm::ivec3(0, 1, 0)) + at(p - glm::ivec3(0, 1, 0)) - 2 * twice;
+        const double sum = at(p + glm::ivec3(1, 0, 0)) + at(p - glm::ivec3(1, 0, 0)) + at(p + glm::ivec3(0, 1, 0)) +
+                           at(p - glm::ivec3(0, 1, 0)) - 2 * twice;
         if (grid_.cells.z < 2) return sum;
         p.z = std::clamp(p.z, 1, grid_.cells.z - 1);
         return sum + at(p + glm::ivec3(0, 0, 1)) + at(p - glm::ivec3(0, 0, 1)) - 2 * at(p);
@@ -38,7 +40,8 @@ private:
         plane.z = z;
         plane.values.resize(size_t(grid_.cells.x) * size_t(grid_.cells.y));
         for (int y = 0; y < grid_.cells.y; ++y)
-            for (int x = 0; x < grid_.cells.x; ++x) plane.values[size_t(x) + size_t(grid_.cells.x) * size_t(y)] = shape_.field(grid_.lower({x, y, z}));
+            for (int x = 0; x < grid_.cells.x; ++x)
+                plane.values[size_t(x) + size_t(grid_.cells.x) * size_t(y)] = shape_.field(grid_.lower({x, y, z}));
     }
 
     const Shape& shape_;
@@ -51,10 +54,14 @@ private:
 Result<SampledField> sampleField(const Shape& shape, glm::ivec3 cells) {
     for (int axis = 0; axis < 3; ++axis)
         if (cells[axis] < 1 || cells[axis] > kMaxGridEdge)
-            return Error{.code = ErrorCode::Usage, .message = fmt::format("{} x {} x {} cells of samples; each edge must be from 1 to {}", cells.x, cells.y, cells.z, kMaxGridEdge)};
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format("{} x {} x {} cells of samples; each edge must be from 1 to {}",
+                                                cells.x, cells.y, cells.z, kMaxGridEdge)};
     SampledField field{TileGrid(cells, shape.extent()), 0, {}};
     const TileGrid& grid = field.grid;
-    if (grid.count() > kMaxGridCells) return Error{.code = ErrorCode::Limit, .message = fmt::format("{} samples; at most {}", grid.count(), kMaxGridCells)};
+    if (grid.count() > kMaxGridCells)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("{} samples; at most {}", grid.count(), kMaxGridCells)};
     field.unit = float(kBandCells * std::max({grid.cell.x, grid.cell.y, grid.cell.z}) / 32767);
     field.steps.reserve(size_t(cells.x) * size_t(cells.y) * size_t(cells.z + 1));
     Planes planes(shape, grid);
@@ -74,7 +81,8 @@ void occupyField(const SampledField& field, Occupancy& occupancy) {
     for (size_t i = 0; i < field.grid.count(); ++i) {
         const glm::ivec3 at = field.grid.at(i);
         int inside = 0;
-        for (int corner = 0; corner < 8; ++corner) inside += field.step(at + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)) <= 0;
+        for (int corner = 0; corner < 8; ++corner)
+            inside += field.step(at + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)) <= 0;
         if (inside != 0 && inside != 8) occupancy.cells[occupancy.grid.index(at / ratio)] = 1;
     }
 }

@@ -19,9 +19,9 @@ namespace vcp::meso {
 
 struct TruthHit {
     bool hit = false;
-    bool resolved = true;      ///< false: the search was given up (grazing a solid for long)
-    double t = 0;              ///< along the ray, tile units
-    glm::dvec3 normal{0};      ///< unit, out of the solid
+    bool resolved = true;  ///< false: the search was given up (grazing a solid for long)
+    double t = 0;          ///< along the ray, tile units
+    glm::dvec3 normal{0};  ///< unit, out of the solid
 };
 
 class Shape {
@@ -47,10 +47,12 @@ private:
 /// its height is value / 65535 * range.
 struct HeightMap {
     glm::ivec2 size{0};
-    double range = 0;               ///< height of 65535, tile units; the slab's extent along z
-    std::vector<uint16_t> texels;   ///< row by row, x fastest
+    double range = 0;              ///< height of 65535, tile units; the slab's extent along z
+    std::vector<uint16_t> texels;  ///< row by row, x fastest
 
-    [[nodiscard]] uint16_t texel(int x, int y) const { return texels[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))]; }
+    [[nodiscard]] uint16_t texel(int x, int y) const {
+        return texels[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))];
+    }
     [[nodiscard]] double height(int x, int y) const { return texel(x, y) * (range / 65535.0); }
     [[nodiscard]] glm::dvec3 extent() const { return {1.0, double(size.y) / double(size.x), range}; }
 };
@@ -62,7 +64,8 @@ Result<std::unique_ptr<Shape>> heightShape(const HeightMap& map);
 /// mesostructure/solids.h has the names.
 Result<std::unique_ptr<Shape>> solidShape(const std::string& name, uint32_t seed);
 /// The repeated triangles must enclose solids: lines enter them as often as they leave them, which a few thousand
-/// lines are asked (nonzero winding along the vertical counts as inside, so parts may overlap). Normals point outwards by the right-hand rule.
+/// lines are asked (nonzero winding along the vertical counts as inside, so parts may overlap). Normals point outwards
+/// by the right-hand rule.
 Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triangles, glm::dvec3 extent);
 
 }  // namespace vcp::meso

@@ -23,8 +23,12 @@ constexpr double kLongest = 3;                   // of a direction at an edge, i
 struct Piece {
     std::array<dvec3, 4> corners, tile;
     uint32_t bits = 0;  ///< as Shell::texels has them
-    [[nodiscard]] dvec3 low() const { return glm::min(glm::min(corners[0], corners[1]), glm::min(corners[2], corners[3])); }
-    [[nodiscard]] dvec3 high() const { return glm::max(glm::max(corners[0], corners[1]), glm::max(corners[2], corners[3])); }
+    [[nodiscard]] dvec3 low() const {
+        return glm::min(glm::min(corners[0], corners[1]), glm::min(corners[2], corners[3]));
+    }
+    [[nodiscard]] dvec3 high() const {
+        return glm::max(glm::max(corners[0], corners[1]), glm::max(corners[2], corners[3]));
+    }
 };
 
 dvec3 faceNormal(const BaseSurface& surface, size_t triangle) {
@@ -45,13 +49,16 @@ std::vector<dvec3> directionsOf(const BaseSurface& surface) {
     };
     each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
         for (int k = 0; k < 3; ++k) {
-            const dvec3 p = surface.positions[t[k]], a = glm::normalize(surface.positions[t[(k + 1) % 3]] - p), b = glm::normalize(surface.positions[t[(k + 2) % 3]] - p);
+            const dvec3 p = surface.positions[t[k]], a = glm::normalize(surface.positions[t[(k + 1) % 3]] - p),
+                        b = glm::normalize(surface.positions[t[(k + 2) % 3]] - p);
             sums[t[k]] += normal * std::acos(std::clamp(glm::dot(a, b), -1.0, 1.0));
         }
     });
     for (dvec3& sum : sums)
-        if (const double length = glm::length(sum); length > 1e-6) sum /= length;
-        else sum = dvec3(0);
+        if (const double length = glm::length(sum); length > 1e-6)
+            sum /= length;
+        else
+            sum = dvec3(0);
     each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
         for (const uint32_t corner : t) least[corner] = std::min(least[corner], glm::dot(sums[corner], normal));
     });
@@ -74,7 +81,8 @@ public:
     [[nodiscard]] bool isJoined(const BaseSurface& surface, size_t triangle, int k) const {
         const Edge edge = edgeOf(surface, triangle, k);
         const auto& uses = uses_.at(edge.corners);
-        return std::ranges::count_if(uses, [&](const Map& map) { return isWhole(map[0] - edge.map[0], map[1] - edge.map[1]); }) > 1;
+        return std::ranges::count_if(
+                   uses, [&](const Map& map) { return isWhole(map[0] - edge.map[0], map[1] - edge.map[1]); }) > 1;
     }
 
 private:
@@ -102,7 +110,12 @@ private:
 class PieceMaker {
 public:
     PieceMaker(const BaseSurface& surface, double height, dvec3 extent, Shell& shell)
-        : surface_(surface), directions_(directionsOf(surface)), joins_(surface, extent), height_(height), tileHeight_(extent.z), shell_(shell) {}
+        : surface_(surface),
+          directions_(directionsOf(surface)),
+          joins_(surface, extent),
+          height_(height),
+          tileHeight_(extent.z),
+          shell_(shell) {}
 
     std::vector<Piece> all() {
         std::vector<Piece> pieces;
@@ -139,14 +152,18 @@ private:
         }
         for (int piece = 0; piece < 3; ++piece) {
             Piece made;
-            for (int k = 0; k < 4; ++k) made.corners[k] = world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
+            for (int k = 0; k < 4; ++k)
+                made.corners[k] = world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
             made.bits = bitsOf(kCorners[piece], isCut);
-            const dvec3 x = made.corners[1] - made.corners[0], y = made.corners[2] - made.corners[0], z = made.corners[3] - made.corners[0];
+            const dvec3 x = made.corners[1] - made.corners[0], y = made.corners[2] - made.corners[0],
+                        z = made.corners[3] - made.corners[0];
             const double volume = glm::dot(glm::cross(x, y), z) * (isOdd ? -1 : 1) * (piece == 1 ? -1 : 1);
             const double scale = glm::length(x) * glm::length(y) * glm::length(z);
             shell_.inverted += volume < 0;
-            if (std::abs(volume) > 1e-12 * scale) pieces.push_back(made);
-            else ++shell_.flat;
+            if (std::abs(volume) > 1e-12 * scale)
+                pieces.push_back(made);
+            else
+                ++shell_.flat;
         }
     }
 
@@ -242,18 +259,24 @@ bool isFinite(const BaseSurface& surface) {
 
 Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent) {
     const auto fail = [](ErrorCode code, const char* message) { return Error{.code = code, .message = message}; };
-    if (!(height > 0) || !std::isfinite(height) || !(extent.z > 0)) return fail(ErrorCode::Usage, "a shell's height must be above 0");
-    if (surface.uvs.size() != surface.triangles.size()) return fail(ErrorCode::Usage, "a base surface needs texture coordinates for each triangle");
-    if (3 * surface.triangles.size() > kMostPieces) return fail(ErrorCode::Limit, "a base surface has at most 5 592 405 triangles");
+    if (!(height > 0) || !std::isfinite(height) || !(extent.z > 0))
+        return fail(ErrorCode::Usage, "a shell's height must be above 0");
+    if (surface.uvs.size() != surface.triangles.size())
+        return fail(ErrorCode::Usage, "a base surface needs texture coordinates for each triangle");
+    if (3 * surface.triangles.size() > kMostPieces)
+        return fail(ErrorCode::Limit, "a base surface has at most 5 592 405 triangles");
     if (!isFinite(surface)) return fail(ErrorCode::InvalidInput, "positions and texture coordinates must be finite");
     Shell shell;
     dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
     for (const auto& triangle : surface.triangles)
-        for (const uint32_t corner : triangle) low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
+        for (const uint32_t corner : triangle)
+            low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
     if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
     const std::vector<Piece> pieces = PieceMaker(surface, height, extent, shell).all();
     if (pieces.empty())
-        return fail(ErrorCode::InvalidInput, shell.flat > 0 ? "all faces lie on their own backs: the surface has no outside" : "no triangle has an area");
+        return fail(ErrorCode::InvalidInput, shell.flat > 0
+                                                 ? "all faces lie on their own backs: the surface has no outside"
+                                                 : "no triangle has an area");
     std::vector<uint32_t> order(pieces.size());
     std::iota(order.begin(), order.end(), 0u);
     shell.texels = TreeMaker(pieces, order).nodes();
@@ -263,7 +286,8 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
     for (const uint32_t i : order) append(pieces[i], extent, shell.texels);
     for (const glm::vec4& texel : shell.texels)
         if (!std::isfinite(texel.x + texel.y + texel.z + texel.w))
-            return fail(ErrorCode::InvalidInput, "positions or texture coordinates are too large or too close together for single precision");
+            return fail(ErrorCode::InvalidInput,
+                        "positions or texture coordinates are too large or too close together for single precision");
     return shell;
 }
 

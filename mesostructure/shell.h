@@ -1,14 +1,14 @@
-// The shell over a base surface that mesostructure fills: a prism a base triangle, from the base along the directions of
-// its corners (Hirche et al. 2004, Wang et al. 2004: three tetrahedra a prism, linear maps to texture space).
+// The shell over a base surface that mesostructure fills: a prism a base triangle, from the base along the directions
+// of its corners (Hirche et al. 2004, Wang et al. 2004: three tetrahedra a prism, linear maps to texture space).
 //
-// Directions are normals averaged over the triangles at a position, weighted by angle, lengthened so that the faces' offset
-// is the height. A side of a prism belongs to two prisms; its diagonal goes from the base at the corner of the lower
-// number, so both cut it alike and the shell has neither gap nor overlap. In a tetrahedron world space and tile space are
-// related linearly: straight rays stay straight, parameters scale.
+// Directions are normals averaged over the triangles at a position, weighted by angle, lengthened so that the faces'
+// offset is the height. A side of a prism belongs to two prisms; its diagonal goes from the base at the corner of the
+// lower number, so both cut it alike and the shell has neither gap nor overlap. In a tetrahedron world space and tile
+// space are related linearly: straight rays stay straight, parameters scale.
 //
 // What a map or a surface may do to a shell is counted, not refused: triangles without area are left out; where the map
-// has no area (the texture is smeared along it); mirrored maps, which need nothing; tetrahedra that are turned inside out,
-// where the surface is more sharply concave than the shell is high, so that pieces overlap and the nearest wins;
+// has no area (the texture is smeared along it); mirrored maps, which need nothing; tetrahedra that are turned inside
+// out, where the surface is more sharply concave than the shell is high, so that pieces overlap and the nearest wins;
 // tetrahedra without volume, which are left out: where faces lie on their own backs there is no outside.
 #pragma once
 
@@ -25,14 +25,16 @@ namespace vcp::meso {
 struct Shell {
     static constexpr uint32_t kNodeTexels = 2, kPieceTexels = 7, kMostInLeaf = 4, kDepth = 32;
 
-    glm::dvec3 origin{0};  ///< what all coordinates are relative to: the middle of the base
+    glm::dvec3 origin{0};        ///< what all coordinates are relative to: the middle of the base
     glm::dvec3 low{0}, high{0};  ///< of the shell, world
     uint32_t nodes = 0, pieces = 0;
-    uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0, inverted = 0, flat = 0;  ///< triangles; the last two: pieces
+    uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0, inverted = 0,
+             flat = 0;  ///< triangles; the last two: pieces
 
     /// `nodes` nodes, then `pieces` tetrahedra, as shaders read them:
     ///   node    (low, first child or first piece) (high, pieces; 0: two children, one after the other)
-    ///   piece   (v0, bits: 1 << i where the face opposite corner i is cut, kBase where the one opposite the last is the base)
+    ///   piece   (v0, bits: 1 << i where the face opposite corner i is cut, kBase where the one opposite the last is
+    ///   the base)
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
     ///           3 x (row of T, 0)                   tile space is q0 + T (p - v0); q0 is in the first tile
     /// Cut is what is on a border of the base, or where the map goes on elsewhere: solid shows its cut there.
@@ -41,7 +43,8 @@ struct Shell {
 };
 
 /// `height`: of the shell over flat parts, world units; `extent`: of the tile, tile units. Errors: Usage (heights not
-/// above 0, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not finite, also in single precision); Limit (2^24 pieces).
+/// above 0, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not finite, also in
+/// single precision); Limit (2^24 pieces).
 Result<Shell> buildShell(const BaseSurface& surface, double height, glm::dvec3 extent);
 
 }  // namespace vcp::meso

@@ -57,7 +57,8 @@ double lattice(dvec3 p, int nx, int ny, double leak, const Element& element) {
 double floorBelow(dvec3 p, double height) { return p.z - height; }
 
 double beads(dvec3 p) {
-    return std::min(floorBelow(p, 0.03), lattice(p, 4, 4, 0, [](dvec3 q, int, int) { return glm::length(q - dvec3(0, 0, 0.13)) - 0.1; }));
+    return std::min(floorBelow(p, 0.03),
+                    lattice(p, 4, 4, 0, [](dvec3 q, int, int) { return glm::length(q - dvec3(0, 0, 0.13)) - 0.1; }));
 }
 
 double ball(dvec3 p) {
@@ -77,7 +78,8 @@ double weave(dvec3 p) {
     double least = 1.0 / 8;
     for (int k = -1; k <= 1; ++k) {
         const int j = int(std::floor(8 * p.y)) + k, i = int(std::floor(8 * p.x)) + k;
-        const double alongX = middle + (j & 1 ? -swing : swing) * std::sin(8 * pi * p.x), alongY = middle - (i & 1 ? -swing : swing) * std::sin(8 * pi * p.y);
+        const double alongX = middle + (j & 1 ? -swing : swing) * std::sin(8 * pi * p.x),
+                     alongY = middle - (i & 1 ? -swing : swing) * std::sin(8 * pi * p.y);
         least = std::min(least, std::hypot(p.y - (j + 0.5) / 8, p.z - alongX) - radius);
         least = std::min(least, std::hypot(p.x - (i + 0.5) / 8, p.z - alongY) - radius);
     }
@@ -97,9 +99,9 @@ double scales(dvec3 p) {
     for (const double shift : {0.0, 0.5}) {
         const dvec3 moved = p - dvec3(shift / 4, shift / 4, 0);
         least = std::min(least, lattice(moved, 4, 4, 0.04, [&](dvec3 q, int, int) {
-            q.z -= 0.1;
-            return disc({c * q.x + s * q.z, q.y, c * q.z - s * q.x}, 0.15, 0.0055);
-        }));
+                             q.z -= 0.1;
+                             return disc({c * q.x + s * q.z, q.y, c * q.z - s * q.x}, 0.15, 0.0055);
+                         }));
     }
     return std::min(least, floorBelow(p, 0.02));
 }
@@ -112,15 +114,18 @@ double smoothMin(double a, double b, double k) {
 
 double kitten(dvec3 p) {
     const dvec3 q(p.x - std::floor(p.x), p.y - std::floor(p.y), p.z);
-    double f = capsule(q, {0.5, 0.3, 0.16}, {0.5, 0.5, 0.18}, 0.12);                 // body
-    f = smoothMin(f, glm::length(q - dvec3(0.5, 0.68, 0.24)) - 0.1, 0.05);           // head
+    double f = capsule(q, {0.5, 0.3, 0.16}, {0.5, 0.5, 0.18}, 0.12);        // body
+    f = smoothMin(f, glm::length(q - dvec3(0.5, 0.68, 0.24)) - 0.1, 0.05);  // head
     for (const double side : {-1.0, 1.0}) {
-        f = smoothMin(f, capsule(q, {0.5 + side * 0.05, 0.74, 0.3}, {0.5 + side * 0.075, 0.79, 0.37}, 0.022), 0.02);   // ears
-        f = smoothMin(f, capsule(q, {0.5 + side * 0.1, 0.52, 0.14}, {0.5 + side * 0.13, 0.66, 0.07}, 0.035), 0.04);   // forelegs
-        f = smoothMin(f, capsule(q, {0.5 + side * 0.11, 0.26, 0.12}, {0.5 + side * 0.18, 0.38, 0.07}, 0.045), 0.04);  // hind legs
+        f = smoothMin(f, capsule(q, {0.5 + side * 0.05, 0.74, 0.3}, {0.5 + side * 0.075, 0.79, 0.37}, 0.022),
+                      0.02);  // ears
+        f = smoothMin(f, capsule(q, {0.5 + side * 0.1, 0.52, 0.14}, {0.5 + side * 0.13, 0.66, 0.07}, 0.035),
+                      0.04);  // forelegs
+        f = smoothMin(f, capsule(q, {0.5 + side * 0.11, 0.26, 0.12}, {0.5 + side * 0.18, 0.38, 0.07}, 0.045),
+                      0.04);  // hind legs
     }
-    f = smoothMin(f, glm::length(q - dvec3(0.5, 0.77, 0.22)) - 0.035, 0.03);          // muzzle
-    f = smoothMin(f, capsule(q, {0.5, 0.2, 0.1}, {0.72, 0.14, 0.08}, 0.025), 0.04);   // tail
+    f = smoothMin(f, glm::length(q - dvec3(0.5, 0.77, 0.22)) - 0.035, 0.03);         // muzzle
+    f = smoothMin(f, capsule(q, {0.5, 0.2, 0.1}, {0.72, 0.14, 0.08}, 0.025), 0.04);  // tail
     f = smoothMin(f, capsule(q, {0.72, 0.14, 0.08}, {0.82, 0.24, 0.09}, 0.022), 0.02);
     return std::min({f, floorBelow(p, 0.03), 0.13});
 }
@@ -128,15 +133,18 @@ double kitten(dvec3 p) {
 double flakes(dvec3 p, uint32_t seed) {
     const double f = lattice(p, 6, 6, 0.07, [&](dvec3 q, int i, int j) {
         const double tilt = 0.25 + 0.5 * hashUnit(i, j, seed), turn = 2 * pi * hashUnit(i, j, seed + 1);
-        const double x = std::cos(turn) * q.x + std::sin(turn) * q.y, y = std::cos(turn) * q.y - std::sin(turn) * q.x, z = q.z - 0.06 - 0.06 * hashUnit(i, j, seed + 2);
-        return box({std::cos(tilt) * x + std::sin(tilt) * z, y, std::cos(tilt) * z - std::sin(tilt) * x}, {0.1, 0.06, 0.01});
+        const double x = std::cos(turn) * q.x + std::sin(turn) * q.y, y = std::cos(turn) * q.y - std::sin(turn) * q.x,
+                     z = q.z - 0.06 - 0.06 * hashUnit(i, j, seed + 2);
+        return box({std::cos(tilt) * x + std::sin(tilt) * z, y, std::cos(tilt) * z - std::sin(tilt) * x},
+                   {0.1, 0.06, 0.01});
     });
     return std::min(f, floorBelow(p, 0.03));
 }
 
 double gyroid(dvec3 p) {
     const double k = 4 * pi;
-    const dvec3 s(std::sin(k * p.x), std::sin(k * p.y), std::sin(k * p.z)), c(std::cos(k * p.x), std::cos(k * p.y), std::cos(k * p.z));
+    const dvec3 s(std::sin(k * p.x), std::sin(k * p.y), std::sin(k * p.z)),
+        c(std::cos(k * p.x), std::cos(k * p.y), std::cos(k * p.z));
     const double sheet = (std::abs(s.x * c.y + s.y * c.z + s.z * c.x) - 0.35) / (k * std::sqrt(6.0));
     return std::max(sheet, std::abs(p.z - 0.125) - 0.1);
 }
@@ -155,12 +163,14 @@ double sponge(dvec3 p) {
 double blades(dvec3 p, uint32_t seed) {
     const double f = lattice(p, 10, 10, 0.06, [&](dvec3 q, int i, int j) {
         const double lean = 0.05 * hashUnit(i, j, seed), turn = 2 * pi * hashUnit(i, j, seed + 1);
-        return capsule(q, {0, 0, 0.02}, {lean * std::cos(turn), lean * std::sin(turn), 0.15 + 0.08 * hashUnit(i, j, seed + 2)}, 0.003);
+        return capsule(q, {0, 0, 0.02},
+                       {lean * std::cos(turn), lean * std::sin(turn), 0.15 + 0.08 * hashUnit(i, j, seed + 2)}, 0.003);
     });
     return std::min(f, floorBelow(p, 0.02));
 }
 
-constexpr std::array<std::string_view, 11> kNames{"beads", "ball", "chain", "weave", "bars", "scales", "kitten", "flakes", "gyroid", "sponge", "blades"};
+constexpr std::array<std::string_view, 11> kNames{"beads",  "ball",   "chain",  "weave",  "bars",  "scales",
+                                                  "kitten", "flakes", "gyroid", "sponge", "blades"};
 
 std::function<double(dvec3)> fieldNamed(std::string_view name, uint32_t seed) {
     if (name == "beads") return beads;
@@ -211,14 +221,16 @@ private:
         if (std::abs(field_(centre)) > glm::length(half)) return false;
         if (depth == 0) return true;
         for (int octant = 0; octant < 8; ++octant) {
-            const dvec3 from(octant & 1 ? centre.x : lower.x, octant & 2 ? centre.y : lower.y, octant & 4 ? centre.z : lower.z);
+            const dvec3 from(octant & 1 ? centre.x : lower.x, octant & 2 ? centre.y : lower.y,
+                             octant & 4 ? centre.z : lower.z);
             if (mayTouch(from, from + half, depth - 1)) return true;
         }
         return false;
     }
     dvec3 normalAt(dvec3 p) const {
         constexpr double e = 1e-6;
-        const dvec3 g(field_(p + dvec3(e, 0, 0)) - field_(p - dvec3(e, 0, 0)), field_(p + dvec3(0, e, 0)) - field_(p - dvec3(0, e, 0)),
+        const dvec3 g(field_(p + dvec3(e, 0, 0)) - field_(p - dvec3(e, 0, 0)),
+                      field_(p + dvec3(0, e, 0)) - field_(p - dvec3(0, e, 0)),
                       field_(p + dvec3(0, 0, e)) - field_(p - dvec3(0, 0, e)));
         const double size = glm::length(g);
         return size > 0 ? g / size : dvec3(0, 0, 1);

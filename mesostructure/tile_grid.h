@@ -38,7 +38,8 @@ struct TileGrid {
     [[nodiscard]] glm::dvec3 extent() const { return cell * glm::dvec3(cells); }
     /// x fastest; x and y wrap, z must lie in the grid.
     [[nodiscard]] size_t index(glm::ivec3 at) const {
-        return size_t(wrapped(at.x, cells.x)) + size_t(cells.x) * (size_t(wrapped(at.y, cells.y)) + size_t(cells.y) * size_t(at.z));
+        return size_t(wrapped(at.x, cells.x)) +
+               size_t(cells.x) * (size_t(wrapped(at.y, cells.y)) + size_t(cells.y) * size_t(at.z));
     }
     [[nodiscard]] glm::ivec3 at(size_t index) const {
         const auto nx = size_t(cells.x), ny = size_t(cells.y);

@@ -2,7 +2,9 @@
 
 namespace vcp {
 
-Clearance::Clearance(int cells) : cells_(cells), side_(cells + 2) { grown_.emplace_back(static_cast<size_t>(side_) * side_, 0); }
+Clearance::Clearance(int cells) : cells_(cells), side_(cells + 2) {
+    grown_.emplace_back(static_cast<size_t>(side_) * side_, 0);
+}
 
 void Clearance::occupy(glm::ivec3 lower, int edge) {
     const uint64_t bits = columns(lower.x, edge);

@@ -23,7 +23,9 @@ public:
 private:
     void grow();
     [[nodiscard]] bool meets(const std::vector<uint64_t>& rows, glm::ivec3 lower, int edge) const;
-    [[nodiscard]] uint64_t columns(int x, int edge) const { return (edge >= 64 ? ~uint64_t{0} : (uint64_t{1} << edge) - 1) << x; }
+    [[nodiscard]] uint64_t columns(int x, int edge) const {
+        return (edge >= 64 ? ~uint64_t{0} : (uint64_t{1} << edge) - 1) << x;
+    }
     [[nodiscard]] size_t row(int y, int z) const { return static_cast<size_t>(y + 1 + side_ * (z + 1)); }
 
     int cells_, side_;

@@ -19,7 +19,8 @@ struct NodePlace {
     [[nodiscard]] glm::ivec3 lower() const { return {x, y, z}; }
     [[nodiscard]] NodePlace child(uint32_t octant) const {
         const uint16_t half = edge / 2;
-        return {static_cast<uint16_t>(x + (octant & 1u ? half : 0)), static_cast<uint16_t>(y + (octant & 2u ? half : 0)),
+        return {static_cast<uint16_t>(x + (octant & 1u ? half : 0)),
+                static_cast<uint16_t>(y + (octant & 2u ? half : 0)),
                 static_cast<uint16_t>(z + (octant & 4u ? half : 0)), half};
     }
 };
@@ -47,7 +48,7 @@ struct CodecPage {
     std::span<uint32_t> normals;
     std::vector<NodePlace> places;  ///< of `nodes`
 
-    const PageView* source = nullptr;  ///< what the encoder codes
+    const PageView* source = nullptr;                             ///< what the encoder codes
     std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: from where in `source`
 
     bool wrong = false;  ///< decoder: the bytes are no page; encoder: the page needs the plain form
@@ -64,7 +65,9 @@ struct CodecPage {
         normals = {reinterpret_cast<uint32_t*>(bytes + s.normals), header.vertices};
     }
     /// The word of node i where the page comes from; 0 for the decoder.
-    [[nodiscard]] uint32_t sourceWord(size_t i) const { return source != nullptr ? source->nodes[size_t{8} * groupSource[i / 8] + i % 8] : 0u; }
+    [[nodiscard]] uint32_t sourceWord(size_t i) const {
+        return source != nullptr ? source->nodes[size_t{8} * groupSource[i / 8] + i % 8] : 0u;
+    }
 
     /// Calls `visit(word, source word, place)` for the root and every node, in order, until something is wrong.
     template <class Visit>

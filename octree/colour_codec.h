@@ -5,9 +5,9 @@
 #include <array>
 
 #include "octree/codec_page.h"
+#include "octree/corner_store.h"
 #include "octree/face_codec.h"
 #include "octree/leaf_triangles.h"
-#include "octree/corner_store.h"
 #include "octree/range_coder.h"
 
 namespace vcp {
@@ -17,7 +17,13 @@ class ColourCodec {
 public:
     /// `faces`, `vertices`: of `page`; read by the encoder, filled by the decoder.
     ColourCodec(Coder& coder, const PageView& page, std::span<uint4> faces, std::span<uint32_t> vertices)
-        : coder_(coder), page_(page), faces_(faces), vertices_(vertices), corners_(1 << page.header.log2Cells), faceDone_(faces.size(), 0), vertexDone_(vertices.size(), 0) {}
+        : coder_(coder),
+          page_(page),
+          faces_(faces),
+          vertices_(vertices),
+          corners_(1 << page.header.log2Cells),
+          faceDone_(faces.size(), 0),
+          vertexDone_(vertices.size(), 0) {}
 
     /// False when the page has faces or vertices that no leaf uses: their colours would be lost.
     bool run() {
@@ -39,7 +45,8 @@ private:
             if (faceDone_[face]) continue;
             faceDone_[face] = 1;
             ++used_;
-            for (int c = 0; c < 4; ++c) codeCorner(place.lower() + int{place.edge} * faceCorner(axis, end, c), place.edge, faces_[face][c]);
+            for (int c = 0; c < 4; ++c)
+                codeCorner(place.lower() + int{place.edge} * faceCorner(axis, end, c), place.edge, faces_[face][c]);
         }
     }
 
@@ -48,8 +55,10 @@ private:
         if (here.known) {
             bool same = colour == here.colour;
             coder_.bit(same_, same);
-            if (same) colour = here.colour;
-            else codeColour(colour, here.colour, 0);
+            if (same)
+                colour = here.colour;
+            else
+                codeColour(colour, here.colour, 0);
         } else {
             std::array<uint32_t, 4> sum{};
             uint32_t count = 0;
@@ -70,7 +79,8 @@ private:
     void codeTriangles(TriangleRange range) {
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             const glm::u32vec2 record = page_.triangles[t];
-            const std::array<uint32_t, 3> v{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y), f64::decodeIndex2(record.y)};
+            const std::array<uint32_t, 3> v{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
+                                            f64::decodeIndex2(record.y)};
             for (const uint32_t vertex : v) {
                 if (vertexDone_[vertex]) continue;
                 std::array<uint32_t, 4> sum{};

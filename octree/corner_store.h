@@ -12,7 +12,9 @@
 
 namespace vcp {
 
-inline uint64_t positionKey(glm::ivec3 p) { return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << 16 | uint64_t(uint32_t(p.z)) << 32; }
+inline uint64_t positionKey(glm::ivec3 p) {
+    return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << 16 | uint64_t(uint32_t(p.z)) << 32;
+}
 
 /// Positions from 0 to the page's edge. `Value` is default for a corner not met before.
 template <class Value>
@@ -20,7 +22,10 @@ class CornerStore {
 public:
     /// `cells`: of the page's edge.
     explicit CornerStore(int cells)
-        : side_(cells + 1), number_(cells <= kMaxArrayCells ? static_cast<size_t>(side_) * side_ * side_ : 0, 0), within_(16), values_(1) {}
+        : side_(cells + 1),
+          number_(cells <= kMaxArrayCells ? static_cast<size_t>(side_) * side_ * side_ : 0, 0),
+          within_(16),
+          values_(1) {}
 
     /// Valid until the next at().
     Value& at(glm::ivec3 p) {
@@ -33,7 +38,8 @@ public:
     }
     /// A default value where nothing was met. Positions may be beyond the page's edge.
     const Value& find(glm::ivec3 p) {
-        if (std::min(p.x, std::min(p.y, p.z)) < 0 || std::max(p.x, std::max(p.y, p.z)) >= kSubcellsPerCell * side_) return values_[0];
+        if (std::min(p.x, std::min(p.y, p.z)) < 0 || std::max(p.x, std::max(p.y, p.z)) >= kSubcellsPerCell * side_)
+            return values_[0];
         if (inArray(p)) return values_[number_[index(p)]];
         const uint32_t* number = within_.find(positionKey(p));
         return values_[number == nullptr ? 0 : *number];
@@ -61,9 +67,12 @@ public:
 private:
     static constexpr int kMaxArrayCells = 64;
 
-    [[nodiscard]] bool inArray(glm::ivec3 p) const { return !number_.empty() && ((p.x | p.y | p.z) & (kSubcellsPerCell - 1)) == 0; }
+    [[nodiscard]] bool inArray(glm::ivec3 p) const {
+        return !number_.empty() && ((p.x | p.y | p.z) & (kSubcellsPerCell - 1)) == 0;
+    }
     [[nodiscard]] size_t index(glm::ivec3 p) const {
-        return static_cast<size_t>((p.x >> kMaxSubcellDepth) + side_ * ((p.y >> kMaxSubcellDepth) + side_ * (p.z >> kMaxSubcellDepth)));
+        return static_cast<size_t>((p.x >> kMaxSubcellDepth) +
+                                   side_ * ((p.y >> kMaxSubcellDepth) + side_ * (p.z >> kMaxSubcellDepth)));
     }
 
     int side_;

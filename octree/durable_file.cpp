@@ -1,11 +1,11 @@
 #include "octree/durable_file.h"
 
-#include <cerrno>
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <system_error>
 #include <unistd.h>
+#include <cerrno>
+#include <system_error>
 
 namespace vcp {
 
@@ -13,7 +13,8 @@ namespace {
 
 /// Calls `write(bytes)`, which says how many it took, until all are taken.
 template <class Write>
-Result<void> untilAllAreTaken(std::span<const std::byte> bytes, const std::filesystem::path& file, const char* whenFull, const Write& write) {
+Result<void> untilAllAreTaken(std::span<const std::byte> bytes, const std::filesystem::path& file, const char* whenFull,
+                              const Write& write) {
     while (!bytes.empty()) {
         const ssize_t n = write(bytes);
         if (n < 0 && errno == EINTR) continue;
@@ -32,15 +33,19 @@ Error systemError(const std::filesystem::path& file, const char* what, int code,
     return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()};
 }
 
-Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes, const std::filesystem::path& file, const char* whenFull) {
+Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes,
+                      const std::filesystem::path& file, const char* whenFull) {
     const uint64_t end = offset + bytes.size();
     return untilAllAreTaken(bytes, file, whenFull, [&](std::span<const std::byte> left) {
         return ::pwrite(descriptor, left.data(), left.size(), static_cast<off_t>(end - left.size()));
     });
 }
 
-Result<void> appendAll(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& file, const char* whenFull) {
-    return untilAllAreTaken(bytes, file, whenFull, [&](std::span<const std::byte> left) { return ::write(descriptor, left.data(), left.size()); });
+Result<void> appendAll(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& file,
+                       const char* whenFull) {
+    return untilAllAreTaken(bytes, file, whenFull, [&](std::span<const std::byte> left) {
+        return ::write(descriptor, left.data(), left.size());
+    });
 }
 
 Result<void> syncFolder(const std::filesystem::path& folder) {
@@ -56,8 +61,10 @@ Result<void> syncFolder(const std::filesystem::path& folder) {
 
 NameLock lockName(int descriptor, const std::filesystem::path& path) {
     if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return NameLock::Held;
-    struct stat opened {}, named {};
-    const bool isSame = ::fstat(descriptor, &opened) == 0 && ::stat(path.c_str(), &named) == 0 && opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+    struct stat opened {
+    }, named{};
+    const bool isSame = ::fstat(descriptor, &opened) == 0 && ::stat(path.c_str(), &named) == 0 &&
+                        opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
     return isSame ? NameLock::Taken : NameLock::Gone;
 }
 

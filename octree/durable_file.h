@@ -19,10 +19,12 @@ inline constexpr const char* kWhenFull = "free some space or choose another fold
 Error systemError(const std::filesystem::path& file, const char* what, int code, const char* whenFull = kWhenFull);
 
 /// Writes all of `bytes` at `offset` of a descriptor, however often it is interrupted. Errors: Io, naming `file`.
-Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes, const std::filesystem::path& file, const char* whenFull = kWhenFull);
+Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes,
+                      const std::filesystem::path& file, const char* whenFull = kWhenFull);
 
 /// The same where the descriptor stands: a file opened with O_APPEND, a pipe.
-Result<void> appendAll(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& file, const char* whenFull = kWhenFull);
+Result<void> appendAll(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& file,
+                       const char* whenFull = kWhenFull);
 
 /// Makes durable what was created, renamed or removed in a folder; an empty path is the current one. On file systems
 /// that cannot, nothing is done. Errors: Io, naming `folder`.

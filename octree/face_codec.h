@@ -24,7 +24,8 @@ inline glm::ivec3 faceCorner(uint32_t axis, int end, int c) {
 template <class Coder>
 class FaceCodec {
 public:
-    FaceCodec(Coder& coder, CodecPage& page) : coder_(coder), page_(page), leaves_(page.header.softLeaves), corners_(1 << page.header.log2Cells) {}
+    FaceCodec(Coder& coder, CodecPage& page)
+        : coder_(coder), page_(page), leaves_(page.header.softLeaves), corners_(1 << page.header.log2Cells) {}
 
     /// Completes the words of soft leaves and fills the faces.
     void run() {
@@ -34,7 +35,8 @@ public:
             if (nodeType(word) != kNodeSoft) return;
             order.push_back({&word, source, place});
         });
-        for (uint32_t i = 0; i < order.size(); ++i) leaves_.findOrAdd(leafKey(order[i].place.lower(), order[i].place.edge)) = i;
+        for (uint32_t i = 0; i < order.size(); ++i)
+            leaves_.findOrAdd(leafKey(order[i].place.lower(), order[i].place.edge)) = i;
         done_.assign(order.size(), 0);
         for (uint32_t i = 0; i < order.size() && !page_.wrong; ++i)
             if (!done_[i]) codeRun(order, i);
@@ -48,14 +50,16 @@ private:
         NodePlace place;
     };
     struct Corner {
-        uint32_t code = 0;  ///< its side turned as flip_ said
-        int edge = 0;       ///< of the leaf it was coded for; 0: not coded
+        uint32_t code = 0;       ///< its side turned as flip_ said
+        int edge = 0;            ///< of the leaf it was coded for; 0: not coded
         glm::i16vec3 normal{0};  ///< of `code`, on the side of the corner or the other; in 1/4096
     };
     /// A direction in 1/4096.
     using Direction = glm::ivec3;
 
-    static uint64_t leafKey(glm::ivec3 lower, int edge) { return positionKey(lower) | uint64_t(std::countr_zero(static_cast<unsigned>(edge))) << 48; }
+    static uint64_t leafKey(glm::ivec3 lower, int edge) {
+        return positionKey(lower) | uint64_t(std::countr_zero(static_cast<unsigned>(edge))) << 48;
+    }
 
     void codeRun(std::vector<Leaf>& order, uint32_t first) {
         uint32_t axis = order[first].source >> kSoftAxisShift & 3u;
@@ -75,7 +79,8 @@ private:
             bool goesOn = false;
             if (next != nullptr && !done_[*next]) {
                 const uint32_t word = order[*next].source;
-                goesOn = Coder::kEncodes && (word >> kSoftAxisShift & 3u) == axis && (word & kLeafIndexMask) == sourceFace + 1;
+                goesOn = Coder::kEncodes && (word >> kSoftAxisShift & 3u) == axis &&
+                         (word & kLeafIndexMask) == sourceFace + 1;
                 coder_.bit(goesOn_, goesOn);
             }
             ++sourceFace;
@@ -114,8 +119,10 @@ private:
         }
         for (int c = 0; c < 4; ++c) {
             uint32_t code = face[c];
-            if (known[c] && asExpected) code = expected[c];
-            else codeCorner(position[c], place.edge, code);
+            if (known[c] && asExpected)
+                code = expected[c];
+            else
+                codeCorner(position[c], place.edge, code);
             face[c] = code;
         }
     }
@@ -147,7 +154,7 @@ private:
         Direction normal{0};
         int distance = 0;
         int neighbours = 0;
-        int along = 0;  ///< sum over neighbours of distance without the corner's own normal
+        int along = 0;         ///< sum over neighbours of distance without the corner's own normal
         glm::ivec3 offset{0};  ///< sum of the offsets from the neighbours, in leaf edges
         bool same = false;     ///< the corner itself is known, but for rounding
     };
@@ -175,7 +182,10 @@ private:
 
     void codeNew(uint32_t& code, const Foretold& f, glm::ivec3 position, int edge) {
         // The side, then the direction, then the distance: each helps with the next.
-        const int certainty = f.neighbours == 0 ? 0 : std::min(4, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(f.distance) / 32))) + 1);
+        const int certainty =
+            f.neighbours == 0
+                ? 0
+                : std::min(4, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(f.distance) / 32))) + 1);
         uint32_t side = code >> 31;
         codeSide(side, f.distance < 0 ? 1u : 0u, sideNew_[certainty], false);
         const bool negative = (side ^ flip_) != 0;
@@ -186,7 +196,8 @@ private:
         int foretold = f.distance;
         const Direction n = oriented(u << 11 | v << 21 | (negative ? 0x80000000u : 0u));
         if (f.neighbours > 0 && !f.same) {
-            foretold = (f.along + (steps(n.x) * f.offset.x + steps(n.y) * f.offset.y + steps(n.z) * f.offset.z) / 2) / f.neighbours;
+            foretold = (f.along + (steps(n.x) * f.offset.x + steps(n.y) * f.offset.y + steps(n.z) * f.offset.z) / 2) /
+                       f.neighbours;
         }
         if (negative) foretold = -foretold;
         foretold = std::clamp(foretold, 0, static_cast<int>(kPackedDistanceMax));
@@ -221,15 +232,20 @@ private:
         if (std::min(point.x, point.y) < 0 || std::max(point.x, point.y) > 1023) page_.wrong = true;
         u = static_cast<uint32_t>(point.x) & 1023u;
         v = static_cast<uint32_t>(point.y) & 1023u;
-        return std::max(size, static_cast<uint32_t>(std::min(3, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(dv)))) / 2)));
+        return std::max(size, static_cast<uint32_t>(std::min(
+                                  3, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(dv)))) / 2)));
     }
 
     // Points beyond an edge of the octahedron's square lie on the other half of that edge.
     static glm::ivec2 folded(glm::ivec2 p) {
-        if (p.x < 0) p = {-p.x, 1023 - p.y};
-        else if (p.x > 1023) p = {2046 - p.x, 1023 - p.y};
-        if (p.y < 0) p = {1023 - p.x, -p.y};
-        else if (p.y > 1023) p = {1023 - p.x, 2046 - p.y};
+        if (p.x < 0)
+            p = {-p.x, 1023 - p.y};
+        else if (p.x > 1023)
+            p = {2046 - p.x, 1023 - p.y};
+        if (p.y < 0)
+            p = {1023 - p.x, -p.y};
+        else if (p.y > 1023)
+            p = {1023 - p.x, 2046 - p.y};
         return p;
     }
     /// The nearest of a point's places beyond the edges.
@@ -281,7 +297,8 @@ private:
     /// A corner's vector in the unit of another leaf.
     static uint32_t rescaled(const Corner& corner, int edge) {
         if (corner.edge == edge) return corner.code;
-        const uint32_t d = (corner.code & kPackedDistanceMax) * static_cast<uint32_t>(corner.edge) / static_cast<uint32_t>(edge);
+        const uint32_t d =
+            (corner.code & kPackedDistanceMax) * static_cast<uint32_t>(corner.edge) / static_cast<uint32_t>(edge);
         return (corner.code & ~kPackedDistanceMax) | std::min(d, kPackedDistanceMax);
     }
 

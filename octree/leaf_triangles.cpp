@@ -58,7 +58,11 @@ bool CubeTest::touches(glm::i32vec3 lower, int edge) {
 }
 
 NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)
-    : nodes_(nodes), cells_(1 << log2Cells), log2Cells_(static_cast<int>(log2Cells)), word_(size_t{1} << (3 * log2Cells), kNodeEmpty << kNodeTypeShift), size_(word_.size()) {
+    : nodes_(nodes),
+      cells_(1 << log2Cells),
+      log2Cells_(static_cast<int>(log2Cells)),
+      word_(size_t{1} << (3 * log2Cells), kNodeEmpty << kNodeTypeShift),
+      size_(word_.size()) {
     fillCells(root, glm::i32vec3(0), log2Cells);
 }
 
@@ -67,7 +71,8 @@ void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge)
     if (word >> kNodeTypeShift == kNodeInternal && log2Edge > 0) {
         const uint32_t* child = &nodes_[size_t{8} * (word & kNodePayloadMask)];
         for (int o = 0; o < 8; ++o)
-            if (child[o] >> kNodeTypeShift != kNodeEmpty) fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
+            if (child[o] >> kNodeTypeShift != kNodeEmpty)
+                fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
         return;
     }
     for (int z = lower.z; z < lower.z + edge; ++z)

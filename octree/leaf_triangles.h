@@ -59,9 +59,12 @@ public:
 
 private:
     void fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge);
-    [[nodiscard]] size_t cell(int x, int y, int z) const { return static_cast<size_t>(x + (y << log2Cells_)) + (static_cast<size_t>(z) << (2 * log2Cells_)); }
+    [[nodiscard]] size_t cell(int x, int y, int z) const {
+        return static_cast<size_t>(x + (y << log2Cells_)) + (static_cast<size_t>(z) << (2 * log2Cells_));
+    }
     template <class Found>
-    uint64_t withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t word, glm::i32vec3 lower, Found&& found) const;
+    uint64_t withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t word, glm::i32vec3 lower,
+                        Found&& found) const;
 
     std::span<const uint32_t> nodes_;
     int cells_, log2Cells_;
@@ -91,8 +94,12 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
                 if (type == kNodeHard) {
                     // A larger leaf is looked at in the first of its cells that come up.
                     const int size = size_[cell(x, y, z)], rest = (1 << size) - 1;
-                    if ((x > first.x && (x & rest) != 0) || (y > first.y && (y & rest) != 0) || (z > first.z && (z & rest) != 0)) continue;
-                    if (test.touches(kLatticePerCell * glm::i32vec3(x & ~rest, y & ~rest, z & ~rest), kLatticePerCell << size)) found(word);
+                    if ((x > first.x && (x & rest) != 0) || (y > first.y && (y & rest) != 0) ||
+                        (z > first.z && (z & rest) != 0))
+                        continue;
+                    if (test.touches(kLatticePerCell * glm::i32vec3(x & ~rest, y & ~rest, z & ~rest),
+                                     kLatticePerCell << size))
+                        found(word);
                 } else if (type == kNodeInternal) {
                     visits += withinCell(test, low, high, word, kLatticePerCell * glm::i32vec3(x, y, z), found);
                 }
@@ -101,7 +108,8 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
 }
 
 template <class Found>
-uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t top, glm::i32vec3 corner, Found&& found) const {
+uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t top, glm::i32vec3 corner,
+                                Found&& found) const {
     struct Visit {
         uint32_t word;
         int edge;
@@ -128,7 +136,8 @@ uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 h
         const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);
         for (uint32_t octants = x & y & z; octants != 0; octants &= octants - 1) {
             const int o = std::countr_zero(octants);
-            stack[waiting++] = {nodes_[size_t{8} * group + static_cast<uint32_t>(o)], half, v.lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2)};
+            stack[waiting++] = {nodes_[size_t{8} * group + static_cast<uint32_t>(o)], half,
+                                v.lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2)};
         }
     }
     return visits;

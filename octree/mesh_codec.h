@@ -20,7 +20,11 @@ template <class Coder>
 class MeshCodec {
 public:
     MeshCodec(Coder& coder, CodecPage& page)
-        : coder_(coder), page_(page), hardLeaves_(numberLeaves(page)), places_(page.header.root, page.nodes, page.header.log2Cells), front_(page.header.vertices) {}
+        : coder_(coder),
+          page_(page),
+          hardLeaves_(numberLeaves(page)),
+          places_(page.header.root, page.nodes, page.header.log2Cells),
+          front_(page.header.vertices) {}
 
     void run() {
         uint32_t count = 0;
@@ -125,12 +129,16 @@ private:
             bool fresh = t[i] == kNone;
             coder_.bit(seedFresh_[i], fresh);
             if (!fresh) {
-                if (positions_.empty()) page_.wrong = true;
-                else codeKnown(t[i]);
+                if (positions_.empty())
+                    page_.wrong = true;
+                else
+                    codeKnown(t[i]);
                 continue;
             }
             t[i] = static_cast<uint32_t>(positions_.size());
-            const glm::i32vec3 near = i > 0 ? positions_[t[0]] : positions_.empty() ? glm::i32vec3(0) : positions_.back();
+            const glm::i32vec3 near = i > 0                ? positions_[t[0]]
+                                      : positions_.empty() ? glm::i32vec3(0)
+                                                           : positions_.back();
             glm::i32vec3 more(0);
             if constexpr (Coder::kEncodes) more = source_.take(old[i], t[i]) - near;
             for (int axis = 0; axis < 3; ++axis) seedVertex_[i > 0 ? 1 : 0].code(coder_, more[axis]);
@@ -155,7 +163,8 @@ private:
         const WideVector n = areaNormal(a, b, o);
         const WideVector m(std::abs(n.x), std::abs(n.y), std::abs(n.z));
         const int k = m.x >= m.y && m.x >= m.z ? 0 : m.y >= m.z ? 1 : 2, i = (k + 1) % 3, j = (k + 2) % 3;
-        const uint32_t scale = static_cast<uint32_t>(std::clamp(static_cast<int>(std::bit_width(static_cast<uint32_t>(size))) - 7, 0, 5));
+        const uint32_t scale =
+            static_cast<uint32_t>(std::clamp(static_cast<int>(std::bit_width(static_cast<uint32_t>(size))) - 7, 0, 5));
         const std::array<bool, 3> known = codeLevel(gate, foretold, more);
         if (!known[static_cast<size_t>(i)]) vertex_[scale][0].code(coder_, more[i]);
         const uint32_t spread = category(more[i], scale);
@@ -163,7 +172,10 @@ private:
         if (!known[static_cast<size_t>(k)]) {
             // Where the surface goes on flat, the third coordinate follows from the two.
             int32_t flat = 0;
-            if (size <= kFlatSteps && n[k] != 0) flat = static_cast<int32_t>(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) + n[j] * std::clamp(more[j], -kFlatSteps, kFlatSteps)) / n[k]);
+            if (size <= kFlatSteps && n[k] != 0)
+                flat = static_cast<int32_t>(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) +
+                                              n[j] * std::clamp(more[j], -kFlatSteps, kFlatSteps)) /
+                                            n[k]);
             int32_t rest = more[k] - flat;
             height_[scale][std::max(spread, category(more[j], scale))].code(coder_, rest);
             more[k] = rest + flat;
@@ -185,7 +197,9 @@ private:
         std::array<bool, 3> known{};
         if (!any) return known;
         for (int axis = 0; axis < 3; ++axis) {
-            const uint32_t ends = (corner[0][axis] == corner[1][axis] ? 1u : 0u) | (corner[0][axis] == corner[2][axis] ? 2u : 0u) | (corner[1][axis] == corner[2][axis] ? 4u : 0u);
+            const uint32_t ends = (corner[0][axis] == corner[1][axis] ? 1u : 0u) |
+                                  (corner[0][axis] == corner[2][axis] ? 2u : 0u) |
+                                  (corner[1][axis] == corner[2][axis] ? 4u : 0u);
             coder_.symbol(level_[ends], which[axis]);
             if (which[axis] > 3) page_.wrong = true;
             known[static_cast<size_t>(axis)] = which[axis] != 0;
@@ -196,7 +210,8 @@ private:
 
     /// How far off a prediction was, 0 to 3, against the edges' size.
     static uint32_t category(int32_t more, uint32_t scale) {
-        const int bits = static_cast<int>(std::bit_width(static_cast<uint32_t>(std::abs(more)))) - static_cast<int>(scale) - 3;
+        const int bits =
+            static_cast<int>(std::bit_width(static_cast<uint32_t>(std::abs(more)))) - static_cast<int>(scale) - 3;
         return static_cast<uint32_t>(std::clamp(bits, 0, 3));
     }
     static int32_t largest(glm::i32vec3 v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
@@ -204,11 +219,13 @@ private:
     void place(glm::i32vec3 position) {
         const uint32_t number = static_cast<uint32_t>(positions_.size());
         const glm::i32vec3 p = position + kLatticeBias;
-        if (number >= page_.header.vertices || std::min(p.x, std::min(p.y, p.z)) < 0 || std::max(p.x, std::max(p.y, p.z)) > static_cast<int>(kField21Mask)) {
+        if (number >= page_.header.vertices || std::min(p.x, std::min(p.y, p.z)) < 0 ||
+            std::max(p.x, std::max(p.y, p.z)) > static_cast<int>(kField21Mask)) {
             page_.wrong = true;
             return;
         }
-        page_.vertices[number] = pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
+        page_.vertices[number] =
+            pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
         positions_.push_back(position);
         inHard_.push_back(places_.typeAt(position) == kNodeHard ? 1 : 0);
     }
@@ -241,7 +258,10 @@ private:
         uint64_t work = uint64_t{256} * page_.header.triangles + 65536;
         for (uint32_t t = 0; t < triangles_.size(); ++t) {
             const auto& [a, b, c] = triangles_[t];
-            const uint64_t visits = places_.hardLeavesOf({positions_[a], positions_[b], positions_[c]}, [&](uint32_t word) { entries.push_back({word & kNodePayloadMask, t}); });
+            const uint64_t visits =
+                places_.hardLeavesOf({positions_[a], positions_[b], positions_[c]}, [&](uint32_t word) {
+                    entries.push_back({word & kNodePayloadMask, t});
+                });
             if (entries.size() > page_.header.triangles || visits > work) {
                 page_.wrong = true;
                 return;
@@ -256,7 +276,8 @@ private:
             const uint32_t count = begin[(word & kNodePayloadMask) + 1];
             const bool isLong = count >= kHardCountLong;
             const uint64_t end = uint64_t{records} + count + (isLong ? 1 : 0);
-            if (count == 0 || end > page_.header.triangles || (Coder::kEncodes && hardLeafTriangles(*page_.source, source).count != count)) {
+            if (count == 0 || end > page_.header.triangles ||
+                (Coder::kEncodes && hardLeafTriangles(*page_.source, source).count != count)) {
                 page_.wrong = true;
                 return;
             }
@@ -267,7 +288,9 @@ private:
         });
         if (records != page_.header.triangles) page_.wrong = true;
         if (page_.wrong) return;
-        for (const Entry& e : entries) page_.triangles[begin[e.leaf]++] = pack21(triangles_[e.triangle][0], triangles_[e.triangle][1], triangles_[e.triangle][2]);
+        for (const Entry& e : entries)
+            page_.triangles[begin[e.leaf]++] =
+                pack21(triangles_[e.triangle][0], triangles_[e.triangle][1], triangles_[e.triangle][2]);
         if constexpr (Coder::kEncodes) verify(entries);
     }
 
@@ -328,7 +351,8 @@ private:
         bool other = point.u != foretold.u || point.v != foretold.v;
         coder_.bit(otherNormal_[inHard_[v]], other);
         if (other) {
-            int32_t du = static_cast<int32_t>(point.u) - static_cast<int32_t>(foretold.u), dv = static_cast<int32_t>(point.v) - static_cast<int32_t>(foretold.v);
+            int32_t du = static_cast<int32_t>(point.u) - static_cast<int32_t>(foretold.u),
+                    dv = static_cast<int32_t>(point.v) - static_cast<int32_t>(foretold.v);
             const uint32_t context = (crease != 0 ? 1u : 0u) + (bent ? 2u : 0u);
             normal_[context].code(coder_, du);
             normal_[4 + context].code(coder_, dv);
@@ -350,7 +374,7 @@ private:
     uint32_t hardLeaves_;
     NodePlaces places_;
     TriangleFront front_;
-    MeshSource source_;  ///< the encoder's
+    MeshSource source_;                    ///< the encoder's
     std::vector<glm::i32vec3> positions_;  ///< of vertices, lattice, from the page's lowest corner
     std::vector<uint8_t> inHard_;          ///< vertices in hard leaves
     std::vector<Index3> triangles_;

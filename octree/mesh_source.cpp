@@ -22,7 +22,8 @@ void MeshSource::collect(const PageView& page) {
         const TriangleRange range = hardLeafTriangles(page, word);
         for (uint32_t r = range.first; r < range.first + range.count; ++r) {
             const glm::u32vec2 record = page.triangles[r];
-            const Index3 t{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y), f64::decodeIndex2(record.y)};
+            const Index3 t{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
+                           f64::decodeIndex2(record.y)};
             if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) wrong_ = true;
             const uint64_t key = uint64_t{t[0]} << 42 | uint64_t{t[1]} << 21 | t[2];
             uint32_t& number = numbers.findOrAdd(key);  // plus 1
@@ -69,7 +70,8 @@ glm::i32vec3 MeshSource::take(uint32_t vertex, uint32_t number) {
     newVertex_[vertex] = number;
     oldVertex_.push_back(vertex);
     const glm::u32vec2 p = positions_[vertex];
-    return glm::i32vec3(glm::u32vec3(f64::decodeIndex0(p.x), f64::decodeIndex1(p.x, p.y), f64::decodeIndex2(p.y))) - kLatticeBias;
+    return glm::i32vec3(glm::u32vec3(f64::decodeIndex0(p.x), f64::decodeIndex1(p.x, p.y), f64::decodeIndex2(p.y))) -
+           kLatticeBias;
 }
 
 uint32_t MeshSource::nextSeed() {

@@ -50,7 +50,7 @@ private:
     bool wrong_ = false;
     std::span<const glm::u32vec2> positions_;
     std::vector<Index3> vertices_;
-    std::vector<uint32_t> triangleOf_;   ///< by record
+    std::vector<uint32_t> triangleOf_;  ///< by record
     std::vector<uint32_t> newTriangle_, newVertex_, oldVertex_;
     std::vector<uint32_t> begin_, around_;  ///< triangles around each vertex
     uint32_t third_ = kNone, seed_ = 0;

@@ -42,7 +42,8 @@ private:
         // The parent's neighbours that are not empty: lower and upper by axis.
         uint32_t beside[3][2];
         for (int axis = 0; axis < 3; ++axis)
-            for (int end = 0; end < 2; ++end) beside[axis][end] = typeBeside(parent, depth - 1, axis, end != 0) != kNodeEmpty ? 1u : 0u;
+            for (int end = 0; end < 2; ++end)
+                beside[axis][end] = typeBeside(parent, depth - 1, axis, end != 0) != kNodeEmpty ? 1u : 0u;
         for (uint32_t o = 0; o < 8; ++o) {
             const size_t i = size_t{8} * g + o;
             page_.places[i] = parent.child(o);
@@ -70,7 +71,9 @@ private:
         const int n = 1 << depth;
         glm::ivec3 p = place.lower() / int{place.edge};
         p[axis] += upper ? 1 : -1;
-        return p[axis] < 0 || p[axis] >= n ? kNodeEmpty : grid_[static_cast<size_t>(depth)][static_cast<size_t>(p.x + n * (p.y + n * p.z))];
+        return p[axis] < 0 || p[axis] >= n
+                   ? kNodeEmpty
+                   : grid_[static_cast<size_t>(depth)][static_cast<size_t>(p.x + n * (p.y + n * p.z))];
     }
 
     uint32_t node(uint32_t source, const NodePlace& place, int depth, uint32_t context) {
@@ -108,12 +111,15 @@ private:
             const glm::ivec3 low = place.lower() / edge, high = low + std::max(1, place.edge / edge);
             for (int z = low.z; z < high.z; ++z)
                 for (int y = low.y; y < high.y; ++y)
-                    for (int x = low.x; x < high.x; ++x) grid_[static_cast<size_t>(d)][static_cast<size_t>(x + n * (y + n * z))] = static_cast<uint8_t>(type);
+                    for (int x = low.x; x < high.x; ++x)
+                        grid_[static_cast<size_t>(d)][static_cast<size_t>(x + n * (y + n * z))] =
+                            static_cast<uint8_t>(type);
         }
     }
 
     uint32_t codes(uint32_t source, const NodePlace& place) {
-        const int size = std::min(3, static_cast<int>(std::bit_width(static_cast<unsigned>(place.edge / kSubcellsPerCell))));
+        const int size =
+            std::min(3, static_cast<int>(std::bit_width(static_cast<unsigned>(place.edge / kSubcellsPerCell))));
         uint32_t wall = source >> kSoftWallShift & kSoftWallMask, dip = source >> kSoftDipShift & 3u;
         coder_.symbol(dip_[size][lastDip_], dip);
         if (dip > 3u) page_.wrong = true;
@@ -132,11 +138,14 @@ private:
         if (foretold)
             page_.forEachNode([&](uint32_t word, uint32_t, const NodePlace& place) {
                 const bool leaf = nodeType(word) == kNodeSoft || nodeType(word) == kNodeHard;
-                if (leaf) clearance.occupy(place.lower() / kSubcellsPerCell, std::max(1, place.edge / kSubcellsPerCell));
+                if (leaf)
+                    clearance.occupy(place.lower() / kSubcellsPerCell, std::max(1, place.edge / kSubcellsPerCell));
             });
         page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace& place) {
             if (nodeType(word) != kNodeEmpty) return;
-            const int least = foretold && place.edge >= kSubcellsPerCell ? clearance.of(place.lower() / kSubcellsPerCell, place.edge / kSubcellsPerCell) : 0;
+            const int least = foretold && place.edge >= kSubcellsPerCell
+                                  ? clearance.of(place.lower() / kSubcellsPerCell, place.edge / kSubcellsPerCell)
+                                  : 0;
             const int foretoldValue = least * static_cast<int>(kClearancePerCell);
             int32_t more = static_cast<int32_t>(source & kNodePayloadMask) - foretoldValue;
             const size_t size = place.edge >= kSubcellsPerCell ? 0 : 1;
@@ -149,8 +158,8 @@ private:
 
     Coder& coder_;
     CodecPage& page_;
-    std::vector<uint8_t> depth_;      ///< by group: of its nodes
-    std::vector<NodePlace> parents_;  ///< by group
+    std::vector<uint8_t> depth_;              ///< by group: of its nodes
+    std::vector<NodePlace> parents_;          ///< by group
     std::vector<std::vector<uint8_t>> grid_;  ///< by depth: types of the nodes, leaves repeated below
     uint32_t groupsMade_ = 0, last_ = 0, lastWall_ = 0, lastDip_ = 0;
     BitModel occupied_[3][64];

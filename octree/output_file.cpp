@@ -1,13 +1,13 @@
 #include "octree/output_file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,19 +31,22 @@ struct KindName {
 constexpr KindName kKinds[] = {
     {OutputKind::Dataset, ".vcp", "a dataset"}, {OutputKind::Asset, ".meso", "a mesostructure asset"},
     {OutputKind::Png, ".png", "a PNG"},         {OutputKind::Pfm, ".pfm", "a PFM"},
-    {OutputKind::JsonText, ".json", "JSON"},        {OutputKind::Svg, ".svg", "an SVG"},
+    {OutputKind::JsonText, ".json", "JSON"},    {OutputKind::Svg, ".svg", "an SVG"},
     {OutputKind::Text, ".csv", "text"},         {OutputKind::Text, ".md", "text"},
     {OutputKind::Ply, ".ply", "a PLY mesh"},    {OutputKind::Obj, ".obj", "an OBJ mesh"},
 };
 
 const char* wordsFor(OutputKind kind) {
-    return std::find_if(std::begin(kKinds), std::end(kKinds), [&](const KindName& each) { return each.kind == kind; })->words;
+    return std::find_if(std::begin(kKinds), std::end(kKinds), [&](const KindName& each) { return each.kind == kind; })
+        ->words;
 }
 
 /// Datasets and assets: their header is written last, so that a mark can stand in its place until then.
 bool isMarked(OutputKind kind) { return kind == OutputKind::Dataset || kind == OutputKind::Asset; }
 
-Error ioError(const fs::path& file, std::string message) { return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()}; }
+Error ioError(const fs::path& file, std::string message) {
+    return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()};
+}
 
 /// The first bytes of a file that is open.
 std::vector<std::byte> startOf(int descriptor) {
@@ -73,29 +76,40 @@ Result<fs::path> followed(const fs::path& path) {
 }
 
 const char* wordsFor(mode_t mode) {
-    return S_ISDIR(mode) ? "a folder" : S_ISCHR(mode) || S_ISBLK(mode) ? "a device" : S_ISFIFO(mode) ? "a pipe" : S_ISSOCK(mode) ? "a socket" : "no regular file";
+    return S_ISDIR(mode)                    ? "a folder"
+           : S_ISCHR(mode) || S_ISBLK(mode) ? "a device"
+           : S_ISFIFO(mode)                 ? "a pipe"
+           : S_ISSOCK(mode)                 ? "a socket"
+                                            : "no regular file";
 }
 
 /// Whether what lies at `target` may be replaced.
 Result<void> checkReplaced(const fs::path& output, const fs::path& target, OutputKind kind, const OutputRules& rules) {
     struct stat there {};
-    if (::lstat(target.c_str(), &there) != 0) return errno == ENOENT ? Result<void>() : systemError(output, "cannot write here", errno);
+    if (::lstat(target.c_str(), &there) != 0)
+        return errno == ENOENT ? Result<void>() : systemError(output, "cannot write here", errno);
     if (S_ISDIR(there.st_mode)) return ioError(output, "is a folder; give a file name");
-    if (!S_ISREG(there.st_mode)) return ioError(output, fmt::format("is {}, which is not replaced; give a file name, or - for standard output", wordsFor(there.st_mode)));
+    if (!S_ISREG(there.st_mode))
+        return ioError(output, fmt::format("is {}, which is not replaced; give a file name, or - for standard output",
+                                           wordsFor(there.st_mode)));
     for (const fs::path& input : rules.inputs) {
         struct stat read {};
         if (::stat(input.c_str(), &read) == 0 && read.st_dev == there.st_dev && read.st_ino == there.st_ino)
-            return ioError(output, input == output ? std::string("is an input, which is never written over; give another name")
-                                                   : fmt::format("is the file {}, which is read; give another name", input.string()));
+            return ioError(output,
+                           input == output
+                               ? std::string("is an input, which is never written over; give another name")
+                               : fmt::format("is the file {}, which is read; give another name", input.string()));
     }
     if (rules.overwrite || there.st_size == 0) return {};
-    if ((there.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0) return ioError(output, "is write-protected; give another name, or ask for overwriting");
+    if ((there.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0)
+        return ioError(output, "is write-protected; give another name, or ask for overwriting");
     const int file = ::open(target.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (file < 0) return systemError(output, "is there, and cannot be looked into", errno);
     const std::vector<std::byte> start = startOf(file);
     ::close(file);
     if (beginsLike(kind, start)) return {};
-    return ioError(output, fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
+    return ioError(output,
+                   fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
 }
 
 /// Removes what an interrupted writer left under that name. Errors: Io (another writer is at it).
@@ -105,7 +119,8 @@ Result<bool> removeLeftover(const fs::path& output, const fs::path& partial) {
     struct stat there {};
     const bool isOurs = ::fstat(file, &there) == 0 && S_ISREG(there.st_mode) && there.st_nlink == 1;
     const std::vector<std::byte> start = isOurs ? startOf(file) : std::vector<std::byte>();
-    const bool isLeft = start.size() >= kPartialMark.size() && std::memcmp(start.data(), kPartialMark.data(), kPartialMark.size()) == 0;
+    const bool isLeft =
+        start.size() >= kPartialMark.size() && std::memcmp(start.data(), kPartialMark.data(), kPartialMark.size()) == 0;
     const NameLock lock = isLeft ? lockName(file, partial) : NameLock::Gone;
     if (lock == NameLock::Taken) ::unlink(partial.c_str());
     ::close(file);
@@ -136,14 +151,16 @@ Result<Partial> createPartial(const fs::path& output, const fs::path& target, bo
     }
     fs::path first = target;
     first += ".partial";
-    return ioError(first, fmt::format("is there, and {} more beside it; remove those that are not needed", kMostPartials - 1));
+    return ioError(first,
+                   fmt::format("is there, and {} more beside it; remove those that are not needed", kMostPartials - 1));
 }
 
 }  // namespace
 
 std::optional<OutputKind> outputKindOf(const fs::path& path) {
     std::string extension = path.extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char letter) { return std::tolower(letter); });
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char letter) { return std::tolower(letter); });
     for (const KindName& each : kKinds)
         if (extension == each.extension) return each.kind;
     return std::nullopt;
@@ -156,22 +173,33 @@ bool beginsLike(OutputKind kind, std::span<const std::byte> start) {
         return at == std::string_view::npos || any.find(text[at]) != std::string_view::npos;
     };
     switch (kind) {
-        case OutputKind::Dataset: return text.starts_with("VCP\r\n\x1a\n");
-        case OutputKind::Asset: return text.starts_with("VCPmeso\n");
-        case OutputKind::Png: return text.starts_with("\x89PNG\r\n\x1a\n");
-        case OutputKind::Pfm: return text.starts_with("Pf\n") || text.starts_with("PF\n");
-        case OutputKind::JsonText: return firstOf("{[");
-        case OutputKind::Svg: return text.starts_with("<svg") || text.starts_with("<?xml");
-        case OutputKind::Text: return text.find('\0') == std::string_view::npos && !text.starts_with("ply");
-        case OutputKind::Ply: return text.starts_with("ply\n") || text.starts_with("ply\r");
-        case OutputKind::Obj: return text.find('\0') == std::string_view::npos && firstOf("#vofgsum");
+        case OutputKind::Dataset:
+            return text.starts_with("VCP\r\n\x1a\n");
+        case OutputKind::Asset:
+            return text.starts_with("VCPmeso\n");
+        case OutputKind::Png:
+            return text.starts_with("\x89PNG\r\n\x1a\n");
+        case OutputKind::Pfm:
+            return text.starts_with("Pf\n") || text.starts_with("PF\n");
+        case OutputKind::JsonText:
+            return firstOf("{[");
+        case OutputKind::Svg:
+            return text.starts_with("<svg") || text.starts_with("<?xml");
+        case OutputKind::Text:
+            return text.find('\0') == std::string_view::npos && !text.starts_with("ply");
+        case OutputKind::Ply:
+            return text.starts_with("ply\n") || text.starts_with("ply\r");
+        case OutputKind::Obj:
+            return text.find('\0') == std::string_view::npos && firstOf("#vofgsum");
     }
     return false;
 }
 
 bool isSameFile(const fs::path& a, const fs::path& b) {
-    struct stat first {}, second {};
-    return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev && first.st_ino == second.st_ino;
+    struct stat first {
+    }, second{};
+    return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev &&
+           first.st_ino == second.st_ino;
 }
 
 Result<void> checkOutput(const fs::path& output, OutputKind kind, const OutputRules& rules) {
@@ -183,7 +211,10 @@ Result<void> checkOutput(const fs::path& output, OutputKind kind, const OutputRu
 Result<OutputFile> OutputFile::create(const fs::path& output, OutputKind kind, const OutputRules& rules) {
     OutputFile made(output, kind, rules);
     if (output == "-") {
-        if (isMarked(kind)) return ioError("standard output", fmt::format("cannot take {}, which is not written front to back; give a file name", wordsFor(kind)));
+        if (isMarked(kind))
+            return ioError(
+                "standard output",
+                fmt::format("cannot take {}, which is not written front to back; give a file name", wordsFor(kind)));
         made.file_ = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
         if (made.file_ < 0) return systemError("standard output", "cannot be written", errno);
         return made;
@@ -201,7 +232,11 @@ Result<OutputFile> OutputFile::create(const fs::path& output, OutputKind kind, c
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : output_(std::move(other.output_)), target_(std::move(other.target_)), partial_(std::exchange(other.partial_, {})), kind_(other.kind_), rules_(std::move(other.rules_)),
+    : output_(std::move(other.output_)),
+      target_(std::move(other.target_)),
+      partial_(std::exchange(other.partial_, {})),
+      kind_(other.kind_),
+      rules_(std::move(other.rules_)),
       file_(std::exchange(other.file_, -1)) {}
 
 OutputFile::~OutputFile() { close(); }
@@ -213,7 +248,9 @@ void OutputFile::close() {
     partial_.clear();
 }
 
-Result<void> OutputFile::write(uint64_t offset, std::span<const std::byte> bytes) { return writeAll(file_, offset, bytes, output_); }
+Result<void> OutputFile::write(uint64_t offset, std::span<const std::byte> bytes) {
+    return writeAll(file_, offset, bytes, output_);
+}
 
 Result<void> OutputFile::append(std::span<const std::byte> bytes) { return appendAll(file_, bytes, output_); }
 
@@ -232,7 +269,8 @@ Result<void> OutputFile::commit() {
     // A file that is replaced keeps its permissions.
     struct stat there {};
     if (::stat(target_.c_str(), &there) == 0) (void)::fchmod(file_, there.st_mode & 0777);
-    if (::rename(partial_.c_str(), target_.c_str()) != 0) return systemError(output_, "cannot rename the finished file", errno);
+    if (::rename(partial_.c_str(), target_.c_str()) != 0)
+        return systemError(output_, "cannot rename the finished file", errno);
     partial_.clear();
     close();
     if (auto synced = syncFolder(target_.parent_path()); !synced) {
@@ -243,7 +281,8 @@ Result<void> OutputFile::commit() {
     return {};
 }
 
-Result<void> writeFile(const fs::path& output, OutputKind kind, std::span<const std::byte> bytes, const OutputRules& rules) {
+Result<void> writeFile(const fs::path& output, OutputKind kind, std::span<const std::byte> bytes,
+                       const OutputRules& rules) {
     auto file = OutputFile::create(output, kind, rules);
     if (!file) return file.error();
     VCP_TRY(file->append(bytes));

@@ -50,7 +50,8 @@ Result<void> checkOutput(const std::filesystem::path& output, OutputKind kind, c
 class OutputFile {
 public:
     /// "-" is standard output, but for datasets and assets, which are not written front to back. Errors: Io.
-    static Result<OutputFile> create(const std::filesystem::path& output, OutputKind kind, const OutputRules& rules = {});
+    static Result<OutputFile> create(const std::filesystem::path& output, OutputKind kind,
+                                     const OutputRules& rules = {});
     ~OutputFile();
     OutputFile(OutputFile&& other) noexcept;
     OutputFile& operator=(OutputFile&&) = delete;
@@ -70,7 +71,8 @@ public:
     Result<void> commit();
 
 private:
-    OutputFile(std::filesystem::path output, OutputKind kind, OutputRules rules) : output_(std::move(output)), kind_(kind), rules_(std::move(rules)) {}
+    OutputFile(std::filesystem::path output, OutputKind kind, OutputRules rules)
+        : output_(std::move(output)), kind_(kind), rules_(std::move(rules)) {}
     void close();
 
     std::filesystem::path output_, target_, partial_;  ///< target_: output_ with links followed
@@ -80,9 +82,11 @@ private:
 };
 
 /// Writes all of `bytes` as a file. Errors: those of OutputFile.
-Result<void> writeFile(const std::filesystem::path& output, OutputKind kind, std::span<const std::byte> bytes, const OutputRules& rules = {});
+Result<void> writeFile(const std::filesystem::path& output, OutputKind kind, std::span<const std::byte> bytes,
+                       const OutputRules& rules = {});
 /// Writes lines of text; the last one ends with a line break.
-Result<void> writeFile(const std::filesystem::path& output, OutputKind kind, std::string_view text, const OutputRules& rules = {});
+Result<void> writeFile(const std::filesystem::path& output, OutputKind kind, std::string_view text,
+                       const OutputRules& rules = {});
 
 /// What a dataset or an asset begins with until it is complete.
 inline constexpr std::string_view kPartialMark = "vcp-part";

@@ -20,7 +20,8 @@ Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     if (h.log2Cells < 1 || h.log2Cells > 7) return broken(4, "page size out of range");
     if (h.faces > kLeafIndexMask || h.triangles > kLeafIndexMask || h.vertices > kField21Mask || h.groups > (1u << 27))
         return broken(12, "page counts out of range");
-    if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError)) return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
+    if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError))
+        return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
     for (size_t i = 0; i < std::size(h.reserved); ++i)
         if (h.reserved[i] != 0) return broken(offsetof(PageHeader, reserved) + 4 * i, "reserved bytes must be zero");
     if (pageSections(h).end != bytes)
@@ -39,7 +40,8 @@ public:
         for (uint32_t g = 0; g < page_.header.groups; ++g) {
             const uint64_t byte = kPageHeaderBytes + uint64_t{32} * g;
             if (depth_[g] == 0xff) return broken(byte, "node group without a parent");
-            for (uint32_t i = 0; i < 8; ++i) VCP_TRY(node(page_.nodes[8 * g + i], g, depth_[g], maxDepth, byte + 4 * i));
+            for (uint32_t i = 0; i < 8; ++i)
+                VCP_TRY(node(page_.nodes[8 * g + i], g, depth_[g], maxDepth, byte + 4 * i));
         }
         if (soft_ != page_.header.softLeaves || hard_ != page_.header.hardLeaves)
             return broken(28, "leaf counts do not match the nodes");
@@ -75,7 +77,8 @@ private:
                 for (uint32_t t = range.first; t < range.first + range.count; ++t) VCP_TRY(triangle(t));
                 return {};
             }
-            default: return {};
+            default:
+                return {};
         }
     }
 

@@ -28,9 +28,11 @@ std::vector<std::byte> plain(std::span<const std::byte> bytes) {
 }
 
 Result<std::vector<uint4>> unpackPlain(std::span<const std::byte> packed, uint64_t bytes) {
-    if (bytes % 16 != 0 || ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes) return broken("page does not decode to its size");
+    if (bytes % 16 != 0 || ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes)
+        return broken("page does not decode to its size");
     std::vector<uint4> out(bytes / 16);
-    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes) return broken("page does not decode to its size");
+    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes)
+        return broken("page does not decode to its size");
     return out;
 }
 
@@ -43,7 +45,8 @@ std::vector<std::byte> coded(RangeEncoder& coder) {
 template <class Coder>
 void codeHeader(Coder& coder, PageHeader& header) {
     NumberModel model;
-    for (uint32_t* field : {&header.log2Cells, &header.groups, &header.faces, &header.triangles, &header.vertices, &header.softLeaves, &header.hardLeaves})
+    for (uint32_t* field : {&header.log2Cells, &header.groups, &header.faces, &header.triangles, &header.vertices,
+                            &header.softLeaves, &header.hardLeaves})
         model.code(coder, *field);
     uint32_t error = std::bit_cast<uint32_t>(header.certifiedError), low = error & 0xffffu, high = error >> 16;
     coder.raw(low, 16);
@@ -53,8 +56,9 @@ void codeHeader(Coder& coder, PageHeader& header) {
 
 /// The counts of a header, before anything is allocated by them.
 bool plausible(const PageHeader& h, uint64_t pageBytes) {
-    return h.log2Cells >= 1 && h.log2Cells <= 7 && h.groups <= 1u << 27 && h.faces <= kLeafIndexMask && h.triangles <= kLeafIndexMask && h.vertices <= kField21Mask &&
-           h.softLeaves <= h.faces && h.hardLeaves <= h.triangles && pageSections(h).end == pageBytes;
+    return h.log2Cells >= 1 && h.log2Cells <= 7 && h.groups <= 1u << 27 && h.faces <= kLeafIndexMask &&
+           h.triangles <= kLeafIndexMask && h.vertices <= kField21Mask && h.softLeaves <= h.faces &&
+           h.hardLeaves <= h.triangles && pageSections(h).end == pageBytes;
 }
 
 template <class Coder>
@@ -93,7 +97,9 @@ bool isBlock(const Result<std::vector<uint4>>& decoded, const std::vector<uint4>
 }  // namespace
 
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
-    const auto plainly = [&] { return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)}; };
+    const auto plainly = [&] {
+        return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
+    };
     const auto source = parsePage(geometry);
     if (!source.ok()) return plainly();
     CodecPage page;

@@ -19,19 +19,25 @@ Error broken(uint64_t byte, std::string what) {
 
 Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2Cells) {
     if (h.magic != PaperPageHeader::kMagic) return broken(0, "not a page of this method");
-    if (h.rootLevel < 1 || h.rootLevel > kMaxLevel || log2Cells > kMaxLevel) return broken(4, "size of the roots out of range");
+    if (h.rootLevel < 1 || h.rootLevel > kMaxLevel || log2Cells > kMaxLevel)
+        return broken(4, "size of the roots out of range");
     uint64_t roots = 1;
     for (const uint32_t count : h.roots) {
-        if (count < 1 || count > kMaxRoots || uint64_t{count} << h.rootLevel > uint64_t{1} << log2Cells) return broken(16, "number of roots out of range");
+        if (count < 1 || count > kMaxRoots || uint64_t{count} << h.rootLevel > uint64_t{1} << log2Cells)
+            return broken(16, "number of roots out of range");
         roots *= count;
     }
     if (h.packing > static_cast<uint32_t>(PaperPacking::Octahedral)) return broken(8, "unknown packing");
-    if (h.nodes < roots || (h.nodes - roots) % 8 != 0 || h.nodes > uint32_t{paper::kPaperEmpty}) return broken(12, "node count out of range");
+    if (h.nodes < roots || (h.nodes - roots) % 8 != 0 || h.nodes > uint32_t{paper::kPaperEmpty})
+        return broken(12, "node count out of range");
     const auto isLength = [](float x) { return x > 0 && std::isfinite(x); };
-    if (!isLength(h.cutoff) || !isLength(h.longest)) return broken(offsetof(PaperPageHeader, cutoff), "lengths are not numbers");
+    if (!isLength(h.cutoff) || !isLength(h.longest))
+        return broken(offsetof(PaperPageHeader, cutoff), "lengths are not numbers");
     for (size_t i = 0; i < std::size(h.reserved); ++i)
-        if (h.reserved[i] != 0) return broken(offsetof(PaperPageHeader, reserved) + 4 * i, "reserved bytes must be zero");
-    if (paperSections(h).end != bytes) return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", paperSections(h).end, bytes));
+        if (h.reserved[i] != 0)
+            return broken(offsetof(PaperPageHeader, reserved) + 4 * i, "reserved bytes must be zero");
+    if (paperSections(h).end != bytes)
+        return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", paperSections(h).end, bytes));
     return {};
 }
 
@@ -39,7 +45,9 @@ Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2
 class NodeCheck {
 public:
     explicit NodeCheck(const PaperPageView& page)
-        : page_(page), roots_(page.header.roots[0] * page.header.roots[1] * page.header.roots[2]), level_((page.header.nodes - roots_) / 8, kNoLevel) {}
+        : page_(page),
+          roots_(page.header.roots[0] * page.header.roots[1] * page.header.roots[2]),
+          level_((page.header.nodes - roots_) / 8, kNoLevel) {}
 
     Result<void> run() {
         for (uint32_t i = 0; i < page_.header.nodes; ++i) VCP_TRY(node(i));
@@ -58,7 +66,8 @@ private:
         const int32_t word = page_.nodes[i];
         if (word < 0) {
             ++leaves_;
-            if (uint64_t{static_cast<uint32_t>(-(word + 1))} + 1 >= page_.header.slices) return broken(byte, "leaf out of range");
+            if (uint64_t{static_cast<uint32_t>(-(word + 1))} + 1 >= page_.header.slices)
+                return broken(byte, "leaf out of range");
             return {};
         }
         if (word >= paper::kPaperEmpty) {
@@ -67,7 +76,8 @@ private:
         }
         const auto child = static_cast<uint32_t>(word);
         if (level == 0) return broken(byte, "nodes are nested too deeply");
-        if (child < roots_ || child <= i || child >= page_.header.nodes || (child - roots_) % 8 != 0 || level_[(child - roots_) / 8] != kNoLevel)
+        if (child < roots_ || child <= i || child >= page_.header.nodes || (child - roots_) % 8 != 0 ||
+            level_[(child - roots_) / 8] != kNoLevel)
             return broken(byte, "node names wrong children");
         level_[(child - roots_) / 8] = static_cast<uint8_t>(level - 1);
         return {};
@@ -92,7 +102,8 @@ Result<PaperPageView> parsePaperPage(std::span<const std::byte> bytes, uint32_t 
     std::memcpy(&page.header, bytes.data(), sizeof(PaperPageHeader));
     VCP_TRY(checkHeader(page.header, bytes.size(), log2Cells));
     page.nodes = {reinterpret_cast<const int32_t*>(bytes.data() + sizeof(PaperPageHeader)), page.header.nodes};
-    page.slices = {reinterpret_cast<const glm::u32vec4*>(bytes.data() + paperSections(page.header).slices), page.header.slices};
+    page.slices = {reinterpret_cast<const glm::u32vec4*>(bytes.data() + paperSections(page.header).slices),
+                   page.header.slices};
     VCP_TRY(NodeCheck(page).run());
     return page;
 }

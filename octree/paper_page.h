@@ -2,12 +2,13 @@
 //
 //   offset   bytes            section
 //   0        64               PaperPageHeader
-//   64       4 * nodes        node words: roots first (x lowest), then groups of eight children (x lowest); padded to 16
+//   64       4 * nodes        node words: roots first (x lowest), then groups of eight children (x lowest); padded to
+//   16
 //   ...      16 * slices      corners of leaves: four codes each, y lowest, then z
 //
 // Node word: inner [0, 2^30): number of its first child, greater than its own; empty [2^30, 2^31): 2^30 plus the
-// distance that the node is from the surface, 2^30 - 1 being `cutoff`; leaf -(i + 1): its corners are slices i and i + 1.
-// Lengths are in finest cells.
+// distance that the node is from the surface, 2^30 - 1 being `cutoff`; leaf -(i + 1): its corners are slices i and i
+// + 1. Lengths are in finest cells.
 #pragma once
 
 #include <cstddef>
@@ -74,7 +75,8 @@ struct PaperPageHeader {
 
     static constexpr uint32_t kMagic = 0x50504356;  // "VCPP"
 };
-static_assert(sizeof(PaperPageHeader) == paper::kPaperHeaderBytes && offsetof(PaperPageHeader, roots) == 16 && offsetof(PaperPageHeader, cutoff) == 32);
+static_assert(sizeof(PaperPageHeader) == paper::kPaperHeaderBytes && offsetof(PaperPageHeader, roots) == 16 &&
+              offsetof(PaperPageHeader, cutoff) == 32);
 
 /// Where the slices begin, and bytes of the page.
 struct PaperSections {

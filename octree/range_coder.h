@@ -37,14 +37,19 @@ struct SymbolModel {
 
     /// `used`: symbols from it on hardly ever come.
     explicit SymbolModel(int used = kSymbols) {
-        for (int i = 0; i < kSymbols; ++i) before[i] = static_cast<int16_t>(i < used ? i * ((1 << kBits) - kSymbols) / used + i : (1 << kBits) - kSymbols + i);
+        for (int i = 0; i < kSymbols; ++i)
+            before[i] =
+                static_cast<int16_t>(i < used ? i * ((1 << kBits) - kSymbols) / used + i : (1 << kBits) - kSymbols + i);
     }
     [[nodiscard]] uint32_t begin(uint32_t symbol) const { return static_cast<uint32_t>(before[symbol]); }
-    [[nodiscard]] uint32_t end(uint32_t symbol) const { return symbol + 1 < kSymbols ? static_cast<uint32_t>(before[symbol + 1]) : 1u << kBits; }
+    [[nodiscard]] uint32_t end(uint32_t symbol) const {
+        return symbol + 1 < kSymbols ? static_cast<uint32_t>(before[symbol + 1]) : 1u << kBits;
+    }
     /// The symbol within whose share `target` lies.
     [[nodiscard]] uint32_t find(uint32_t target) const {
         int16_t count = 0;
-        for (int i = 0; i < kSymbols; ++i) count = static_cast<int16_t>(count + (before[i] <= static_cast<int16_t>(target) ? 1 : 0));
+        for (int i = 0; i < kSymbols; ++i)
+            count = static_cast<int16_t>(count + (before[i] <= static_cast<int16_t>(target) ? 1 : 0));
         return static_cast<uint32_t>(count - 1);
     }
     void learn(uint32_t symbol) {
@@ -172,7 +177,9 @@ public:
         rawCount_ -= count;
     }
     /// Whether exactly the bytes that there were have been used.
-    [[nodiscard]] bool complete() const { return !torn_ && rawAt_ == raw_.size() && at_ >= bytes_.size() && at_ <= bytes_.size() + kSparedZeros; }
+    [[nodiscard]] bool complete() const {
+        return !torn_ && rawAt_ == raw_.size() && at_ >= bytes_.size() && at_ <= bytes_.size() + kSparedZeros;
+    }
 
 private:
     uint32_t next() {

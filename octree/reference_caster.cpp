@@ -109,7 +109,8 @@ glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dv
 
 /// Vertex normals blended, each on the side of the triangle that the ray comes from; at a crease the
 /// triangle's own.
-glm::dvec3 triangleNormal(const PageView& view, std::array<uint32_t, 3> v, double weight1, double weight2, glm::dvec3 direction) {
+glm::dvec3 triangleNormal(const PageView& view, std::array<uint32_t, 3> v, double weight1, double weight2,
+                          glm::dvec3 direction) {
     glm::dvec3 p[3];
     for (int i = 0; i < 3; ++i) p[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
     glm::dvec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);

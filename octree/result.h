@@ -79,8 +79,7 @@ private:
 }  // namespace vcp
 
 /// Returns the error of `expr` from the enclosing function, if there is one.
-#define VCP_TRY(expr)                                    \
-    do {                                                 \
-        if (auto vcpTried = (expr); !vcpTried)           \
-            return vcpTried.error();                     \
+#define VCP_TRY(expr)                                                   \
+    do {                                                                \
+        if (auto vcpTried = (expr); !vcpTried) return vcpTried.error(); \
     } while (false)

@@ -65,7 +65,9 @@ void TriangleFront::begin(uint32_t a, uint32_t b, uint32_t c) {
 /// Where the front returns along the edge it came, both sides have met.
 void TriangleFront::zip(uint32_t g) {
     const Gate made = gates_[g];
-    const auto meets = [&](uint32_t other) { return other != kNone && other != g && gates_[other].from == made.to && gates_[other].to == made.from; };
+    const auto meets = [&](uint32_t other) {
+        return other != kNone && other != g && gates_[other].from == made.to && gates_[other].to == made.from;
+    };
     if (meets(made.next)) {
         const uint32_t after = gates_[made.next].next;
         gates_[g].open = gates_[made.next].open = false;

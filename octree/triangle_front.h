@@ -31,8 +31,12 @@ public:
     }
     [[nodiscard]] const Gate& gate(uint32_t g) const { return gates_[g]; }
     /// The vertex that closes the corner with the next or previous gate, or kNone.
-    [[nodiscard]] uint32_t nextVertex(uint32_t g) const { return gates_[g].next == kNone ? kNone : gates_[gates_[g].next].to; }
-    [[nodiscard]] uint32_t previousVertex(uint32_t g) const { return gates_[g].previous == kNone ? kNone : gates_[gates_[g].previous].from; }
+    [[nodiscard]] uint32_t nextVertex(uint32_t g) const {
+        return gates_[g].next == kNone ? kNone : gates_[gates_[g].next].to;
+    }
+    [[nodiscard]] uint32_t previousVertex(uint32_t g) const {
+        return gates_[g].previous == kNone ? kNone : gates_[gates_[g].previous].from;
+    }
     /// Triangles so far at a vertex, up to 255.
     [[nodiscard]] uint32_t degree(uint32_t vertex) const { return degree_[vertex]; }
 

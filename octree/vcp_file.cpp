@@ -1,5 +1,7 @@
 #include "octree/vcp_file.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
@@ -8,8 +10,6 @@
 #include <limits>
 #include <new>
 #include <optional>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <fmt/format.h>
 #define XXH_INLINE_ALL
@@ -57,7 +57,11 @@ private:
 };
 
 Error broken(const std::string& file, std::string element, uint64_t byte, std::string message) {
-    return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = file, .element = std::move(element), .byte = byte};
+    return {.code = ErrorCode::InvalidInput,
+            .message = std::move(message),
+            .file = file,
+            .element = std::move(element),
+            .byte = byte};
 }
 
 Error broken(const ByteReader& reader, std::string element, uint64_t byte, std::string message) {
@@ -76,19 +80,30 @@ Error brokenEntry(const std::string& file, uint64_t index, std::string message, 
 class EntryCheck {
 public:
     EntryCheck(const std::string& file, const Dataset& dataset)
-        : file_(file), header_(dataset.header), hasColour_(dataset.hasColour()), end_(blockOffset(blocksOf(dataset.header.pages))) {}
+        : file_(file),
+          header_(dataset.header),
+          hasColour_(dataset.hasColour()),
+          end_(blockOffset(blocksOf(dataset.header.pages))) {}
 
     Result<void> check(uint64_t index, const PageEntry& e, uint32_t level) {
-        const auto fail = [&](uint64_t field, const char* message) { return brokenEntry(file_, index, message, field); };
+        const auto fail = [&](uint64_t field, const char* message) {
+            return brokenEntry(file_, index, message, field);
+        };
         if (e.level != level) return fail(offsetof(PageEntry, level), "wrong level");
         VCP_TRY(extent(index, e.offset, e.storedBytes, e.pageBytes));
         VCP_TRY(colour(index, e));
-        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError)) return fail(offsetof(PageEntry, certifiedError), "certified error is not a length");
-        if (e.certifiedError > header_.level[level].certifiedError) return fail(offsetof(PageEntry, certifiedError), "certified error is larger than its level's in the header");
-        if (e.hardLeaves > e.leaves) return fail(offsetof(PageEntry, hardLeaves), "leaf counts: more hard leaves than leaves");
+        if (!(e.certifiedError >= 0) || !std::isfinite(e.certifiedError))
+            return fail(offsetof(PageEntry, certifiedError), "certified error is not a length");
+        if (e.certifiedError > header_.level[level].certifiedError)
+            return fail(offsetof(PageEntry, certifiedError),
+                        "certified error is larger than its level's in the header");
+        if (e.hardLeaves > e.leaves)
+            return fail(offsetof(PageEntry, hardLeaves), "leaf counts: more hard leaves than leaves");
         // The root's word stands in the page's header, each other leaf's among the nodes.
-        if (e.leaves > e.pageBytes / sizeof(uint32_t)) return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");
-        if (e.childMask == 0 && e.firstChild != 0) return fail(offsetof(PageEntry, firstChild), "wrong child pages: a first one where there are none");
+        if (e.leaves > e.pageBytes / sizeof(uint32_t))
+            return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");
+        if (e.childMask == 0 && e.firstChild != 0)
+            return fail(offsetof(PageEntry, firstChild), "wrong child pages: a first one where there are none");
         for (size_t i = 0; i < sizeof e.reserved; ++i)
             if (e.reserved[i] != 0) return fail(offsetof(PageEntry, reserved) + i, "reserved bytes must be zero");
         if (level == 0 && e.morton != 0) return fail(offsetof(PageEntry, morton), "the root is not at the origin");
@@ -97,23 +112,31 @@ public:
 
 private:
     Result<void> colour(uint64_t index, const PageEntry& e) {
-        const auto fail = [&](uint64_t field, const char* message) { return brokenEntry(file_, index, message, field); };
+        const auto fail = [&](uint64_t field, const char* message) {
+            return brokenEntry(file_, index, message, field);
+        };
         if (e.colourStoredBytes == 0) {
-            if (e.colourBytes != 0 || (hasColour_ && e.leaves != 0)) return fail(offsetof(PageEntry, colourStoredBytes), "colour is missing");
-            if (e.colourOffset != 0) return fail(offsetof(PageEntry, colourOffset), "a place of colour where there is none");
+            if (e.colourBytes != 0 || (hasColour_ && e.leaves != 0))
+                return fail(offsetof(PageEntry, colourStoredBytes), "colour is missing");
+            if (e.colourOffset != 0)
+                return fail(offsetof(PageEntry, colourOffset), "a place of colour where there is none");
             if (e.colourHash != 0) return fail(offsetof(PageEntry, colourHash), "a hash of colour where there is none");
             return {};
         }
-        if (!hasColour_) return fail(offsetof(PageEntry, colourStoredBytes), "has colour, but the header says that no page has");
-        if (e.colourOffset > end_ + kBlockBytes) return fail(offsetof(PageEntry, colourOffset), "its colour does not follow it");
+        if (!hasColour_)
+            return fail(offsetof(PageEntry, colourStoredBytes), "has colour, but the header says that no page has");
+        if (e.colourOffset > end_ + kBlockBytes)
+            return fail(offsetof(PageEntry, colourOffset), "its colour does not follow it");
         return extent(index, e.colourOffset, e.colourStoredBytes, e.colourBytes);
     }
 
     Result<void> extent(uint64_t index, uint64_t offset, uint64_t stored, uint64_t bytes) {
         const uint64_t fileBytes = header_.fileBytes - sizeof(CommitRecord);
-        if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > fileBytes || offset > fileBytes - stored)
+        if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > fileBytes ||
+            offset > fileBytes - stored)
             return brokenEntry(file_, index, "page lies outside the file or overlaps another");
-        if (bytes == 0 || bytes > kMaxPageBytes || bytes % 16 != 0) return brokenEntry(file_, index, "page size out of range");
+        if (bytes == 0 || bytes > kMaxPageBytes || bytes % 16 != 0)
+            return brokenEntry(file_, index, "page size out of range");
         end_ = offset + stored;
         return {};
     }
@@ -147,9 +170,11 @@ Result<void> checkDirectory(const std::string& file, const Dataset& d) {
             const PageEntry& e = d.pages[index];
             VCP_TRY(entries.check(index, e, level));
             if (e.childMask == 0) continue;
-            if (level + 1 >= d.header.levels || e.firstChild != next) return brokenEntry(file, index, "wrong child pages");
+            if (level + 1 >= d.header.levels || e.firstChild != next)
+                return brokenEntry(file, index, "wrong child pages");
             VCP_TRY(eachChild(e, [&](uint64_t child, uint32_t octant) -> Result<void> {
-                if (child >= d.header.pages || !isChildAt(d.pages[child], e, octant)) return brokenEntry(file, index, "child pages do not match");
+                if (child >= d.header.pages || !isChildAt(d.pages[child], e, octant))
+                    return brokenEntry(file, index, "child pages do not match");
                 return {};
             }));
             next += childrenOf(e).size();
@@ -160,17 +185,20 @@ Result<void> checkDirectory(const std::string& file, const Dataset& d) {
 
 /// A block that holds `entries` and a hash, and is zero between.
 Result<void> checkBlock(const std::string& file, uint64_t block, uint64_t entries, std::span<const std::byte> bytes) {
-    const auto fail = [&](uint64_t byte, std::string message) { return broken(file, fmt::format("directory block {}", block), blockOffset(block) + byte, std::move(message)); };
+    const auto fail = [&](uint64_t byte, std::string message) {
+        return broken(file, fmt::format("directory block {}", block), blockOffset(block) + byte, std::move(message));
+    };
     uint64_t hash = 0;
     std::memcpy(&hash, bytes.data() + kBlockBytes - 8, 8);
-    if (hashBytes(bytes.first(kBlockBytes - 8)) != hash) return fail(0, "hash does not match: the file was changed or damaged");
+    if (hashBytes(bytes.first(kBlockBytes - 8)) != hash)
+        return fail(0, "hash does not match: the file was changed or damaged");
     for (uint64_t byte = entries * sizeof(PageEntry); byte < kBlockBytes - 8; ++byte)
         if (bytes[byte] != std::byte{0}) return fail(byte, "bytes behind the last entry must be zero");
     return {};
 }
 
-/// Reads `bytes` in pieces, the first of at most kFirstPiece, each as large as all before it, so that a claim takes no more
-/// memory than a few times what came. take(piece) -> Result<void>.
+/// Reads `bytes` in pieces, the first of at most kFirstPiece, each as large as all before it, so that a claim takes no
+/// more memory than a few times what came. take(piece) -> Result<void>.
 constexpr uint64_t kFirstPiece = 1 << 20;
 constexpr uint64_t kLargestPiece = 16 << 20;
 template <class Take>
@@ -185,7 +213,8 @@ Result<void> readInPieces(const ByteReader& reader, uint64_t offset, uint64_t by
 }
 
 /// The stored bytes of a page, checked against their hash.
-Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset, uint32_t stored, uint64_t hash) {
+Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset,
+                                          uint32_t stored, uint64_t hash) {
     std::vector<std::byte> packed;
     if (stored <= kFirstPiece) {
         packed.resize(stored);
@@ -196,7 +225,8 @@ Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::s
             return {};
         }));
     }
-    if (hashBytes(packed) != hash) return broken(reader, element, offset, "hash does not match: the page was changed or damaged");
+    if (hashBytes(packed) != hash)
+        return broken(reader, element, offset, "hash does not match: the page was changed or damaged");
     return packed;
 }
 
@@ -249,7 +279,8 @@ PageDirectory& PageDirectory::operator=(const PageDirectory& other) {
         const size_t first = b * kEntriesPerBlock, count = std::min<size_t>(kEntriesPerBlock, size() - first);
         std::copy_n(other.sparse_.data() + first, count, sparse_.data() + first);
         for (size_t page = first; page < first + count; ++page)
-            for (const uint64_t child : childrenOf(sparse_[page])) parts_->afterParents[child] = static_cast<uint32_t>(page + 1);
+            for (const uint64_t child : childrenOf(sparse_[page]))
+                parts_->afterParents[child] = static_cast<uint32_t>(page + 1);
         parts_->known[b] = 1;
     }
     parts_->blocksKnown = other.parts_->blocksKnown.load();
@@ -262,15 +293,23 @@ void PageDirectory::expect(size_t pages) {
     parts_ = std::make_unique<Parts>(pages);
 }
 
-bool PageDirectory::knowsBlock(uint64_t block) const { return !parts_ || parts_->known[block].load(std::memory_order_acquire) != 0; }
-uint64_t PageDirectory::blocksKnown() const { return parts_ ? parts_->blocksKnown.load(std::memory_order_acquire) : blocks(); }
+bool PageDirectory::knowsBlock(uint64_t block) const {
+    return !parts_ || parts_->known[block].load(std::memory_order_acquire) != 0;
+}
+uint64_t PageDirectory::blocksKnown() const {
+    return parts_ ? parts_->blocksKnown.load(std::memory_order_acquire) : blocks();
+}
 
 /// Takes one block in: its entries for themselves, then with the parents and children that are known. Each page has one
 /// parent, on the level above: so what is known is a tree, whatever the rest will be.
 class BlockAdmission {
 public:
     BlockAdmission(const Dataset& dataset, const std::string& file, uint64_t block)
-        : d_(dataset), directory_(dataset.pages), file_(file), block_(block), first_(block * kEntriesPerBlock),
+        : d_(dataset),
+          directory_(dataset.pages),
+          file_(file),
+          block_(block),
+          first_(block * kEntriesPerBlock),
           count_(std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - first_)) {}
 
     Result<void> run(std::span<const std::byte> bytes) {
@@ -303,19 +342,24 @@ private:
         while (page >= d_.header.level[level].firstEntry + d_.header.level[level].pages) ++level;
         return level;
     }
-    [[nodiscard]] bool isThere(uint64_t page) const { return page / kEntriesPerBlock == block_ || directory_.knows(page); }
+    [[nodiscard]] bool isThere(uint64_t page) const {
+        return page / kEntriesPerBlock == block_ || directory_.knows(page);
+    }
 
     Result<void> linkChildren(uint64_t page) const {
         const PageEntry& e = directory_[page];
         if (e.childMask == 0) return {};
         if (e.level + 1u >= d_.header.levels) return brokenEntry(file_, page, "wrong child pages");
         const LevelRow& below = d_.header.level[e.level + 1];
-        if (e.firstChild < below.firstEntry || *childrenOf(e).end() > below.firstEntry + below.pages) return brokenEntry(file_, page, "wrong child pages");
+        if (e.firstChild < below.firstEntry || *childrenOf(e).end() > below.firstEntry + below.pages)
+            return brokenEntry(file_, page, "wrong child pages");
         return eachChild(e, [&](uint64_t child, uint32_t octant) -> Result<void> {
             uint32_t& parent = directory_.parts_->afterParents[child];
-            if (parent != PageDirectory::Parts::kNoPage && parent != page + 1) return brokenEntry(file_, page, "wrong child pages");
+            if (parent != PageDirectory::Parts::kNoPage && parent != page + 1)
+                return brokenEntry(file_, page, "wrong child pages");
             parent = static_cast<uint32_t>(page + 1);
-            if (isThere(child) && !isChildAt(directory_[child], e, octant)) return brokenEntry(file_, page, "child pages do not match");
+            if (isThere(child) && !isChildAt(directory_[child], e, octant))
+                return brokenEntry(file_, page, "child pages do not match");
             return {};
         });
     }
@@ -325,7 +369,8 @@ private:
         if (after == PageDirectory::Parts::kNoPage || !isThere(after - 1)) return {};
         const PageEntry& parent = directory_[after - 1];
         return eachChild(parent, [&](uint64_t child, uint32_t octant) -> Result<void> {
-            if (child == page && !isChildAt(directory_[page], parent, octant)) return brokenEntry(file_, page, "child pages do not match");
+            if (child == page && !isChildAt(directory_[page], parent, octant))
+                return brokenEntry(file_, page, "child pages do not match");
             return {};
         });
     }
@@ -336,18 +381,25 @@ private:
     uint64_t block_, first_, count_;
 };
 
-Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block, std::span<const std::byte> bytes) {
+Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block,
+                        std::span<const std::byte> bytes) {
     if (dataset.pages.knowsBlock(block)) return {};
-    VCP_TRY(checkBlock(file, block, std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - block * kEntriesPerBlock), bytes));
+    VCP_TRY(checkBlock(file, block,
+                       std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - block * kEntriesPerBlock), bytes));
     return BlockAdmission(dataset, file, block).run(bytes);
 }
 
-double Dataset::cellOf(uint32_t level) const { return std::ldexp(header.cell, static_cast<int>(header.levels - 1 - level)); }
+double Dataset::cellOf(uint32_t level) const {
+    return std::ldexp(header.cell, static_cast<int>(header.levels - 1 - level));
+}
 
-double Dataset::edgeOf(const PageEntry& page) const { return std::ldexp(cellOf(page.level), static_cast<int>(header.log2Cells)); }
+double Dataset::edgeOf(const PageEntry& page) const {
+    return std::ldexp(cellOf(page.level), static_cast<int>(header.log2Cells));
+}
 
 glm::dvec3 Dataset::originOf(const PageEntry& page) const {
-    return glm::dvec3(header.origin[0], header.origin[1], header.origin[2]) + edgeOf(page) * glm::dvec3(mortonDecode(page.morton));
+    return glm::dvec3(header.origin[0], header.origin[1], header.origin[2]) +
+           edgeOf(page) * glm::dvec3(mortonDecode(page.morton));
 }
 
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) {
@@ -358,14 +410,16 @@ Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) 
         ::close(*file);
         return Error{.code = ErrorCode::Io, .message = "its size cannot be asked", .file = path.string()};
     }
-    return std::shared_ptr<ByteReader>(std::make_shared<LocalFile>(*file, static_cast<uint64_t>(info.st_size), path.string()));
+    return std::shared_ptr<ByteReader>(
+        std::make_shared<LocalFile>(*file, static_cast<uint64_t>(info.st_size), path.string()));
 }
 
 namespace {
 
 Result<FileHeader> readHeader(const ByteReader& reader) {
     if (reader.size() < kDirectoryOffset + kBlockBytes + sizeof(CommitRecord))
-        return broken(reader, "header", reader.size(), reader.size() == 0 ? "the file is empty" : "the file is too short for a .vcp file");
+        return broken(reader, "header", reader.size(),
+                      reader.size() == 0 ? "the file is empty" : "the file is too short for a .vcp file");
     FileHeader header;
     std::vector<std::byte> first(kDirectoryOffset);
     VCP_TRY(reader.read(0, first));
@@ -377,16 +431,20 @@ Result<FileHeader> readHeader(const ByteReader& reader) {
 }
 
 /// `directoryHash`: of its bytes, where all of them are there.
-Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header, std::optional<uint64_t> directoryHash) {
+Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header,
+                               std::optional<uint64_t> directoryHash) {
     CommitRecord commit;
     const uint64_t offset = reader.size() - sizeof commit;
     VCP_TRY(reader.read(offset, std::as_writable_bytes(std::span(&commit, 1))));
-    if (std::memcmp(commit.magic, CommitRecord{}.magic, 8) != 0 || commit.fileBytes != reader.size() || commit.headerHash != header.hash ||
-        (directoryHash && commit.directoryHash != *directoryHash) ||
+    if (std::memcmp(commit.magic, CommitRecord{}.magic, 8) != 0 || commit.fileBytes != reader.size() ||
+        commit.headerHash != header.hash || (directoryHash && commit.directoryHash != *directoryHash) ||
         commit.hash != hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash))))
-        return broken(reader, "commit record", offset, "does not match the file: it was not finished, changed or damaged");
+        return broken(reader, "commit record", offset,
+                      "does not match the file: it was not finished, changed or damaged");
     for (size_t i = 0; i < std::size(commit.reserved); ++i)
-        if (commit.reserved[i] != 0) return broken(reader, "commit record", offset + offsetof(CommitRecord, reserved) + 8 * i, "reserved bytes must be zero");
+        if (commit.reserved[i] != 0)
+            return broken(reader, "commit record", offset + offsetof(CommitRecord, reserved) + 8 * i,
+                          "reserved bytes must be zero");
     return {};
 }
 
@@ -394,7 +452,8 @@ Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& heade
 Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<const std::byte> blocks) {
     for (uint64_t from = 0; from < blocks.size(); from += kBlockBytes) {
         const std::span block = blocks.subspan(from, kBlockBytes);
-        const uint64_t first = dataset.pages.size(), count = std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - first);
+        const uint64_t first = dataset.pages.size(),
+                       count = std::min<uint64_t>(kEntriesPerBlock, dataset.header.pages - first);
         VCP_TRY(checkBlock(file, first / kEntriesPerBlock, count, block));
         for (uint64_t i = 0; i < count; ++i) {
             PageEntry entry;
@@ -410,10 +469,11 @@ Result<Dataset> readWhole(const ByteReader& reader, const FileHeader& header) {
     Dataset dataset{header, {}};
     XXH3_state_t hash;
     XXH3_64bits_reset(&hash);
-    VCP_TRY(readInPieces(reader, kDirectoryOffset, blocksOf(header.pages) * kBlockBytes, [&](std::span<const std::byte> piece) {
-        XXH3_64bits_update(&hash, piece.data(), piece.size());
-        return appendBlocks(dataset, reader.name(), piece);
-    }));
+    VCP_TRY(readInPieces(reader, kDirectoryOffset, blocksOf(header.pages) * kBlockBytes,
+                         [&](std::span<const std::byte> piece) {
+                             XXH3_64bits_update(&hash, piece.data(), piece.size());
+                             return appendBlocks(dataset, reader.name(), piece);
+                         }));
     VCP_TRY(checkCommitRecord(reader, header, XXH3_64bits_digest(&hash)));
     VCP_TRY(checkDirectory(reader.name(), dataset));
     return dataset;
@@ -438,22 +498,33 @@ Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes) {
     try {
         dataset.pages.expect(header->pages);
     } catch (const std::bad_alloc&) {
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("a directory of {} pages needs more addresses than this process may have", header->pages), .file = reader.name()};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("a directory of {} pages needs more addresses than this process may have",
+                                            header->pages),
+                     .file = reader.name()};
     }
-    for (uint64_t b = 0; b < lead.size() / kBlockBytes; ++b) VCP_TRY(admitBlock(dataset, reader.name(), b, std::span(lead).subspan(b * kBlockBytes, kBlockBytes)));
+    for (uint64_t b = 0; b < lead.size() / kBlockBytes; ++b)
+        VCP_TRY(admitBlock(dataset, reader.name(), b, std::span(lead).subspan(b * kBlockBytes, kBlockBytes)));
     return dataset;
 }
 
 /// A page's header and its entry in the directory say the same.
-static Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset, uint64_t index, const PageHeader& page) {
+static Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset, uint64_t index,
+                                      const PageHeader& page) {
     const PageEntry& e = dataset.pages[index];
-    const auto fail = [&](std::string message) { return broken(reader, fmt::format("page {}", index), e.offset, std::move(message)); };
+    const auto fail = [&](std::string message) {
+        return broken(reader, fmt::format("page {}", index), e.offset, std::move(message));
+    };
     const uint64_t leaves = uint64_t{page.softLeaves} + page.hardLeaves;
     if (leaves != e.leaves || page.hardLeaves != e.hardLeaves)
-        return fail(fmt::format("has {} leaves, {} of them hard; its directory entry says {} and {}", leaves, page.hardLeaves, e.leaves, e.hardLeaves));
+        return fail(fmt::format("has {} leaves, {} of them hard; its directory entry says {} and {}", leaves,
+                                page.hardLeaves, e.leaves, e.hardLeaves));
     // Both were rounded up to single precision, one in cells and one in world units.
-    const double error = page.certifiedError * dataset.cellOf(e.level), slack = 1e-6 * error + 4 * double(std::numeric_limits<float>::denorm_min());
-    if (std::abs(error - e.certifiedError) > slack) return fail(fmt::format("has a certified error of {:g}, its directory entry says {:g}", error, e.certifiedError));
+    const double error = page.certifiedError * dataset.cellOf(e.level),
+                 slack = 1e-6 * error + 4 * double(std::numeric_limits<float>::denorm_min());
+    if (std::abs(error - e.certifiedError) > slack)
+        return fail(
+            fmt::format("has a certified error of {:g}, its directory entry says {:g}", error, e.certifiedError));
     return {};
 }
 
@@ -469,18 +540,24 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     if (dataset.header.method == Method::Paper) {
         const auto paper = parsePaperPage(page.geometryBytes(), dataset.header.log2Cells);
         if (!paper) return broken(reader, element, e.offset, paper.error().line());
-        if (paper->header.leaves != e.leaves) return broken(reader, element, e.offset, fmt::format("has {} leaves, its directory entry says {}", paper->header.leaves, e.leaves));
-        if (paper->header.packing != dataset.header.paper.packing) return broken(reader, element, e.offset, "its packing differs from the file's");
+        if (paper->header.leaves != e.leaves)
+            return broken(reader, element, e.offset,
+                          fmt::format("has {} leaves, its directory entry says {}", paper->header.leaves, e.leaves));
+        if (paper->header.packing != dataset.header.paper.packing)
+            return broken(reader, element, e.offset, "its packing differs from the file's");
         return page;
     }
     const auto view = parsePage(page.geometryBytes());
     if (!view) return broken(reader, element, e.offset, view.error().line());
-    if (view->header.log2Cells != dataset.header.log2Cells) return broken(reader, element, e.offset, "page size differs from the file's");
+    if (view->header.log2Cells != dataset.header.log2Cells)
+        return broken(reader, element, e.offset, "page size differs from the file's");
     VCP_TRY(checkAgainstEntry(reader, dataset, index, view->header));
     if (!withColour || e.colourBytes == 0) return page;
-    const auto storedColour = readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash);
+    const auto storedColour =
+        readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash);
     if (!storedColour) return storedColour.error();
-    if (e.colourBytes != colourPageBytes(view->header)) return broken(reader, element + " colour", e.colourOffset, "colour page does not decode to its page's size");
+    if (e.colourBytes != colourPageBytes(view->header))
+        return broken(reader, element + " colour", e.colourOffset, "colour page does not decode to its page's size");
     auto colour = unpackColour(*storedColour, e.colourBytes, *view);
     if (!colour) return broken(reader, element + " colour", e.colourOffset, colour.error().message);
     page.colour = *std::move(colour);

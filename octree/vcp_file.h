@@ -35,7 +35,7 @@ namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 2;
 inline constexpr uint32_t kMethodFileVersion = 3;  ///< of files whose method is not Certified
-inline constexpr uint32_t kMaxLevels = 22;  ///< Morton codes have 21 bits an axis
+inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
@@ -62,26 +62,29 @@ struct FileHeader {
     uint32_t headerBytes = 4096;
     uint64_t fileBytes = 0;
     uint64_t pages = 0;
-    double origin[3] = {};  ///< world position of the lowest corner of the root page
-    double cell = 0;        ///< edge of a cell of the finest level, world units
-    double errorTarget = 0; ///< what the builder was asked for, world units
+    double origin[3] = {};         ///< world position of the lowest corner of the root page
+    double cell = 0;               ///< edge of a cell of the finest level, world units
+    double errorTarget = 0;        ///< what the builder was asked for, world units
     double certifiedErrorMax = 0;  ///< of the finest level, world units
     double boundsMin[3] = {};      ///< of the mesh, world units
     double boundsMax[3] = {};
-    uint32_t levels = 0;    ///< 1 to kMaxLevels
-    uint32_t log2Cells = 0; ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;     ///< bit 0: has colour
+    uint32_t levels = 0;  ///< 1 to kMaxLevels
+    uint32_t log2Cells =
+        0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
+    uint32_t flags = 0;  ///< bit 0: has colour
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft and hard, of the finest level
     uint64_t hardLeaves = 0;  ///< of the finest level
     LevelRow level[kMaxLevels] = {};
-    uint64_t hash = 0;  ///< XXH3-64 of the 4096 bytes with this field zero
+    uint64_t hash = 0;      ///< XXH3-64 of the 4096 bytes with this field zero
     PaperParameters paper;  ///< zero where the method is another
 };
 inline constexpr uint32_t kFlagColour = 1;
-static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 && offsetof(FileHeader, triangles) == 144);
-static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels && sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 + 32);
+static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 &&
+              offsetof(FileHeader, triangles) == 144);
+static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels &&
+              sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 + 32);
 
 /// One page in the directory.
 struct PageEntry {
@@ -133,7 +136,9 @@ private:
 };
 
 /// The entries of a page's children, in octant order.
-inline EntryRange childrenOf(const PageEntry& page) { return {page.firstChild, static_cast<uint64_t>(std::popcount(page.childMask))}; }
+inline EntryRange childrenOf(const PageEntry& page) {
+    return {page.firstChild, static_cast<uint64_t>(std::popcount(page.childMask))};
+}
 
 struct CommitRecord {
     char magic[8] = {'V', 'C', 'P', 'c', 'o', 'm', 'm', 't'};
@@ -145,9 +150,10 @@ struct CommitRecord {
 };
 static_assert(sizeof(CommitRecord) == 64);
 
-/// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those of
-/// some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any thread may
-/// read it; the entry of a page that is not known must not be read. Entries that are not known take no memory.
+/// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those
+/// of some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any
+/// thread may read it; the entry of a page that is not known must not be read. Entries that are not known take no
+/// memory.
 class PageDirectory {
 public:
     PageDirectory();
@@ -208,27 +214,32 @@ public:
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
     /// What read() gave for these bytes proved wrong: a copy of them is not used again.
-    virtual void distrust(uint64_t offset, uint64_t bytes) const { static_cast<void>(offset), static_cast<void>(bytes); }
+    virtual void distrust(uint64_t offset, uint64_t bytes) const {
+        static_cast<void>(offset), static_cast<void>(bytes);
+    }
 };
 
 /// Opens a local file for bounded reads (pread); a pipe or device in its place is not waited for. Errors: Io.
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 
-/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header claims.
-/// Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
+/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header
+/// claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
 inline constexpr uint64_t kLeadBytes = 64 << 10;
 
-/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so that
-/// what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of kBlockBytes,
-/// more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many pages.
+/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so
+/// that what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of
+/// kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many
+/// pages.
 Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
 constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
 
-/// Checks a block of the directory, by its hash and against the blocks that are known, and makes its entries known; nothing
-/// where they are. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`. Any thread. Errors: InvalidInput.
-Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block, std::span<const std::byte> bytes);
+/// Checks a block of the directory, by its hash and against the blocks that are known, and makes its entries known;
+/// nothing where they are. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`. Any thread. Errors:
+/// InvalidInput.
+Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block,
+                        std::span<const std::byte> bytes);
 constexpr uint64_t blockOffset(uint64_t block) { return kDirectoryOffset + block * kBlockBytes; }
 
 /// A page's decoded bytes, 16-byte aligned.
@@ -240,12 +251,13 @@ struct PageBytes {
     [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
 };
 
-/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page. Safe on hostile bytes: allocates
-/// at most a few times the entry's pageBytes, which readDataset has bounded. The page's entry is known. Any thread.
+/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page.
+/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded. The
+/// page's entry is known. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 
-/// Reads every byte of the file and checks it, also those between pages, and that header, directory and pages say the same. Calls `progress(bytes done)` now and
-/// then; it returns false to cancel. Errors: the first thing that is wrong.
+/// Reads every byte of the file and checks it, also those between pages, and that header, directory and pages say the
+/// same. Calls `progress(bytes done)` now and then; it returns false to cancel. Errors: the first thing that is wrong.
 Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t) = nullptr, void* user = nullptr);
 
 /// XXH3-64.

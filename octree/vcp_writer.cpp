@@ -23,13 +23,15 @@ StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std
     return page;
 }
 
-Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path& output, uint64_t pages, const OutputRules& rules) {
+Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path& output, uint64_t pages,
+                                                     const OutputRules& rules) {
     auto file = OutputFile::create(output, OutputKind::Dataset, rules);
     if (!file) return file.error();
     return std::unique_ptr<VcpWriter>(new VcpWriter(*std::move(file), pages));
 }
 
-VcpWriter::VcpWriter(OutputFile file, uint64_t pages) : file_(std::move(file)), end_(alignPage(kDirectoryOffset + directoryBytes(pages))), pages_(pages) {}
+VcpWriter::VcpWriter(OutputFile file, uint64_t pages)
+    : file_(std::move(file)), end_(alignPage(kDirectoryOffset + directoryBytes(pages))), pages_(pages) {}
 
 Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
     entry.offset = end_;

@@ -25,7 +25,8 @@ StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std
 class VcpWriter {
 public:
     /// `pages` is the final number of pages: it fixes the directory's size. Errors: Io.
-    static Result<std::unique_ptr<VcpWriter>> create(const std::filesystem::path& output, uint64_t pages, const OutputRules& rules = {});
+    static Result<std::unique_ptr<VcpWriter>> create(const std::filesystem::path& output, uint64_t pages,
+                                                     const OutputRules& rules = {});
     VcpWriter(const VcpWriter&) = delete;
     VcpWriter& operator=(const VcpWriter&) = delete;
 

@@ -33,12 +33,16 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
 void addNormal(WideVector& sum, WideVector normal) {
     const int64_t most = std::max(largest(sum), largest(normal));
     if (most >= int64_t{1} << 61) return;  // only a page made to overflow gets here
-    const bool opposed = most < int64_t{1} << 30 ? product(sum, normal) < 0 : product(shortened(sum, 30), shortened(normal, 30)) < 0;
-    if (opposed) sum -= normal;
-    else sum += normal;
+    const bool opposed =
+        most < int64_t{1} << 30 ? product(sum, normal) < 0 : product(shortened(sum, 30), shortened(normal, 30)) < 0;
+    if (opposed)
+        sum -= normal;
+    else
+        sum += normal;
 }
 
-std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums, std::span<const std::array<uint32_t, 3>> triangles) {
+std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums,
+                             std::span<const std::array<uint32_t, 3>> triangles) {
     std::vector<glm::i32vec3> of(sums.size());
     for (size_t v = 0; v < sums.size(); ++v) of[v] = glm::i32vec3(shortened(sums[v], 11));
     std::vector<uint8_t> crease(sums.size(), 0);
@@ -66,7 +70,8 @@ NormalGridPoint normalGridPoint(WideVector sum) {
 }
 
 uint32_t packGridNormal(NormalGridPoint p, bool crease) {
-    const uint32_t x = (p.u * 32767 + kNormalSteps / 2) / kNormalSteps * 2, y = (p.v * 65535 + kNormalSteps / 2) / kNormalSteps;
+    const uint32_t x = (p.u * 32767 + kNormalSteps / 2) / kNormalSteps * 2,
+                   y = (p.v * 65535 + kNormalSteps / 2) / kNormalSteps;
     return x | (crease ? kNormalCreaseBit : 0u) | y << 16;
 }
 

@@ -21,7 +21,8 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 void addNormal(WideVector& sum, WideVector normal);
 
 /// By vertex: whether the normal of one of its triangles turns away from its own by more than 40 degrees.
-std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums, std::span<const std::array<uint32_t, 3>> triangles);
+std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums,
+                             std::span<const std::array<uint32_t, 3>> triangles);
 
 /// Normals are kept to 12 + 12 bits of the octahedron's upper half (z >= 0), 0.07 degrees: they have no side.
 inline constexpr uint32_t kNormalSteps = 4095;

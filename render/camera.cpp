@@ -12,19 +12,22 @@ CameraBasis cameraBasis(const Camera& camera, uint32_t width, uint32_t height) {
     basis.forward = glm::normalize(camera.forward);
     basis.right = glm::normalize(glm::cross(basis.forward, camera.up));
     basis.up = glm::cross(basis.right, basis.forward);
-    basis.halfHeight = camera.projection == Projection::Perspective ? std::tan(camera.verticalFov / 2) : camera.orthographicHeight / 2;
+    basis.halfHeight =
+        camera.projection == Projection::Perspective ? std::tan(camera.verticalFov / 2) : camera.orthographicHeight / 2;
     basis.halfWidth = basis.halfHeight * double(width) / double(height);
     return basis;
 }
 
 CameraRay cameraRay(const Camera& camera, uint32_t width, uint32_t height, double x, double y) {
     const CameraBasis basis = cameraBasis(camera, width, height);
-    const glm::dvec3 aside = basis.right * (2 * x / width - 1) * basis.halfWidth + basis.up * (1 - 2 * y / height) * basis.halfHeight;
+    const glm::dvec3 aside =
+        basis.right * (2 * x / width - 1) * basis.halfWidth + basis.up * (1 - 2 * y / height) * basis.halfHeight;
     if (camera.projection == Projection::Orthographic) return {camera.eye + aside, basis.forward};
     return {camera.eye, glm::normalize(basis.forward + aside)};
 }
 
-Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::dvec3 up, double verticalFov, double aspect) {
+Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::dvec3 up, double verticalFov,
+                 double aspect) {
     Camera camera;
     camera.forward = glm::normalize(forward);
     camera.up = up;
@@ -35,9 +38,12 @@ Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::
     const double tanY = basis.halfHeight, tanX = tanY * aspect;
     double distance = 0;
     for (int corner = 0; corner < 8; ++corner) {
-        const glm::dvec3 p = glm::dvec3(corner & 1 ? boxMax.x : boxMin.x, corner & 2 ? boxMax.y : boxMin.y, corner & 4 ? boxMax.z : boxMin.z) - middle;
+        const glm::dvec3 p = glm::dvec3(corner & 1 ? boxMax.x : boxMin.x, corner & 2 ? boxMax.y : boxMin.y,
+                                        corner & 4 ? boxMax.z : boxMin.z) -
+                             middle;
         const double ahead = glm::dot(p, basis.forward);
-        distance = std::max({distance, std::abs(glm::dot(p, basis.right)) / tanX - ahead, std::abs(glm::dot(p, basis.up)) / tanY - ahead});
+        distance = std::max({distance, std::abs(glm::dot(p, basis.right)) / tanX - ahead,
+                             std::abs(glm::dot(p, basis.up)) / tanY - ahead});
     }
     camera.eye = middle - camera.forward * (distance * 1.02);
     camera.orthographicHeight = 2 * distance * tanY;

@@ -16,8 +16,8 @@ struct Camera {
     glm::dvec3 forward{0, 0, -1};
     glm::dvec3 up{0, 1, 0};
     Projection projection = Projection::Perspective;
-    double verticalFov = 0.6;      ///< perspective: angle from the lower to the upper edge, radians
-    double orthographicHeight = 1; ///< orthographic: from the lower to the upper edge, world units
+    double verticalFov = 0.6;       ///< perspective: angle from the lower to the upper edge, radians
+    double orthographicHeight = 1;  ///< orthographic: from the lower to the upper edge, world units
 
     bool operator==(const Camera&) const = default;
 };

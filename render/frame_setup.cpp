@@ -22,15 +22,24 @@ glm::vec4 encoded(glm::vec3 linear) { return glm::vec4(glm::pow(glm::max(linear,
 
 frame::uint shadingMode(ShadingMode mode) {
     switch (mode) {
-        case ShadingMode::Lit: return frame::kShadeLit;
-        case ShadingMode::Clay: return frame::kShadeClay;
-        case ShadingMode::Unlit: return frame::kShadeUnlit;
-        case ShadingMode::Normals: return frame::kShadeNormals;
-        case ShadingMode::Steps: return frame::kShadeSteps;
-        case ShadingMode::Cells: return frame::kShadeCells;
-        case ShadingMode::Fetches: return frame::kShadeFetches;
-        case ShadingMode::Level: return frame::kShadeLevel;
-        case ShadingMode::Error: return frame::kShadeError;
+        case ShadingMode::Lit:
+            return frame::kShadeLit;
+        case ShadingMode::Clay:
+            return frame::kShadeClay;
+        case ShadingMode::Unlit:
+            return frame::kShadeUnlit;
+        case ShadingMode::Normals:
+            return frame::kShadeNormals;
+        case ShadingMode::Steps:
+            return frame::kShadeSteps;
+        case ShadingMode::Cells:
+            return frame::kShadeCells;
+        case ShadingMode::Fetches:
+            return frame::kShadeFetches;
+        case ShadingMode::Level:
+            return frame::kShadeLevel;
+        case ShadingMode::Error:
+            return frame::kShadeError;
     }
     return frame::kShadeLit;
 }
@@ -43,7 +52,8 @@ PicturePlane picturePlane(const CameraBasis& basis, const PictureTile& tile) {
     PicturePlane plane;
     plane.stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth);
     plane.stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
-    plane.corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + plane.stepX * double(tile.x) + plane.stepY * double(tile.y);
+    plane.corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + plane.stepX * double(tile.x) +
+                   plane.stepY * double(tile.y);
     return plane;
 }
 
@@ -57,7 +67,8 @@ CameraBasis basisOf(const FrameRequest& request) {
 void setOrigin(frame::FrameConstants& c, glm::dvec3 eye, double rootCells) {
     const double latticePerCell = double(c.lattice.x);
     c.originLattice = glm::ivec4(0);
-    if (glm::all(glm::greaterThan(eye, glm::dvec3(-0.5 * rootCells))) && glm::all(glm::lessThan(eye, glm::dvec3(1.5 * rootCells)))) {
+    if (glm::all(glm::greaterThan(eye, glm::dvec3(-0.5 * rootCells))) &&
+        glm::all(glm::lessThan(eye, glm::dvec3(1.5 * rootCells)))) {
         const glm::dvec3 lattice = glm::floor(eye * latticePerCell);
         c.originLattice = glm::ivec4(glm::ivec3(lattice), 0);
         eye -= lattice / latticePerCell;
@@ -78,7 +89,8 @@ void setSections(frame::FrameConstants& c, const FrameRequest& request, const Fi
 // Rays of light begin so many pixels above the surface, beside the error of what is drawn.
 constexpr double kLiftPixels = 0.5;
 
-void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header, const CameraBasis& basis, double errorPixels) {
+void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header, const CameraBasis& basis,
+              double errorPixels) {
     const double pixel = 2 * basis.halfHeight / wholePicture(request).fullHeight;
     const bool perspective = request.camera.projection == Projection::Perspective;
     const double diagonal = glm::distance(glm::dvec3(header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]),
@@ -101,7 +113,8 @@ LightDirections lightDirections(const FrameRequest& request, const CameraBasis& 
 }
 
 bool hasLight(const Shading& shading) {
-    return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) && (shading.shadows || shading.occlusionRays > 0);
+    return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) &&
+           (shading.shadows || shading.occlusionRays > 0);
 }
 
 bool isFalseColour(ShadingMode mode) { return shadingMode(mode) >= frame::kShadeSteps; }
@@ -110,8 +123,8 @@ uint32_t hitPlanes(const FrameRequest& request, bool colour) {
     return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || isFalseColour(request.shading.mode) ? 1 : 0);
 }
 
-frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels,
-                                    const Similarity& placement) {
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour,
+                                     double errorPixels, const Similarity& placement) {
     frame::FrameConstants c{};
     const FileHeader header = dataset != nullptr ? dataset->header : FileHeader{.cell = 1, .levels = 1, .log2Cells = 5};
     const CameraBasis basis = basisOf(request);
@@ -129,7 +142,8 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     const int latticeBits = int(frame::kLatticeBits) - int(header.log2Cells) - int(header.levels - 1);
     c.lattice = {std::ldexp(1.0f, latticeBits), std::ldexp(1.0f, -latticeBits), 0, 0};
     const glm::dvec3 corner(header.origin[0], header.origin[1], header.origin[2]);
-    setOrigin(c, (request.camera.eye - corner) / header.cell, std::ldexp(1.0, int(header.log2Cells + header.levels) - 1));
+    setOrigin(c, (request.camera.eye - corner) / header.cell,
+              std::ldexp(1.0, int(header.log2Cells + header.levels) - 1));
 
     c.picture = {request.width, request.height, (request.width + frame::kTileSize - 1) / frame::kTileSize,
                  (request.height + frame::kTileSize - 1) / frame::kTileSize};
@@ -162,7 +176,8 @@ std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
     for (uint32_t y = 0; y < request.height; ++y) {
         const glm::vec4 colour = glm::mix(top, bottom, (float(whole.y + y) + 0.5f) / float(whole.fullHeight));
         rows[y] = 0xff000000u;
-        for (int i = 0; i < 3; ++i) rows[y] |= static_cast<uint32_t>(std::lround(glm::clamp(colour[i], 0.0f, 1.0f) * 255)) << 8 * i;
+        for (int i = 0; i < 3; ++i)
+            rows[y] |= static_cast<uint32_t>(std::lround(glm::clamp(colour[i], 0.0f, 1.0f) * 255)) << 8 * i;
     }
     return rows;
 }
@@ -183,7 +198,8 @@ SelectionView selectionView(const FrameRequest& request) {
     const auto plane = [&](glm::dvec3 inward, double off) {
         return view.orthographic ? glm::dvec4(inward, off) : glm::dvec4(inward + basis.forward * off, 0);
     };
-    view.planes = {plane(basis.right, -left), plane(-basis.right, right), plane(basis.up, -lower), plane(-basis.up, upper)};
+    view.planes = {plane(basis.right, -left), plane(-basis.right, right), plane(basis.up, -lower),
+                   plane(-basis.up, upper)};
     return view;
 }
 
@@ -194,23 +210,29 @@ Result<void> checkRequest(const FrameRequest& request) {
         return usage("a picture is 1 to 16384 pixels wide and high");
     const PictureTile whole = wholePicture(request);
     constexpr uint32_t kLargestWhole = 1 << 20;
-    if (whole.fullWidth < 1 || whole.fullHeight < 1 || whole.fullWidth > kLargestWhole || whole.fullHeight > kLargestWhole ||
-        uint64_t{whole.x} + request.width > whole.fullWidth || uint64_t{whole.y} + request.height > whole.fullHeight)
+    if (whole.fullWidth < 1 || whole.fullHeight < 1 || whole.fullWidth > kLargestWhole ||
+        whole.fullHeight > kLargestWhole || uint64_t{whole.x} + request.width > whole.fullWidth ||
+        uint64_t{whole.y} + request.height > whole.fullHeight)
         return usage("a tile must lie within its picture, and that be at most 2^20 pixels wide and high");
     if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
     const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
-    if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up)) return usage("the camera has coordinates that are not numbers");
+    if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up))
+        return usage("the camera has coordinates that are not numbers");
     if (!(request.march.epsilon > 0) || !std::isfinite(request.march.epsilon)) return usage("epsilon must be above 0");
     if (request.sections.size() > kMostSections) return usage("at most 6 section planes at once");
     for (const SectionPlane& plane : request.sections)
-        if (!finite(plane.normal) || !std::isfinite(plane.offset) || !(glm::length(plane.normal) > 0)) return usage("a section plane's normal is zero or not a number");
+        if (!finite(plane.normal) || !std::isfinite(plane.offset) || !(glm::length(plane.normal) > 0))
+            return usage("a section plane's normal is zero or not a number");
     if (request.shading.occlusionRays > kMostOcclusionRays) return usage("at most 64 occlusion rays a pixel");
-    if (!(request.shading.occlusionRadius >= 0) || !std::isfinite(request.shading.occlusionRadius)) return usage("the occlusion radius must not be negative");
+    if (!(request.shading.occlusionRadius >= 0) || !std::isfinite(request.shading.occlusionRadius))
+        return usage("the occlusion radius must not be negative");
     const double sine = glm::length(glm::cross(camera.forward, camera.up));
-    if (!(sine > 1e-9 * glm::length(camera.forward) * glm::length(camera.up))) return usage("the camera's forward and up directions are parallel or zero");
+    if (!(sine > 1e-9 * glm::length(camera.forward) * glm::length(camera.up)))
+        return usage("the camera's forward and up directions are parallel or zero");
     if (camera.projection == Projection::Perspective && !(camera.verticalFov > 0 && camera.verticalFov < 3.1))
         return usage("the camera's field of view must be above 0 and below 3.1 radians");
-    if (camera.projection == Projection::Orthographic && !(camera.orthographicHeight > 0)) return usage("the camera's height must be above 0");
+    if (camera.projection == Projection::Orthographic && !(camera.orthographicHeight > 0))
+        return usage("the camera's height must be above 0");
     return {};
 }
 

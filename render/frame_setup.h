@@ -10,8 +10,8 @@ namespace vcp {
 /// `request` as seen from the dataset (requestIn); what shows the world's axes or units is told by `placement`.
 /// `dataset` may be null: a picture of the background. `stripes`: see stripedIndex in tiles.glsl.
 /// `colour`: whether hits have colours. `errorPixels`: of what is drawn (UpdateResult).
-frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour, double errorPixels,
-                                    const Similarity& placement = {});
+frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour,
+                                     double errorPixels, const Similarity& placement = {});
 
 /// Towards the light and towards the middle of the sky, unit, in the axes of the request's camera.
 struct LightDirections {

@@ -38,7 +38,9 @@ void addCones(meso::Cones cones, int levels, MesoRecord& record) {
     static_assert(kMesoMostBorders >= meso::kMostAzimuths && kMesoMostBorders >= meso::kMostElevations);
     record.cones = {cones.azimuth, cones.elevation, levels, 0};
     const meso::ConeBorders borders(cones);
-    for (int k = 0; k < meso::kMostAzimuths; ++k) record.borders[k] = glm::vec4(borders.azimuths[k], k < meso::kMostElevations ? borders.elevations[k] : glm::vec2(0));
+    for (int k = 0; k < meso::kMostAzimuths; ++k)
+        record.borders[k] =
+            glm::vec4(borders.azimuths[k], k < meso::kMostElevations ? borders.elevations[k] : glm::vec2(0));
 }
 
 void addCompressed(const meso::CompressedMap& map, Packer& packer, MesoRecord& record) {
@@ -48,7 +50,8 @@ void addCompressed(const meso::CompressedMap& map, Packer& packer, MesoRecord& r
     for (size_t i = 0; i < map.levels.size(); ++i) {
         const auto& level = map.levels[i];
         const uint32_t steps = packer.add(level.steps);
-        record.levels[i] = {steps, level.entries, uint32_t(level.edge) << 16 | uint32_t(level.factor), packer.add(level.brick)};
+        record.levels[i] = {steps, level.entries, uint32_t(level.edge) << 16 | uint32_t(level.factor),
+                            packer.add(level.brick)};
     }
 }
 
@@ -143,18 +146,26 @@ void addSphere(const meso::SphereMap& map, Packer& packer, MesoArrays& arrays) {
 
 Result<MesoArrays> packMesoArrays(const meso::Method& method) {
     const auto fail = [](ErrorCode code, const char* message) { return Error{.code = code, .message = message}; };
-    const bool isComplete = method.kind == meso::WalkKind::Sphere  ? method.sphere != nullptr
-                            : method.kind != meso::WalkKind::Grid ? method.heights != nullptr
-                                                                  : method.boxes || method.compressed || method.distances || method.occupancy;
+    const bool isComplete = method.kind == meso::WalkKind::Sphere ? method.sphere != nullptr
+                            : method.kind != meso::WalkKind::Grid
+                                ? method.heights != nullptr
+                                : method.boxes || method.compressed || method.distances || method.occupancy;
     if (!isComplete) return fail(ErrorCode::Usage, "a mesostructure method without its arrays");
     static_assert(kMesoMaxLevels >= 13, "a pyramid over kMaxGridEdge texels");
-    if (method.compressed && method.compressed->levels.size() > kMesoMaxLevels) return fail(ErrorCode::Limit, "a compressed map of too many levels");
+    if (method.compressed && method.compressed->levels.size() > kMesoMaxLevels)
+        return fail(ErrorCode::Limit, "a compressed map of too many levels");
     MesoArrays arrays;
     Packer packer;
     switch (method.kind) {
-        case meso::WalkKind::Relief: addRelief(method, packer, arrays); break;
-        case meso::WalkKind::Pyramid: addPyramid(*method.heights, packer, arrays); break;
-        case meso::WalkKind::Sphere: addSphere(*method.sphere, packer, arrays); break;
+        case meso::WalkKind::Relief:
+            addRelief(method, packer, arrays);
+            break;
+        case meso::WalkKind::Pyramid:
+            addPyramid(*method.heights, packer, arrays);
+            break;
+        case meso::WalkKind::Sphere:
+            addSphere(*method.sphere, packer, arrays);
+            break;
         default:
             arrays.constants[0] = kMesoGrid;
             addSkipping(method.skipping(), packer, arrays);

@@ -1,5 +1,5 @@
-// The arrays of a mesostructure method as shaders read them: one run of 32-bit words, a record of where each begins, and
-// the specialization constants of the one pipeline that marches them (shared/meso_layout.h).
+// The arrays of a mesostructure method as shaders read them: one run of 32-bit words, a record of where each begins,
+// and the specialization constants of the one pipeline that marches them (shared/meso_layout.h).
 #pragma once
 
 #include <array>
@@ -23,7 +23,8 @@ using uvec4 = glm::uvec4;
 
 #include "render/shared/meso_layout.h"
 
-static_assert(sizeof(MesoRecord) == 144 + 16 * (kMesoMaxLevels + kMesoMostBorders) && offsetof(MesoRecord, levels) == 144);
+static_assert(sizeof(MesoRecord) == 144 + 16 * (kMesoMaxLevels + kMesoMostBorders) &&
+              offsetof(MesoRecord, levels) == 144);
 static_assert(sizeof(MesoView) == 208 && offsetof(MesoView, picture) == 96);
 
 }  // namespace frame
@@ -34,8 +35,8 @@ struct MesoArrays {
     std::vector<uint32_t> words;          ///< a multiple of 4
 };
 
-/// Pure; the method is not referred to afterwards. Errors: Usage (a method without its arrays), Limit (2^32 words, or cells
-/// of more than kMesoMaxLevels levels).
+/// Pure; the method is not referred to afterwards. Errors: Usage (a method without its arrays), Limit (2^32 words, or
+/// cells of more than kMesoMaxLevels levels).
 Result<MesoArrays> packMesoArrays(const meso::Method& method);
 
 }  // namespace vcp

@@ -31,7 +31,8 @@ struct MesoMarcher::State {
             pass.record(commands);
             timer.mark(commands, 1);
         }));
-        if (!timer.hasClock()) return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        if (!timer.hasClock())
+            return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         const auto ms = timer.read();
         if (!ms) return ms.error();
         return ms->front();
@@ -60,10 +61,13 @@ Result<std::unique_ptr<MesoMarcher>> MesoMarcher::create(const MesoMarcherOption
 
 const DeviceInfo& MesoMarcher::device() const { return state_->device->info(); }
 
-Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method* const> methods, std::span<const meso::MarchRay> rays, int rounds) {
+Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method* const> methods,
+                                                    std::span<const meso::MarchRay> rays, int rounds) {
     std::vector<MesoMarched> marched(methods.size());
     if (rays.empty()) return marched;
-    if (rays.size() > kMostRays) return Error{.code = ErrorCode::Limit, .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
+    if (rays.size() > kMostRays)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
     std::vector<MesoRaysPass> passes;
     for (const meso::Method* method : methods) {
         const auto arrays = packMesoArrays(*method);
@@ -76,7 +80,8 @@ Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method
             const auto ms = state_->milliseconds(passes[i]);
             if (!ms) return ms.error();
             const double processorMs = double(std::clock() - start) * 1e3 / CLOCKS_PER_SEC;
-            if (round > 0) marched[i].nsPerRay.push_back((device().software ? processorMs : *ms) * 1e6 / double(rays.size()));
+            if (round > 0)
+                marched[i].nsPerRay.push_back((device().software ? processorMs : *ms) * 1e6 / double(rays.size()));
         }
     for (size_t i = 0; i < passes.size(); ++i) {
         auto results = passes[i].read();

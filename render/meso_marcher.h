@@ -1,5 +1,5 @@
-// Lists of rays through one mesostructure method, on a device of its own: for measuring, and for comparing with the reference.
-// Pictures of surfaces are Renderer::setSurfaces.
+// Lists of rays through one mesostructure method, on a device of its own: for measuring, and for comparing with the
+// reference. Pictures of surfaces are Renderer::setSurfaces.
 //
 // One thread at a time.
 #pragma once
@@ -21,7 +21,8 @@ struct MesoMarcherOptions {
 
 struct MesoMarched {
     std::vector<meso::MarchResult> results;
-    std::vector<double> nsPerRay;  ///< of each round: the queue's time, or without its clock the call's; on a software device the processor's, of all threads
+    std::vector<double> nsPerRay;  ///< of each round: the queue's time, or without its clock the call's; on a software
+                                   ///< device the processor's, of all threads
 };
 
 class MesoMarcher {
@@ -34,9 +35,10 @@ public:
 
     [[nodiscard]] const DeviceInfo& device() const;
 
-    /// All rays by each method: a round over the methods to warm up and then `rounds` rounds, so that what else the machine does
-    /// falls on all alike. Errors: those of packMesoArrays; Device; Limit.
-    Result<std::vector<MesoMarched>> march(std::span<const meso::Method* const> methods, std::span<const meso::MarchRay> rays, int rounds);
+    /// All rays by each method: a round over the methods to warm up and then `rounds` rounds, so that what else the
+    /// machine does falls on all alike. Errors: those of packMesoArrays; Device; Limit.
+    Result<std::vector<MesoMarched>> march(std::span<const meso::Method* const> methods,
+                                           std::span<const meso::MarchRay> rays, int rounds);
 
     [[nodiscard]] std::vector<std::string> validationMessages() const;
 

@@ -20,7 +20,9 @@ Cover coverOf(uint32_t coarse, uint32_t coarseSize, uint32_t size) {
     const double step = double(size) / coarseSize, begin = coarse * step, end = begin + step;
     Cover cover{std::min(uint32_t(begin), size - 1), {}};
     for (uint32_t i = 0; i < 3 && cover.first + i < size; ++i)
-        cover.parts[i] = float(std::max(0.0, std::min(end, double(cover.first) + i + 1) - std::max(begin, double(cover.first) + i)) / step);
+        cover.parts[i] =
+            float(std::max(0.0, std::min(end, double(cover.first) + i + 1) - std::max(begin, double(cover.first) + i)) /
+                  step);
     return cover;
 }
 
@@ -34,7 +36,8 @@ std::vector<glm::vec4> halved(const std::vector<glm::vec4>& fine, glm::uvec2 siz
             glm::vec4 sum(0);
             for (uint32_t j = 0; j < 3; ++j)
                 for (uint32_t i = 0; i < 3; ++i)
-                    if (const float part = rows.parts[j] * columns.parts[i]; part > 0) sum += part * fine[size_t{rows.first + j} * size.x + columns.first + i];
+                    if (const float part = rows.parts[j] * columns.parts[i]; part > 0)
+                        sum += part * fine[size_t{rows.first + j} * size.x + columns.first + i];
             made.push_back(sum);
         }
     }

@@ -21,7 +21,8 @@ constexpr uint64_t kStagingBytes = 16ull << 20;
 }  // namespace
 
 uint64_t poolChunkBytes(const VkPhysicalDeviceLimits& limits, PageAccess access) {
-    const uint64_t reach = access == PageAccess::TexelBuffer ? uint64_t{limits.maxTexelBufferElements} * 16 : limits.maxStorageBufferRange;
+    const uint64_t reach =
+        access == PageAccess::TexelBuffer ? uint64_t{limits.maxTexelBufferElements} * 16 : limits.maxStorageBufferRange;
     return std::min(std::bit_floor(reach), uint64_t{1} << 30);
 }
 
@@ -31,19 +32,20 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
     if (units == 0) return Error{.code = ErrorCode::Limit, .message = "the budget has no room for a page"};
     if (units * kPoolUnitBytes > chunkBytes * frame::kMaxPoolChunks)
         return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("a pool of {} bytes is more than shaders can address on '{}'; at most {}", bytes,
-                                            device.info().name, chunkBytes * frame::kMaxPoolChunks)};
+                     .message = fmt::format("a pool of {} bytes is more than shaders can address on '{}'; at most {}",
+                                            bytes, device.info().name, chunkBytes * frame::kMaxPoolChunks)};
     std::unique_ptr<PagePool> pool(new PagePool(device, units * kPoolUnitBytes));
     pool->chunkShift_ = static_cast<uint32_t>(std::countr_zero(chunkBytes / 16));
-    constexpr VkBufferUsageFlags kUsage =
-        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-        VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+    constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT |
+                                          VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                          VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
     for (uint64_t done = 0; done < pool->bytes(); done += chunkBytes) {
         Chunk chunk;
         auto buffer = device.createBuffer(std::min(chunkBytes, pool->bytes() - done), kUsage, MemoryUse::Local);
         if (!buffer) return buffer.error();
         chunk.buffer = std::move(*buffer);
-        const uint64_t viewBytes = std::min(chunk.buffer.bytes(), uint64_t{device.limits().maxTexelBufferElements} * 16);
+        const uint64_t viewBytes =
+            std::min(chunk.buffer.bytes(), uint64_t{device.limits().maxTexelBufferElements} * 16);
         auto view = device.createTexelView(chunk.buffer, VK_FORMAT_R32G32B32A32_UINT, viewBytes);
         if (!view) return view.error();
         chunk.view = std::move(*view);
@@ -57,7 +59,8 @@ PagePool::~PagePool() { static_cast<void>(device_.waitForCopies()); }
 Result<void> PagePool::reserveStaging(uint64_t bytes) {
     if (staging_.bytes() >= bytes) return {};
     VCP_TRY(device_.waitForCopies());
-    auto staging = device_.createBuffer(std::bit_ceil(bytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Upload);
+    auto staging = device_.createBuffer(
+        std::bit_ceil(bytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Upload);
     if (!staging) return staging.error();
     staging_ = std::move(*staging);
     return {};
@@ -65,7 +68,8 @@ Result<void> PagePool::reserveStaging(uint64_t bytes) {
 
 bool PagePool::overlapsWaiting(uint64_t chunk, uint64_t at, uint64_t bytes) const {
     return std::any_of(waiting_.begin(), waiting_.end(), [&](const StagedCopy& copy) {
-        return copy.chunk == chunk && at < copy.region.dstOffset + copy.region.size && copy.region.dstOffset < at + bytes;
+        return copy.chunk == chunk && at < copy.region.dstOffset + copy.region.size &&
+               copy.region.dstOffset < at + bytes;
     });
 }
 
@@ -94,7 +98,8 @@ Result<void> PagePool::flush() {
     stagedBytes_ = 0;
     const std::vector<StagedCopy> copies = std::exchange(waiting_, {});
     return device_.submitCopies([&](VkCommandBuffer commands) {
-        for (const StagedCopy& copy : copies) vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
+        for (const StagedCopy& copy : copies)
+            vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
     });
 }
 

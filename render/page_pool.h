@@ -1,8 +1,8 @@
 // Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that
 // shaders see as texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into
-// their slots; elsewhere through a staging buffer, many with one submission, on the queue for copies where there is one. A slot is written only while no frame that
-// could read it is in flight: the renderer waits for each frame. Who is in which slot is not known here
-// (streaming/residency_policy.h).
+// their slots; elsewhere through a staging buffer, many with one submission, on the queue for copies where there is
+// one. A slot is written only while no frame that could read it is in flight: the renderer waits for each frame. Who is
+// in which slot is not known here (streaming/residency_policy.h).
 #pragma once
 
 #include <memory>
@@ -20,8 +20,8 @@ public:
     static Result<std::unique_ptr<PagePool>> create(Device& device, uint64_t bytes, PageAccess access);
     ~PagePool();
 
-    /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: they fit into the slot and are multiples
-    /// of 16. Errors: Device.
+    /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: they fit into the slot and are
+    /// multiples of 16. Errors: Device.
     Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes);
     /// What was written is there for all that is submitted later; nothing waits for it here. Errors: Device.
     Result<void> flush();
@@ -31,7 +31,9 @@ public:
     Result<void> move(PoolSlot from, PoolSlot to);
 
     /// Number of the slot's first texel, over all chunks.
-    [[nodiscard]] uint32_t texel(PoolSlot slot) const { return static_cast<uint32_t>(slot.firstUnit * (kPoolUnitBytes / 16)); }
+    [[nodiscard]] uint32_t texel(PoolSlot slot) const {
+        return static_cast<uint32_t>(slot.firstUnit * (kPoolUnitBytes / 16));
+    }
     [[nodiscard]] uint64_t bytes() const { return bytes_; }
 
     [[nodiscard]] uint32_t chunks() const { return static_cast<uint32_t>(chunks_.size()); }

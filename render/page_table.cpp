@@ -42,7 +42,8 @@ void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, flo
     const auto texelOf = [&](uint64_t byte) { return page.texel + static_cast<uint32_t>(byte / 16); };
     const uint32_t error = (std::bit_cast<uint32_t>(errorCells) + ~frame::kRecordErrorMask) & frame::kRecordErrorMask;
     record[0] = {frame::kRecordResident | error, 0, page.header.root, page.texel};
-    record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices), texelOf(sections.normals)};
+    record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices),
+                 texelOf(sections.normals)};
     record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), 0};
 }
 

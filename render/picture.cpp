@@ -50,7 +50,8 @@ Result<void> writePng(const Picture& picture, const std::filesystem::path& path,
     File file(::fdopen(::dup(output->descriptor()), "wb"));
     if (!file) return ioError(path, "cannot write");
     png_image image = imageOf(picture);
-    if (png_image_write_to_stdio(&image, file.get(), 0, picture.rgba.data(), 0, nullptr) == 0) return Error{.code = ErrorCode::Io, .message = pngError(image), .file = name};
+    if (png_image_write_to_stdio(&image, file.get(), 0, picture.rgba.data(), 0, nullptr) == 0)
+        return Error{.code = ErrorCode::Io, .message = pngError(image), .file = name};
     if (std::fflush(file.get()) != 0) return ioError(path, "cannot write");
     return output->commit();
 }
@@ -61,7 +62,9 @@ Result<Picture> readPng(const std::filesystem::path& path) {
     const auto& file = *opened;
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
-    const auto invalid = [&](const std::string& what) { return Error{.code = ErrorCode::InvalidInput, .message = what, .file = path.string()}; };
+    const auto invalid = [&](const std::string& what) {
+        return Error{.code = ErrorCode::InvalidInput, .message = what, .file = path.string()};
+    };
     if (png_image_begin_read_from_stdio(&image, file.get()) == 0) return invalid(pngError(image));
     if (uint64_t{image.width} * image.height > kMaxPixels) {
         png_image_free(&image);

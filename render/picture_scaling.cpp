@@ -8,11 +8,14 @@ namespace {
 
 constexpr VkImageSubresourceLayers kLayer{VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
 
-VkOffset3D farCorner(uint32_t width, uint32_t height) { return {static_cast<int32_t>(width), static_cast<int32_t>(height), 1}; }
+VkOffset3D farCorner(uint32_t width, uint32_t height) {
+    return {static_cast<int32_t>(width), static_cast<int32_t>(height), 1};
+}
 
 }  // namespace
 
-void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to, VkAccessFlags wrote, VkAccessFlags next) {
+void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to, VkAccessFlags wrote,
+                  VkAccessFlags next) {
     VkImageMemoryBarrier barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER};
     barrier.srcAccessMask = wrote;
     barrier.dstAccessMask = next;
@@ -21,7 +24,8 @@ void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, V
     barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     barrier.image = image;
     barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    const VkPipelineStageFlags before = from == VK_IMAGE_LAYOUT_UNDEFINED ? VK_PIPELINE_STAGE_ALL_COMMANDS_BIT : VK_PIPELINE_STAGE_TRANSFER_BIT;
+    const VkPipelineStageFlags before =
+        from == VK_IMAGE_LAYOUT_UNDEFINED ? VK_PIPELINE_STAGE_ALL_COMMANDS_BIT : VK_PIPELINE_STAGE_TRANSFER_BIT;
     vkCmdPipelineBarrier(commands, before, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, nullptr, 0, nullptr, 1, &barrier);
 }
 
@@ -64,7 +68,10 @@ void PictureScaling::record(VkCommandBuffer commands, const Buffer& picture, VkI
     vkCmdCopyBufferToImage(commands, picture.handle(), image_, kTo, 1, &copy);
     changeLayout(commands, image_, kTo, kFrom, VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT);
     changeLayout(commands, target, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
-    const VkImageBlit blit{kLayer, {{0, 0, 0}, farCorner(size_.width, size_.height)}, kLayer, {{0, 0, 0}, farCorner(extent.width, extent.height)}};
+    const VkImageBlit blit{kLayer,
+                           {{0, 0, 0}, farCorner(size_.width, size_.height)},
+                           kLayer,
+                           {{0, 0, 0}, farCorner(extent.width, extent.height)}};
     const bool same = size_.width == extent.width && size_.height == extent.height;
     vkCmdBlitImage(commands, image_, kFrom, target, kTo, 1, &blit, same ? VK_FILTER_NEAREST : VK_FILTER_LINEAR);
 }

@@ -30,6 +30,7 @@ private:
 };
 
 /// A barrier from transfers to all that follows; from all that came before where the image was not ours.
-void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to, VkAccessFlags wrote, VkAccessFlags next);
+void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to, VkAccessFlags wrote,
+                  VkAccessFlags next);
 
 }  // namespace vcp

@@ -21,7 +21,8 @@ constexpr uint64_t kMoreThanAnyBudget = 1ull << 60;
 
 /// The largest pool that it can make use of, as far as is known.
 uint64_t bytesOf(const Dataset& dataset, bool withColour) {
-    return poolShapeFor(dataset, withColour && dataset.hasColour(), kMoreThanAnyBudget, kMoreThanAnyBudget).units * kPoolUnitBytes;
+    return poolShapeFor(dataset, withColour && dataset.hasColour(), kMoreThanAnyBudget, kMoreThanAnyBudget).units *
+           kPoolUnitBytes;
 }
 
 /// Of another dataset in the same picture.
@@ -56,13 +57,16 @@ Renderer::~Renderer() = default;
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
     if (options.budgetBytes < kLeastBudget)
-        return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", options.budgetBytes, kLeastBudget)};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("a budget of {} bytes is too small; at least {}", options.budgetBytes,
+                                            kLeastBudget)};
     auto shared = std::make_shared<Shared>();
     shared->options = options;
     if (options.host) {
         shared->instance = Instance::borrow(options.host->instance);
     } else {
-        auto instance = Instance::create(options.validation, options.surface ? options.surface->instanceExtensions : options.windowExtensions);
+        auto instance = Instance::create(
+            options.validation, options.surface ? options.surface->instanceExtensions : options.windowExtensions);
         if (!instance) return instance.error();
         shared->instance = std::move(*instance);
     }
@@ -90,14 +94,17 @@ Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
     const auto window = createSurface();
     if (!window) return window.error();
     const bool forWindows = *window != VK_NULL_HANDLE || !options.windowExtensions.empty();
-    auto made = options.host ? Device::borrow(*options.host, faults) : Device::create(*instance, options.device, *window, forWindows, faults);
+    auto made = options.host ? Device::borrow(*options.host, faults)
+                             : Device::create(*instance, options.device, *window, forWindows, faults);
     if (!made) {
         if (*window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
         return made.error();
     }
     device = std::move(*made);
     info = device->info();
-    access = options.access != PageAccess::Auto ? options.access : info.software ? PageAccess::TexelBuffer : PageAccess::StorageBuffer;
+    access = options.access != PageAccess::Auto ? options.access
+             : info.software                    ? PageAccess::TexelBuffer
+                                                : PageAccess::StorageBuffer;
     stripes = info.software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
     return attach(*window);
 }
@@ -126,7 +133,9 @@ Result<void> Renderer::State::makeLayers() {
 }
 
 bool Renderer::State::isComplete() const {
-    const bool isBound = std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) { return datasets.empty() || layer.residency != nullptr; });
+    const bool isBound = std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) {
+        return datasets.empty() || layer.residency != nullptr;
+    });
     return isBound && layers.size() == std::max<size_t>(datasets.size(), 1);
 }
 
@@ -135,7 +144,9 @@ Result<void> Renderer::State::attachToDevice() {
     if (!window) return window.error();
     if (*window == VK_NULL_HANDLE || device->shows(*window)) return attach(*window);
     vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
-    return Error{.code = ErrorCode::Device, .message = "device '" + info.name + "', as it was chosen for the first view, cannot show pictures in this window"};
+    return Error{.code = ErrorCode::Device,
+                 .message = "device '" + info.name +
+                            "', as it was chosen for the first view, cannot show pictures in this window"};
 }
 
 void Renderer::State::release() {
@@ -159,9 +170,12 @@ void Renderer::State::hidePool() {
 
 Result<void> Renderer::State::showPool() {
     static_cast<void>(device->takeOutOfMemory());  // a pool that was halved for it is fine
-    if (std::any_of(datasets.begin(), datasets.end(), [](const Shared::Placed& each) { return !each.residency->hasPool(); })) datasets.clear();
+    if (std::any_of(datasets.begin(), datasets.end(),
+                    [](const Shared::Placed& each) { return !each.residency->hasPool(); }))
+        datasets.clear();
     std::vector<std::pair<uint32_t, uint32_t>> layouts;
-    for (const Shared::Placed& each : datasets) layouts.emplace_back(each.residency->pages().chunks(), each.residency->pages().chunkShift());
+    for (const Shared::Placed& each : datasets)
+        layouts.emplace_back(each.residency->pages().chunks(), each.residency->pages().chunkShift());
     if (!layouts.empty() && layouts != std::exchange(shared->poolLayouts, layouts)) clearPipelines();
     for (State* view : shared->views) {
         VCP_TRY(view->makeLayers());
@@ -198,7 +212,8 @@ Result<void> Renderer::State::rebuild() {
     DeviceFaults faults = options.faults;
     faults.lostAtSubmission = 0;
     // A window decides which queue there has to be.
-    const auto windowed = std::find_if(shared->views.begin(), shared->views.end(), [](const State* view) { return view->surface.has_value(); });
+    const auto windowed = std::find_if(shared->views.begin(), shared->views.end(),
+                                       [](const State* view) { return view->surface.has_value(); });
     State* const first = windowed != shared->views.end() ? *windowed : this;
     VCP_TRY(first->createDevice(faults));
     for (State* view : shared->views)
@@ -219,7 +234,8 @@ bool Renderer::State::recover(bool mayRebuild) {
     bool halved = false;
     for (const Shared::Placed& placed : datasets) {
         if (!placed.residency->hasPool()) continue;
-        const auto done = placed.residency->setBudgets(*device, access, placed.residency->pages().bytes() / 2, options.ramBytes / datasets.size());
+        const auto done = placed.residency->setBudgets(*device, access, placed.residency->pages().bytes() / 2,
+                                                       options.ramBytes / datasets.size());
         if (!done && done.error().code != ErrorCode::Limit) return false;
         halved = halved || done.ok();
     }
@@ -265,14 +281,17 @@ Result<void> Renderer::openDatasets(std::vector<PlacedDataset> datasets) {
     for (size_t i = 0; i < datasets.size(); ++i) {
         options.budgetBytes = shares[i];
         const bool isShared = datasets.size() > 1 && !datasets[i].dataset->pages.empty();
-        const uint64_t needed = isShared ? datasets[i].source->bytesToRead(0, o.colour && datasets[i].dataset->hasColour()) : 0;
+        const uint64_t needed =
+            isShared ? datasets[i].source->bytesToRead(0, o.colour && datasets[i].dataset->hasColour()) : 0;
         if (needed > options.loader.heldBytes) {
             close();
             return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to read the coarsest page of one takes {}: allow more (--ram)",
+                         .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to "
+                                                "read the coarsest page of one takes {}: allow more (--ram)",
                                                 datasets.size(), o.ramBytes, needed)};
         }
-        auto residency = Residency::create(*state_->device, state_->access, options, std::move(datasets[i].dataset), std::move(datasets[i].source));
+        auto residency = Residency::create(*state_->device, state_->access, options, std::move(datasets[i].dataset),
+                                           std::move(datasets[i].source));
         if (!residency) {
             close();
             return residency.error();
@@ -286,7 +305,8 @@ Result<void> Renderer::openDatasets(std::vector<PlacedDataset> datasets) {
 
 Result<void> Renderer::State::setShares(uint64_t budgetBytes, uint64_t ramBytes) {
     std::vector<uint64_t> bytes;
-    for (const Shared::Placed& placed : datasets) bytes.push_back(bytesOf(placed.residency->dataset(), placed.residency->hasColour()));
+    for (const Shared::Placed& placed : datasets)
+        bytes.push_back(bytesOf(placed.residency->dataset(), placed.residency->hasColour()));
     const std::vector<uint64_t> shares = budgetShares(budgetBytes, bytes);
     // What shrinks goes first, so that all together are never more than they may be.
     for (const bool shrinks : {true, false})
@@ -302,7 +322,9 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     State& s = *state_;
     if (!s.device) return kGone;
     if (budgetBytes < kLeastBudget)
-        return Error{.code = ErrorCode::Usage, .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
+        return Error{
+            .code = ErrorCode::Usage,
+            .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
     if (!s.datasets.empty()) {
         s.hidePool();
         const auto done = s.setShares(budgetBytes, ramBytes);
@@ -365,8 +387,9 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
     State& s = *state_;
     if (!s.device) return kGone;
-    auto result = s.datasets.empty() ? UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()}
-                                     : s.tryAgain([&] { return s.updateAll(request); });
+    auto result = s.datasets.empty()
+                      ? UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()}
+                      : s.tryAgain([&] { return s.updateAll(request); });
     if (!result) return result;
     result->deviceLosses = s.losses;
     result->changed = std::exchange(s.mesoSeen, s.shared->mesoVersion) != s.shared->mesoVersion || result->changed;
@@ -381,8 +404,10 @@ Result<UpdateResult> Renderer::State::updateAll(const FrameRequest& request) {
         auto one = layer.residency->update(selectionView(requestIn(layer.placement, request)), number);
         if (!one) return one;
         layer.errorPixels = one->errorPixels;
-        if (all) add(*all, *one);
-        else all = *std::move(one);
+        if (all)
+            add(*all, *one);
+        else
+            all = *std::move(one);
     }
     return *std::move(all);
 }

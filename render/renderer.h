@@ -31,8 +31,8 @@
 #include <string>
 #include <vector>
 
-#include <glm/vec3.hpp>
 #include <vulkan/vulkan_core.h>
+#include <glm/vec3.hpp>
 
 #include "octree/paper_page.h"
 #include "octree/result.h"
@@ -52,8 +52,8 @@ struct DeviceInfo {
     std::string type;    ///< "discrete", "integrated", "virtual", "cpu", "other"
     std::string driver;  ///< name and version
     bool software = false;
-    bool usable = false; ///< Vulkan 1.2 with a compute queue
-    bool chosen = false; ///< what an empty or the given choice selects
+    bool usable = false;  ///< Vulkan 1.2 with a compute queue
+    bool chosen = false;  ///< what an empty or the given choice selects
 };
 
 /// Devices of this machine; `choice` as in RendererOptions::device marks the chosen one.
@@ -101,35 +101,36 @@ struct WindowDrawing {
 using DrawOver = std::function<void(VkCommandBuffer commands, VkExtent2D size)>;
 
 struct RendererOptions {
-    std::string device;             ///< index, or part of the name in any case; empty: the best one
+    std::string device;                   ///< index, or part of the name in any case; empty: the best one
     uint64_t budgetBytes = 512ull << 20;  ///< of the page pool, never exceeded; at least 1 MiB
-    bool colour = true;             ///< false: colour pages are neither read nor allocated
-    bool validation = false;        ///< validation layers, core and synchronization; see validationMessages
+    bool colour = true;                   ///< false: colour pages are neither read nor allocated
+    bool validation = false;              ///< validation layers, core and synchronization; see validationMessages
     PageAccess access = PageAccess::Auto;
-    uint32_t loaderThreads = 0;           ///< shared out among the datasets, one each at least; 0: what their sources need
-    uint64_t ramBytes = 256ull << 20;     ///< of pages on their way to the pool, and of stored ones kept to be read again; never exceeded
+    uint32_t loaderThreads = 0;  ///< shared out among the datasets, one each at least; 0: what their sources need
+    uint64_t ramBytes =
+        256ull << 20;  ///< of pages on their way to the pool, and of stored ones kept to be read again; never exceeded
     LoadOrder order = LoadOrder::Feedback;  ///< of pages; others are for comparison
-    uint64_t uploadBytes = 16ull << 20;   ///< taken into the pool by one update (one page at least)
+    uint64_t uploadBytes = 16ull << 20;     ///< taken into the pool by one update (one page at least)
     DeviceFaults faults;
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for
     /// Instance extensions for windows of views that are added later; the queue then has graphics.
     std::vector<std::string> windowExtensions;
-    /// In place of a device of our own: `device`, `validation`, `surface` and `windowExtensions` are not looked at then.
-    /// When it is lost it is not made anew: Errors from then on.
+    /// In place of a device of our own: `device`, `validation`, `surface` and `windowExtensions` are not looked at
+    /// then. When it is lost it is not made anew: Errors from then on.
     std::optional<HostDevice> host;
 };
 
 enum class ShadingMode {
-    Lit,     ///< vertex colours where there are any, else clay; light and hemisphere
-    Clay,    ///< one colour, with light
-    Unlit,   ///< vertex colours where there are any, else clay, as they are
-    Normals, ///< normal as colour
+    Lit,      ///< vertex colours where there are any, else clay; light and hemisphere
+    Clay,     ///< one colour, with light
+    Unlit,    ///< vertex colours where there are any, else clay, as they are
+    Normals,  ///< normal as colour
     // False colours, blue through green to red (Demir and Westermann 2015, Figures 8 and 9).
-    Steps,   ///< node visits of the ray, 0 to 64 (compiles the counting variant on first use)
-    Cells,   ///< leaves that the ray was intersected with, 0 to 16 (the same)
-    Fetches, ///< 16-byte reads of the ray, 0 to 128 (the same)
-    Level,   ///< level of the page that was hit, coarsest to finest
-    Error,   ///< certified error of the page that was hit, 0 to 1 pixel
+    Steps,    ///< node visits of the ray, 0 to 64 (compiles the counting variant on first use)
+    Cells,    ///< leaves that the ray was intersected with, 0 to 16 (the same)
+    Fetches,  ///< 16-byte reads of the ray, 0 to 128 (the same)
+    Level,    ///< level of the page that was hit, coarsest to finest
+    Error,    ///< certified error of the page that was hit, 0 to 1 pixel
 };
 
 /// Cuts away what lies on the plane's far side: kept is where dot(normal, x) >= offset, world units.
@@ -149,12 +150,12 @@ struct Shading {
                                                      ///< where it follows the camera, else in world axes
     glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
     glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; of cut solids
-    bool shadows = false;         ///< hard shadows: a further ray a pixel
-    uint32_t occlusionRays = 0;   ///< ambient occlusion: so many further rays a pixel, at most 64; 0: off
-    double occlusionRadius = 0;   ///< how far they look, world units; 0: a tenth of the box's diagonal
-    glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};    ///< linear
+    bool shadows = false;                            ///< hard shadows: a further ray a pixel
+    uint32_t occlusionRays = 0;  ///< ambient occlusion: so many further rays a pixel, at most 64; 0: off
+    double occlusionRadius = 0;  ///< how far they look, world units; 0: a tenth of the box's diagonal
+    glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
-    bool transparent = false;     ///< background is black with alpha 0
+    bool transparent = false;  ///< background is black with alpha 0
 
     bool operator==(const Shading&) const = default;
 };
@@ -171,55 +172,58 @@ struct PictureTile {
 /// their own march, from their one page; they have no beam pass, no shadows, no ambient occlusion and no caps: what a
 /// request asks of these is left out.
 struct FrameRequest {
-    Camera camera;  ///< of the whole, where the picture is a tile
+    Camera camera;                        ///< of the whole, where the picture is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
     std::optional<PictureTile> tile;      ///< absent: the picture is the whole
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
-    std::vector<SectionPlane> sections;   ///< at most kMostSections
-    bool sectionCaps = false;  ///< fills what the planes cut open; right for closed surfaces
-    bool beam = true;          ///< beam pass; the picture is the same without it, only later
-    bool countSteps = false;   ///< fills FrameStats::steps and fetches (a slower variant)
-    PaperMarch march;          ///< of datasets of the method `paper`
+    std::vector<SectionPlane> sections;  ///< at most kMostSections
+    bool sectionCaps = false;            ///< fills what the planes cut open; right for closed surfaces
+    bool beam = true;                    ///< beam pass; the picture is the same without it, only later
+    bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
+    PaperMarch march;                    ///< of datasets of the method `paper`
 
     bool operator==(const FrameRequest&) const = default;
 };
 
 struct UpdateResult {
-    bool changed = false;  ///< the cut differs from that of the update before
-    bool settled = false;  ///< nothing that this view wants is missing, loading or queued
-    bool drawable = false; ///< at least the coarsest page is there
-    double errorPixels = 0;     ///< largest projected certified error in the cut (inf without a page or certificate)
-    uint64_t residentBytes = 0; ///< geometry and colour pages in the pool
-    uint64_t bytesRead = 0;     ///< decompressed page bytes the loader has delivered since open()
-    bool relaxed = false;       ///< the budget is too small for the view's pixel error; errorPixels says what it has
-    uint64_t heldBytesMax = 0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
+    bool changed = false;        ///< the cut differs from that of the update before
+    bool settled = false;        ///< nothing that this view wants is missing, loading or queued
+    bool drawable = false;       ///< at least the coarsest page is there
+    double errorPixels = 0;      ///< largest projected certified error in the cut (inf without a page or certificate)
+    uint64_t residentBytes = 0;  ///< geometry and colour pages in the pool
+    uint64_t bytesRead = 0;      ///< decompressed page bytes the loader has delivered since open()
+    bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels says what it has
+    uint64_t heldBytesMax =
+        0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
     uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
-    uint64_t reloads = 0;       ///< pages loaded twice in one still view: always 0
-    uint32_t deviceLosses = 0;  ///< since create(): each time all was made anew and pages are read again
-    uint64_t failures = 0;      ///< reads that failed and were, or will be, tried again
+    uint64_t reloads = 0;               ///< pages loaded twice in one still view: always 0
+    uint32_t deviceLosses = 0;          ///< since create(): each time all was made anew and pages are read again
+    uint64_t failures = 0;              ///< reads that failed and were, or will be, tried again
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
-    uint32_t pagesMissing = 0;  ///< wanted, not resident
-    uint32_t pagesPending = 0;  ///< wished for, being read, or waiting for an update
+    uint32_t pagesMissing = 0;                    ///< wanted, not resident
+    uint32_t pagesPending = 0;                    ///< wished for, being read, or waiting for an update
     uint32_t coarsestLevel = 0, finestLevel = 0;  ///< of the pages in the cut
-    std::vector<Error> problems;  ///< pages that cannot be read; each is reported once
+    std::vector<Error> problems;                  ///< pages that cannot be read; each is reported once
 };
 
 struct FrameStats {
     uint64_t rays = 0;        ///< pixels
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
     uint64_t hitPixels = 0;   ///< that any dataset or surface is hit in
-    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0, msFeedback = 0;  ///< GPU timestamps; 0 where the device has none
-    double msFrame = 0;       ///< from submission to completion, wall clock
+    double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0,
+           msFeedback = 0;            ///< GPU timestamps; 0 where the device has none
+    double msFrame = 0;               ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
-    uint64_t poolBytes = 0;     ///< allocated for the pool
-    uint64_t colourBytes = 0;   ///< of colour, in the pool
+    uint64_t poolBytes = 0;           ///< allocated for the pool
+    uint64_t colourBytes = 0;         ///< of colour, in the pool
     uint32_t pagesInCut = 0;
-    uint32_t pipelines = 0;     ///< made since create()
-    double msSurfaces = 0;      ///< of surfaces with mesostructure; GPU timestamps
-    uint64_t unresolvedRays = 0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
-    uint64_t farHits = 0;       ///< of pixels and surfaces, shown by what they are from far and not marched
-    uint64_t surfaceBytes = 0;  ///< of mesostructure on the device, beside the pool: assets and shells
+    uint32_t pipelines = 0;  ///< made since create()
+    double msSurfaces = 0;   ///< of surfaces with mesostructure; GPU timestamps
+    uint64_t unresolvedRays =
+        0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
+    uint64_t farHits = 0;         ///< of pixels and surfaces, shown by what they are from far and not marched
+    uint64_t surfaceBytes = 0;    ///< of mesostructure on the device, beside the pool: assets and shells
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 
@@ -238,32 +242,32 @@ struct PlacedDataset {
     std::shared_ptr<const Dataset> dataset;
     std::shared_ptr<const PageSource> source;  ///< of this one alone
     Similarity placement;
-    uint32_t loaderThreads = 2;                ///< that keep its source busy
+    uint32_t loaderThreads = 2;  ///< that keep its source busy
 };
 
 /// A page in the pool, for a picture of what is there.
 struct PageBox {
-    glm::dvec3 corner;                 ///< world
-    std::array<glm::dvec3, 3> edges;   ///< from the corner, world
-    uint32_t level = 0;                ///< 0: the coarsest
-    bool isDrawn = false;              ///< in the cut of this view
+    glm::dvec3 corner;                ///< world
+    std::array<glm::dvec3, 3> edges;  ///< from the corner, world
+    uint32_t level = 0;               ///< 0: the coarsest
+    bool isDrawn = false;             ///< in the cut of this view
 };
 
 /// What the rays of the last frame that missed pages met, 24 x 16 over the picture, row by row from the upper left.
 struct FeedbackPicture {
     static constexpr uint32_t kWidth = 24, kHeight = 16;
-    /// Of the page that was hit, its certified error in pixels there, of several datasets' the largest; below 0: nothing was hit. Above the request's
-    /// errorPixels the ray asked for finer pages.
+    /// Of the page that was hit, its certified error in pixels there, of several datasets' the largest; below 0:
+    /// nothing was hit. Above the request's errorPixels the ray asked for finer pages.
     std::array<float, size_t{kWidth} * kHeight> errorPixels;
 };
 
 /// What one pixel shows.
 struct PixelHit {
-    double depth;         ///< distance from the ray's origin, world units
-    glm::dvec3 position;  ///< world space
-    glm::vec3 normal;     ///< unit, towards the viewer
-    size_t dataset = 0;   ///< number of the dataset, in the order of open()
-    bool onCap = false;   ///< on what a section plane cut open
+    double depth;            ///< distance from the ray's origin, world units
+    glm::dvec3 position;     ///< world space
+    glm::vec3 normal;        ///< unit, towards the viewer
+    size_t dataset = 0;      ///< number of the dataset, in the order of open()
+    bool onCap = false;      ///< on what a section plane cut open
     bool onSurface = false;  ///< on mesostructure; then `dataset` means nothing
 };
 
@@ -277,9 +281,9 @@ public:
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
-    /// Another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for a window:
-    /// the options of create() must have had one too, or windowExtensions, or the
-    /// host's device what it takes. Errors: Device.
+    /// Another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for a
+    /// window: the options of create() must have had one too, or windowExtensions, or the host's device what it takes.
+    /// Errors: Device.
     Result<std::unique_ptr<Renderer>> addView(const std::optional<SurfaceSource>& surface = {});
 
     [[nodiscard]] const DeviceInfo& device() const;
@@ -287,30 +291,33 @@ public:
 
     /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
-    /// Shows several, each drawn by itself and the nearest surface seen; shadows and occlusion are within each. Budgets are
-    /// shared out (budgetShares). `surfaces`: as setSurfaces. Errors: those of open of one and of setSurfaces; then nothing is shown.
+    /// Shows several, each drawn by itself and the nearest surface seen; shadows and occlusion are within each. Budgets
+    /// are shared out (budgetShares). `surfaces`: as setSurfaces. Errors: those of open of one and of setSurfaces; then
+    /// nothing is shown.
     Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces = {});
     /// Stops the loader and forgets all pages.
     void close();
 
     /// Surfaces with mesostructure, in all views, in place of those before: drawn over the datasets that are open, the
-    /// nearer is seen at each pixel. They take light, shadows, normals, unlit colours and steps (their iterations, 0 to 100) from the request;
-    /// what strays less than the request's errorPixels from its mean height
-    /// is shown by its light from far; they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be uploaded again to a device that
-    /// is made anew. Without any, nothing is made for them. On an error there are none. Errors: Device, Limit.
+    /// nearer is seen at each pixel. They take light, shadows, normals, unlit colours and steps (their iterations, 0 to
+    /// 100) from the request; what strays less than the request's errorPixels from its mean height is shown by its
+    /// light from far; they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be
+    /// uploaded again to a device that is made anew. Without any, nothing is made for them. On an error there are none.
+    /// Errors: Device, Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
 
-    /// Other budgets than the options', from now on: what has no room goes at once, what is kept is not read again where
-    /// `ramBytes` has room to carry it over. Waits for the copies. To be followed by update(). Errors: Usage; Limit,
-    /// where the coarsest page has no room: the budgets stay as they were; Device: the dataset is closed.
+    /// Other budgets than the options', from now on: what has no room goes at once, what is kept is not read again
+    /// where `ramBytes` has room to carry it over. Waits for the copies. To be followed by update(). Errors: Usage;
+    /// Limit, where the coarsest page has no room: the budgets stay as they were; Device: the dataset is closed.
     Result<void> setBudgets(uint64_t budgetBytes, uint64_t ramBytes);
 
     /// `gone` is called before a lost device is given up: what was made with windowDrawing() is destroyed then, and
     /// windowDrawing() asked again. Called by update() and render().
     void onDeviceLoss(std::function<void()> gone);
 
-    /// See the top of this file. Where the device runs out of memory, here or in render(), the pool is halved; where the
-    /// device was lost, all is made anew, once a call, and read again. Errors: Device. Problems of single pages are in the result.
+    /// See the top of this file. Where the device runs out of memory, here or in render(), the pool is halved; where
+    /// the device was lost, all is made anew, once a call, and read again. Errors: Device. Problems of single pages are
+    /// in the result.
     Result<UpdateResult> update(const FrameRequest& request);
     /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
     /// returns true (asked several times a second).
@@ -336,8 +343,8 @@ public:
     /// One pixel of the last render(); nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
 
-    /// Copies the last picture into the host's image, scaled to it, sRGB-encoded; what was in the image is lost. Waits for
-    /// the GPU. Errors: Usage, where nothing was drawn yet or the queue has no graphics; Device.
+    /// Copies the last picture into the host's image, scaled to it, sRGB-encoded; what was in the image is lost. Waits
+    /// for the GPU. Errors: Usage, where nothing was drawn yet or the queue has no graphics; Device.
     Result<void> copyPicture(const ImageTarget& target);
     /// All pages in the pool; takes time for each.
     [[nodiscard]] std::vector<PageBox> residentPages() const;

@@ -34,17 +34,25 @@ void add(FrameStats& all, const FrameStats& one) {
 
 MesoShading mesoShading(ShadingMode mode) {
     switch (mode) {
-        case ShadingMode::Normals: return MesoShading::Normals;
-        case ShadingMode::Unlit: return MesoShading::Unlit;
-        case ShadingMode::Steps: return MesoShading::Heat;
-        default: return MesoShading::Lit;
+        case ShadingMode::Normals:
+            return MesoShading::Normals;
+        case ShadingMode::Unlit:
+            return MesoShading::Unlit;
+        case ShadingMode::Steps:
+            return MesoShading::Heat;
+        default:
+            return MesoShading::Lit;
     }
 }
 
 MesoLook mesoLook(const FrameRequest& request) {
     const PictureTile tile = wholePicture(request);
-    const LightDirections directions = lightDirections(request, cameraBasis(request.camera, tile.fullWidth, tile.fullHeight));
-    return {request.camera, tile, directions.light, directions.sky, request.shading.shadows, mesoShading(request.shading.mode), request.errorPixels};
+    const LightDirections directions =
+        lightDirections(request, cameraBasis(request.camera, tile.fullWidth, tile.fullHeight));
+    return {request.camera,          tile,
+            directions.light,        directions.sky,
+            request.shading.shadows, mesoShading(request.shading.mode),
+            request.errorPixels};
 }
 
 }  // namespace
@@ -63,18 +71,23 @@ PassConstants Renderer::State::constantsFor(const Layer& layer, const FrameReque
 }
 
 Result<void> Renderer::State::checkLimits(const Layer& layer, const FrameRequest& request) const {
-    const uint64_t words = uint64_t{request.width} * request.height * hitPlanes(request, layer.residency != nullptr && layer.residency->hasColour());
+    const uint64_t words = uint64_t{request.width} * request.height *
+                           hitPlanes(request, layer.residency != nullptr && layer.residency->hasColour());
     const VkPhysicalDeviceLimits& limits = device->limits();
     if (words * 4 <= limits.maxStorageBufferRange && words <= limits.maxTexelBufferElements) return {};
-    return Error{.code = ErrorCode::Limit,
-                 .message = fmt::format("{} x {} pixels are more than '{}' can address at once; at most {} pixels", request.width, request.height,
-                                        device->info().name, std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) / (words / (uint64_t{request.width} * request.height)))};
+    return Error{
+        .code = ErrorCode::Limit,
+        .message = fmt::format("{} x {} pixels are more than '{}' can address at once; at most {} pixels",
+                               request.width, request.height, device->info().name,
+                               std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) /
+                                   (words / (uint64_t{request.width} * request.height)))};
 }
 
 Result<void> Renderer::State::prepareTable(Layer& layer) {
     const uint64_t version = layer.residency != nullptr ? layer.residency->version() : 0;
     if (!layer.tableStale && version == layer.tableVersion) return {};
-    auto next = layer.residency != nullptr ? layer.residency->table(number) : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+    auto next = layer.residency != nullptr ? layer.residency->table(number)
+                                           : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
     if (layer.tableStale || next != layer.table) VCP_TRY(layer.resources->setTable(next));
     layer.table = std::move(next);
     layer.tableVersion = version;
@@ -95,9 +108,13 @@ Result<void> Renderer::State::prepare(Layer& layer, const FrameRequest& request)
         VCP_TRY(compose.prepare(*resources, constants));
     }
     VCP_TRY(beam.prepare(*resources, constants, request.beam));
-    const SectionKind sections = request.sections.empty() ? SectionKind::None : request.sectionCaps ? SectionKind::Capped : SectionKind::Open;
-    if (layer.isPaper()) VCP_TRY(paperTrace.prepare(*resources, constants, sections != SectionKind::None, request.march));
-    else VCP_TRY(trace.prepare(*resources, constants, sections));
+    const SectionKind sections = request.sections.empty() ? SectionKind::None
+                                 : request.sectionCaps    ? SectionKind::Capped
+                                                          : SectionKind::Open;
+    if (layer.isPaper())
+        VCP_TRY(paperTrace.prepare(*resources, constants, sections != SectionKind::None, request.march));
+    else
+        VCP_TRY(trace.prepare(*resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
     if (traceLight) VCP_TRY(light.prepare(*resources, constants));
     if (layer.listens()) VCP_TRY(feedback.prepare(*device, *resources, constants, layer.table));
@@ -107,8 +124,9 @@ Result<void> Renderer::State::prepare(Layer& layer, const FrameRequest& request)
 void Renderer::State::recordFrame(VkCommandBuffer commands, const Layer& layer, const FrameRequest& request) {
     const auto& resources = layer.resources;
     timer.reset(commands);
-    frame::FrameConstants c = frameConstants(request, layer.residency != nullptr ? &layer.residency->dataset() : nullptr, stripes, layer.constants.colour,
-                                             layer.errorPixels, layer.placement);
+    frame::FrameConstants c =
+        frameConstants(request, layer.residency != nullptr ? &layer.residency->dataset() : nullptr, stripes,
+                       layer.constants.colour, layer.errorPixels, layer.placement);
     c.lattice.z = feedback.jitter().x;
     c.lattice.w = feedback.jitter().y;
     resources->begin(commands, c);
@@ -116,8 +134,10 @@ void Renderer::State::recordFrame(VkCommandBuffer commands, const Layer& layer, 
     timer.mark(commands, 0);
     beam.record(commands, *resources);
     timer.mark(commands, 1);
-    if (layer.isPaper()) paperTrace.record(commands, *resources);
-    else trace.record(commands, *resources);
+    if (layer.isPaper())
+        paperTrace.record(commands, *resources);
+    else
+        trace.record(commands, *resources);
     timer.mark(commands, 2);
     if (hasLight(request.shading)) light.record(commands, *resources);
     timer.mark(commands, 3);
@@ -144,14 +164,17 @@ Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
     drawn.reset();
     if (!device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
-    if (std::any_of(layers.begin(), layers.end(), [](const Layer& layer) { return layer.listens(); })) feedbackPicture.reset();
+    if (std::any_of(layers.begin(), layers.end(), [](const Layer& layer) { return layer.listens(); }))
+        feedbackPicture.reset();
     std::optional<FrameStats> all;
     for (Layer& layer : layers) {
         layer.drawn = layer.drawable(request);
         auto stats = drawLayer(layer, layer.drawn);
         if (!stats) return stats;
-        if (all) add(*all, *stats);
-        else all = *stats;
+        if (all)
+            add(*all, *stats);
+        else
+            all = *stats;
     }
     if (shared->meso) {
         VCP_TRY(drawSurfaces(request, *all));
@@ -211,7 +234,8 @@ void Renderer::State::keep(const RayFeedback& heard, const SelectionView& view, 
     const double unit = std::ldexp(dataset.edgeOf(dataset.pages[0]), -static_cast<int>(frame::kLatticeBits));
     for (const RayFeedback::Hit& hit : heard.hits) {
         const double distance = view.orthographic ? 1 : glm::length(corner + glm::dvec3(hit.place) * unit - view.eye);
-        const double error = double(dataset.pages[hit.page].certifiedError) * view.pixelsPerUnit / std::max(distance, unit);
+        const double error =
+            double(dataset.pages[hit.page].certifiedError) * view.pixelsPerUnit / std::max(distance, unit);
         float& kept = feedbackPicture->errorPixels[hit.ray];
         kept = std::max(kept, static_cast<float>(error));
     }

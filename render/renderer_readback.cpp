@@ -31,7 +31,8 @@ Result<std::vector<uint32_t>> Renderer::State::hitPlane(const Layer& layer, uint
     for (uint32_t y = 0; y < size.height; ++y)
         for (uint32_t x = 0; x < size.width; ++x) {
             const uint32_t tile = y / frame::kTileSize * size.tilesX() + x / frame::kTileSize;
-            if (std::bit_cast<float>((*starts)[tile]) >= frame::kTileEmpty) (*words)[uint64_t{y} * size.width + x] = missing;
+            if (std::bit_cast<float>((*starts)[tile]) >= frame::kTileEmpty)
+                (*words)[uint64_t{y} * size.width + x] = missing;
         }
     return words;
 }
@@ -59,7 +60,8 @@ Result<std::vector<float>> Renderer::readDepth() {
     for (size_t i = 1; depth && i < state_->layers.size(); ++i) {
         const auto other = state_->depthOf(state_->layers[i]);
         if (!other) return other;
-        std::transform(depth->begin(), depth->end(), other->begin(), depth->begin(), [](float a, float b) { return b < a || std::isnan(a) ? b : a; });
+        std::transform(depth->begin(), depth->end(), other->begin(), depth->begin(),
+                       [](float a, float b) { return b < a || std::isnan(a) ? b : a; });
     }
     const auto depths = state_->mesoPlane(kMesoDepth), normals = state_->mesoPlane(kMesoNormal);
     if (!depths || !normals) return depths ? normals.error() : depths.error();
@@ -76,22 +78,27 @@ Result<std::vector<float>> Renderer::State::depthOf(const Layer& layer) const {
     std::transform(words->begin(), words->end(), depth.begin(), [&](uint32_t word) {
         const float cells = std::abs(std::bit_cast<float>(word));
         if (cells >= frame::kGaveUp) return std::numeric_limits<float>::quiet_NaN();
-        return cells >= frame::kNoHit ? std::numeric_limits<float>::infinity() : static_cast<float>(double(cells) * cell);
+        return cells >= frame::kNoHit ? std::numeric_limits<float>::infinity()
+                                      : static_cast<float>(double(cells) * cell);
     });
     return depth;
 }
 
 Result<std::vector<uint32_t>> Renderer::readWork() {
     const State& s = *state_;
-    if (!s.drawn || !showsWork(s.drawn->shading.mode)) return Error{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
+    if (!s.drawn || !showsWork(s.drawn->shading.mode))
+        return Error{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
     const ShadingMode mode = s.drawn->shading.mode;
-    const float most = mode == ShadingMode::Steps ? frame::kMostShownSteps : mode == ShadingMode::Cells ? frame::kMostShownCells : frame::kMostShownFetches;
+    const float most = mode == ShadingMode::Steps   ? frame::kMostShownSteps
+                       : mode == ShadingMode::Cells ? frame::kMostShownCells
+                                                    : frame::kMostShownFetches;
     std::vector<uint32_t> work;
     for (const State::Layer& layer : s.layers) {
         const auto words = s.hitPlane(layer, hitPlanes(layer.drawn, layer.constants.colour) - 1, 0);
         if (!words) return words;
         work.resize(words->size());
-        for (size_t i = 0; i < work.size(); ++i) work[i] += static_cast<uint32_t>(std::lround(std::bit_cast<float>((*words)[i]) * most));
+        for (size_t i = 0; i < work.size(); ++i)
+            work[i] += static_cast<uint32_t>(std::lround(std::bit_cast<float>((*words)[i]) * most));
     }
     return work;
 }
@@ -160,7 +167,8 @@ Result<std::optional<PixelHit>> Renderer::State::pickSurfaces(uint32_t x, uint32
 
 PixelHit Renderer::State::hitAt(uint32_t x, uint32_t y, double depth) const {
     const PictureTile whole = wholePicture(*drawn);
-    const CameraRay ray = cameraRay(drawn->camera, whole.fullWidth, whole.fullHeight, whole.x + x + 0.5, whole.y + y + 0.5);
+    const CameraRay ray =
+        cameraRay(drawn->camera, whole.fullWidth, whole.fullHeight, whole.x + x + 0.5, whole.y + y + 0.5);
     return {.depth = depth, .position = ray.origin + ray.direction * depth, .normal = glm::vec3(0)};
 }
 
@@ -171,7 +179,8 @@ Result<std::optional<PixelHit>> Renderer::State::pick(const Layer& layer, uint32
     const uint64_t tile = uint64_t{y / frame::kTileSize} * size.tilesX() + x / frame::kTileSize;
     const uint64_t at = uint64_t{y} * size.width + x;
     uint32_t words[3];
-    const std::pair<const Buffer*, uint64_t> reads[] = {{&resources->tileStarts(), tile}, {&resources->hits(), at}, {&resources->hits(), size.pixels() + at}};
+    const std::pair<const Buffer*, uint64_t> reads[] = {
+        {&resources->tileStarts(), tile}, {&resources->hits(), at}, {&resources->hits(), size.pixels() + at}};
     for (int i = 0; i < 3; ++i) {
         auto word = readWords(*device, *reads[i].first, reads[i].second, 1);
         if (!word) return word.error();
@@ -189,17 +198,21 @@ Result<std::optional<PixelHit>> Renderer::State::pick(const Layer& layer, uint32
 Result<void> Renderer::copyPicture(const ImageTarget& target) {
     State& s = *state_;
     if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    if (!s.options.host) return Error{.code = ErrorCode::Usage, .message = "images are those of a device of the host, and there is none"};
+    if (!s.options.host)
+        return Error{.code = ErrorCode::Usage,
+                     .message = "images are those of a device of the host, and there is none"};
     if (target.image == VK_NULL_HANDLE || target.width == 0 || target.height == 0)
         return Error{.code = ErrorCode::Usage, .message = "there is no image, or it has no area"};
-    if (!s.device->hasGraphics()) return Error{.code = ErrorCode::Usage, .message = "pictures are scaled to images by queues with graphics, which this is not"};
+    if (!s.device->hasGraphics())
+        return Error{.code = ErrorCode::Usage,
+                     .message = "pictures are scaled to images by queues with graphics, which this is not"};
     if (!s.scaling) s.scaling = std::make_unique<PictureScaling>(*s.device);
     VCP_TRY(s.scaling->prepare(s.layers.front().resources->size()));
     auto commands = s.device->beginCommands();
     if (!commands) return commands.error();
     s.scaling->record(*commands, s.layers.front().resources->picture(), target.image, {target.width, target.height});
-    changeLayout(*commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter, VK_ACCESS_TRANSFER_WRITE_BIT,
-                 VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
+    changeLayout(*commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter,
+                 VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
     return s.device->endCommandsAndWait(target.wait, target.signal);
 }
 
@@ -213,7 +226,8 @@ std::vector<PageBox> Renderer::residentPages() const {
             const PageEntry& entry = dataset.pages[page];
             const glm::dvec3 low = dataset.originOf(entry);
             const double edge = dataset.edgeOf(entry) * layer.placement.scale;
-            PageBox box{layer.placement.toWorld(low), {}, entry.level, std::binary_search(cut.begin(), cut.end(), page)};
+            PageBox box{
+                layer.placement.toWorld(low), {}, entry.level, std::binary_search(cut.begin(), cut.end(), page)};
             for (int axis = 0; axis < 3; ++axis) {
                 glm::dvec3 along(0);
                 along[axis] = edge;
@@ -245,8 +259,8 @@ Result<WindowDrawing> Renderer::windowDrawing() {
     if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
     const auto renderPass = s.swapchain->renderPass();
     if (!renderPass) return renderPass.error();
-    return WindowDrawing{s.instance->handle(), s.device->physical(), s.device->handle(), s.device->queue(), s.device->queueFamily(), *renderPass};
+    return WindowDrawing{s.instance->handle(), s.device->physical(),    s.device->handle(),
+                         s.device->queue(),    s.device->queueFamily(), *renderPass};
 }
 
 }  // namespace vcp
-

@@ -1,12 +1,11 @@
-// What a Renderer is made of: what its views share, and a view. For renderer.cpp (its life), renderer_frame.cpp (drawing) and
-// renderer_readback.cpp (what was drawn).
+// What a Renderer is made of: what its views share, and a view. For renderer.cpp (its life), renderer_frame.cpp
+// (drawing) and renderer_readback.cpp (what was drawn).
 #pragma once
 
 #include "render/renderer.h"
 
 #include <utility>
 
-#include "render/picture_scaling.h"
 #include "render/passes/beam.h"
 #include "render/passes/compose.h"
 #include "render/passes/feedback.h"
@@ -15,6 +14,7 @@
 #include "render/passes/paper_trace.h"
 #include "render/passes/shade.h"
 #include "render/passes/trace.h"
+#include "render/picture_scaling.h"
 #include "render/residency.h"
 #include "render/swapchain.h"
 #include "render/vulkan/pass_timer.h"
@@ -54,8 +54,8 @@ struct Renderer::Shared {
         std::unique_ptr<MesoSurfacePass> pass;
         PassTimer timer;
     };
-    std::unique_ptr<Meso> meso;    // null: there are none
-    uint64_t mesoVersion = 0;      // counts setSurfaces
+    std::unique_ptr<Meso> meso;  // null: there are none
+    uint64_t mesoVersion = 0;    // counts setSurfaces
     std::vector<State*> views;
     ViewNumber nextNumber = 0;
 
@@ -109,19 +109,23 @@ struct Renderer::State {
         double errorPixels = 0;         // of the cut
         FrameRequest drawn;
 
-        [[nodiscard]] bool isPaper() const { return residency != nullptr && residency->dataset().header.method == Method::Paper; }
+        [[nodiscard]] bool isPaper() const {
+            return residency != nullptr && residency->dataset().header.method == Method::Paper;
+        }
         /// Whether the next frame has a feedback pass.
         [[nodiscard]] bool listens() const { return residency != nullptr && residency->listens() && !isPaper(); }
         /// World units a unit of the hits' depths.
-        [[nodiscard]] double unit() const { return (residency != nullptr ? residency->dataset().header.cell : 1) * placement.scale; }
+        [[nodiscard]] double unit() const {
+            return (residency != nullptr ? residency->dataset().header.cell : 1) * placement.scale;
+        }
         /// The request from the dataset's own space, without what its method cannot draw.
         [[nodiscard]] FrameRequest drawable(const FrameRequest& request) const;
     };
     std::vector<Layer> layers;  // one a dataset, and at least one; the first one's picture is the view's
     PassTimer timer;
-    ComposeTarget target;       // where pictures are composed
+    ComposeTarget target;  // where pictures are composed
     MesoTarget mesoTarget;
-    uint64_t mesoSeen = 0;      // Shared::mesoVersion of the last update
+    uint64_t mesoSeen = 0;  // Shared::mesoVersion of the last update
     std::optional<FrameRequest> drawn;
     bool keepsFeedback = false;
     std::optional<FeedbackPicture> feedbackPicture;
@@ -184,6 +188,8 @@ auto Renderer::State::tryAgain(Do doIt) -> decltype(doIt()) {
 inline const Error kGone{.code = ErrorCode::Device, .message = "the device was lost and could not be made anew"};
 
 /// Whether pixels show the work of their rays.
-constexpr bool showsWork(ShadingMode mode) { return mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches; }
+constexpr bool showsWork(ShadingMode mode) {
+    return mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches;
+}
 
 }  // namespace vcp

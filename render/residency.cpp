@@ -12,12 +12,15 @@ namespace vcp {
 
 namespace {
 
-double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double steadySeconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace
 
 Result<std::unique_ptr<Residency>> Residency::create(Device& device, PageAccess access, const ResidencyOptions& options,
-                                                     std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source) {
+                                                     std::shared_ptr<const Dataset> dataset,
+                                                     std::shared_ptr<const PageSource> source) {
     std::unique_ptr<Residency> made(new Residency(options));
     made->options_.loader.withColour = options.loader.withColour && dataset->hasColour();
     made->dataset_ = std::move(dataset);
@@ -44,13 +47,16 @@ bool Residency::hasRoomIn(PoolShape shape) const {
 Result<void> Residency::createPool(Device& device, PageAccess access) {
     for (uint64_t budget = options_.budgetBytes;; budget /= 2) {
         const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budget, poolChunkBytes(device.limits(), access));
-        if (policy_) policy_->setPool(shape);
-        else policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
+        if (policy_)
+            policy_->setPool(shape);
+        else
+            policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
         if (!dataset_->pages.empty() && !policy_->hasRoom())
-            return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
-                                                pageUnits(dataset_->pages[0], hasColour()) * kPoolUnitBytes),
-                         .file = source_->name()};
+            return Error{
+                .code = ErrorCode::Limit,
+                .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
+                                       pageUnits(dataset_->pages[0], hasColour()) * kPoolUnitBytes),
+                .file = source_->name()};
         auto pool = PagePool::create(device, shape.units * kPoolUnitBytes, access);
         if (pool) {
             pool_ = std::move(*pool);
@@ -61,7 +67,8 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
     }
 }
 
-/// Pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones in what is left.
+/// Pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones in what
+/// is left.
 Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
     std::vector<CarriedPage> carried;
     uint64_t room = options_.loader.heldBytes;
@@ -83,7 +90,9 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
     const uint64_t chunkBytes = poolChunkBytes(device.limits(), access);
     const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budgetBytes, chunkBytes);
     if (!hasRoomIn(shape))
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes), .file = source_->name()};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes),
+                     .file = source_->name()};
     options_.budgetBytes = budgetBytes;
     options_.loader.heldBytes = ramBytes;
     startLoader();  // what the old one held is gone

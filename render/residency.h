@@ -23,7 +23,7 @@ namespace vcp {
 
 struct ResidencyOptions {
     uint64_t budgetBytes = 512ull << 20;  ///< of the pool
-    uint64_t uploadBytes = 16ull << 20;   ///< that one update takes in, half of it while a view moves; one page at least
+    uint64_t uploadBytes = 16ull << 20;  ///< that one update takes in, half of it while a view moves; one page at least
     LoadOrder order = LoadOrder::Feedback;
     LoaderOptions loader;
 };
@@ -33,7 +33,8 @@ public:
     /// Allocates the pool: never more than budgetBytes, and no more than the dataset can fill. Where the device
     /// has not so much, half of it, and so on. Errors: Device; Limit, where the coarsest page has no room.
     static Result<std::unique_ptr<Residency>> create(Device& device, PageAccess access, const ResidencyOptions& options,
-                                                     std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
+                                                     std::shared_ptr<const Dataset> dataset,
+                                                     std::shared_ptr<const PageSource> source);
 
     /// Other budgets, from now on; no frame is in flight. The pool is made anew without there ever being more than one:
     /// pages go from the old one to the new by way of the memory that `ramBytes` allows, coarse ones first; others are
@@ -92,7 +93,9 @@ private:
         std::vector<uint64_t> reported;  // as of its last update
     };
     /// What one update takes in, and the loader reads before it.
-    [[nodiscard]] uint64_t uploadBytes() const { return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes); }
+    [[nodiscard]] uint64_t uploadBytes() const {
+        return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes);
+    }
     UpdateResult report(const PolicyOutcome& outcome) const;
 
     ResidencyOptions options_;
@@ -101,11 +104,11 @@ private:
     std::unique_ptr<PagePool> pool_;
     std::shared_ptr<const PageSource> source_;
     std::unique_ptr<PageLoader> loader_;
-    LoaderStats past_;  // of the loaders before this one
+    LoaderStats past_;                                  // of the loaders before this one
     std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
     std::map<ViewNumber, ViewCut> cuts_;
-    std::vector<Error> problems_;    // not reported yet
-    std::vector<uint64_t> tooLarge_; // pages given up because reading them takes more memory than there is
+    std::vector<Error> problems_;     // not reported yet
+    std::vector<uint64_t> tooLarge_;  // pages given up because reading them takes more memory than there is
     bool listens_ = false;
 };
 

@@ -26,13 +26,17 @@ struct Similarity {
 
     bool operator==(const Similarity&) const = default;
     [[nodiscard]] glm::dvec3 toWorld(glm::dvec3 point) const { return translation + scale * (rotation * point); }
-    [[nodiscard]] glm::dvec3 fromWorld(glm::dvec3 point) const { return glm::conjugate(rotation) * ((point - translation) / scale); }
+    [[nodiscard]] glm::dvec3 fromWorld(glm::dvec3 point) const {
+        return glm::conjugate(rotation) * ((point - translation) / scale);
+    }
     /// Of a direction; its length stays.
-    [[nodiscard]] glm::dvec3 turnedFromWorld(glm::dvec3 direction) const { return glm::conjugate(rotation) * direction; }
+    [[nodiscard]] glm::dvec3 turnedFromWorld(glm::dvec3 direction) const {
+        return glm::conjugate(rotation) * direction;
+    }
 };
 
-/// Of a 4 x 4 matrix, row by row, that takes columns (x, y, z, 1) to the world. Errors: Usage, where it is no similarity:
-/// not affine, mirrored, or with other scales along other axes (to 1e-6).
+/// Of a 4 x 4 matrix, row by row, that takes columns (x, y, z, 1) to the world. Errors: Usage, where it is no
+/// similarity: not affine, mirrored, or with other scales along other axes (to 1e-6).
 Result<Similarity> similarityFromMatrix(std::span<const double, 16> rows);
 
 /// A plane of the world in a dataset's own space.

@@ -110,7 +110,8 @@ Result<void> Swapchain::recreate(PictureSize window) {
     if (extent_.width == 0 || extent_.height == 0) return {};
     VkSwapchainCreateInfoKHR info{VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR};
     info.surface = surface_;
-    info.minImageCount = can.maxImageCount > 0 ? std::min(can.minImageCount + 1, can.maxImageCount) : can.minImageCount + 1;
+    info.minImageCount =
+        can.maxImageCount > 0 ? std::min(can.minImageCount + 1, can.maxImageCount) : can.minImageCount + 1;
     info.imageFormat = format_.format;
     info.imageColorSpace = format_.colorSpace;
     info.imageExtent = extent_;
@@ -142,7 +143,8 @@ void Swapchain::recordOver(VkCommandBuffer commands, const DrawOver& drawOver, u
     vkCmdEndRenderPass(commands);
 }
 
-Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const DrawOver& drawOver) {
+Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window,
+                             const DrawOver& drawOver) {
     if (window.width == 0 || window.height == 0) return {};
     if (swapchain_ == VK_NULL_HANDLE || window != window_) VCP_TRY(recreate(window));
     uint32_t image = 0;
@@ -163,7 +165,8 @@ Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, Pic
     if (drawOver)
         recordOver(*commands, drawOver, image);
     else
-        changeLayout(*commands, images_[image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_ACCESS_TRANSFER_WRITE_BIT, 0);
+        changeLayout(*commands, images_[image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
+                     VK_ACCESS_TRANSFER_WRITE_BIT, 0);
     VCP_TRY(device_.endCommandsAndWait(acquired_, shown_[image]));
     VkPresentInfoKHR present{VK_STRUCTURE_TYPE_PRESENT_INFO_KHR};
     present.waitSemaphoreCount = 1;

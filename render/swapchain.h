@@ -14,14 +14,16 @@ namespace vcp {
 class Swapchain {
 public:
     /// Takes the surface over.
-    Swapchain(VkInstance instance, Device& device, VkSurfaceKHR surface) : instance_(instance), device_(device), surface_(surface), scaling_(device) {}
+    Swapchain(VkInstance instance, Device& device, VkSurfaceKHR surface)
+        : instance_(instance), device_(device), surface_(surface), scaling_(device) {}
     ~Swapchain();
     Swapchain(const Swapchain&) = delete;
     Swapchain& operator=(const Swapchain&) = delete;
 
     /// Shows an RGBA8 picture, scaled to the window's framebuffer, with what `drawOver` draws over it, if it is not
     /// empty; waits until it is handed over. Does nothing where the framebuffer has no area. Errors: Device.
-    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window, const DrawOver& drawOver = {});
+    Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window,
+                      const DrawOver& drawOver = {});
 
     /// What drawOver draws in; made on first use. Errors: Device.
     Result<VkRenderPass> renderPass();
@@ -41,7 +43,7 @@ private:
     VkSurfaceFormatKHR format_{};  // VK_FORMAT_UNDEFINED: not chosen yet
     VkRenderPass renderPass_ = VK_NULL_HANDLE;
     std::vector<VkImage> images_;
-    std::vector<VkImageView> views_;           // one an image, like the framebuffers; empty until drawn over
+    std::vector<VkImageView> views_;  // one an image, like the framebuffers; empty until drawn over
     std::vector<VkFramebuffer> framebuffers_;
     std::vector<VkSemaphore> shown_;  // one an image: free again when the image comes back
     VkSemaphore acquired_ = VK_NULL_HANDLE;

@@ -34,24 +34,31 @@ struct KeptFile {
 std::vector<KeptFile> keptFiles(const fs::path& folder) {
     std::vector<KeptFile> files;
     std::error_code failed;
-    for (auto entry = fs::directory_iterator(folder, failed); !failed && entry != fs::directory_iterator(); entry.increment(failed)) {
+    for (auto entry = fs::directory_iterator(folder, failed); !failed && entry != fs::directory_iterator();
+         entry.increment(failed)) {
         if (entry->path().extension() != kExtension) continue;
         std::error_code gone;
         const auto used = entry->last_write_time(gone);
         const uint64_t bytes = gone ? 0 : entry->file_size(gone);
         if (!gone) files.push_back({used, entry->path(), bytes});
     }
-    std::sort(files.begin(), files.end(), [](const KeptFile& a, const KeptFile& b) { return a.used != b.used ? a.used < b.used : a.path < b.path; });
+    std::sort(files.begin(), files.end(), [](const KeptFile& a, const KeptFile& b) {
+        return a.used != b.used ? a.used < b.used : a.path < b.path;
+    });
     return files;
 }
 
 }  // namespace
 
-Result<std::shared_ptr<CachingReader>> CachingReader::open(std::shared_ptr<const ByteReader> reader, const std::string& identity,
-                                                           const fs::path& folder, uint64_t limitBytes) {
+Result<std::shared_ptr<CachingReader>> CachingReader::open(std::shared_ptr<const ByteReader> reader,
+                                                           const std::string& identity, const fs::path& folder,
+                                                           uint64_t limitBytes) {
     std::error_code failed;
     fs::create_directories(folder, failed);
-    if (failed) return Error{.code = ErrorCode::Io, .message = "the cache folder cannot be made: " + failed.message(), .file = folder.string()};
+    if (failed)
+        return Error{.code = ErrorCode::Io,
+                     .message = "the cache folder cannot be made: " + failed.message(),
+                     .file = folder.string()};
     const uint64_t source = hashBytes(std::as_bytes(std::span(identity)));
     std::shared_ptr<CachingReader> made(new CachingReader(std::move(reader), source, folder, limitBytes));
     for (const KeptFile& file : keptFiles(folder)) made->kept_ += file.bytes;
@@ -59,9 +66,13 @@ Result<std::shared_ptr<CachingReader>> CachingReader::open(std::shared_ptr<const
     return made;
 }
 
-fs::path CachingReader::pathOf(uint64_t block) const { return folder_ / fmt::format("{:016x}-{:08x}{}", source_, block, kExtension); }
+fs::path CachingReader::pathOf(uint64_t block) const {
+    return folder_ / fmt::format("{:016x}-{:08x}{}", source_, block, kExtension);
+}
 
-uint64_t CachingReader::sizeOf(uint64_t block) const { return std::min(kCacheBlockBytes, size() - block * kCacheBlockBytes); }
+uint64_t CachingReader::sizeOf(uint64_t block) const {
+    return std::min(kCacheBlockBytes, size() - block * kCacheBlockBytes);
+}
 
 uint64_t CachingReader::bytesKept() const {
     const std::lock_guard lock(mutex_);
@@ -73,7 +84,8 @@ bool CachingReader::load(uint64_t block, std::span<std::byte> bytes) const {
     const auto file = openRegularStream(path);
     if (!file) return false;
     uint64_t seal = 0;
-    const bool isRead = std::fread(&seal, sizeof seal, 1, file->get()) == 1 && std::fread(bytes.data(), 1, bytes.size(), file->get()) == bytes.size();
+    const bool isRead = std::fread(&seal, sizeof seal, 1, file->get()) == 1 &&
+                        std::fread(bytes.data(), 1, bytes.size(), file->get()) == bytes.size();
     std::error_code ignored;
     if (isRead && std::fgetc(file->get()) == EOF && seal == sealOf(source_, block, bytes)) {
         fs::last_write_time(path, fs::file_time_type::clock::now(), ignored);
@@ -85,7 +97,8 @@ bool CachingReader::load(uint64_t block, std::span<std::byte> bytes) const {
 
 void CachingReader::keep(uint64_t block, std::span<const std::byte> bytes) const {
     static std::atomic<uint64_t> number{0};
-    const fs::path path = pathOf(block), partial = folder_ / fmt::format("{:016x}-{}-{}.partial", source_, ::getpid(), number++);
+    const fs::path path = pathOf(block),
+                   partial = folder_ / fmt::format("{:016x}-{}-{}.partial", source_, ::getpid(), number++);
     std::ofstream file(partial, std::ios::binary | std::ios::trunc);
     const uint64_t seal = sealOf(source_, block, bytes);
     file.write(reinterpret_cast<const char*>(&seal), sizeof seal);
@@ -121,7 +134,8 @@ void CachingReader::trim() const {
 }
 
 void CachingReader::distrust(uint64_t offset, uint64_t bytes) const {
-    for (uint64_t block = offset / kCacheBlockBytes; bytes > 0 && block <= (offset + bytes - 1) / kCacheBlockBytes; ++block) {
+    for (uint64_t block = offset / kCacheBlockBytes; bytes > 0 && block <= (offset + bytes - 1) / kCacheBlockBytes;
+         ++block) {
         std::error_code ignored;
         const std::lock_guard lock(mutex_);
         if (fs::remove(pathOf(block), ignored)) kept_ -= std::min(kept_, sizeOf(block) + sizeof(uint64_t));
@@ -135,7 +149,9 @@ Result<void> CachingReader::read(uint64_t offset, std::span<std::byte> bytes) co
     const uint64_t first = offset / kCacheBlockBytes, last = (offset + bytes.size() - 1) / kCacheBlockBytes;
     const uint64_t begin = first * kCacheBlockBytes;
     std::vector<std::byte> blocks(last * kCacheBlockBytes + sizeOf(last) - begin);
-    const auto spanOf = [&](uint64_t block) { return std::span(blocks).subspan((block - first) * kCacheBlockBytes, sizeOf(block)); };
+    const auto spanOf = [&](uint64_t block) {
+        return std::span(blocks).subspan((block - first) * kCacheBlockBytes, sizeOf(block));
+    };
     for (uint64_t block = first; block <= last;) {
         if (load(block, spanOf(block))) {
             ++block;
@@ -145,7 +161,8 @@ Result<void> CachingReader::read(uint64_t offset, std::span<std::byte> bytes) co
         uint64_t end = block + 1;
         while (end <= last && !load(end, spanOf(end))) ++end;
         const uint64_t from = block * kCacheBlockBytes;
-        const std::span missing = std::span(blocks).subspan(from - begin, (end - 1) * kCacheBlockBytes + sizeOf(end - 1) - from);
+        const std::span missing =
+            std::span(blocks).subspan(from - begin, (end - 1) * kCacheBlockBytes + sizeOf(end - 1) - from);
         VCP_TRY(reader_->read(from, missing));
         for (uint64_t got = block; got < end; ++got) keep(got, spanOf(got));
         block = end + 1;

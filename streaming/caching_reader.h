@@ -22,8 +22,9 @@ inline constexpr uint64_t kCacheBlockBytes = 32 << 10;
 class CachingReader final : public ByteReader {
 public:
     /// `identity`: equal for equal bytes (HttpReader::identity). Makes the folder. Errors: Io.
-    static Result<std::shared_ptr<CachingReader>> open(std::shared_ptr<const ByteReader> reader, const std::string& identity,
-                                                       const std::filesystem::path& folder, uint64_t limitBytes);
+    static Result<std::shared_ptr<CachingReader>> open(std::shared_ptr<const ByteReader> reader,
+                                                       const std::string& identity, const std::filesystem::path& folder,
+                                                       uint64_t limitBytes);
 
     /// A block that cannot be kept (a full disk) is no error: it is read again next time.
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
@@ -36,7 +37,8 @@ public:
     [[nodiscard]] uint64_t bytesKept() const;
 
 private:
-    CachingReader(std::shared_ptr<const ByteReader> reader, uint64_t source, std::filesystem::path folder, uint64_t limitBytes)
+    CachingReader(std::shared_ptr<const ByteReader> reader, uint64_t source, std::filesystem::path folder,
+                  uint64_t limitBytes)
         : reader_(std::move(reader)), source_(source), folder_(std::move(folder)), limitBytes_(limitBytes) {}
     [[nodiscard]] std::filesystem::path pathOf(uint64_t block) const;
     [[nodiscard]] uint64_t sizeOf(uint64_t block) const;

@@ -39,7 +39,10 @@ struct FaultyReader::Sleep {
 FaultyReader::FaultyReader(std::shared_ptr<const ByteReader> reader, const Faults& faults, FaultClock clock)
     : reader_(std::move(reader)), faults_(faults), clock_(std::move(clock)), sleep_(std::make_unique<Sleep>()) {
     sleep_->isReal = !clock_.sleep;
-    if (!clock_.now) clock_.now = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
+    if (!clock_.now)
+        clock_.now = [] {
+            return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+        };
 }
 
 FaultyReader::~FaultyReader() = default;
@@ -54,7 +57,8 @@ void FaultyReader::interrupt() const {
 }
 
 double FaultyReader::delayOf(uint64_t offset, uint64_t attempt, size_t bytes) const {
-    double delay = faults_.latencySeconds + faults_.spreadSeconds * fraction(drawn(faults_, offset, attempt, Draw::Spread));
+    double delay =
+        faults_.latencySeconds + faults_.spreadSeconds * fraction(drawn(faults_, offset, attempt, Draw::Spread));
     if (fraction(drawn(faults_, offset, attempt, Draw::Stall)) < faults_.stallRate) delay += faults_.stallSeconds;
     if (faults_.bytesPerSecond > 0) {
         const std::lock_guard lock(mutex_);
@@ -72,11 +76,16 @@ Result<void> FaultyReader::read(uint64_t offset, std::span<std::byte> bytes) con
         attempt = attempts_[offset]++;
     }
     if (const double delay = delayOf(offset, attempt, bytes.size()); delay > 0) {
-        if (!sleep_->isReal) clock_.sleep(delay);
-        else if (!sleep_->wait(delay)) return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = name(), .byte = offset};
+        if (!sleep_->isReal)
+            clock_.sleep(delay);
+        else if (!sleep_->wait(delay))
+            return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = name(), .byte = offset};
     }
     if (fraction(drawn(faults_, offset, attempt, Draw::Error)) < faults_.errorRate)
-        return Error{.code = ErrorCode::Io, .message = "read failed (a fault that was asked for)", .file = name(), .byte = offset};
+        return Error{.code = ErrorCode::Io,
+                     .message = "read failed (a fault that was asked for)",
+                     .file = name(),
+                     .byte = offset};
     VCP_TRY(reader_->read(offset, bytes));
     if (!bytes.empty() && fraction(drawn(faults_, offset, attempt, Draw::Corrupt)) < faults_.corruptRate) {
         const uint64_t place = drawn(faults_, offset, attempt, Draw::Place);

@@ -29,7 +29,7 @@ struct Faults {
 
 /// Time as FaultyReader sees it; steady time where not given.
 struct FaultClock {
-    std::function<double()> now;               ///< seconds
+    std::function<double()> now;  ///< seconds
     std::function<void(double seconds)> sleep;
 };
 

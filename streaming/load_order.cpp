@@ -38,7 +38,8 @@ uint64_t hashOf(uint64_t x) {
 /// The child at a place, or nothing where the surface does not go on there.
 std::optional<uint64_t> childAt(const PageEntry& page, glm::ivec3 place) {
     const int bit = kPlaceBits - 1 - page.level;
-    const uint32_t octant = uint32_t(place.x >> bit & 1) | uint32_t(place.y >> bit & 1) << 1 | uint32_t(place.z >> bit & 1) << 2;
+    const uint32_t octant =
+        uint32_t(place.x >> bit & 1) | uint32_t(place.y >> bit & 1) << 1 | uint32_t(place.z >> bit & 1) << 2;
     if ((page.childMask >> octant & 1) == 0) return std::nullopt;
     return uint64_t{page.firstChild} + std::popcount(page.childMask & ((1u << octant) - 1));
 }
@@ -58,11 +59,14 @@ std::optional<LoadOrder> loadOrderNamed(std::string_view name) {
 
 std::string_view nameOf(LoadOrder order) { return kNames[static_cast<size_t>(order)]; }
 
-LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits, LoadOrder order)
+LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits,
+                               LoadOrder order)
     : dataset_(std::move(dataset)), pageUnits_(pageUnits.size()), parents_(dataset_->pages.size()), order_(order) {
     for (uint64_t page = 0; page < pageUnits.size(); ++page) {
-        if (!dataset_->pages.knows(page)) page += kEntriesPerBlock - 1 - page % kEntriesPerBlock;  // nor is any other of its block
-        else if (pageUnits[page] != 0) learn(page, pageUnits[page]);
+        if (!dataset_->pages.knows(page))
+            page += kEntriesPerBlock - 1 - page % kEntriesPerBlock;  // nor is any other of its block
+        else if (pageUnits[page] != 0)
+            learn(page, pageUnits[page]);
     }
 }
 
@@ -111,7 +115,8 @@ double LoadPriorities::feedbackPriority(uint64_t page, std::span<const Selection
     if (const double gain = gainOf(page); gain > 0) return inRange(gain / double(units), kRequested, kMost);
     if (const double nearness = nearnessOf(page); nearness > 0) return inRange(nearness, kPassed, kRequested);
     double error = 0;
-    for (const SelectionView& view : views) error = std::max(error, std::min(projectedError(*dataset_, dataset_->pages[page], view), 1e9));
+    for (const SelectionView& view : views)
+        error = std::max(error, std::min(projectedError(*dataset_, dataset_->pages[page], view), 1e9));
     return inRange(error, kLeast, kPassed);
 }
 
@@ -123,16 +128,21 @@ double LoadPriorities::priorityBelow(uint64_t page, std::span<const SelectionVie
             const glm::dvec3 low = dataset_->originOf(entry), high = low + dataset_->edgeOf(entry);
             double distance = kMost;
             for (const SelectionView& view : views)
-                distance = std::min(distance, glm::length(glm::clamp(view.eye, low, high) - view.eye) / dataset_->edgeOf(dataset_->pages[0]));
+                distance = std::min(distance, glm::length(glm::clamp(view.eye, low, high) - view.eye) /
+                                                  dataset_->edgeOf(dataset_->pages[0]));
             return std::max(kMost / (1 + distance * kMost), kLeast);
         }
-        case LoadOrder::Breadth: return std::ldexp(1.0, -entry.level);
-        case LoadOrder::Random: return kLeast + double(hashOf(page) >> 11) * 0x1p-53;
-        default: return feedbackPriority(page, views, units);
+        case LoadOrder::Breadth:
+            return std::ldexp(1.0, -entry.level);
+        case LoadOrder::Random:
+            return kLeast + double(hashOf(page) >> 11) * 0x1p-53;
+        default:
+            return feedbackPriority(page, views, units);
     }
 }
 
-std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing, std::span<const SelectionView> views) const {
+std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing,
+                                                std::span<const SelectionView> views) const {
     if (order_ == LoadOrder::Error) return missing;
     std::unordered_map<uint64_t, uint64_t> units;  // of missing children
     for (const WantedPage& wanted : missing) units[parents_[wanted.page]] += pageUnits_[wanted.page];

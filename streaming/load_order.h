@@ -62,7 +62,8 @@ struct RayFeedback {
 
 class LoadPriorities {
 public:
-    /// `pageUnits[i]`: what page i takes of the pool; 0 where its entry is not known yet. Only those of known entries are read.
+    /// `pageUnits[i]`: what page i takes of the pool; 0 where its entry is not known yet. Only those of known entries
+    /// are read.
     LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits, LoadOrder order);
 
     [[nodiscard]] LoadOrder order() const { return order_; }
@@ -77,7 +78,8 @@ public:
     /// `missing`: wanted pages that are not resident, as choosePages ordered them. Returns them most urgent first;
     /// priorities are 0.001 to 10^6, the root's is infinite; with LoadOrder::Error, `missing` as it is. Of several
     /// views the one counts to which a page is most urgent.
-    [[nodiscard]] std::vector<WantedPage> ordered(std::vector<WantedPage> missing, std::span<const SelectionView> views) const;
+    [[nodiscard]] std::vector<WantedPage> ordered(std::vector<WantedPage> missing,
+                                                  std::span<const SelectionView> views) const;
 
     /// Pixels of error that refining `page` takes off the rays heard of; 0: no ray would have liked that.
     [[nodiscard]] double gainOf(uint64_t page) const;

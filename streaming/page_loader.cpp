@@ -1,9 +1,9 @@
 #include "streaming/page_loader.h"
 
-#include <algorithm>
-#include <cmath>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -19,16 +19,18 @@ uint64_t sizeOf(const LoadedPage& page) {
     return page.bytes ? page.bytes->geometryBytes().size() + page.bytes->colourBytes().size() : 0;
 }
 
-// Makes this thread, one of so many, less urgent than what started it: by steps of the system's niceness, of which each takes
-// a fifth of its share of the processor. All together have about the share that two threads have 8 steps down, a third of one
-// thread that draws.
+// Makes this thread, one of so many, less urgent than what started it: by steps of the system's niceness, of which each
+// takes a fifth of its share of the processor. All together have about the share that two threads have 8 steps down, a
+// third of one thread that draws.
 void giveWay(uint32_t threads) {
     const int steps = 8 + static_cast<int>(std::lround(std::log(std::max(threads, 2u) / 2.0) / std::log(1.25)));
     const auto thread = static_cast<id_t>(::gettid());
     ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + steps);
 }
 
-double steadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double steadySeconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace
 
@@ -71,7 +73,8 @@ std::vector<LoadedPage> PageLoader::collect(uint64_t mostBytes) {
         const std::lock_guard lock(mutex_);
         uint64_t bytes = 0;
         auto end = done_.begin();
-        while (end != done_.end() && (end == done_.begin() || bytes + sizeOf(*end) <= mostBytes)) bytes += sizeOf(*end++);
+        while (end != done_.end() && (end == done_.begin() || bytes + sizeOf(*end) <= mostBytes))
+            bytes += sizeOf(*end++);
         pages.assign(std::make_move_iterator(done_.begin()), std::make_move_iterator(end));
         done_.erase(done_.begin(), end);
         for (const LoadedPage& page : pages) queue_.delivered(page.page);
@@ -108,10 +111,13 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     const uint64_t bytes = source_->bytesToRead(first, options_.withColour);
     if (bytes > options_.heldBytes) {
         queue_.begin(first);
-        handOver(first, Error{.code = ErrorCode::Limit,
-                              .message = fmt::format("reading it takes {} bytes of memory, more than the {} bytes allowed for pages on their way; allow more, or build the file with smaller cells", bytes, options_.heldBytes),
-                              .file = source_->name(),
-                              .element = fmt::format("page {}", first)});
+        handOver(first,
+                 Error{.code = ErrorCode::Limit,
+                       .message = fmt::format("reading it takes {} bytes of memory, more than the {} bytes allowed for "
+                                              "pages on their way; allow more, or build the file with smaller cells",
+                                              bytes, options_.heldBytes),
+                       .file = source_->name(),
+                       .element = fmt::format("page {}", first)});
         return Run{first, 0};
     }
     if (!fits(bytes)) return std::nullopt;
@@ -173,8 +179,10 @@ void PageLoader::work() {
         } else {
             // Woken by new wishes, by collect(), or when a page may be tried again.
             const double wait = queue_.nextTry() - now;
-            if (wait > 0 && std::isfinite(wait)) work_.wait_for(lock, std::chrono::duration<double>(wait));
-            else work_.wait(lock);
+            if (wait > 0 && std::isfinite(wait))
+                work_.wait_for(lock, std::chrono::duration<double>(wait));
+            else
+                work_.wait(lock);
         }
     }
     --working_;

@@ -10,8 +10,9 @@
 // No read begins while as many bytes are done as the next collect() would take: what a moving view wants changes before
 // more could be of use, and it would have been read in vain.
 //
-// Memory is reserved before a page is read and given back when it is collected: it never exceeds the limit. What is left
-// of it, the source may keep stored pages in (PageSource::keepWithin). Nothing here waits but waitForPage() and the destructor, which interrupts reads in progress.
+// Memory is reserved before a page is read and given back when it is collected: it never exceeds the limit. What is
+// left of it, the source may keep stored pages in (PageSource::keepWithin). Nothing here waits but waitForPage() and
+// the destructor, which interrupts reads in progress.
 #pragma once
 
 #include <chrono>
@@ -36,15 +37,16 @@ struct LoadedPage {
 struct LoaderOptions {
     bool withColour = true;
     uint32_t threads = 2;
-    uint32_t allThreads = 0;           ///< with those of other loaders of the same picture; 0: there are none
-    uint64_t heldBytes = 64ull << 20;  ///< of pages being read and not collected yet, and of those that the source keeps
+    uint32_t allThreads = 0;  ///< with those of other loaders of the same picture; 0: there are none
+    uint64_t heldBytes =
+        64ull << 20;  ///< of pages being read and not collected yet, and of those that the source keeps
     RetryPolicy retry;
 };
 
 struct LoaderStats {
-    uint64_t bytesRead = 0;  ///< decompressed, of all pages that were read without an error
-    uint64_t pagesRead = 0;  ///< without an error
-    uint64_t failures = 0;   ///< of single attempts
+    uint64_t bytesRead = 0;     ///< decompressed, of all pages that were read without an error
+    uint64_t pagesRead = 0;     ///< without an error
+    uint64_t failures = 0;      ///< of single attempts
     uint64_t heldBytes = 0;     ///< of pages being read and not collected yet
     uint64_t heldBytesMax = 0;  ///< of these and what the source kept
 };
@@ -57,8 +59,8 @@ public:
     PageLoader(const PageLoader&) = delete;
     PageLoader& operator=(const PageLoader&) = delete;
 
-    /// Replaces the list of wishes. Pages being read or waiting to be collected are not read again. While pages of `mostDone`
-    /// bytes wait to be collected, no further read begins.
+    /// Replaces the list of wishes. Pages being read or waiting to be collected are not read again. While pages of
+    /// `mostDone` bytes wait to be collected, no further read begins.
     void request(std::vector<PageRequest> wishes, uint64_t mostDone = UINT64_MAX);
 
     /// Pages that are done, in the order they were; as many as have `mostBytes` together, but one at least.

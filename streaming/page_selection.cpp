@@ -68,7 +68,8 @@ double excessOf(const Dataset& dataset, uint64_t page, std::span<const Selection
 
 bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> states) {
     const EntryRange children = childrenOf(page);
-    return page.childMask != 0 && std::all_of(children.begin(), children.end(), [&](uint64_t child) { return states[child] != kUnavailable; });
+    return page.childMask != 0 &&
+           std::all_of(children.begin(), children.end(), [&](uint64_t child) { return states[child] != kUnavailable; });
 }
 
 struct ChildrenBytes {
@@ -88,8 +89,8 @@ ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<c
 
 }  // namespace
 
-PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
-                       std::span<const uint8_t> states) {
+PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
+                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
     PageChoice choice;
     choice.refined = SparseArray<uint8_t>(dataset.pages.size());  // kNotRefined
     if (dataset.pages.empty() || states[0] != kAvailable || pageBytes[0] > budgetBytes) return choice;
@@ -124,7 +125,8 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
     return choice;
 }
 
-DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice, std::span<const uint8_t> resident) {
+DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice,
+                        std::span<const uint8_t> resident) {
     DrawableCut drawable;
     drawable.errorPixels = kInfinity;
     drawable.complete = true;
@@ -150,10 +152,13 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
             drawable.pagesWanted += children.size();
             drawable.pagesMissing += children.size();
         }
-        const bool drawn = !at.isCovered && !(refined && std::all_of(children.begin(), children.end(), [&](uint64_t child) { return resident[child] != 0; }));
+        const bool drawn =
+            !at.isCovered && !(refined && std::all_of(children.begin(), children.end(),
+                                                      [&](uint64_t child) { return resident[child] != 0; }));
         if (refined)
             for (const uint64_t child : children) walk.push_back({child, at.isCovered || drawn});
-        if (!refined && isTooCoarse(error, view) && entry.childMask != 0) drawable.isRelaxed = drawable.isRelaxed || choice.relaxed;
+        if (!refined && isTooCoarse(error, view) && entry.childMask != 0)
+            drawable.isRelaxed = drawable.isRelaxed || choice.relaxed;
         if (!drawn) continue;
         drawable.cut.push_back(at.page);
         // Inside a page's box the error has no bound; it is reported as seen from a cell away.

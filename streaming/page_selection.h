@@ -42,7 +42,8 @@ struct SelectionView {
 
 struct WantedPage {
     uint64_t page;
-    double priority;  ///< projected error of what is drawn without it, as a multiple of what views allow; the root's is infinite
+    double priority;  ///< projected error of what is drawn without it, as a multiple of what views allow; the root's is
+                      ///< infinite
 };
 
 /// Whether a page's children may be drawn in its place.
@@ -61,27 +62,29 @@ enum Refinement : uint8_t {
 struct PageChoice {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
-    std::vector<uint64_t> awaited; ///< pages that would be refined next, were their children known; most urgent first
-    SparseArray<uint8_t> refined;  ///< a Refinement for each page of the dataset
-    bool relaxed = false;          ///< the budget kept a page from being refined
+    std::vector<uint64_t> awaited;  ///< pages that would be refined next, were their children known; most urgent first
+    SparseArray<uint8_t> refined;   ///< a Refinement for each page of the dataset
+    bool relaxed = false;           ///< the budget kept a page from being refined
 };
 
-/// `pageBytes[i]`: what page i takes of the budget (any unit); 0: its entry is not known yet. `states[i]`: a PageState. Both have
-/// one element a page of the dataset.
-PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes, std::span<const uint64_t> pageBytes,
-                       std::span<const uint8_t> states);
+/// `pageBytes[i]`: what page i takes of the budget (any unit); 0: its entry is not known yet. `states[i]`: a PageState.
+/// Both have one element a page of the dataset.
+PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
+                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> states);
 
 /// What one view can draw of a choice.
 struct DrawableCut {
     std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
-    double errorPixels = 0;     ///< largest projected error in the cut, of pages in view, from no nearer than a cell; infinite without one
+    double errorPixels =
+        0;  ///< largest projected error in the cut, of pages in view, from no nearer than a cell; infinite without one
     uint64_t pagesWanted = 0, pagesMissing = 0;  ///< of the choice, that this view needs; of these, not resident
-    bool complete = false;      ///< none is missing; also where nothing can be drawn
-    bool isRelaxed = false;     ///< the budget kept a page of this view from being refined
+    bool complete = false;                       ///< none is missing; also where nothing can be drawn
+    bool isRelaxed = false;                      ///< the budget kept a page of this view from being refined
 };
 
 /// `view`: one of those of the choice. `resident[i]`: page i may be drawn.
-DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice, std::span<const uint8_t> resident);
+DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice,
+                        std::span<const uint8_t> resident);
 
 /// Both in one: the answer for a view and what is resident.
 struct Selection : PageChoice, DrawableCut {};

@@ -23,9 +23,11 @@ Extent extentOf(const PageEntry& page, bool withColour) {
 /// A stretch of a file that is in memory already.
 class Stretch final : public ByteReader {
 public:
-    Stretch(const ByteReader& file, uint64_t begin, std::span<const std::byte> bytes) : file_(file), begin_(begin), bytes_(bytes) {}
+    Stretch(const ByteReader& file, uint64_t begin, std::span<const std::byte> bytes)
+        : file_(file), begin_(begin), bytes_(bytes) {}
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
-        if (offset < begin_ || bytes.size() > bytes_.size() || offset - begin_ > bytes_.size() - bytes.size()) return file_.read(offset, bytes);
+        if (offset < begin_ || bytes.size() > bytes_.size() || offset - begin_ > bytes_.size() - bytes.size())
+            return file_.read(offset, bytes);
         std::memcpy(bytes.data(), bytes_.data() + (offset - begin_), bytes.size());
         return {};
     }
@@ -64,10 +66,12 @@ Result<PageBytes> FilePageSource::readFrom(const ByteReader& bytes, uint64_t pag
 
 std::vector<Result<PageBytes>> FilePageSource::readBlocks(uint64_t first, uint32_t count) const {
     std::vector<std::byte> stored(count * kBlockBytes);
-    if (const auto got = reader_->read(blockOffset(first), stored); !got) return std::vector<Result<PageBytes>>(count, got.error());
+    if (const auto got = reader_->read(blockOffset(first), stored); !got)
+        return std::vector<Result<PageBytes>>(count, got.error());
     std::vector<Result<PageBytes>> blocks;
     for (uint64_t i = 0; i < count; ++i) {
-        const auto admitted = admitBlock(*dataset_, reader_->name(), first + i, std::span(stored).subspan(i * kBlockBytes, kBlockBytes));
+        const auto admitted =
+            admitBlock(*dataset_, reader_->name(), first + i, std::span(stored).subspan(i * kBlockBytes, kBlockBytes));
         if (!admitted) reader_->distrust(blockOffset(first + i), kBlockBytes);
         blocks.push_back(admitted ? Result<PageBytes>(PageBytes{}) : admitted.error());
     }
@@ -92,7 +96,9 @@ std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t 
             pages.push_back(got.error());
             continue;
         }
-        const auto bytes = kept[i] ? std::span(*kept[i]) : std::span<const std::byte>(stored).subspan(extent(i).begin - begin, extent(i).end - extent(i).begin);
+        const auto bytes = kept[i] ? std::span(*kept[i])
+                                   : std::span<const std::byte>(stored).subspan(extent(i).begin - begin,
+                                                                                extent(i).end - extent(i).begin);
         pages.push_back(readFrom(Stretch(*reader_, extent(i).begin, bytes), first + i, withColour));
         if (!kept[i] && pages.back()) kept_.keep(first + i, {bytes.begin(), bytes.end()});
     }
@@ -100,10 +106,12 @@ std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t 
 }
 
 uint32_t FilePageSource::runFrom(uint64_t first, uint32_t most, bool withColour) const {
-    if (isBlock(first)) return static_cast<uint32_t>(std::min<uint64_t>(most, kFirstBlockNumber + dataset_->pages.blocks() - first));
+    if (isBlock(first))
+        return static_cast<uint32_t>(std::min<uint64_t>(most, kFirstBlockNumber + dataset_->pages.blocks() - first));
     uint32_t count = 1;
     const Extent start = extentOf(dataset_->pages[first], withColour);
-    for (uint64_t last = start.end; count < most && first + count < dataset_->pages.size() && dataset_->pages.knows(first + count); ++count) {
+    for (uint64_t last = start.end;
+         count < most && first + count < dataset_->pages.size() && dataset_->pages.knows(first + count); ++count) {
         const Extent next = extentOf(dataset_->pages[first + count], withColour);
         if (next.begin > last + kLargestGap || next.end - start.begin > runBytes_) break;
         last = next.end;

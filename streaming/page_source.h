@@ -10,8 +10,8 @@
 
 namespace vcp {
 
-/// A block of the directory (octree/vcp_file.h) is asked for as a page of this number or above; it takes no bytes when it has
-/// been read, but its entries are known then.
+/// A block of the directory (octree/vcp_file.h) is asked for as a page of this number or above; it takes no bytes when
+/// it has been read, but its entries are known then.
 inline constexpr uint64_t kFirstBlockNumber = uint64_t{1} << 63;
 constexpr bool isBlock(uint64_t number) { return number >= kFirstBlockNumber; }
 constexpr uint64_t numberOfBlock(uint64_t block) { return kFirstBlockNumber + block; }
@@ -31,8 +31,8 @@ public:
 
     /// Memory that reading a page takes: its stored bytes, twice, and what it returns.
     [[nodiscard]] virtual uint64_t bytesToRead(uint64_t page, bool withColour) const = 0;
-    /// What pages take as they are stored may be kept in memory to be read again: at most `bytes` from now on, whatever is
-    /// being read. Returns how many are kept. For one PageLoader, which has the memory.
+    /// What pages take as they are stored may be kept in memory to be read again: at most `bytes` from now on, whatever
+    /// is being read. Returns how many are kept. For one PageLoader, which has the memory.
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
@@ -45,7 +45,8 @@ class FilePageSource final : public PageSource {
 public:
     /// `runBytes`: pages that lie together are read together up to so many stored bytes. Worth it where a
     /// read takes long however short it is; 0: one page at a time.
-    FilePageSource(std::shared_ptr<const ByteReader> reader, std::shared_ptr<const Dataset> dataset, uint64_t runBytes = 0)
+    FilePageSource(std::shared_ptr<const ByteReader> reader, std::shared_ptr<const Dataset> dataset,
+                   uint64_t runBytes = 0)
         : reader_(std::move(reader)), dataset_(std::move(dataset)), runBytes_(runBytes) {}
 
     Result<PageBytes> read(uint64_t page, bool withColour) const override;

@@ -14,12 +14,16 @@ namespace vcp {
 /// One thread at a time.
 class ReadAhead final : public ByteReader {
 public:
-    explicit ReadAhead(std::shared_ptr<const ByteReader> reader, uint64_t pieceBytes = 4 << 20) : reader_(std::move(reader)), pieceBytes_(pieceBytes) {}
+    explicit ReadAhead(std::shared_ptr<const ByteReader> reader, uint64_t pieceBytes = 4 << 20)
+        : reader_(std::move(reader)), pieceBytes_(pieceBytes) {}
 
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
-        const auto isHeld = [&] { return offset >= begin_ && bytes.size() <= piece_.size() && offset - begin_ <= piece_.size() - bytes.size(); };
+        const auto isHeld = [&] {
+            return offset >= begin_ && bytes.size() <= piece_.size() && offset - begin_ <= piece_.size() - bytes.size();
+        };
         if (!isHeld()) {
-            if (offset > size() || bytes.size() > size() - offset || bytes.size() >= pieceBytes_) return reader_->read(offset, bytes);
+            if (offset > size() || bytes.size() > size() - offset || bytes.size() >= pieceBytes_)
+                return reader_->read(offset, bytes);
             std::vector<std::byte> piece(std::min(pieceBytes_, size() - offset));
             VCP_TRY(reader_->read(offset, piece));
             begin_ = offset;

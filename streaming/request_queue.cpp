@@ -11,7 +11,8 @@ std::optional<double> RetryPolicy::delayAfter(uint32_t failures, uint32_t damage
 }
 
 void RequestQueue::replace(std::vector<PageRequest> wishes) {
-    std::stable_sort(wishes.begin(), wishes.end(), [](const PageRequest& a, const PageRequest& b) { return a.priority > b.priority; });
+    std::stable_sort(wishes.begin(), wishes.end(),
+                     [](const PageRequest& a, const PageRequest& b) { return a.priority > b.priority; });
     wishes_ = std::move(wishes);
     over_.clear();
     priorities_.clear();

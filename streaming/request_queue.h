@@ -27,8 +27,8 @@ struct PageRequest {
 
 /// When a page that failed is read again.
 struct RetryPolicy {
-    uint32_t attempts = 8;          ///< of a read that fails
-    uint32_t damagedAttempts = 4;   ///< of these, where bytes came and were wrong
+    uint32_t attempts = 8;         ///< of a read that fails
+    uint32_t damagedAttempts = 4;  ///< of these, where bytes came and were wrong
     double firstDelaySeconds = 0.05;
     double growth = 2;
     double longestDelaySeconds = 0.5;
@@ -62,14 +62,18 @@ public:
     /// Pages wished for or under way.
     [[nodiscard]] size_t pending() const;
     /// Elements of all containers: bounded by the dataset's pages.
-    [[nodiscard]] size_t entries() const { return wishes_.size() + priorities_.size() + underWay_.size() + over_.size() + givenUp_.size() + trials_.size(); }
+    [[nodiscard]] size_t entries() const {
+        return wishes_.size() + priorities_.size() + underWay_.size() + over_.size() + givenUp_.size() + trials_.size();
+    }
 
 private:
     struct Trial {
         uint32_t failures = 0, damaged = 0;
         double due = 0;
     };
-    [[nodiscard]] bool isIdle(uint64_t page) const { return !underWay_.contains(page) && !over_.contains(page) && !givenUp_.contains(page); }
+    [[nodiscard]] bool isIdle(uint64_t page) const {
+        return !underWay_.contains(page) && !over_.contains(page) && !givenUp_.contains(page);
+    }
     [[nodiscard]] double dueOf(uint64_t page) const;
 
     RetryPolicy policy_;

@@ -16,7 +16,8 @@ namespace {
 constexpr double kAheadUrgency = 1e-9;
 // Of blocks of the directory: nothing but the coarsest page comes before.
 constexpr double kBlockUrgency = std::numeric_limits<double>::max();
-// Moving pages aside costs a frame its time: so many times a page's units are moved for it before what nobody wants goes.
+// Moving pages aside costs a frame its time: so many times a page's units are moved for it before what nobody wants
+// goes.
 constexpr uint64_t kCheapMoves = 2;
 // Motion is continued for no more steps than this.
 constexpr double kMostAhead = 20;
@@ -50,7 +51,9 @@ bool isWhole(const Dataset& dataset) { return dataset.pages.blocksKnown() == dat
 /// Nothing but zeros where the directory comes in parts: look() learns what there is.
 SparseArray<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
     SparseArray<uint64_t> units(dataset.pages.size());
-    if (isWhole(dataset)) std::transform(dataset.pages.begin(), dataset.pages.end(), units.data(), [&](const PageEntry& page) { return pageUnits(page, withColour); });
+    if (isWhole(dataset))
+        std::transform(dataset.pages.begin(), dataset.pages.end(), units.data(),
+                       [&](const PageEntry& page) { return pageUnits(page, withColour); });
     return units;
 }
 
@@ -62,7 +65,10 @@ uint64_t pageUnits(const PageEntry& page, bool withColour) {
 
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes) {
     const uint64_t chunk = chunkBytes / kPoolUnitBytes;
-    if (!isWhole(dataset)) return {std::min(unitsOf(kMostGrowth * dataset.header.fileBytes) + dataset.pages.size(), budgetBytes / kPoolUnitBytes), chunk};
+    if (!isWhole(dataset))
+        return {std::min(unitsOf(kMostGrowth * dataset.header.fileBytes) + dataset.pages.size(),
+                         budgetBytes / kPoolUnitBytes),
+                chunk};
     uint64_t all = 0, largest = 1;
     for (const PageEntry& page : dataset.pages) {
         all += pageUnits(page, withColour);
@@ -77,8 +83,11 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
     return {std::min(useful, budgetBytes / kPoolUnitBytes), chunk};
 }
 
-ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order)
-    : dataset_(std::move(dataset)), allocator_(pool.units, pool.unitsPerChunk), pageUnits_(unitsOfAll(*dataset_, withColour)),
+ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
+                                 LoadOrder order)
+    : dataset_(std::move(dataset)),
+      allocator_(pool.units, pool.unitsPerChunk),
+      pageUnits_(unitsOfAll(*dataset_, withColour)),
       priorities_(dataset_, pageUnits_, order) {
     pool_ = pool;
     const size_t pages = dataset_->pages.size();
@@ -104,7 +113,8 @@ void ResidencyPolicy::learnBlocks() {
         if (blocksSeen_[block] != 0 || !pages.knowsBlock(block)) continue;
         blocksSeen_[block] = 1;
         ++blocksKnown_;
-        const uint64_t first = block * kEntriesPerBlock, end = std::min<uint64_t>(first + kEntriesPerBlock, pages.size());
+        const uint64_t first = block * kEntriesPerBlock,
+                       end = std::min<uint64_t>(first + kEntriesPerBlock, pages.size());
         for (uint64_t page = first; page < end; ++page) {
             pageUnits_[page] = pageUnits(pages[page], withColour_);
             largestUnits_ = std::max(largestUnits_, pageUnits_[page]);
@@ -138,7 +148,8 @@ void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber
     learnBlocks();
     const auto known = motions_.find(number);
     Motion next{view, seconds, std::nullopt, known == motions_.end() || known->second.view != view};
-    if (next.moves && known != motions_.end()) next.later = aheadOf(view, known->second.view, seconds - known->second.seconds);
+    if (next.moves && known != motions_.end())
+        next.later = aheadOf(view, known->second.view, seconds - known->second.seconds);
     // A view that stands still looks at nothing ahead.
     stale_ = stale_ || next.moves || known->second.moves;
     if (next.moves || emptied_) stillSince_ = round_;
@@ -204,8 +215,8 @@ void ResidencyPolicy::evict(uint64_t page) {
     ++counts_.evictions;
 }
 
-/// Moves pages down until `units` free ones are on end: few units, or as few as possible. False: no chunk has so many, or it takes
-/// more than `most` units.
+/// Moves pages down until `units` free ones are on end: few units, or as few as possible. False: no chunk has so many,
+/// or it takes more than `most` units.
 bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves) {
     struct Window {
         uint64_t begin = 0, end = 0, cost = UINT64_MAX;  // units
@@ -269,7 +280,8 @@ Placement ResidencyPolicy::place(uint64_t page) {
         ++counts_.refused;
         return placement;
     }
-    const Resident& placed = slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, seconds_}).first->second;
+    const Resident& placed =
+        slots_.emplace(page, Resident{*placement.slot, rank == Rank::Wanted ? round_ : 0, seconds_}).first->second;
     if (evictable_ && mayEvict(page, placed, Rank::Wanted)) evictable_->push({rank, placed.lastWanted, page});
     pageAt_.emplace(placement.slot->firstUnit, page);
     resident_[page] = 1;
@@ -328,7 +340,8 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
 }
 
 /// Those that hold children of the pages that wait for them, but `blocks`, which have been wished for.
-void ResidencyPolicy::wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks, std::vector<PageRequest>& wishes) const {
+void ResidencyPolicy::wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
+                                    std::vector<PageRequest>& wishes) const {
     uint64_t last = UINT64_MAX;
     for (const uint64_t page : awaited) {
         for (const uint64_t child : childrenOf(dataset_->pages[page])) {
@@ -359,7 +372,9 @@ bool ResidencyPolicy::giveUp(uint64_t page) {
 uint64_t ResidencyPolicy::bytesHeld() const {
     constexpr uint64_t kNode = 4 * sizeof(void*);  // of a map, beside its value
     const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-    uint64_t bytes = pageUnits_.bytes() + resident_.bytes() + states_.bytes() + blocksSeen_.bytes() + loadedIn_.bytes() + bytesOf(views_) + bytesOf(ahead_.wanted) + ahead_.refined.bytes() + ranks_.bytes();
+    uint64_t bytes = pageUnits_.bytes() + resident_.bytes() + states_.bytes() + blocksSeen_.bytes() +
+                     loadedIn_.bytes() + bytesOf(views_) + bytesOf(ahead_.wanted) + ahead_.refined.bytes() +
+                     ranks_.bytes();
     bytes += bytesOf(choice_.wanted) + choice_.refined.bytes() + priorities_.bytesHeld() + allocator_.bytesHeld();
     bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);

@@ -20,8 +20,10 @@
 //   still views load no page twice. The coarsest page is wanted by all views.
 // - Hysteresis: while a view moves, a page that came less than kSettlingSeconds ago is not evicted
 //   for another, and what would need its place is not wished for.
-// - Where the directory comes in parts, views wish for the blocks that they must know, before all pages but the coarsest.
-//   What has come counts from the next look() on. A view whose pages may have children that are not known has not settled.
+// - Where the directory comes in parts, views wish for the blocks that they must know, before all pages but the
+// coarsest.
+//   What has come counts from the next look() on. A view whose pages may have children that are not known has not
+//   settled.
 // - While a view moves, what it would want a little later (its motion continued for kAheadSeconds) is
 //   wished for last, and only into places that are free or hold what no view wants.
 #pragma once
@@ -54,8 +56,8 @@ struct PoolShape {
     uint64_t units = 0, unitsPerChunk = 0;
 };
 
-/// The largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only part of its
-/// directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
+/// The largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only part of
+/// its directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes);
 
 inline constexpr uint64_t kMostGrowth = 8;
@@ -76,8 +78,8 @@ struct Placement {
 struct PolicyCounts {
     uint64_t loads = 0, evictions = 0, moves = 0;
     uint64_t unitsLoaded = 0, unitsMoved = 0;
-    uint64_t refused = 0;   ///< pages that were read and had no place
-    uint64_t reloads = 0;   ///< pages placed twice in one still view: must stay 0
+    uint64_t refused = 0;  ///< pages that were read and had no place
+    uint64_t reloads = 0;  ///< pages placed twice in one still view: must stay 0
 };
 
 struct PolicyOutcome {
@@ -89,7 +91,8 @@ struct PolicyOutcome {
 class ResidencyPolicy {
 public:
     /// `pool` from poolShapeFor. `order` decides what is read first, and nothing else.
-    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool, LoadOrder order = LoadOrder::Feedback);
+    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
+                    LoadOrder order = LoadOrder::Feedback);
 
     /// Whether the coarsest page fits.
     [[nodiscard]] bool hasRoom() const { return !pageUnits_.empty() && pageUnits_[0] <= planned_; }
@@ -99,14 +102,16 @@ public:
     /// The view is gone.
     void forgetView(ViewNumber number);
     /// What the rays of a frame of `view` met: its wishes come first.
-    void hear(const RayFeedback& feedback, const SelectionView& view) { priorities_.hear(feedback, view, views_.size()); }
+    void hear(const RayFeedback& feedback, const SelectionView& view) {
+        priorities_.hear(feedback, view, views_.size());
+    }
     Placement place(uint64_t page);
     /// Precondition: hasLooked(number).
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
     [[nodiscard]] DrawableCut drawable(ViewNumber number) const;
 
-    /// The page, or block of the directory (numberOfBlock), cannot be read: from the next look() its parents are drawn in its
-    /// place. True the first time.
+    /// The page, or block of the directory (numberOfBlock), cannot be read: from the next look() its parents are drawn
+    /// in its place. True the first time.
     bool giveUp(uint64_t page);
     /// It can be read after all.
     void restore(uint64_t page);
@@ -146,8 +151,11 @@ private:
         Rank rank;
         uint64_t lastWanted, page;
 
-        /// Goes later: first the least wanted, then what was wanted longest ago; deeper levels come later in the directory.
-        bool operator<(const Evictable& other) const { return std::tuple(other.rank, other.lastWanted, page) < std::tuple(rank, lastWanted, other.page); }
+        /// Goes later: first the least wanted, then what was wanted longest ago; deeper levels come later in the
+        /// directory.
+        bool operator<(const Evictable& other) const {
+            return std::tuple(other.rank, other.lastWanted, page) < std::tuple(rank, lastWanted, other.page);
+        }
     };
     struct Motion {
         SelectionView view;
@@ -165,25 +173,26 @@ private:
     void learnBlocks();
     void choose();
     [[nodiscard]] std::span<uint8_t> statesOf(uint64_t number);
-    void wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks, std::vector<PageRequest>& wishes) const;
+    void wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
+                       std::vector<PageRequest>& wishes) const;
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
     std::shared_ptr<const Dataset> dataset_;
     SlotAllocator allocator_;
     SparseArray<uint64_t> pageUnits_;  // 0: its entry is not known yet
-    uint64_t largestUnits_ = 1;  // of pageUnits_
+    uint64_t largestUnits_ = 1;        // of pageUnits_
     bool withColour_ = false;
     LoadPriorities priorities_;
     PoolShape pool_;
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
-    std::map<uint64_t, uint64_t> pageAt_;  // by the slot's first unit
+    std::map<uint64_t, uint64_t> pageAt_;                      // by the slot's first unit
     std::optional<std::priority_queue<Evictable>> evictable_;  // of this round, once one had to go; some may have gone
     SparseArray<uint8_t> resident_;
-    SparseArray<uint8_t> states_;       // PageState
-    SparseArray<uint8_t> blocksSeen_;   // of the directory; empty: all
-    uint64_t blocksKnown_ = 0;          // of these, seen
-    SparseArray<uint64_t> loadedIn_;  // the still view that a page was last placed in: its stillSince_
+    SparseArray<uint8_t> states_;      // PageState
+    SparseArray<uint8_t> blocksSeen_;  // of the directory; empty: all
+    uint64_t blocksKnown_ = 0;         // of these, seen
+    SparseArray<uint64_t> loadedIn_;   // the still view that a page was last placed in: its stillSince_
 
     std::map<ViewNumber, Motion> motions_;
     std::vector<SelectionView> views_;  // of motions_

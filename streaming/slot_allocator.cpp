@@ -5,7 +5,8 @@
 
 namespace vcp {
 
-SlotAllocator::SlotAllocator(uint64_t units, uint64_t unitsPerChunk) : taken_(units, false), unitsPerChunk_(unitsPerChunk) {}
+SlotAllocator::SlotAllocator(uint64_t units, uint64_t unitsPerChunk)
+    : taken_(units, false), unitsPerChunk_(unitsPerChunk) {}
 
 std::optional<PoolSlot> SlotAllocator::allocate(uint64_t units) {
     assert(units > 0);

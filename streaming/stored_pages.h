@@ -1,5 +1,5 @@
-// Pages as their file stores them, kept in memory to be read again: a view under a small budget gives pages up and wants
-// them back.
+// Pages as their file stores them, kept in memory to be read again: a view under a small budget gives pages up and
+// wants them back.
 #pragma once
 
 #include <cstddef>

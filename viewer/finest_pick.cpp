@@ -68,7 +68,8 @@ Result<std::vector<PageOnRay>> finestPagesOn(const ByteReader& reader, const Dat
 
 /// Shortens a ray to what a plane keeps of it.
 void clip(Ray& ray, const SectionPlane& plane) {
-    const double start = glm::dot(plane.normal, ray.origin) - plane.offset, slope = glm::dot(plane.normal, ray.direction);
+    const double start = glm::dot(plane.normal, ray.origin) - plane.offset,
+                 slope = glm::dot(plane.normal, ray.direction);
     if (slope > 0)
         ray.tMin = std::max(ray.tMin, -start / slope);
     else if (slope < 0)

@@ -16,7 +16,8 @@ namespace vcp {
 
 class FinestPick {
 public:
-    FinestPick(std::shared_ptr<const ByteReader> reader, const Dataset& dataset) : reader_(std::move(reader)), pages_(reader_, dataset) {}
+    FinestPick(std::shared_ptr<const ByteReader> reader, const Dataset& dataset)
+        : reader_(std::move(reader)), pages_(reader_, dataset) {}
 
     /// The first hit on what the section planes keep; nothing where the ray hits nothing. Reads from the file or
     /// server, so it may take long. One thread at a time. Errors: those of readPage.

@@ -46,13 +46,20 @@ constexpr KeyHelp kKeyMap[] = {
 /// Camera axes, as Viewer::fly(); 0: nowhere.
 glm::dvec3 flyDirectionOf(uint32_t key) {
     switch (key) {
-        case 'W': return {0, 0, 1};
-        case 'S': return {0, 0, -1};
-        case 'A': return {-1, 0, 0};
-        case 'D': return {1, 0, 0};
-        case 'E': return {0, 1, 0};
-        case 'Q': return {0, -1, 0};
-        default: return {0, 0, 0};
+        case 'W':
+            return {0, 0, 1};
+        case 'S':
+            return {0, 0, -1};
+        case 'A':
+            return {-1, 0, 0};
+        case 'D':
+            return {1, 0, 0};
+        case 'E':
+            return {0, 1, 0};
+        case 'Q':
+            return {0, -1, 0};
+        default:
+            return {0, 0, 0};
     }
 }
 
@@ -62,22 +69,38 @@ std::span<const KeyHelp> keyMap() { return kKeyMap; }
 
 std::optional<ViewerAction> actionOf(uint32_t key) {
     switch (key) {
-        case 'F': return ViewerAction::Fit;
-        case 'R': return ViewerAction::Reset;
-        case 'L': return ViewerAction::ToggleLight;
-        case 'S': return ViewerAction::ToggleShadows;
-        case 'O': return ViewerAction::ToggleOcclusion;
-        case 'X': return ViewerAction::ToggleSection;
-        case 'M': return ViewerAction::NextShading;
-        case 'C': return ViewerAction::ToggleColour;
-        case 'P': return ViewerAction::ToggleProjection;
-        case 'U': return ViewerAction::ToggleUpAxis;
-        case 'G': return ViewerAction::ToggleFly;
-        case '1': return ViewerAction::ViewFront;
-        case '3': return ViewerAction::ViewRight;
-        case '7': return ViewerAction::ViewTop;
-        case '9': return ViewerAction::ViewIsometric;
-        default: return std::nullopt;
+        case 'F':
+            return ViewerAction::Fit;
+        case 'R':
+            return ViewerAction::Reset;
+        case 'L':
+            return ViewerAction::ToggleLight;
+        case 'S':
+            return ViewerAction::ToggleShadows;
+        case 'O':
+            return ViewerAction::ToggleOcclusion;
+        case 'X':
+            return ViewerAction::ToggleSection;
+        case 'M':
+            return ViewerAction::NextShading;
+        case 'C':
+            return ViewerAction::ToggleColour;
+        case 'P':
+            return ViewerAction::ToggleProjection;
+        case 'U':
+            return ViewerAction::ToggleUpAxis;
+        case 'G':
+            return ViewerAction::ToggleFly;
+        case '1':
+            return ViewerAction::ViewFront;
+        case '3':
+            return ViewerAction::ViewRight;
+        case '7':
+            return ViewerAction::ViewTop;
+        case '9':
+            return ViewerAction::ViewIsometric;
+        default:
+            return std::nullopt;
     }
 }
 

@@ -22,7 +22,9 @@ constexpr double kFarSide = 0.3;
 double unitsPerPixelAt(glm::dvec3 point, const OrbitCamera& camera, glm::ivec2 size) {
     const double depth = camera.depthOf(point);
     if (depth <= 0) return 0;
-    const double height = camera.projection == Projection::Perspective ? camera.viewHeight() * depth / camera.focusDistance : camera.viewHeight();
+    const double height = camera.projection == Projection::Perspective
+                              ? camera.viewHeight() * depth / camera.focusDistance
+                              : camera.viewHeight();
     return height / std::max(1, size.y);
 }
 
@@ -41,18 +43,20 @@ double distanceToSegment(glm::dvec2 p, glm::dvec2 a, glm::dvec2 b) {
 
 double distanceToRing(glm::dvec2 p, const std::vector<glm::dvec2>& ring) {
     double least = std::numeric_limits<double>::infinity();
-    for (size_t i = 0; i < ring.size(); ++i) least = std::min(least, distanceToSegment(p, ring[i], ring[(i + 1) % ring.size()]));
+    for (size_t i = 0; i < ring.size(); ++i)
+        least = std::min(least, distanceToSegment(p, ring[i], ring[(i + 1) % ring.size()]));
     return least;
 }
 
 }  // namespace
 
 glm::dvec3 onPlane(const SectionPlane& plane, glm::dvec3 point) {
-    return point - plane.normal * ((glm::dot(plane.normal, point) - plane.offset) / glm::dot(plane.normal, plane.normal));
+    return point -
+           plane.normal * ((glm::dot(plane.normal, point) - plane.offset) / glm::dot(plane.normal, plane.normal));
 }
 
-std::optional<SectionHandle> sectionHandle(const SectionPlane& plane, size_t number, glm::dvec3 anchor, const OrbitCamera& camera, glm::ivec2 size,
-                                           double scale) {
+std::optional<SectionHandle> sectionHandle(const SectionPlane& plane, size_t number, glm::dvec3 anchor,
+                                           const OrbitCamera& camera, glm::ivec2 size, double scale) {
     const double units = unitsPerPixelAt(anchor, camera, size) * scale;
     const auto foot = camera.pixelOf(anchor, size);
     if (!(units > 0) || !foot) return std::nullopt;
@@ -74,7 +78,8 @@ SectionGrab grabAt(std::span<const SectionHandle> handles, glm::dvec2 pixel, dou
     double nearest = kReach * scale;
     for (const SectionHandle& handle : handles) {
         const double toFoot = glm::distance(pixel, handle.foot) * kReach / kFootReach;
-        const double toArrow = handle.isAlongView ? toFoot : std::min(toFoot, distanceToSegment(pixel, handle.foot, handle.tip));
+        const double toArrow =
+            handle.isAlongView ? toFoot : std::min(toFoot, distanceToSegment(pixel, handle.foot, handle.tip));
         if (toArrow < nearest) grab = {SectionGrip::Move, handle.plane}, nearest = toArrow;
     }
     if (grab.grip != SectionGrip::None) return grab;
@@ -85,10 +90,19 @@ SectionGrab grabAt(std::span<const SectionHandle> handles, glm::dvec2 pixel, dou
     return grab;
 }
 
-SectionDrag::SectionDrag(const SectionHandle& handle, SectionGrip grip, const SectionPlane& plane, glm::dvec2 pressed, const OrbitCamera& camera,
-                         glm::ivec2 size, double scale)
-    : grip_(grip), plane_(handle.plane), before_(plane), anchor_(handle.anchor), normal_(glm::normalize(plane.normal)), isAlongView_(handle.isAlongView),
-      pressed_(pressed), camera_(camera), size_(size), radius_(kRing * scale), unitsPerPixel_(unitsPerPixelAt(handle.anchor, camera, size)) {
+SectionDrag::SectionDrag(const SectionHandle& handle, SectionGrip grip, const SectionPlane& plane, glm::dvec2 pressed,
+                         const OrbitCamera& camera, glm::ivec2 size, double scale)
+    : grip_(grip),
+      plane_(handle.plane),
+      before_(plane),
+      anchor_(handle.anchor),
+      normal_(glm::normalize(plane.normal)),
+      isAlongView_(handle.isAlongView),
+      pressed_(pressed),
+      camera_(camera),
+      size_(size),
+      radius_(kRing * scale),
+      unitsPerPixel_(unitsPerPixelAt(handle.anchor, camera, size)) {
     const auto [u, v] = axesOf(normal_);
     double nearest = std::numeric_limits<double>::infinity();
     for (size_t i = 0; i < handle.ring.size(); ++i) {

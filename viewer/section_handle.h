@@ -22,8 +22,8 @@ namespace vcp {
 enum class SectionGrip { None, Move, Turn };
 
 struct SectionHandle {
-    size_t plane = 0;       ///< number of its section plane
-    glm::dvec3 anchor{0};   ///< the foot: a point of the plane, world
+    size_t plane = 0;      ///< number of its section plane
+    glm::dvec3 anchor{0};  ///< the foot: a point of the plane, world
     glm::dvec2 foot{0}, tip{0};
     std::vector<glm::dvec2> ring;  ///< closed by its first point
     bool isAlongView = false;      ///< the arrow is too short to be drawn or followed
@@ -42,8 +42,8 @@ glm::dvec3 onPlane(const SectionPlane& plane, glm::dvec3 point);
 
 /// Nothing where the foot is not before the eye. `anchor`: a point of the plane. `scale`: pixels a unit of the
 /// layout (1 on a common display, 2 on a dense one).
-std::optional<SectionHandle> sectionHandle(const SectionPlane& plane, size_t number, glm::dvec3 anchor, const OrbitCamera& camera, glm::ivec2 size,
-                                           double scale);
+std::optional<SectionHandle> sectionHandle(const SectionPlane& plane, size_t number, glm::dvec3 anchor,
+                                           const OrbitCamera& camera, glm::ivec2 size, double scale);
 
 /// What is under the cursor; of several the nearest, arrows before rings.
 SectionGrab grabAt(std::span<const SectionHandle> handles, glm::dvec2 pixel, double scale);
@@ -51,8 +51,8 @@ SectionGrab grabAt(std::span<const SectionHandle> handles, glm::dvec2 pixel, dou
 /// A plane in the hand, from the press on. The camera stays meanwhile.
 class SectionDrag {
 public:
-    SectionDrag(const SectionHandle& handle, SectionGrip grip, const SectionPlane& plane, glm::dvec2 pressed, const OrbitCamera& camera,
-                glm::ivec2 size, double scale);
+    SectionDrag(const SectionHandle& handle, SectionGrip grip, const SectionPlane& plane, glm::dvec2 pressed,
+                const OrbitCamera& camera, glm::ivec2 size, double scale);
 
     /// The plane with the cursor at `pixel`; where it was pressed, the plane as it was. `farthest`: that a plane is
     /// moved, world units.
@@ -71,7 +71,7 @@ private:
     glm::dvec2 pressed_;
     OrbitCamera camera_;
     glm::ivec2 size_;
-    double radius_;    // of the ring, pixels
+    double radius_;  // of the ring, pixels
     double unitsPerPixel_;
     double side_ = 1;  // -1: the far side was gripped
 };

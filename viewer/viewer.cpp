@@ -27,9 +27,9 @@ constexpr double kRefineFrames = 3;
 constexpr int kLargestReduction = 8;
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
-constexpr double kFarthestSection = 4;  // of the diagonal, that a drag moves a plane
-constexpr double kFlySeconds = 4;    // for the dataset's diagonal, at speed 1
-constexpr double kLongestFlyStep = 0.1;  // seconds: a hiccup is no leap
+constexpr double kFarthestSection = 4;     // of the diagonal, that a drag moves a plane
+constexpr double kFlySeconds = 4;          // for the dataset's diagonal, at speed 1
+constexpr double kLongestFlyStep = 0.1;    // seconds: a hiccup is no leap
 constexpr double kFlySpeedPerNotch = 1.25;
 constexpr uint32_t kOcclusionRays = 8;
 // A dataset smaller than this part of the picture's height is far enough away.
@@ -57,7 +57,9 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 
 }  // namespace
 
-std::string formatPixels(double pixels) { return pixels < 10 ? fmt::format("{:.2g}", pixels) : fmt::format("{:.0f}", pixels); }
+std::string formatPixels(double pixels) {
+    return pixels < 10 ? fmt::format("{:.2g}", pixels) : fmt::format("{:.0f}", pixels);
+}
 
 std::string statusLine(const ViewerStatus& status, size_t most) {
     const std::string device = status.device + (status.software ? " (software)" : "");
@@ -67,15 +69,19 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
     if (!status.without.empty()) parts.push_back(status.without);
     if (status.update.drawable && status.levels > 0) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
-        const std::string levels = coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
+        const std::string levels =
+            coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
         parts.push_back(fmt::format("{} (finest {})", levels, status.levels - 1));
-        if (coarsest + 1 < status.levels) parts.push_back(fmt::format("error {} px", formatPixels(status.update.errorPixels)));
+        if (coarsest + 1 < status.levels)
+            parts.push_back(fmt::format("error {} px", formatPixels(status.update.errorPixels)));
     }
     if (status.reduction > 1) parts.push_back(fmt::format("1/{} size", status.reduction));
     parts.push_back(fmt::format("{:.0f} ms", status.frame.msFrame));
     if (status.levels > 0) parts.push_back(formatCount(status.triangles) + " triangles");
     if (status.frame.surfaceBytes > 0) parts.push_back("mesostructure " + formatBytes(status.frame.surfaceBytes));
-    if (status.update.drawable && status.levels > 0) parts.push_back(fmt::format("{} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes)));
+    if (status.update.drawable && status.levels > 0)
+        parts.push_back(
+            fmt::format("{} of {}", formatBytes(status.update.residentBytes), formatBytes(status.budgetBytes)));
     parts.push_back(device);
     std::string line = parts.front();
     for (size_t i = 1; i < parts.size() && line.size() + 3 + parts[i].size() <= most; ++i) line += " | " + parts[i];
@@ -93,7 +99,11 @@ std::unique_ptr<Viewer> Viewer::on(std::unique_ptr<Renderer> view, const ViewerO
 }
 
 Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
-    : options_(options), renderer_(std::move(renderer)), shading_(options.shading), sections_(options.sections), sectionCaps_(options.sectionCaps) {
+    : options_(options),
+      renderer_(std::move(renderer)),
+      shading_(options.shading),
+      sections_(options.sections),
+      sectionCaps_(options.sectionCaps) {
     status_.device = renderer_->device().name;
     status_.software = renderer_->device().software;
     status_.budgetBytes = options.renderer.budgetBytes;
@@ -106,14 +116,17 @@ Result<void> Viewer::open(std::shared_ptr<const Dataset> dataset, std::shared_pt
     return open(std::move(one), {}, camera, std::move(name));
 }
 
-Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name) {
-    if (datasets.empty() && surfaces.surfaces.empty()) return Error{.code = ErrorCode::Usage, .message = "there is nothing to open"};
+Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera,
+                          std::string name) {
+    if (datasets.empty() && surfaces.surfaces.empty())
+        return Error{.code = ErrorCode::Usage, .message = "there is nothing to open"};
     VCP_TRY(renderer_->open(datasets, surfaces.surfaces));
     show(datasets, surfaces, camera, std::move(name));
     return {};
 }
 
-void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name) {
+void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera,
+                  std::string name) {
     dataset_ = datasets.empty() ? nullptr : datasets.front().dataset;
     isOpen_ = true;
     isPaper_ = !datasets.empty() && surfaces.surfaces.empty();
@@ -122,7 +135,8 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     for (const PlacedDataset& each : datasets) {
         const FileHeader& header = each.dataset->header;
         bounds_ = bounds_.joined(placedBox({{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
-                                            {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}}, each.placement));
+                                            {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}},
+                                           each.placement));
         isPaper_ = isPaper_ && header.method == Method::Paper;
         status_.triangles += header.triangles;
         status_.levels = std::max(status_.levels, header.levels);
@@ -195,7 +209,10 @@ void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
     cursor_ = pixel;
     const bool left = button == MouseButton::Left;
     if (left && !modifiers.shift && !modifiers.control && gripSection(pixel)) return;
-    drag_ = !left || modifiers.shift ? Drag::Pan : modifiers.control ? Drag::Light : isFlying_ ? Drag::Head : Drag::Orbit;
+    drag_ = !left || modifiers.shift ? Drag::Pan
+            : modifiers.control      ? Drag::Light
+            : isFlying_              ? Drag::Head
+                                     : Drag::Orbit;
     const bool onSurface = drag_ == Drag::Pan || pointAt(pixel);
     pivot_ = onSurface ? pointOfInterest(pixel) : bounds_.centre();
 }
@@ -206,12 +223,23 @@ void Viewer::move(glm::dvec2 pixel) {
     const double perPixel = std::numbers::pi / std::max(1, size_.y);
     const double headPerPixel = camera_.fovY / std::max(1, size_.y);
     switch (drag_) {
-        case Drag::None: break;
-        case Drag::Section: dragSection(pixel); break;
-        case Drag::Orbit: camera_.orbit(pivot_, -by.x * perPixel, -by.y * perPixel); break;
-        case Drag::Pan: camera_.pan(cursor_, pixel, camera_.depthOf(pivot_), size_); break;
-        case Drag::Light: turnLight(by * perPixel); break;
-        case Drag::Head: camera_.turnHead(by.x * headPerPixel, by.y * headPerPixel); break;
+        case Drag::None:
+            break;
+        case Drag::Section:
+            dragSection(pixel);
+            break;
+        case Drag::Orbit:
+            camera_.orbit(pivot_, -by.x * perPixel, -by.y * perPixel);
+            break;
+        case Drag::Pan:
+            camera_.pan(cursor_, pixel, camera_.depthOf(pivot_), size_);
+            break;
+        case Drag::Light:
+            turnLight(by * perPixel);
+            break;
+        case Drag::Head:
+            camera_.turnHead(by.x * headPerPixel, by.y * headPerPixel);
+            break;
     }
     cursor_ = pixel;
 }
@@ -232,8 +260,10 @@ std::vector<SectionHandle> Viewer::sectionHandles() const {
     std::vector<SectionHandle> handles;
     if (handleScale_ <= 0 || !isOpen_ || !hasSize()) return handles;
     for (size_t i = 0; i < sections_.size(); ++i) {
-        const glm::dvec3 anchor = onPlane(sections_[i], i < sectionAnchors_.size() ? sectionAnchors_[i] : bounds_.centre());
-        if (auto handle = sectionHandle(sections_[i], i, anchor, camera_, size_, handleScale_)) handles.push_back(*std::move(handle));
+        const glm::dvec3 anchor =
+            onPlane(sections_[i], i < sectionAnchors_.size() ? sectionAnchors_[i] : bounds_.centre());
+        if (auto handle = sectionHandle(sections_[i], i, anchor, camera_, size_, handleScale_))
+            handles.push_back(*std::move(handle));
     }
     return handles;
 }
@@ -247,7 +277,8 @@ bool Viewer::gripSection(glm::dvec2 pixel) {
     const std::vector<SectionHandle> handles = sectionHandles();
     const SectionGrab grab = grabAt(handles, pixel, handleScale_);
     if (grab.grip == SectionGrip::None) return false;
-    const auto handle = std::find_if(handles.begin(), handles.end(), [&](const SectionHandle& each) { return each.plane == grab.plane; });
+    const auto handle = std::find_if(handles.begin(), handles.end(),
+                                     [&](const SectionHandle& each) { return each.plane == grab.plane; });
     sectionAnchors_.resize(std::max(sectionAnchors_.size(), sections_.size()), bounds_.centre());
     sectionAnchors_[handle->plane] = handle->anchor;
     sectionDrag_.emplace(*handle, grab.grip, sections_[handle->plane], pixel, camera_, size_, handleScale_);
@@ -319,7 +350,8 @@ void Viewer::advanceCamera(double now) {
         if (part >= 1) move_.reset();
     } else if (isSentSomewhere()) {
         const double step = std::min(now - now_, kLongestFlyStep) * flySpeed_ * bounds_.diagonal() / kFlySeconds;
-        camera_.position += camera_.orientation * (glm::dvec3(flyDirection_.x, flyDirection_.y, -flyDirection_.z) * step);
+        camera_.position +=
+            camera_.orientation * (glm::dvec3(flyDirection_.x, flyDirection_.y, -flyDirection_.z) * step);
     }
 }
 
@@ -355,7 +387,8 @@ std::string Viewer::whyWithout(ViewerAction action) const {
     if (!isPaper_) return {};
     if (action == ViewerAction::ToggleShadows) return "files of the method paper are drawn without shadows";
     if (action == ViewerAction::ToggleOcclusion) return "files of the method paper are drawn without ambient occlusion";
-    if (action == ViewerAction::ToggleSection && !sections_.empty()) return "sections of files of the method paper have no caps";
+    if (action == ViewerAction::ToggleSection && !sections_.empty())
+        return "sections of files of the method paper have no caps";
     return {};
 }
 
@@ -368,25 +401,51 @@ void Viewer::act(ViewerAction action) {
             moveTo(there);
             break;
         }
-        case ViewerAction::Reset: moveTo(home_); break;
-        case ViewerAction::ToggleLight: toggleLight(); break;
-        case ViewerAction::ToggleShadows: shading_.shadows = !shading_.shadows; break;
-        case ViewerAction::ToggleOcclusion: shading_.occlusionRays = shading_.occlusionRays > 0 ? 0 : kOcclusionRays; break;
-        case ViewerAction::ToggleSection: toggleSection(); break;
-        case ViewerAction::NextShading: shading_.mode = next(shading_.mode); break;
-        case ViewerAction::ToggleProjection: toggleProjection(); break;
-        case ViewerAction::ToggleColour: shading_.mode = shading_.mode == ShadingMode::Clay ? ShadingMode::Lit : ShadingMode::Clay; break;
+        case ViewerAction::Reset:
+            moveTo(home_);
+            break;
+        case ViewerAction::ToggleLight:
+            toggleLight();
+            break;
+        case ViewerAction::ToggleShadows:
+            shading_.shadows = !shading_.shadows;
+            break;
+        case ViewerAction::ToggleOcclusion:
+            shading_.occlusionRays = shading_.occlusionRays > 0 ? 0 : kOcclusionRays;
+            break;
+        case ViewerAction::ToggleSection:
+            toggleSection();
+            break;
+        case ViewerAction::NextShading:
+            shading_.mode = next(shading_.mode);
+            break;
+        case ViewerAction::ToggleProjection:
+            toggleProjection();
+            break;
+        case ViewerAction::ToggleColour:
+            shading_.mode = shading_.mode == ShadingMode::Clay ? ShadingMode::Lit : ShadingMode::Clay;
+            break;
         case ViewerAction::ToggleUpAxis: {
             OrbitCamera there = camera_;
             there.standUp(camera_.up == UpAxis::Y ? UpAxis::Z : UpAxis::Y);
             moveTo(there);
             break;
         }
-        case ViewerAction::ToggleFly: isFlying_ = !isFlying_; break;
-        case ViewerAction::ViewFront: look(View::Front); break;
-        case ViewerAction::ViewRight: look(View::Right); break;
-        case ViewerAction::ViewTop: look(View::Top); break;
-        case ViewerAction::ViewIsometric: look(View::Isometric); break;
+        case ViewerAction::ToggleFly:
+            isFlying_ = !isFlying_;
+            break;
+        case ViewerAction::ViewFront:
+            look(View::Front);
+            break;
+        case ViewerAction::ViewRight:
+            look(View::Right);
+            break;
+        case ViewerAction::ViewTop:
+            look(View::Top);
+            break;
+        case ViewerAction::ViewIsometric:
+            look(View::Isometric);
+            break;
     }
 }
 
@@ -395,7 +454,8 @@ bool Viewer::isMoving(double now) const { return now - movedAt_ < kRestSeconds; 
 int Viewer::reductionAt(double now) const {
     if (options_.movingFrameMs <= 0 || !isMoving(now)) return 1;
     if (fullFrameMs_ <= options_.movingFrameMs) return movingReduction_;
-    const int wanted = static_cast<int>(std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
+    const int wanted = static_cast<int>(
+        std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
     return std::max(wanted, movingReduction_);
 }
 
@@ -450,8 +510,7 @@ NextStep Viewer::nextStep(double now) const {
     next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now));
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
     const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
-    if (isCheaper)
-        next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
+    if (isCheaper) next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
     if (isSentSomewhere()) next.waitSeconds = 0;
     return next;
 }
@@ -461,11 +520,13 @@ Result<void> Viewer::draw() {
     if (!stats) return stats.error();
     status_.frame = *stats;
     status_.reduction = requestReduction_;
-    const bool wantsLight = request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
+    const bool wantsLight =
+        request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
     status_.without = isPaper_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
     // The first frame also compiles; it says nothing about the next. Nor does a moving one trace occlusion.
     if (framesDrawn_ > 0)
-        fullFrameMs_ = requestReduction_ * requestReduction_ * (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));
+        fullFrameMs_ = requestReduction_ * requestReduction_ *
+                       (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));
     ++framesDrawn_;
     drawn_ = request_;
     drawnAt_ = now_;

@@ -43,9 +43,9 @@ struct Modifiers {
 
 /// What keys do; which key does it is the host's to say.
 enum class ViewerAction {
-    Fit,               ///< all of the dataset into the picture, from the same side
-    Reset,             ///< the camera the dataset opened with
-    ToggleLight,       ///< the light follows the camera, or stays where it is in the world
+    Fit,          ///< all of the dataset into the picture, from the same side
+    Reset,        ///< the camera the dataset opened with
+    ToggleLight,  ///< the light follows the camera, or stays where it is in the world
     ToggleShadows,
     ToggleOcclusion,   ///< ambient occlusion; left out while the camera moves
     ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
@@ -85,13 +85,13 @@ struct ViewerStatus {
     uint64_t triangles = 0;
     uint32_t levels = 0;
     UpdateResult update;
-    FrameStats frame;      ///< of the last draw()
-    int reduction = 1;     ///< the last picture has 1/reduction of the width and height
+    FrameStats frame;   ///< of the last draw()
+    int reduction = 1;  ///< the last picture has 1/reduction of the width and height
     std::string device;
     bool software = false;
     uint64_t budgetBytes = 0;
-    std::string without;   ///< what is asked for and not drawn, in a few words; empty: nothing
-    std::string problem;   ///< the last thing that went wrong, in one line; empty when nothing has
+    std::string without;  ///< what is asked for and not drawn, in a few words; empty: nothing
+    std::string problem;  ///< the last thing that went wrong, in one line; empty when nothing has
 };
 
 /// "0.46", "510".
@@ -112,12 +112,14 @@ public:
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source,
                       const OrbitCamera& camera, std::string name);
 
-    /// Shows several datasets where they are placed, and surfaces with mesostructure. Errors: Usage, where there is neither; those of
-    /// Renderer::open and setSurfaces.
-    Result<void> open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name);
+    /// Shows several datasets where they are placed, and surfaces with mesostructure. Errors: Usage, where there is
+    /// neither; those of Renderer::open and setSurfaces.
+    Result<void> open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera,
+                      std::string name);
 
     /// The same, where a view that shares the device has opened it all already; what it is made of is not looked at.
-    void show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera, std::string name);
+    void show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera,
+              std::string name);
 
     /// Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);
@@ -159,7 +161,10 @@ public:
 
     [[nodiscard]] const OrbitCamera& camera() const { return camera_; }
     /// At once.
-    void setCamera(const OrbitCamera& camera) { camera_ = camera; move_.reset(); }
+    void setCamera(const OrbitCamera& camera) {
+        camera_ = camera;
+        move_.reset();
+    }
     [[nodiscard]] const Box& bounds() const { return bounds_; }
     /// Whether anything was opened.
     [[nodiscard]] bool isOpen() const { return isOpen_; }
@@ -178,8 +183,8 @@ public:
     [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
     void setSections(std::vector<SectionPlane> planes);
     void setSectionCaps(bool caps) { sectionCaps_ = caps; }
-    /// Section planes can be gripped from now on; for a host that draws the handles. `scale`: as of sectionHandle(); 0: no
-    /// longer.
+    /// Section planes can be gripped from now on; for a host that draws the handles. `scale`: as of sectionHandle(); 0:
+    /// no longer.
     void showSectionHandles(double scale) { handleScale_ = scale; }
     /// To be drawn over the picture.
     [[nodiscard]] std::vector<SectionHandle> sectionHandles() const;
@@ -248,10 +253,10 @@ private:
     glm::dvec3 flyDirection_{0};
     double flySpeed_ = 1;
 
-    FrameRequest request_;                ///< of the last update
+    FrameRequest request_;  ///< of the last update
     int requestReduction_ = 1;
-    std::optional<FrameRequest> drawn_;   ///< of the last draw
-    OrbitCamera seen_;                    ///< the camera of the last update
+    std::optional<FrameRequest> drawn_;  ///< of the last draw
+    OrbitCamera seen_;                   ///< the camera of the last update
     double movedAt_ = -std::numeric_limits<double>::infinity();
     double drawnAt_ = -std::numeric_limits<double>::infinity();
     double now_ = 0;

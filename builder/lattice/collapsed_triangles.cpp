@@ -32,7 +32,9 @@ void addSegments(const LatticeTriangle& t, std::vector<Segment>& segments) {
     std::array<std::pair<Point, uint32_t>, 3> corner;
     for (int i = 0; i < 3; ++i) corner[i] = {pointOf(t.corner[i]), t.colour[i]};
     std::sort(corner.begin(), corner.end());
-    const auto add = [&](int i, int k) { segments.push_back({corner[i].first, corner[k].first, {corner[i].second, corner[k].second}}); };
+    const auto add = [&](int i, int k) {
+        segments.push_back({corner[i].first, corner[k].first, {corner[i].second, corner[k].second}});
+    };
     if (corner[0].first == corner[2].first) return add(0, 2);
     if (corner[0].first != corner[1].first) add(0, 1);
     if (corner[1].first != corner[2].first) add(1, 2);
@@ -52,7 +54,8 @@ void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segme
 }
 
 /// A neighbour of `p` in its page that does not lie on the line from `p` to `q`.
-glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q, const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
+glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q,
+                        const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
     for (int axis = 0; axis < 3; ++axis)
         for (const int step : {1, -1}) {
             glm::i32vec3 r = p;
@@ -66,7 +69,9 @@ glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q, const std::function<bool
 
 void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(glm::i32vec3)>& owns,
                    const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
-    const auto firstCollapsed = std::partition(soup.begin(), soup.end(), [](const LatticeTriangle& t) { return hasArea(t.corner[0], t.corner[1], t.corner[2]); });
+    const auto firstCollapsed = std::partition(soup.begin(), soup.end(), [](const LatticeTriangle& t) {
+        return hasArea(t.corner[0], t.corner[1], t.corner[2]);
+    });
     if (firstCollapsed == soup.end()) return;
     std::vector<Segment> segments;
     for (auto t = firstCollapsed; t != soup.end(); ++t) addSegments(*t, segments);
@@ -74,7 +79,9 @@ void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(
     std::erase_if(segments, [&](const Segment& s) { return !owns(vectorOf(s.a)) && !owns(vectorOf(s.b)); });
     removeCovered(soup, segments);
     std::sort(segments.begin(), segments.end());
-    segments.erase(std::unique(segments.begin(), segments.end(), [](const Segment& a, const Segment& b) { return a.ends() == b.ends(); }), segments.end());
+    segments.erase(std::unique(segments.begin(), segments.end(),
+                               [](const Segment& a, const Segment& b) { return a.ends() == b.ends(); }),
+                   segments.end());
     for (const Segment& s : segments) {
         LatticeTriangle t{};
         t.corner[0] = vectorOf(s.a);

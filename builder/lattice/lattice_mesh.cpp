@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include <glm/geometric.hpp>
 #include <oneapi/tbb/parallel_sort.h>
+#include <glm/geometric.hpp>
 
 #include "octree/leaf_math.h"
 #include "octree/vcp_file.h"
@@ -17,7 +17,8 @@ namespace {
 
 struct PositionHash {
     size_t operator()(glm::i32vec3 p) const {
-        uint64_t h = uint32_t(p.x) * 0x9e3779b97f4a7c15u ^ uint32_t(p.y) * 0xc2b2ae3d27d4eb4fu ^ uint32_t(p.z) * 0x165667b19e3779f9u;
+        uint64_t h = uint32_t(p.x) * 0x9e3779b97f4a7c15u ^ uint32_t(p.y) * 0xc2b2ae3d27d4eb4fu ^
+                     uint32_t(p.z) * 0x165667b19e3779f9u;
         return h ^ h >> 29;
     }
 };
@@ -34,7 +35,7 @@ public:
     uint32_t findOrAdd(const std::vector<glm::i32vec3>& positions, glm::i32vec3 p, uint32_t next) {
         if (next * 3ull >= slots_.size() * 2) grow(positions);
         const size_t mask = slots_.size() - 1;
-        for (size_t i = PositionHash{}(p) & mask;; i = (i + 1) & mask) {
+        for (size_t i = PositionHash{}(p)&mask;; i = (i + 1) & mask) {
             if (slots_[i] == kEmpty) return slots_[i] = next;
             if (positions[slots_[i]] == p) return slots_[i];
         }
@@ -72,7 +73,8 @@ struct OrderedVertex {
 /// Sorts the vertices; returns the new number of each.
 std::vector<uint32_t> sortVertices(std::vector<glm::i32vec3>& positions) {
     std::vector<OrderedVertex> order(positions.size());
-    for (uint32_t v = 0; v < order.size(); ++v) order[v] = {mortonEncode(glm::u32vec3(positions[v] >> 11)), positions[v], v};
+    for (uint32_t v = 0; v < order.size(); ++v)
+        order[v] = {mortonEncode(glm::u32vec3(positions[v] >> 11)), positions[v], v};
     tbb::parallel_sort(order.begin(), order.end());
     std::vector<uint32_t> renamed(order.size());
     for (uint32_t v = 0; v < order.size(); ++v) {
@@ -95,7 +97,8 @@ struct OrderedTriangle {
 /// Triangles by smallest vertex, then by the others; of the repeated ones the first, with the largest stray.
 void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, LatticeMesh& mesh) {
     std::vector<uint32_t> begin(mesh.positions.size() + 1, 0);
-    for (size_t k = 0; k < soup.size(); ++k) ++begin[std::min({corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]}) + 1];
+    for (size_t k = 0; k < soup.size(); ++k)
+        ++begin[std::min({corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]}) + 1];
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
     std::vector<OrderedTriangle> ordered(soup.size());
     std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
@@ -115,14 +118,16 @@ void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint
                 mesh.stray.back() = std::max(mesh.stray.back(), t->stray);
                 continue;
             }
-            mesh.triangles.push_back(t->turned ? std::array<uint32_t, 3>{v, t->third, t->second} : std::array<uint32_t, 3>{v, t->second, t->third});
+            mesh.triangles.push_back(t->turned ? std::array<uint32_t, 3>{v, t->third, t->second}
+                                               : std::array<uint32_t, 3>{v, t->second, t->third});
             mesh.stray.push_back(t->stray);
         }
     }
 }
 
 /// Means of the colours that triangles give their vertices.
-std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, size_t vertices) {
+std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners,
+                                  size_t vertices) {
     std::vector<std::array<uint32_t, 5>> sums(vertices, {0, 0, 0, 0, 0});
     for (size_t k = 0; k < corners.size(); ++k) {
         const uint32_t colour = soup[k / 3].colour[k % 3];
@@ -162,9 +167,11 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
         const std::vector<uint32_t> renamed = sortVertices(mesh.positions);
         for (uint32_t& v : corners) v = renamed[v];
     }
-    // They agree, but where a kept thin part ends at another's vertex: then any will do that does not depend on the order.
+    // They agree, but where a kept thin part ends at another's vertex: then any will do that does not depend on the
+    // order.
     mesh.normals.assign(mesh.positions.size(), 0xffffffffu);
-    for (size_t k = 0; k < corners.size(); ++k) mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);
+    for (size_t k = 0; k < corners.size(); ++k)
+        mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);
     if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
     sortTriangles(soup, corners, mesh);
     return mesh;
@@ -172,7 +179,8 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
 
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
     const auto named = [](glm::i32vec3 q) { return OrderedVertex{mortonEncode(glm::u32vec3(q >> 11)), q, 0}; };
-    const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p), [&](glm::i32vec3 q, const OrderedVertex& wanted) { return named(q) < wanted; });
+    const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p),
+                                     [&](glm::i32vec3 q, const OrderedVertex& wanted) { return named(q) < wanted; });
     if (at == mesh.positions.end() || *at != p) return {};
     return static_cast<uint32_t>(at - mesh.positions.begin());
 }

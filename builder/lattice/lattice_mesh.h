@@ -16,11 +16,11 @@
 namespace vcp {
 
 struct LatticeMesh {
-    std::vector<glm::i32vec3> positions;  ///< distinct
-    std::vector<uint32_t> colours;        ///< RGBA8, as many as positions, or empty
-    std::vector<uint32_t> normals;        ///< packNormal with crease flag, as many as positions
+    std::vector<glm::i32vec3> positions;             ///< distinct
+    std::vector<uint32_t> colours;                   ///< RGBA8, as many as positions, or empty
+    std::vector<uint32_t> normals;                   ///< packNormal with crease flag, as many as positions
     std::vector<std::array<uint32_t, 3>> triangles;  ///< none without area, none twice
-    std::vector<float> stray;             ///< cells, as many as triangles: how far its points may be from the mesh's, both ways
+    std::vector<float> stray;  ///< cells, as many as triangles: how far its points may be from the mesh's, both ways
 };
 
 /// Rounding a point to the lattice moves it at most so far, in cells.
@@ -41,8 +41,8 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 
 /// Vertex normals (octree/vertex_normal.h): the mean of the incident triangles' normals by area, taken without
-/// orientation (a mesh need not have one); the page codec foretells them from a page's triangles. A vertex where a triangle turns away by more than 40 degrees is
-/// marked as crease: its normal is not to be interpolated.
+/// orientation (a mesh need not have one); the page codec foretells them from a page's triangles. A vertex where a
+/// triangle turns away by more than 40 degrees is marked as crease: its normal is not to be interpolated.
 void computeNormals(LatticeMesh& mesh);
 
 }  // namespace vcp

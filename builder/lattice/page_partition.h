@@ -30,16 +30,21 @@ struct PageGrid {
     template <class Visit>
     void forPagesNear(const glm::i32vec3 (&corner)[3], double margin, Visit&& visit) const {
         const double steps = double(kLatticePerCell);
-        const glm::i32vec3 low = glm::min(corner[0], glm::min(corner[1], corner[2])), high = glm::max(corner[0], glm::max(corner[1], corner[2]));
+        const glm::i32vec3 low = glm::min(corner[0], glm::min(corner[1], corner[2])),
+                           high = glm::max(corner[0], glm::max(corner[1], corner[2]));
         // Touching counts, so the bounds are widened by a hair.
-        const glm::dvec3 from = (glm::dvec3(low) / steps - margin) / edgeCells() - 1e-9, to = (glm::dvec3(high) / steps + margin) / edgeCells() + 1e-9;
-        const glm::i32vec3 first = glm::max(glm::i32vec3(glm::floor(from)), 0), last = glm::min(glm::i32vec3(glm::floor(to)), lastPage());
+        const glm::dvec3 from = (glm::dvec3(low) / steps - margin) / edgeCells() - 1e-9,
+                         to = (glm::dvec3(high) / steps + margin) / edgeCells() + 1e-9;
+        const glm::i32vec3 first = glm::max(glm::i32vec3(glm::floor(from)), 0),
+                           last = glm::min(glm::i32vec3(glm::floor(to)), lastPage());
         if (first == last) return visit(mortonEncode(glm::u32vec3(first)));
-        const BoxOverlap overlap({glm::dvec3(corner[0]) / steps, glm::dvec3(corner[1]) / steps, glm::dvec3(corner[2]) / steps});
+        const BoxOverlap overlap(
+            {glm::dvec3(corner[0]) / steps, glm::dvec3(corner[1]) / steps, glm::dvec3(corner[2]) / steps});
         for (int z = first.z; z <= last.z; ++z)
             for (int y = first.y; y <= last.y; ++y)
                 for (int x = first.x; x <= last.x; ++x)
-                    if (overlap.test((glm::dvec3(x, y, z) + 0.5) * edgeCells(), edgeCells() / 2 + margin)) visit(mortonEncode(glm::u32vec3(x, y, z)));
+                    if (overlap.test((glm::dvec3(x, y, z) + 0.5) * edgeCells(), edgeCells() / 2 + margin))
+                        visit(mortonEncode(glm::u32vec3(x, y, z)));
     }
 
     static constexpr uint32_t kLog2LatticePerCell = 11;

@@ -13,9 +13,9 @@ namespace vcp {
 template <class Real>
 struct WorldTriangle {
     glm::vec<3, Real> corner[3];
-    uint32_t colour[3];    ///< RGBA8; white where the mesh has none
+    uint32_t colour[3];  ///< RGBA8; white where the mesh has none
     glm::vec2 uv[3];
-    uint32_t material;     ///< number among the soup's materials, from 1; 0: none
+    uint32_t material;  ///< number among the soup's materials, from 1; 0: none
     uint32_t reserved = 0;
 };
 static_assert(sizeof(WorldTriangle<float>) == 80 && sizeof(WorldTriangle<double>) == 120);

@@ -65,7 +65,8 @@ WIDER_CLONES void squaredDistances(glm::dvec3 query, TriangleBatch& batch) {
         const double ax = batch.corners[0][i] - px, ay = batch.corners[1][i] - py, az = batch.corners[2][i] - pz;
         const double bx = batch.corners[3][i] - px, by = batch.corners[4][i] - py, bz = batch.corners[5][i] - pz;
         const double cx = batch.corners[6][i] - px, cy = batch.corners[7][i] - py, cz = batch.corners[8][i] - pz;
-        const double ux = bx - ax, uy = by - ay, uz = bz - az, vx = cx - ax, vy = cy - ay, vz = cz - az, wx = cx - bx, wy = cy - by, wz = cz - bz;
+        const double ux = bx - ax, uy = by - ay, uz = bz - az, vx = cx - ax, vy = cy - ay, vz = cz - az, wx = cx - bx,
+                     wy = cy - by, wz = cz - bz;
         // The interior: as in closestOnTriangle.
         const double nx = uy * vz - vy * uz, ny = uz * vx - vz * ux, nz = ux * vy - vx * uy;
         const double n2 = nx * nx + ny * ny + nz * nz;
@@ -74,12 +75,17 @@ WIDER_CLONES void squaredDistances(glm::dvec3 query, TriangleBatch& batch) {
         const double height = ax * nx + ay * ny + az * nz;
         const double area2 = larger(n2, kTiny), outside = larger(larger(-wb, -wc), larger(wb + wc - n2, kTiny - n2));
         // The edges a b, a c, b c.
-        const double fu = larger(smaller(-(ax * ux + ay * uy + az * uz) / larger(ux * ux + uy * uy + uz * uz, kTiny), 1.0), 0.0);
-        const double fv = larger(smaller(-(ax * vx + ay * vy + az * vz) / larger(vx * vx + vy * vy + vz * vz, kTiny), 1.0), 0.0);
-        const double fw = larger(smaller(-(bx * wx + by * wy + bz * wz) / larger(wx * wx + wy * wy + wz * wz, kTiny), 1.0), 0.0);
-        const double qx = ax + fu * ux, qy = ay + fu * uy, qz = az + fu * uz, rx = ax + fv * vx, ry = ay + fv * vy, rz = az + fv * vz;
+        const double fu =
+            larger(smaller(-(ax * ux + ay * uy + az * uz) / larger(ux * ux + uy * uy + uz * uz, kTiny), 1.0), 0.0);
+        const double fv =
+            larger(smaller(-(ax * vx + ay * vy + az * vz) / larger(vx * vx + vy * vy + vz * vz, kTiny), 1.0), 0.0);
+        const double fw =
+            larger(smaller(-(bx * wx + by * wy + bz * wz) / larger(wx * wx + wy * wy + wz * wz, kTiny), 1.0), 0.0);
+        const double qx = ax + fu * ux, qy = ay + fu * uy, qz = az + fu * uz, rx = ax + fv * vx, ry = ay + fv * vy,
+                     rz = az + fv * vz;
         const double sx = bx + fw * wx, sy = by + fw * wy, sz = bz + fw * wz;
-        const double edges = smaller(smaller(qx * qx + qy * qy + qz * qz, rx * rx + ry * ry + rz * rz), sx * sx + sy * sy + sz * sz);
+        const double edges =
+            smaller(smaller(qx * qx + qy * qy + qz * qz, rx * rx + ry * ry + rz * rz), sx * sx + sy * sy + sz * sz);
         const double face = height * height / area2;
         batch.squared[i] = outside > 0 ? edges : face;
     }
@@ -97,7 +103,8 @@ bool BoxOverlap::test(glm::dvec3 centre, double half) const {
     for (int i = 0; i < 3; ++i)
         if (lower_[i] > centre[i] + half || upper_[i] < centre[i] - half) return false;
     const glm::dvec3 a = t_[0] - centre;
-    if (std::abs(glm::dot(normal_, a)) > half * (std::abs(normal_.x) + std::abs(normal_.y) + std::abs(normal_.z))) return false;
+    if (std::abs(glm::dot(normal_, a)) > half * (std::abs(normal_.x) + std::abs(normal_.y) + std::abs(normal_.z)))
+        return false;
     const glm::dvec3 b = t_[1] - centre, c = t_[2] - centre;
     for (const glm::dvec3& e : edge_) {
         // Axes e x (x, y, z): two components of the projection each.
@@ -139,7 +146,8 @@ void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Po
     unsigned beyond[3] = {};  // bit 2 * axis + end: outside that plane
     for (int i = 0; i < 3; ++i)
         for (int axis = 0; axis < 3; ++axis)
-            beyond[i] |= (triangle[i][axis] < lower[axis] ? 1u : 0u) << 2 * axis | (triangle[i][axis] > upper[axis] ? 2u : 0u) << 2 * axis;
+            beyond[i] |= (triangle[i][axis] < lower[axis] ? 1u : 0u) << 2 * axis |
+                         (triangle[i][axis] > upper[axis] ? 2u : 0u) << 2 * axis;
     if (beyond[0] & beyond[1] & beyond[2]) return;
     for (const glm::dvec3& p : triangle) polygon.add(p);
     const unsigned planes = beyond[0] | beyond[1] | beyond[2];

@@ -14,8 +14,8 @@ namespace vcp {
 using Triangle3 = std::array<glm::dvec3, 3>;
 
 struct ClosestPoint {
-    glm::dvec3 offset{0};      ///< closest point minus query
-    double squared = 0;        ///< its squared length
+    glm::dvec3 offset{0};         ///< closest point minus query
+    double squared = 0;           ///< its squared length
     glm::dvec3 weights{1, 0, 0};  ///< barycentric, of the three corners
 };
 

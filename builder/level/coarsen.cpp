@@ -65,7 +65,8 @@ private:
         std::sort(images.begin(), images.end(), [](const Image& a, const Image& b) { return a.corners < b.corners; });
         out_.imageOf.assign(fine_.triangles.size(), kNone);
         for (const Image& image : images) {
-            if (out_.mesh.triangles.empty() || out_.mesh.triangles.back() != image.corners) out_.mesh.triangles.push_back(image.corners);
+            if (out_.mesh.triangles.empty() || out_.mesh.triangles.back() != image.corners)
+                out_.mesh.triangles.push_back(image.corners);
             out_.imageOf[image.fine] = static_cast<uint32_t>(out_.mesh.triangles.size() - 1);
         }
     }
@@ -103,10 +104,12 @@ private:
             for (const auto& [a, b] : {std::pair(c[0], c[1]), std::pair(c[1], c[2]), std::pair(c[0], c[2])})
                 if (a != b && !isEdge(a, b)) lines.push_back({a, b, k});
         }
-        std::sort(lines.begin(), lines.end(), [](const Line& x, const Line& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+        std::sort(lines.begin(), lines.end(),
+                  [](const Line& x, const Line& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
         for (size_t begin = 0, end = 0; begin < lines.size(); begin = end) {
             Farthest farthest(clusters_.positions[lines[begin].a], clusters_.positions[lines[begin].b]);
-            for (end = begin; end < lines.size() && lines[end].a == lines[begin].a && lines[end].b == lines[begin].b; ++end)
+            for (end = begin; end < lines.size() && lines[end].a == lines[begin].a && lines[end].b == lines[begin].b;
+                 ++end)
                 for (const uint32_t v : fine_.triangles[lines[end].fine]) farthest.offer(v, fine_.positions[v]);
             keep(lines[begin].a, lines[begin].b, farthest);
             used_[lines[begin].a] = used_[lines[begin].b] = true;
@@ -148,7 +151,9 @@ private:
             vertex_ = vertex;
             fine_ = fine;
         }
-        [[nodiscard]] std::optional<uint32_t> vertex() const { return squared_ > 0 ? std::optional(vertex_) : std::nullopt; }
+        [[nodiscard]] std::optional<uint32_t> vertex() const {
+            return squared_ > 0 ? std::optional(vertex_) : std::nullopt;
+        }
 
     private:
         glm::dvec3 a_, along_;
@@ -179,14 +184,16 @@ private:
     const LatticeMesh& fine_;
     const VertexClusters& clusters_;
     CoarseTriangles out_;
-    std::vector<uint32_t> collapsed_;         ///< short fine triangles
-    std::vector<uint32_t> fanBegin_, fans_;   ///< images at each cluster
-    std::vector<bool> used_;                  ///< clusters that are a corner of something
+    std::vector<uint32_t> collapsed_;        ///< short fine triangles
+    std::vector<uint32_t> fanBegin_, fans_;  ///< images at each cluster
+    std::vector<bool> used_;                 ///< clusters that are a corner of something
 };
 
 }  // namespace
 
-CoarseTriangles coarseTriangles(const LatticeMesh& fine, const VertexClusters& clusters) { return Emitter(fine, clusters).run(); }
+CoarseTriangles coarseTriangles(const LatticeMesh& fine, const VertexClusters& clusters) {
+    return Emitter(fine, clusters).run();
+}
 
 LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image)[3]) {
     LatticeTriangle t;
@@ -196,7 +203,8 @@ LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image
         t.normal[i] = image[i].normal;
     }
     double moved = 0;
-    for (int i = 0; i < 3; ++i) moved = std::max(moved, glm::length(glm::dvec3(fine.corner[i]) / 2.0 - glm::dvec3(image[i].position)));
+    for (int i = 0; i < 3; ++i)
+        moved = std::max(moved, glm::length(glm::dvec3(fine.corner[i]) / 2.0 - glm::dvec3(image[i].position)));
     t.stray = std::nextafter(static_cast<float>(moved / kLatticePerCell + double(fine.stray) / 2), 1e9f);
     if (hasArea(t.corner[0], t.corner[1], t.corner[2])) return t;
     // Along the longest side, with the third corner where the mesh had it; ties by that.
@@ -204,7 +212,8 @@ LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image
     double longest = -1;
     for (int i = 0; i < 3; ++i) {
         const double length = glm::length(glm::dvec3(t.corner[(i + 1) % 3] - t.corner[i]));
-        if (length < longest || (length == longest && !lessThan(fine.corner[(i + 2) % 3], fine.corner[(from + 2) % 3]))) continue;
+        if (length < longest || (length == longest && !lessThan(fine.corner[(i + 2) % 3], fine.corner[(from + 2) % 3])))
+            continue;
         longest = length;
         from = i;
     }
@@ -212,7 +221,8 @@ LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image
     glm::i32vec3& third = t.corner[(from + 2) % 3];
     third = fine.corner[(from + 2) % 3] >> 1;
     const glm::i32vec3 along = b - a;
-    if (!hasArea(a, b, third)) third = a + (along.y == 0 && along.z == 0 ? glm::i32vec3(0, 1, 0) : glm::i32vec3(1, 0, 0));
+    if (!hasArea(a, b, third))
+        third = a + (along.y == 0 && along.z == 0 ? glm::i32vec3(0, 1, 0) : glm::i32vec3(1, 0, 0));
     return t;
 }
 
@@ -240,7 +250,8 @@ LatticeMesh coarsen(const LatticeMesh& fine) {
         for (int i = 0; i < 3; ++i) {
             corner(fine, f[i], from, i);
             const uint32_t c = clusters.ofVertex[f[i]];
-            image[i] = {clusters.positions[c], clusters.colours.empty() ? 0xffffffffu : clusters.colours[c], clusters.normals.empty() ? 0 : clusters.normals[c]};
+            image[i] = {clusters.positions[c], clusters.colours.empty() ? 0xffffffffu : clusters.colours[c],
+                        clusters.normals.empty() ? 0 : clusters.normals[c]};
         }
         soup.push_back(longImage(from, image));
     }

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <mutex>
 
-#include <glm/geometric.hpp>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <glm/geometric.hpp>
 
 #include "builder/level/stray_bound.h"
 
@@ -166,9 +166,12 @@ Result<void> LevelStep::stepLong(size_t bin, const LatticeMesh& mesh, const Imag
 Result<void> LevelStep::run(size_t bin, const LatticeMesh& mesh) {
     Images images = imagesOf(bin, mesh);
     images.image.resize(mesh.positions.size());
-    const auto colourOf = [](const std::vector<uint32_t>& colours, size_t v) { return colours.empty() ? 0xffffffffu : colours[v]; };
+    const auto colourOf = [](const std::vector<uint32_t>& colours, size_t v) {
+        return colours.empty() ? 0xffffffffu : colours[v];
+    };
     if (first_) {
-        for (size_t v = 0; v < mesh.positions.size(); ++v) images.image[v] = {mesh.positions[v], colourOf(mesh.colours, v), mesh.normals[v]};
+        for (size_t v = 0; v < mesh.positions.size(); ++v)
+            images.image[v] = {mesh.positions[v], colourOf(mesh.colours, v), mesh.normals[v]};
     } else {
         const VertexClusters clusters = clusterVertices(mesh);
         for (size_t v = 0; v < mesh.positions.size(); ++v)

@@ -36,7 +36,8 @@ struct WaitingTriangle {
 /// Where the next level's triangles go: into every bin that needs them.
 class LevelSink {
 public:
-    LevelSink(const PageGrid& grid, const PagePartition& partition, RecordBins<LatticeTriangle>& bins) : grid_(grid), partition_(partition), bins_(bins) {}
+    LevelSink(const PageGrid& grid, const PagePartition& partition, RecordBins<LatticeTriangle>& bins)
+        : grid_(grid), partition_(partition), bins_(bins) {}
 
     /// A batch of its own for each thread; flush when done.
     class Batch {
@@ -62,7 +63,8 @@ class LevelStep {
 public:
     /// `first`: the step from the snapped triangles to the finest level. `grid`, `partition`: of the level
     /// stepped from.
-    LevelStep(bool first, const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting, LevelSink& sink)
+    LevelStep(bool first, const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting,
+              LevelSink& sink)
         : first_(first), grid_(grid), partition_(partition), waiting_(waiting), sink_(sink) {}
 
     /// `mesh`: all triangles of the bin, with their normals.

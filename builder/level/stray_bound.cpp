@@ -6,11 +6,11 @@
 #include <limits>
 #include <span>
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "builder/level/triangle_cover.h"
 #include "octree/leaf_math.h"
@@ -41,12 +41,14 @@ public:
         for (size_t c = 0; c < clusters; ++c) begin_[c + 1] += begin_[c];
         all_.resize(begin_.back());
         std::vector<uint32_t> next(begin_.begin(), begin_.end() - 1);
-        for (size_t k = 0; k < triangles; ++k) forDistinct(corners(k), clusters, [&](uint32_t c) { all_[next[c]++] = static_cast<uint32_t>(k); });
+        for (size_t k = 0; k < triangles; ++k)
+            forDistinct(corners(k), clusters, [&](uint32_t c) { all_[next[c]++] = static_cast<uint32_t>(k); });
     }
     /// Triangles at any of the corners, ascending.
     void around(const Index3& corners, std::vector<uint32_t>& out) const {
         out.clear();
-        forDistinct(corners, begin_.size() - 1, [&](uint32_t c) { out.insert(out.end(), all_.begin() + begin_[c], all_.begin() + begin_[c + 1]); });
+        forDistinct(corners, begin_.size() - 1,
+                    [&](uint32_t c) { out.insert(out.end(), all_.begin() + begin_[c], all_.begin() + begin_[c + 1]); });
         std::sort(out.begin(), out.end());
         out.erase(std::unique(out.begin(), out.end()), out.end());
     }
@@ -63,7 +65,8 @@ private:
 
 struct Box {
     glm::dvec3 low, high;
-    explicit Box(const Triangle3& t) : low(glm::min(t[0], glm::min(t[1], t[2]))), high(glm::max(t[0], glm::max(t[1], t[2]))) {}
+    explicit Box(const Triangle3& t)
+        : low(glm::min(t[0], glm::min(t[1], t[2]))), high(glm::max(t[0], glm::max(t[1], t[2]))) {}
     [[nodiscard]] double distanceSquared(const Box& other) const {
         const glm::dvec3 gap = glm::max(glm::max(other.low - high, low - other.high), 0.0);
         return glm::dot(gap, gap);
@@ -81,8 +84,10 @@ struct Meshes {
         : fine(fineMesh),
           clusters(vertexClusters),
           coarse(coarseTriangles),
-          coarseFans(clusters.positions.size(), coarse.mesh.triangles.size(), [&](size_t k) { return coarse.mesh.triangles[k]; }),
-          fineFans(clusters.positions.size(), fine.triangles.size(), [&](size_t k) { return clustersAt(fine, clusters, k); }),
+          coarseFans(clusters.positions.size(), coarse.mesh.triangles.size(),
+                     [&](size_t k) { return coarse.mesh.triangles[k]; }),
+          fineFans(clusters.positions.size(), fine.triangles.size(),
+                   [&](size_t k) { return clustersAt(fine, clusters, k); }),
           stray(coarse.mesh.triangles.size(), 0),
           moved(coarse.mesh.triangles.size(), std::numeric_limits<double>::infinity()) {
         prisms.reserve(stray.size());
@@ -106,11 +111,19 @@ struct Meshes {
 class StrayBound {
 public:
     explicit StrayBound(Meshes& meshes)
-        : fine_(meshes.fine), clusters_(meshes.clusters), coarse_(meshes.coarse), coarseFans_(meshes.coarseFans), fineFans_(meshes.fineFans), prisms_(meshes.prisms), stray_(meshes.stray), moved_(meshes.moved) {}
+        : fine_(meshes.fine),
+          clusters_(meshes.clusters),
+          coarse_(meshes.coarse),
+          coarseFans_(meshes.coarseFans),
+          fineFans_(meshes.fineFans),
+          prisms_(meshes.prisms),
+          stray_(meshes.stray),
+          moved_(meshes.moved) {}
 
     void moveFine(size_t k) {
         const uint32_t image = coarse_.imageOf[k];
-        if (image != kNone && !isLongFine(k)) moved_[image] = std::min(moved_[image], motionOf(k) + double(fine_.stray[k]) / 2);
+        if (image != kNone && !isLongFine(k))
+            moved_[image] = std::min(moved_[image], motionOf(k) + double(fine_.stray[k]) / 2);
     }
     void boundFine(size_t k);
     void boundCoarse(size_t k);
@@ -121,7 +134,8 @@ private:
     void raise(size_t coarse, double stray) {
         const std::atomic_ref<double> shared(stray_[coarse]);
         double now = shared.load(std::memory_order_relaxed);
-        while (now < stray && !shared.compare_exchange_weak(now, stray, std::memory_order_relaxed)) {}
+        while (now < stray && !shared.compare_exchange_weak(now, stray, std::memory_order_relaxed)) {
+        }
     }
     [[nodiscard]] bool isLongFine(size_t k) const {
         const Index3& t = fine_.triangles[k];
@@ -131,7 +145,9 @@ private:
     [[nodiscard]] Triangle3 fineTriangle(size_t k) const {
         std::array<glm::i32vec3, 3> p;
         for (int i = 0; i < 3; ++i) p[i] = fine_.positions[fine_.triangles[k][i]];
-        std::sort(p.begin(), p.end(), [](glm::i32vec3 a, glm::i32vec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; });
+        std::sort(p.begin(), p.end(), [](glm::i32vec3 a, glm::i32vec3 b) {
+            return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+        });
         Triangle3 t;
         for (int i = 0; i < 3; ++i) t[i] = glm::dvec3(p[i]) / (2.0 * kLatticePerCell);
         return t;
@@ -140,7 +156,8 @@ private:
     [[nodiscard]] double motionOf(size_t k) const {
         double squared = 0;
         for (const uint32_t v : fine_.triangles[k]) {
-            const glm::dvec3 d = glm::dvec3(fine_.positions[v]) / 2.0 - glm::dvec3(clusters_.positions[clusters_.ofVertex[v]]);
+            const glm::dvec3 d =
+                glm::dvec3(fine_.positions[v]) / 2.0 - glm::dvec3(clusters_.positions[clusters_.ofVertex[v]]);
             squared = std::max(squared, glm::dot(d, d));
         }
         return std::sqrt(squared) / kLatticePerCell;
@@ -158,11 +175,13 @@ private:
 
     /// Bound for a part of a coarse triangle, against pieces_[begin, end); `reach` is a bound that is known.
     /// Where the pieces are many, the part is quartered, so that each quarter has its own few.
-    double boundPart(const TrianglePrism& prism, const Triangle3& part, size_t begin, size_t end, double reach, int halvings) {
+    double boundPart(const TrianglePrism& prism, const Triangle3& part, size_t begin, size_t end, double reach,
+                     int halvings) {
         const glm::dvec3 centre = (part[0] + part[1] + part[2]) / 3.0;
         double radius = 0;
         for (const glm::dvec3& p : part) radius = std::max(radius, glm::distance(p, centre));
-        for (size_t i = begin; i < end; ++i) reach = std::min(reach, glm::distance(pieces_[i].corners[0], centre) + radius + pieces_[i].stray);
+        for (size_t i = begin; i < end; ++i)
+            reach = std::min(reach, glm::distance(pieces_[i].corners[0], centre) + radius + pieces_[i].stray);
         if (reach <= kEnough && halvings < kPartHalvings) return reach;
         const Box box(part);
         const size_t first = pieces_.size();
@@ -173,9 +192,11 @@ private:
         }
         double bound = 0;
         if (pieces_.size() - first > kManyPieces && halvings > 0) {
-            const glm::dvec3 ab = (part[0] + part[1]) * 0.5, bc = (part[1] + part[2]) * 0.5, ca = (part[2] + part[0]) * 0.5;
+            const glm::dvec3 ab = (part[0] + part[1]) * 0.5, bc = (part[1] + part[2]) * 0.5,
+                             ca = (part[2] + part[0]) * 0.5;
             const size_t last = pieces_.size();
-            for (const Triangle3& quarter : {Triangle3{part[0], ab, ca}, Triangle3{ab, part[1], bc}, Triangle3{ca, bc, part[2]}, Triangle3{ab, bc, ca}})
+            for (const Triangle3& quarter : {Triangle3{part[0], ab, ca}, Triangle3{ab, part[1], bc},
+                                             Triangle3{ca, bc, part[2]}, Triangle3{ab, bc, ca}})
                 bound = std::max(bound, boundPart(prism, quarter, first, last, reach, halvings - 1));
         } else {
             bound = std::min(reach, coverPart(prism, part, first));
@@ -194,7 +215,8 @@ private:
             ownPrisms_.emplace_back(pieces_[i].corners, pieces_[i].stray);
         }
         std::sort(order_.begin(), order_.end(), [&](const auto& a, const auto& b) {
-            return a.first != b.first ? a.first < b.first : lessThan(ownPrisms_[a.second].corners, ownPrisms_[b.second].corners);
+            return a.first != b.first ? a.first < b.first
+                                      : lessThan(ownPrisms_[a.second].corners, ownPrisms_[b.second].corners);
         });
         others_.clear();
         for (const auto& [away, n] : order_) others_.push_back(&ownPrisms_[n]);
@@ -206,7 +228,8 @@ private:
         const size_t clusters = clusters_.positions.size();
         const auto along = [&](uint32_t n) {
             const Index3 c = clustersOf(n);
-            return std::all_of(t.begin(), t.end(), [&](uint32_t v) { return v >= clusters || v == c[0] || v == c[1] || v == c[2]; });
+            return std::all_of(t.begin(), t.end(),
+                               [&](uint32_t v) { return v >= clusters || v == c[0] || v == c[1] || v == c[2]; });
         };
         if (std::any_of(near_.begin(), near_.end(), [&](uint32_t n) { return along(n) && !isLongFine(n); })) return;
         std::erase_if(near_, [&](uint32_t n) { return !along(n); });
@@ -277,7 +300,8 @@ void StrayBound::boundCoarse(size_t k) {
     // Those over or under it are enough, but for ridges and borders.
     pieces_.clear();
     for (const uint32_t n : near_)
-        if (const FinePiece piece{fineTriangle(n), double(fine_.stray[n]) / 2}; overlap(prisms_[k], piece.corners)) pieces_.push_back(piece);
+        if (const FinePiece piece{fineTriangle(n), double(fine_.stray[n]) / 2}; overlap(prisms_[k], piece.corners))
+            pieces_.push_back(piece);
     double bound = boundPart(prisms_[k], prisms_[k].corners, 0, pieces_.size(), moved_[k], kPartHalvings);
     if (bound > kEnough) {
         pieces_.clear();
@@ -302,7 +326,8 @@ std::vector<float> boundStray(const LatticeMesh& fine, const VertexClusters& clu
     forAll(fine.triangles.size(), &StrayBound::boundFine);
     forAll(meshes.stray.size(), &StrayBound::boundCoarse);
     std::vector<float> stray(meshes.stray.size());
-    for (size_t k = 0; k < stray.size(); ++k) stray[k] = std::nextafter(static_cast<float>(meshes.stray[k]), std::numeric_limits<float>::infinity());
+    for (size_t k = 0; k < stray.size(); ++k)
+        stray[k] = std::nextafter(static_cast<float>(meshes.stray[k]), std::numeric_limits<float>::infinity());
     return stray;
 }
 

@@ -53,7 +53,11 @@ struct TriangleCover::PolygonHeights {
     /// Whether the polygon has a part inside of all sides, each taken alone.
     [[nodiscard]] bool reachInto() const { return low[0] < -kThin && low[1] < -kThin && low[2] < -kThin; }
     /// Least and largest distance from the triangle's own plane.
-    [[nodiscard]] double nearest() const { return low[TrianglePrism::kOwn] > 0 ? low[TrianglePrism::kOwn] : high[TrianglePrism::kOwn] < 0 ? -high[TrianglePrism::kOwn] : 0; }
+    [[nodiscard]] double nearest() const {
+        return low[TrianglePrism::kOwn] > 0    ? low[TrianglePrism::kOwn]
+               : high[TrianglePrism::kOwn] < 0 ? -high[TrianglePrism::kOwn]
+                                               : 0;
+    }
     [[nodiscard]] double farthest() const { return std::max(high[TrianglePrism::kOwn], -low[TrianglePrism::kOwn]); }
 };
 
@@ -85,7 +89,8 @@ double TriangleCover::record(const Match& match) {
     return bound;
 }
 
-double TriangleCover::bound(const Triangle3& triangle, std::span<const TrianglePrism* const> others, std::span<double> worst) {
+double TriangleCover::bound(const Triangle3& triangle, std::span<const TrianglePrism* const> others,
+                            std::span<double> worst) {
     others_ = others;
     worst_ = worst;
     if (others.empty()) return std::numeric_limits<double>::infinity();
@@ -133,7 +138,9 @@ WIDER_CLONES double TriangleCover::cover(const Polygon& polygon, size_t first, M
 
 /// Cuts off what is farther than `room` outside the prism, side by side. What is left; null where that is nothing.
 /// `heights`: of the polygon, then of what is left.
-WIDER_CLONES const TriangleCover::Polygon* TriangleCover::split(const TrianglePrism& o, double room, const Polygon& polygon, PolygonHeights& heights, Pieces& pieces) {
+WIDER_CLONES const TriangleCover::Polygon* TriangleCover::split(const TrianglePrism& o, double room,
+                                                                const Polygon& polygon, PolygonHeights& heights,
+                                                                Pieces& pieces) {
     const Polygon* left = &polygon;
     for (int s = 0; s < 3; ++s) {
         if (heights.high[s] <= room) {
@@ -168,11 +175,13 @@ double TriangleCover::settle(const Polygon& polygon, Match best, int halvings) {
             TrianglePrism::Heights h;
             o.heights(p, h);
             const double beside = std::max(std::max(h[0], h[1]), std::max(h[2], 0.0)), farther = limit + kThin;
-            return std::abs(h[TrianglePrism::kOwn]) >= limit || h[TrianglePrism::kOwn] * h[TrianglePrism::kOwn] + beside * beside >= farther * farther;
+            return std::abs(h[TrianglePrism::kOwn]) >= limit ||
+                   h[TrianglePrism::kOwn] * h[TrianglePrism::kOwn] + beside * beside >= farther * farther;
         };
         double squared = 0;
         for (int i = 0; i < polygon.count && squared < limit * limit; ++i)
-            squared = isBeyond(polygon.p[i]) ? limit * limit : std::max(squared, closestOnTriangle(polygon.p[i], o.corners).squared);
+            squared = isBeyond(polygon.p[i]) ? limit * limit
+                                             : std::max(squared, closestOnTriangle(polygon.p[i], o.corners).squared);
         if (squared < limit * limit) best = {std::sqrt(squared) + o.extra, j};
     }
     if (best.distance <= enough_ || halvings == 0 || polygon.count + 1 > Polygon::kMost) return record(best);

@@ -27,9 +27,9 @@ struct TrianglePrism {
 
     Triangle3 corners;
     Heights x{}, y{}, z{}, offset{};  ///< the planes' unit normals, by axis, and their offsets
-    double extra = 0;         ///< added to distances to it
-    double cornerFactor = 1;  ///< a point x outside all of its sides at once is at most x times this off
-    bool isNeedle = false;    ///< too thin for its prism to be certain; measured by the convex bound alone
+    double extra = 0;                 ///< added to distances to it
+    double cornerFactor = 1;          ///< a point x outside all of its sides at once is at most x times this off
+    bool isNeedle = false;            ///< too thin for its prism to be certain; measured by the convex bound alone
 
     TrianglePrism() = default;
     /// `corners` must span an area.
@@ -38,7 +38,9 @@ struct TrianglePrism {
     /// Of a point, over each plane.
     void heights(glm::dvec3 p, Heights& h) const { h = x * p.x + y * p.y + z * p.z - offset; }
     /// Distance of a point from the triangle's own plane.
-    [[nodiscard]] double away(glm::dvec3 p) const { return std::abs(x[kOwn] * p.x + y[kOwn] * p.y + z[kOwn] * p.z - offset[kOwn]); }
+    [[nodiscard]] double away(glm::dvec3 p) const {
+        return std::abs(x[kOwn] * p.x + y[kOwn] * p.y + z[kOwn] * p.z - offset[kOwn]);
+    }
 };
 
 class TriangleCover {
@@ -60,7 +62,8 @@ private:
     };
     double cover(const Polygon& polygon, size_t first, Match best);
     struct Pieces;
-    static const Polygon* split(const TrianglePrism& other, double room, const Polygon& polygon, PolygonHeights& heights, Pieces& pieces);
+    static const Polygon* split(const TrianglePrism& other, double room, const Polygon& polygon,
+                                PolygonHeights& heights, Pieces& pieces);
     double settle(const Polygon& polygon, Match best, int halvings);
     double record(const Match& match);
 

@@ -118,11 +118,15 @@ public:
         std::vector<Keyed> order;
         order.reserve(mesh_.positions.size());
         for (uint32_t v = 0; v < mesh_.positions.size(); ++v)
-            if (begin_[v] != begin_[v + 1]) order.push_back({mortonEncode(glm::u32vec3(mesh_.positions[v] / kLargestCube)), v});
-        std::sort(order.begin(), order.end(), [](const Keyed& a, const Keyed& b) { return a.cube != b.cube ? a.cube < b.cube : a.vertex < b.vertex; });
+            if (begin_[v] != begin_[v + 1])
+                order.push_back({mortonEncode(glm::u32vec3(mesh_.positions[v] / kLargestCube)), v});
+        std::sort(order.begin(), order.end(), [](const Keyed& a, const Keyed& b) {
+            return a.cube != b.cube ? a.cube < b.cube : a.vertex < b.vertex;
+        });
         for (size_t begin = 0, end = 0; begin < order.size(); begin = end) {
             members_.clear();
-            for (end = begin; end < order.size() && order[end].cube == order[begin].cube; ++end) members_.push_back({.vertex = order[end].vertex});
+            for (end = begin; end < order.size() && order[end].cube == order[begin].cube; ++end)
+                members_.push_back({.vertex = order[end].vertex});
             const glm::i32vec3 lower = mesh_.positions[members_[0].vertex] / kLargestCube * kLargestCube;
             centre_ = glm::dvec3(lower) / double(kCoarseCell) + kLargestClusterCells / 2;
             describeMembers();
@@ -134,11 +138,11 @@ public:
 private:
     struct Member {
         uint32_t vertex;
-        bool stays = false;     ///< how far it moves counts: a long triangle uses it, or it is a tip
-        uint32_t planes = 0;    ///< first in planes_
-        uint32_t borders = 0;   ///< first of the planes at borders
+        bool stays = false;    ///< how far it moves counts: a long triangle uses it, or it is a tip
+        uint32_t planes = 0;   ///< first in planes_
+        uint32_t borders = 0;  ///< first of the planes at borders
         uint32_t end = 0;
-        glm::dvec3 point{0};    ///< coarse cells from centre_
+        glm::dvec3 point{0};  ///< coarse cells from centre_
         Quadric quadric{};
     };
     struct Plane {
@@ -205,7 +209,8 @@ private:
         int64_t count = 0;
         for (size_t i = 0, end = 0; i < edges_.size(); i = end) {
             glm::dvec3 inward(0);
-            for (end = i; end < edges_.size() && edges_[end].other == edges_[i].other; ++end) inward += edges_[end].inward;
+            for (end = i; end < edges_.size() && edges_[end].other == edges_[i].other; ++end)
+                inward += edges_[end].inward;
             const double length = glm::length(edges_[i].along);
             direction.add(edges_[i].along / length, 1, 1);
             ++count;
@@ -260,8 +265,10 @@ private:
     double errorOf(Members members, glm::dvec3 r, const Quadric& sum) const {
         double planes = 0, borders = 0, motion = 0, staying = 0;
         for (const Member& m : members) {
-            for (uint32_t i = m.planes; i < m.borders; ++i) planes = std::max(planes, std::abs(glm::dot(planes_[i].normal, r) - planes_[i].offset));
-            for (uint32_t i = m.borders; i < m.end; ++i) borders = std::max(borders, std::abs(glm::dot(planes_[i].normal, r) - planes_[i].offset));
+            for (uint32_t i = m.planes; i < m.borders; ++i)
+                planes = std::max(planes, std::abs(glm::dot(planes_[i].normal, r) - planes_[i].offset));
+            for (uint32_t i = m.borders; i < m.end; ++i)
+                borders = std::max(borders, std::abs(glm::dot(planes_[i].normal, r) - planes_[i].offset));
             const double moved = glm::distance(m.point, r);
             motion = std::max(motion, moved);
             if (m.stays) staying = std::max(staying, moved);
@@ -291,7 +298,8 @@ private:
         for (const Member& m : members)
             for (int c = 0; c < 4; ++c) channel[c] += mesh_.colours[m.vertex] >> 8 * c & 255u;
         uint32_t colour = 0;
-        for (int c = 0; c < 4; ++c) colour |= static_cast<uint32_t>((channel[c] + members.size() / 2) / members.size()) << 8 * c;
+        for (int c = 0; c < 4; ++c)
+            colour |= static_cast<uint32_t>((channel[c] + members.size() / 2) / members.size()) << 8 * c;
         return colour;
     }
 
@@ -304,7 +312,8 @@ private:
             crease = crease || (mesh_.normals[m.vertex] & kNormalCreaseBit) != 0;
         }
         const glm::dvec3 n = dominantDirection(sum.matrix());
-        for (const Member& m : members) crease = crease || std::abs(glm::dot(n, f64::decodeNormal(mesh_.normals[m.vertex]))) < kCreaseCosine;
+        for (const Member& m : members)
+            crease = crease || std::abs(glm::dot(n, f64::decodeNormal(mesh_.normals[m.vertex]))) < kCreaseCosine;
         return packNormal(n, crease);
     }
 

@@ -26,7 +26,8 @@ std::array<glm::dvec3, 2> perpendiculars(glm::dvec3 d) {
 /// Between the segments p0 p1 and q0 q1.
 double segmentDistance(glm::dvec3 p0, glm::dvec3 p1, glm::dvec3 q0, glm::dvec3 q1) {
     const glm::dvec3 p = p1 - p0, q = q1 - q0, r = p0 - q0;
-    const double pp = glm::dot(p, p), pq = glm::dot(p, q), qq = glm::dot(q, q), pr = glm::dot(p, r), qr = glm::dot(q, r);
+    const double pp = glm::dot(p, p), pq = glm::dot(p, q), qq = glm::dot(q, q), pr = glm::dot(p, r),
+                 qr = glm::dot(q, r);
     const auto share = [](double part, double whole) { return whole > 0 ? std::clamp(part / whole, 0.0, 1.0) : 0.0; };
     // The nearest points of the lines, cut to one segment, then to the other, then to the first again.
     double s = share(pq * qr - qq * pr, pp * qq - pq * pq);
@@ -126,7 +127,8 @@ bool RayJudge::borderNear(glm::dvec3 first, glm::dvec3 last) const {
     const IndexedMesh& mesh = mesh_->mesh();
     using Place = std::array<double, 3>;
     std::map<std::pair<Place, Place>, int> triangles;
-    for (const uint32_t triangle : mesh_->trianglesNear(glm::min(first, last) - radius_, glm::max(first, last) + radius_))
+    for (const uint32_t triangle :
+         mesh_->trianglesNear(glm::min(first, last) - radius_, glm::max(first, last) + radius_))
         for (int i = 0; i < 3; ++i) {
             const auto place = [&](int corner) {
                 const glm::dvec3 p = mesh.positions[mesh.triangles[triangle][corner % 3]];

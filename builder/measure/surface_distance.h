@@ -1,4 +1,5 @@
-// How far the surface of a level of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify --against`).
+// How far the surface of a level of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify
+// --against`).
 //
 //   mesh to surface   samples: vertices, points on edges, points inside triangles, by area; of triangles that
 //                     have area, for the others show nothing. The distance to
@@ -22,7 +23,7 @@ namespace vcp {
 struct SurfaceDistanceOptions {
     uint64_t samples = 200'000;  ///< points of the mesh, and visits of leaves
     uint64_t seed = 1;
-    unsigned threads = 0;  ///< 0: one a processor
+    unsigned threads = 0;         ///< 0: one a processor
     uint32_t level = UINT32_MAX;  ///< the level whose surface is measured; the finest if there is none of that number
     /// Called from one thread at a time with the fraction done; false cancels. May be empty.
     std::function<bool(double)> progress;

@@ -30,7 +30,9 @@ TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_
         entries.insert(entries.end(), part.begin(), part.end());
         std::vector<Entry>().swap(part);
     }
-    tbb::parallel_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.page != b.page ? a.page < b.page : a.triangle < b.triangle; });
+    tbb::parallel_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+        return a.page != b.page ? a.page < b.page : a.triangle < b.triangle;
+    });
     TriangleBins bins;
     bins.triangles.reserve(entries.size());
     for (const Entry& e : entries) {

@@ -16,8 +16,8 @@ inline constexpr double kBinMarginCells = 2.25;
 
 /// Triangles of each page, pages in Morton order, triangles in the mesh's order.
 struct TriangleBins {
-    std::vector<uint64_t> pages;       ///< Morton codes
-    std::vector<uint64_t> begin;       ///< pages.size() + 1 offsets into `triangles`
+    std::vector<uint64_t> pages;  ///< Morton codes
+    std::vector<uint64_t> begin;  ///< pages.size() + 1 offsets into `triangles`
     std::vector<uint32_t> triangles;
 
     [[nodiscard]] std::span<const uint32_t> of(size_t page) const {
@@ -27,6 +27,7 @@ struct TriangleBins {
 
 /// A triangle is binned to every page from code `first` to before `end` whose cube, widened by the margin, it
 /// overlaps. Uses the calling arena's threads.
-TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first = 0, uint64_t end = ~uint64_t{0});
+TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first = 0,
+                          uint64_t end = ~uint64_t{0});
 
 }  // namespace vcp

@@ -66,7 +66,8 @@ WIDER_CLONES void CellOverlap::classify(glm::ivec3 low, glm::ivec3 high, std::ve
                     notTouching |= (s < touch_.low[a] ? 1 : 0) | (s > touch_.high[a] ? 1 : 0);
                 }
                 if (notNear) continue;
-                cell[x - low.x] = rowTouches && x >= touchLow_.x && x <= touchHigh_.x && !notTouching ? kTouches : kNear;
+                cell[x - low.x] =
+                    rowTouches && x >= touchLow_.x && x <= touchHigh_.x && !notTouching ? kTouches : kNear;
             }
         }
 }

@@ -29,18 +29,21 @@ constexpr double kHopelessCosine = 0.4;
 
 double clippedArea(const Polygon& polygon, glm::dvec3 normal) {
     glm::dvec3 sum(0);
-    for (size_t i = 1; i + 1 < polygon.size(); ++i) sum += glm::cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
+    for (size_t i = 1; i + 1 < polygon.size(); ++i)
+        sum += glm::cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
     return std::abs(glm::dot(sum, normal)) / 2;
 }
 
 /// The triangles clipped to the widened leaf, in leaf space. False when a bad edge is inside.
-bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles, CertificateScratch& s) {
+bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles,
+                   CertificateScratch& s) {
     const double half = edge / 2 + kCertificateMarginCells;
     const glm::dvec3 centre = lower + edge / 2;
     for (const CertifiedTriangle* t : triangles) {
         if (t->badEdges == 0) continue;
         for (int i = 0; i < 3; ++i)
-            if ((t->badEdges >> i & 1) && segmentMeetsBox(t->corners[i], t->corners[(i + 1) % 3], centre, half)) return false;
+            if ((t->badEdges >> i & 1) && segmentMeetsBox(t->corners[i], t->corners[(i + 1) % 3], centre, half))
+                return false;
     }
     // Edges are powers of two, so leaf space costs no rounding.
     const double scale = 1 / edge, margin = kCertificateMarginCells * scale;
@@ -53,7 +56,8 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
     s.count = 0;
     Polygon polygon;
     for (const CertifiedTriangle* t : triangles) {
-        clipToBox({(t->corners[0] - lower) * scale, (t->corners[1] - lower) * scale, (t->corners[2] - lower) * scale}, glm::dvec3(-margin), glm::dvec3(1 + margin), polygon);
+        clipToBox({(t->corners[0] - lower) * scale, (t->corners[1] - lower) * scale, (t->corners[2] - lower) * scale},
+                  glm::dvec3(-margin), glm::dvec3(1 + margin), polygon);
         if (polygon.empty()) continue;
         for (const glm::dvec3& p : polygon) {
             s.x[s.count] = static_cast<float>(p.x);
@@ -74,7 +78,8 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
 glm::dvec3 referenceDirection(const CertificateScratch& s) {
     const size_t largest = static_cast<size_t>(std::max_element(s.areas.begin(), s.areas.end()) - s.areas.begin());
     glm::dvec3 sum(0);
-    for (size_t i = 0; i < s.normals.size(); ++i) sum += (glm::dot(s.normals[i], s.normals[largest]) < 0 ? -s.areas[i] : s.areas[i]) * s.normals[i];
+    for (size_t i = 0; i < s.normals.size(); ++i)
+        sum += (glm::dot(s.normals[i], s.normals[largest]) < 0 ? -s.areas[i] : s.areas[i]) * s.normals[i];
     const double length = glm::length(sum);
     if (!(length > 0)) return glm::dvec3(0);
     const glm::dvec3 n = sum / length;
@@ -96,7 +101,8 @@ public:
             for (int q = 0; q < kPoints; ++q) {
                 const auto [i, j, k] = index_[q];
                 const auto [u, v, w] = index_[p];
-                rows[p][q] = 24 / (factorial[i] * factorial[j] * factorial[k]) * std::pow(u / 4.0, i) * std::pow(v / 4.0, j) * std::pow(w / 4.0, k);
+                rows[p][q] = 24 / (factorial[i] * factorial[j] * factorial[k]) * std::pow(u / 4.0, i) *
+                             std::pow(v / 4.0, j) * std::pow(w / 4.0, k);
             }
             rows[p][kPoints + p] = 1;
         }
@@ -112,7 +118,8 @@ public:
             }
         }
         for (int r = 0; r < kPoints; ++r)
-            for (int m = 0; m < kPoints; ++m) coefficient_[m][r] = static_cast<float>(rows[r][kPoints + m] / rows[r][r]);
+            for (int m = 0; m < kPoints; ++m)
+                coefficient_[m][r] = static_cast<float>(rows[r][kPoints + m] / rows[r][r]);
         for (int p = 0; p < 16; ++p)
             for (int c = 0; c < 3; ++c) weight_[c][p] = static_cast<float>(index_[p % kPoints][c]) / 4;
     }
@@ -137,8 +144,21 @@ public:
     }
 
 private:
-    static constexpr std::array<std::array<int, 3>, kPoints> index_{{{4, 0, 0}, {0, 4, 0}, {0, 0, 4}, {3, 1, 0}, {2, 2, 0}, {1, 3, 0}, {0, 3, 1}, {0, 2, 2},
-                                                                     {0, 1, 3}, {1, 0, 3}, {2, 0, 2}, {3, 0, 1}, {2, 1, 1}, {1, 2, 1}, {1, 1, 2}}};
+    static constexpr std::array<std::array<int, 3>, kPoints> index_{{{4, 0, 0},
+                                                                     {0, 4, 0},
+                                                                     {0, 0, 4},
+                                                                     {3, 1, 0},
+                                                                     {2, 2, 0},
+                                                                     {1, 3, 0},
+                                                                     {0, 3, 1},
+                                                                     {0, 2, 2},
+                                                                     {0, 1, 3},
+                                                                     {1, 0, 3},
+                                                                     {2, 0, 2},
+                                                                     {3, 0, 1},
+                                                                     {2, 1, 1},
+                                                                     {1, 2, 1},
+                                                                     {1, 1, 2}}};
     alignas(64) float coefficient_[kPoints][16] = {};  ///< [point][coefficient]
     alignas(64) float weight_[3][16] = {};             ///< of the corners, at each point
 };
@@ -185,7 +205,8 @@ private:
         }
         const glm::vec3 centre = 0.5f * (low + high);
         float radius2 = 0;
-        for (size_t i = begin; i < end; ++i) radius2 = std::max(radius2, glm::dot(point(i) - centre, point(i) - centre));
+        for (size_t i = begin; i < end; ++i)
+            radius2 = std::max(radius2, glm::dot(point(i) - centre, point(i) - centre));
         const double slack = halfCurvature_ * double(radius2);
         if (accept(double(value), slack)) return true;
         const bool fits = 2 * (end - begin) - 3 <= kHalfway;
@@ -237,7 +258,8 @@ private:
         }
         const glm::vec3 ab = 0.5f * (a + b), bc = 0.5f * (b + c), ca = 0.5f * (c + a);
         const double part = slack / 4;
-        return triangle(a, ab, ca, part, depth + 1) && triangle(ab, b, bc, part, depth + 1) && triangle(ca, bc, c, part, depth + 1) && triangle(ab, bc, ca, part, depth + 1);
+        return triangle(a, ab, ca, part, depth + 1) && triangle(ab, b, bc, part, depth + 1) &&
+               triangle(ca, bc, c, part, depth + 1) && triangle(ab, bc, ca, part, depth + 1);
     }
 
     const LeafSurface& surface_;
@@ -248,22 +270,27 @@ private:
 /// Largest F that, with the wall tolerance of its code, is at most `sum`.
 double largestWalled(double sum) {
     double most = 0;
-    for (uint32_t code = 1; code <= kSoftWallMask; ++code) most = std::max(most, std::min(wallOf(code), sum - wallOf(code)));
+    for (uint32_t code = 1; code <= kSoftWallMask; ++code)
+        most = std::max(most, std::min(wallOf(code), sum - wallOf(code)));
     return most;
 }
 
 }  // namespace
 
-Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles, double tolerance,
-                        const std::function<const CornerVector&(int)>& corner, CertificateScratch& scratch) {
+Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles,
+                        double tolerance, const std::function<const CornerVector&(int)>& corner,
+                        CertificateScratch& scratch) {
     Certificate result;
     if (!clipTriangles(lower, edge, triangles, scratch)) return result;
     const glm::dvec3 n = referenceDirection(scratch);
     if (n == glm::dvec3(0)) return result;
-    if (quadricResidual(scratch.x.data(), scratch.y.data(), scratch.z.data(), scratch.count, n) > kHopelessResidual * tolerance / edge) return result;
+    if (quadricResidual(scratch.x.data(), scratch.y.data(), scratch.z.data(), scratch.count, n) >
+        kHopelessResidual * tolerance / edge)
+        return result;
     for (int i = 0; i < 8; ++i) {
         const CornerVector& c = corner(i);
-        if (c.distance > double(kPackedDistanceRange) * edge || std::abs(glm::dot(c.direction, n)) < kHopelessCosine) return result;
+        if (c.distance > double(kPackedDistanceRange) * edge || std::abs(glm::dot(c.direction, n)) < kHopelessCosine)
+            return result;
         result.codes[i] = packVector(c.distance / edge, c.direction, glm::dot(c.direction, n) < 0);
     }
 

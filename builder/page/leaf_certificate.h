@@ -34,16 +34,16 @@ struct CornerVector {
 /// A triangle as the certificate sees it, in page space.
 struct CertifiedTriangle {
     Triangle3 corners;
-    glm::dvec3 normal{0};        ///< unit
-    uint8_t badEdges = 0;        ///< bit i: the edge from corner i is a border, crease, fold or non-manifold
+    glm::dvec3 normal{0};  ///< unit
+    uint8_t badEdges = 0;  ///< bit i: the edge from corner i is a border, crease, fold or non-manifold
 };
 
 struct Certificate {
     bool soft = false;
     std::array<uint32_t, 8> codes{};  ///< packed corners
-    double maxValue = 0;   ///< F, in leaf edges
-    double minSlope = 1;   ///< g
-    double curvature = 0;  ///< per leaf edge
+    double maxValue = 0;              ///< F, in leaf edges
+    double minSlope = 1;              ///< g
+    double curvature = 0;             ///< per leaf edge
 };
 
 /// Scratch memory of certify; one a thread.
@@ -59,8 +59,9 @@ struct CertificateScratch {
 /// (F + W)/g, W the wall tolerance of F's code, is at most `tolerance` cells. `triangles` are all that overlap
 /// the leaf widened by the margin. `corner` is asked for the vector of corner 0 to 7 only once the mesh itself
 /// allows a soft leaf.
-Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles, double tolerance,
-                        const std::function<const CornerVector&(int)>& corner, CertificateScratch& scratch);
+Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles,
+                        double tolerance, const std::function<const CornerVector&(int)>& corner,
+                        CertificateScratch& scratch);
 
 /// Smallest wall code whose tolerance is at least `value` leaf edges; 16 when there is none.
 uint32_t wallCode(double value);

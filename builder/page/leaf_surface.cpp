@@ -27,7 +27,8 @@ LeafSurface::LeafSurface(const std::array<uint32_t, 8>& codes) {
     for (size_t i = 0; i < 8; ++i) {
         const double side = f64::decodeSide(codes[i]);
         slope_[i] = 0.5 * side * f64::decodeDirection(codes[i] >> 11);
-        constant_[i] = side * f64::decodeDistance(codes[i]) - glm::dot(slope_[i], glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
+        constant_[i] =
+            side * f64::decodeDistance(codes[i]) - glm::dot(slope_[i], glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
         coefficients_[i] = static_cast<float>(constant_[i]);
         coefficients_[i + 8] = static_cast<float>(slope_[i].x);
         coefficients_[i + 16] = static_cast<float>(slope_[i].y);
@@ -38,10 +39,12 @@ LeafSurface::LeafSurface(const std::array<uint32_t, 8>& codes) {
 double LeafSurface::value(glm::dvec3 x) const {
     const auto along = [&](int i) { return constant_[i] + glm::dot(slope_[i], x); };
     const auto mix = [](double a, double b, double t) { return a + (b - a) * t; };
-    return mix(mix(mix(along(0), along(1), x.x), mix(along(2), along(3), x.x), x.y), mix(mix(along(4), along(5), x.x), mix(along(6), along(7), x.x), x.y), x.z);
+    return mix(mix(mix(along(0), along(1), x.x), mix(along(2), along(3), x.x), x.y),
+               mix(mix(along(4), along(5), x.x), mix(along(6), along(7), x.x), x.y), x.z);
 }
 
-WIDER_CLONES void LeafSurface::evaluate(const float* px, const float* py, const float* pz, float* value, size_t count) const {
+WIDER_CLONES void LeafSurface::evaluate(const float* px, const float* py, const float* pz, float* value,
+                                        size_t count) const {
     const float *c = coefficients_.data(), *sx = c + 8, *sy = c + 16, *sz = c + 24;
     for (size_t first = 0; first < count; first += kBatchStep) {
         float v[kBatchStep];
@@ -51,7 +54,8 @@ WIDER_CLONES void LeafSurface::evaluate(const float* px, const float* py, const 
             const float a2 = c[2] + sx[2] * x + sy[2] * y + sz[2] * z, a3 = c[3] + sx[3] * x + sy[3] * y + sz[3] * z;
             const float a4 = c[4] + sx[4] * x + sy[4] * y + sz[4] * z, a5 = c[5] + sx[5] * x + sy[5] * y + sz[5] * z;
             const float a6 = c[6] + sx[6] * x + sy[6] * y + sz[6] * z, a7 = c[7] + sx[7] * x + sy[7] * y + sz[7] * z;
-            const float y0 = a0 + (a1 - a0) * x, y1 = a2 + (a3 - a2) * x, y2 = a4 + (a5 - a4) * x, y3 = a6 + (a7 - a6) * x;
+            const float y0 = a0 + (a1 - a0) * x, y1 = a2 + (a3 - a2) * x, y2 = a4 + (a5 - a4) * x,
+                        y3 = a6 + (a7 - a6) * x;
             const float z0 = y0 + (y1 - y0) * y, z1 = y2 + (y3 - y2) * y;
             v[i] = z0 + (z1 - z0) * z;
         }
@@ -79,13 +83,16 @@ BernsteinCube::BernsteinCube(const LeafSurface& surface, double lower, double up
     double f1[4][3], y1[4][3], z1[4][3];  // [corner of y, z][x]
     for (int i = 0; i < 4; ++i) {
         const double *a = corner[2 * i], *b = corner[2 * i + 1];
-        const Quadratic c = raised(a[0], b[0]), x = timesCoordinate(a[1], b[1], lower, upper), y = raised(a[2], b[2]), z = raised(a[3], b[3]);
+        const Quadratic c = raised(a[0], b[0]), x = timesCoordinate(a[1], b[1], lower, upper), y = raised(a[2], b[2]),
+                        z = raised(a[3], b[3]);
         for (int m = 0; m < 3; ++m) f1[i][m] = c.c[m] + x.c[m], y1[i][m] = y.c[m], z1[i][m] = z.c[m];
     }
     double f2[2][9], z2[2][9];  // [corner of z][x, y]
     for (int i = 0; i < 2; ++i)
         for (int m = 0; m < 3; ++m) {
-            const Quadratic f = raised(f1[2 * i][m], f1[2 * i + 1][m]), y = timesCoordinate(y1[2 * i][m], y1[2 * i + 1][m], lower, upper), z = raised(z1[2 * i][m], z1[2 * i + 1][m]);
+            const Quadratic f = raised(f1[2 * i][m], f1[2 * i + 1][m]),
+                            y = timesCoordinate(y1[2 * i][m], y1[2 * i + 1][m], lower, upper),
+                            z = raised(z1[2 * i][m], z1[2 * i + 1][m]);
             for (int n = 0; n < 3; ++n) f2[i][m + 3 * n] = f.c[n] + y.c[n], z2[i][m + 3 * n] = z.c[n];
         }
     for (size_t m = 0; m < 9; ++m) {
@@ -96,7 +103,9 @@ BernsteinCube::BernsteinCube(const LeafSurface& surface, double lower, double up
 
 double BernsteinCube::minDerivative(glm::dvec3 n) const {
     // Each partial has degree 1 along its axis; raised to 2 there, the three share one control net.
-    const auto slope = [](double a, double b, double c, int i) { return i == 0 ? b - a : i == 2 ? c - b : (c - a) / 2; };
+    const auto slope = [](double a, double b, double c, int i) {
+        return i == 0 ? b - a : i == 2 ? c - b : (c - a) / 2;
+    };
     double least[3] = {1e300, 1e300, 1e300};
     for (int z = 0; z < 3; ++z)
         for (int y = 0; y < 3; ++y)

@@ -34,7 +34,11 @@ class TreeBuilder {
 public:
     /// `hardEdge`: of the boxes, in cells, that become leaves without a try for less; 1: none do.
     TreeBuilder(PageGeometry& geometry, double tolerance, int hardEdge)
-        : geometry_(geometry), tolerance_(tolerance), hardEdge_(hardEdge), mostLeaves_(mostSplitLeaves(geometry.triangleCount())), mostRecords_(mostSplitRecords(geometry.triangleCount())) {
+        : geometry_(geometry),
+          tolerance_(tolerance),
+          hardEdge_(hardEdge),
+          mostLeaves_(mostSplitLeaves(geometry.triangleCount())),
+          mostRecords_(mostSplitRecords(geometry.triangleCount())) {
         fillOccupancy();
     }
 
@@ -59,7 +63,8 @@ private:
             std::vector<uint8_t> up(static_cast<size_t>(m) * m * m, 0);
             for (int z = 0; z < 2 * m; ++z)
                 for (int y = 0; y < 2 * m; ++y)
-                    for (int x = 0; x < 2 * m; ++x) up[index(m, x / 2, y / 2, z / 2)] |= occupancy_.back()[index(2 * m, x, y, z)];
+                    for (int x = 0; x < 2 * m; ++x)
+                        up[index(m, x / 2, y / 2, z / 2)] |= occupancy_.back()[index(2 * m, x, y, z)];
             occupancy_.push_back(std::move(up));
         }
     }
@@ -91,7 +96,8 @@ private:
     }
 
     /// A cell or less: soft if it certifies, hard if its triangles are few or splitting gains nothing, else split.
-    void fillCell(uint32_t index, const NodeBox& box, std::span<const uint32_t> around, std::span<const uint32_t> inside, uint32_t depth) {
+    void fillCell(uint32_t index, const NodeBox& box, std::span<const uint32_t> around,
+                  std::span<const uint32_t> inside, uint32_t depth) {
         tree_.nodes[index].box = box;
         if (inside.empty()) return;
         if (const auto certificate = certify(box, around, tolerance_)) return makeSoft(index, *certificate);
@@ -103,7 +109,8 @@ private:
         for (const auto& list : children.inside) together += list.size();
         if (double(together) > kMaxRepetition * double(inside.size())) return makeHard(index, inside);
         const uint32_t first = addChildren(index);
-        for (uint32_t i = 0; i < 8; ++i) fillCell(first + i, box.child(static_cast<int>(i)), children.around[i], children.inside[i], depth + 1);
+        for (uint32_t i = 0; i < 8; ++i)
+            fillCell(first + i, box.child(static_cast<int>(i)), children.around[i], children.inside[i], depth + 1);
     }
 
     uint32_t addChildren(uint32_t index) {
@@ -120,8 +127,11 @@ private:
         pointers_.clear();
         for (const uint32_t k : around) triangles_.push_back(geometry_.triangle(k));
         for (const CertifiedTriangle& t : triangles_) pointers_.push_back(&t);
-        const auto corner = [&](int i) -> const CornerVector& { return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)); };
-        const Certificate certificate = certifyLeaf(box.lowerCells(), box.edgeCells(), pointers_, tolerance, corner, scratch_);
+        const auto corner = [&](int i) -> const CornerVector& {
+            return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2));
+        };
+        const Certificate certificate =
+            certifyLeaf(box.lowerCells(), box.edgeCells(), pointers_, tolerance, corner, scratch_);
         if (!certificate.soft) return {};
         return certificate;
     }
@@ -148,7 +158,8 @@ private:
         for (uint32_t c = first; c < first + 8; ++c) {
             if (tree_.nodes[c].kind == Kind::Internal) return;
             soft += tree_.nodes[c].kind == Kind::Soft;
-            worst = std::max(worst, tree_.nodes[c].kind == Kind::Soft ? errorOf(tree_.soft[tree_.nodes[c].index]) : 0.0);
+            worst =
+                std::max(worst, tree_.nodes[c].kind == Kind::Soft ? errorOf(tree_.soft[tree_.nodes[c].index]) : 0.0);
             if (tree_.nodes[c].kind != Kind::Hard) continue;
             // What a child holds, the parent would.
             if (tree_.hard[tree_.nodes[c].index].triangles.size() > kMergedHardTriangles) return;
@@ -161,14 +172,16 @@ private:
             if (hard == 0 && (box.edge > kMaxSoftCells * kSubcells || worst > kMergeTrial * tolerance_)) return;
             geometry_.trianglesOf(box, around, inside);
         }
-        const std::optional<Certificate> certificate = soft > 0 && hard == 0 ? certify(box, around, kMergeTolerance * tolerance_) : std::nullopt;
+        const std::optional<Certificate> certificate =
+            soft > 0 && hard == 0 ? certify(box, around, kMergeTolerance * tolerance_) : std::nullopt;
         if (certificate && !colourFits(box, first)) return;
         const bool hardFits = hard > 0 && inside.size() <= kMergedHardTriangles;
         if (soft + hard > 0 && !certificate && !hardFits) return;
         // The children and their leaves are the last ones made.
         tree_.nodes.resize(first);
         tree_.soft.resize(tree_.soft.size() - soft);
-        for (size_t i = tree_.hard.size() - hard; i < tree_.hard.size(); ++i) records_ -= tree_.hard[i].triangles.size();
+        for (size_t i = tree_.hard.size() - hard; i < tree_.hard.size(); ++i)
+            records_ -= tree_.hard[i].triangles.size();
         tree_.hard.resize(tree_.hard.size() - hard);
         tree_.nodes[index].kind = Kind::Empty;
         if (certificate) makeSoft(index, *certificate);
@@ -179,7 +192,8 @@ private:
     bool colourFits(const NodeBox& box, uint32_t firstChild) {
         if (!geometry_.hasColour()) return true;
         uint32_t outer[8];
-        for (int i = 0; i < 8; ++i) outer[i] = geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)).colour;
+        for (int i = 0; i < 8; ++i)
+            outer[i] = geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)).colour;
         for (int m = 0; m < 27; ++m) {
             const glm::ivec3 g(m % 3, m / 3 % 3, m / 9);
             if (!cornerOfLeaf(g, firstChild)) continue;
@@ -187,7 +201,8 @@ private:
             for (int c = 0; c < 4; ++c) {
                 double blend = 0;
                 for (int i = 0; i < 8; ++i) {
-                    const glm::dvec3 w = glm::mix(1.0 - glm::dvec3(g) / 2.0, glm::dvec3(g) / 2.0, glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
+                    const glm::dvec3 w =
+                        glm::mix(1.0 - glm::dvec3(g) / 2.0, glm::dvec3(g) / 2.0, glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
                     blend += w.x * w.y * w.z * double(outer[i] >> 8 * c & 255u);
                 }
                 if (std::abs(blend - double(colour >> 8 * c & 255u)) > kColourTolerance) return false;
@@ -201,7 +216,9 @@ private:
         for (int i = 0; i < 8; ++i) {
             const glm::ivec3 o(i & 1, i >> 1 & 1, i >> 2);
             const glm::ivec3 d = g - o;
-            if (d.x >= 0 && d.x <= 1 && d.y >= 0 && d.y <= 1 && d.z >= 0 && d.z <= 1 && tree_.nodes[firstChild + static_cast<uint32_t>(i)].kind != Kind::Empty) return true;
+            if (d.x >= 0 && d.x <= 1 && d.y >= 0 && d.y <= 1 && d.z >= 0 && d.z <= 1 &&
+                tree_.nodes[firstChild + static_cast<uint32_t>(i)].kind != Kind::Empty)
+                return true;
         }
         return false;
     }
@@ -222,7 +239,8 @@ private:
 
 size_t PageTree::records() const {
     size_t count = 0;
-    for (const HardLeaf& leaf : hard) count += leaf.triangles.size() + (leaf.triangles.size() >= kHardCountLong ? 1 : 0);
+    for (const HardLeaf& leaf : hard)
+        count += leaf.triangles.size() + (leaf.triangles.size() >= kHardCountLong ? 1 : 0);
     return count;
 }
 

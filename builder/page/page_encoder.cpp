@@ -37,8 +37,8 @@ public:
 
 private:
     static uint64_t key(const NodeBox& box) {
-        return uint64_t(uint32_t(box.lower.x) & 0xffffu) | uint64_t(uint32_t(box.lower.y) & 0xffffu) << 16 | uint64_t(uint32_t(box.lower.z) & 0xffffu) << 32 |
-               uint64_t(uint32_t(box.edge)) << 48;
+        return uint64_t(uint32_t(box.lower.x) & 0xffffu) | uint64_t(uint32_t(box.lower.y) & 0xffffu) << 16 |
+               uint64_t(uint32_t(box.lower.z) & 0xffffu) << 32 | uint64_t(uint32_t(box.edge)) << 48;
     }
     std::unordered_map<uint64_t, uint32_t> map_;
 };
@@ -54,9 +54,12 @@ NodeBox neighbour(const NodeBox& box, int axis, int end) {
 int sideAgreement(const SoftLeaf& a, const SoftLeaf& b, int axis, int endOfA) {
     int same = 0;
     for (int c = 0; c < 4; ++c) {
-        const uint32_t ca = a.certificate.codes[cornerOfFace(axis, endOfA, c)], cb = b.certificate.codes[cornerOfFace(axis, 1 - endOfA, c)];
-        if (ca == cb) ++same;
-        else if (ca == flipSide(cb)) --same;
+        const uint32_t ca = a.certificate.codes[cornerOfFace(axis, endOfA, c)],
+                       cb = b.certificate.codes[cornerOfFace(axis, 1 - endOfA, c)];
+        if (ca == cb)
+            ++same;
+        else if (ca == flipSide(cb))
+            --same;
     }
     return same == 4 ? 1 : same == -4 ? -1 : 0;
 }
@@ -83,7 +86,12 @@ void setWalls(PageTree& tree, const LeafMap& map) {
 class FacePacker {
 public:
     FacePacker(const PageTree& tree, const LeafMap& map, PageGeometry& geometry, bool withColour)
-        : tree_(tree), map_(map), geometry_(geometry), withColour_(withColour), first_(tree.soft.size(), kUnset), axis_(tree.soft.size(), 0) {
+        : tree_(tree),
+          map_(map),
+          geometry_(geometry),
+          withColour_(withColour),
+          first_(tree.soft.size(), kUnset),
+          axis_(tree.soft.size(), 0) {
         for (uint32_t i = 0; i < tree.soft.size(); ++i)
             if (first_[i] == kUnset) packRun(i);
     }
@@ -139,7 +147,11 @@ private:
             const int corner = cornerOfFace(axis, end, c);
             const uint32_t code = leaf.certificate.codes[corner];
             face[c] = link.flip ? flipSide(code) : code;
-            if (withColour_) colour[c] = geometry_.corner(leaf.box.lower + leaf.box.edge * glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)).colour;
+            if (withColour_)
+                colour[c] =
+                    geometry_
+                        .corner(leaf.box.lower + leaf.box.edge * glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2))
+                        .colour;
         }
         faces.push_back(face);
         if (withColour_) colours.push_back(colour);
@@ -178,7 +190,8 @@ public:
             const auto& v = geometry_.vertices(k);
             records.push_back(pack21(vertex(v[0]), vertex(v[1]), vertex(v[2])));
         }
-        return kNodeHard << kNodeTypeShift | (isLong ? kHardCountLong : static_cast<uint32_t>(count)) << kHardCountShift | first;
+        return kNodeHard << kNodeTypeShift |
+               (isLong ? kHardCountLong : static_cast<uint32_t>(count)) << kHardCountShift | first;
     }
 
     std::vector<glm::u32vec2> records, vertices;
@@ -189,7 +202,8 @@ private:
         const auto [entry, isNew] = local_.try_emplace(global, static_cast<uint32_t>(vertices.size()));
         if (isNew) {
             const glm::i32vec3 p = mesh_.positions[global] - geometry_.originLattice() + kLatticeBias;
-            vertices.push_back(pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z)));
+            vertices.push_back(
+                pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z)));
             normals.push_back(mesh_.normals[global]);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
         }
@@ -224,11 +238,14 @@ private:
                 return kNodeInternal << kNodeTypeShift | static_cast<uint32_t>(queue.size() - 1);
             case TreeNode::Kind::Soft: {
                 const SoftLeaf& leaf = tree_.soft[n.index];
-                return kNodeSoft << kNodeTypeShift | dipCode(leaf.certificate.curvature) << kSoftDipShift | leaf.wall << kSoftWallShift |
-                       faces_.axis(n.index) << kSoftAxisShift | faces_.firstFace(n.index);
+                return kNodeSoft << kNodeTypeShift | dipCode(leaf.certificate.curvature) << kSoftDipShift |
+                       leaf.wall << kSoftWallShift | faces_.axis(n.index) << kSoftAxisShift | faces_.firstFace(n.index);
             }
-            case TreeNode::Kind::Hard: return triangles_.add(tree_.hard[n.index]);
-            default: return emptyNode(n.box.edge >= kSubcells ? clearance_.of(n.box.lower / kSubcells, n.box.edge / kSubcells) : 0);
+            case TreeNode::Kind::Hard:
+                return triangles_.add(tree_.hard[n.index]);
+            default:
+                return emptyNode(
+                    n.box.edge >= kSubcells ? clearance_.of(n.box.lower / kSubcells, n.box.edge / kSubcells) : 0);
         }
     }
 
@@ -245,7 +262,9 @@ void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>
 
 /// Everything that separates the page's surface from the mesh, in cells: certified leaves, the level's
 /// stray, the slack of hard leaves' triangles (1e-4 cells).
-double pageError(const PageTree& tree, const PageGeometry& geometry) { return std::max(tree.certifiedError(), 2e-4) + geometry.stray(); }
+double pageError(const PageTree& tree, const PageGeometry& geometry) {
+    return std::max(tree.certifiedError(), 2e-4) + geometry.stray();
+}
 
 }  // namespace
 
@@ -271,7 +290,8 @@ EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh
     header.vertices = static_cast<uint32_t>(triangles.vertices.size());
     header.softLeaves = static_cast<uint32_t>(tree.soft.size());
     header.hardLeaves = page.hardLeaves;
-    header.certifiedError = std::nextafter(static_cast<float>(page.certifiedError), std::numeric_limits<float>::infinity());
+    header.certifiedError =
+        std::nextafter(static_cast<float>(page.certifiedError), std::numeric_limits<float>::infinity());
     const PageSections s = pageSections(header);
     page.geometry.resize(s.end);
     std::memcpy(page.geometry.data(), &header, sizeof header);

@@ -51,7 +51,8 @@ private:
 
 }  // namespace
 
-PageGeometry::PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page, uint32_t log2Cells)
+PageGeometry::PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                           uint32_t log2Cells)
     : mesh_(mesh), cells_(1 << log2Cells), origin_(glm::i32vec3(page) * (kLatticePerCell << log2Cells)) {
     loadTriangles(triangles);
     markBadEdges();
@@ -63,7 +64,8 @@ void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
     vertices_.reserve(triangles.size());
     for (const uint32_t k : triangles) {
         Triangle t{};
-        for (int i = 0; i < 3; ++i) t.corners[i] = glm::vec3(mesh_.positions[mesh_.triangles[k][i]] - origin_) / float(kLatticePerCell);
+        for (int i = 0; i < 3; ++i)
+            t.corners[i] = glm::vec3(mesh_.positions[mesh_.triangles[k][i]] - origin_) / float(kLatticePerCell);
         const Triangle3 c = cornersOf(t);
         t.normal = glm::vec3(glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0])));
         t.centre = (t.corners[0] + t.corners[1] + t.corners[2]) / 3.0f;
@@ -91,10 +93,12 @@ void PageGeometry::markBadEdges() {
             // Oriented by the shared edge, both normals agree where the surface continues and oppose at a fold.
             const uint32_t first = slot.firstUse / 4;
             const bool sameDirection = vertices_[first][slot.firstUse % 4] == a;
-            slot.good = (sameDirection ? -1 : 1) * double(glm::dot(triangles_[first].normal, triangles_[k].normal)) >= kCreaseCosine;
+            slot.good = (sameDirection ? -1 : 1) * double(glm::dot(triangles_[first].normal, triangles_[k].normal)) >=
+                        kCreaseCosine;
         }
     for (uint32_t k = 0; k < vertices_.size(); ++k)
-        for (int i = 0; i < 3; ++i) triangles_[k].badEdges |= static_cast<uint8_t>((table[slots[k][i]].good ? 0u : 1u) << i);
+        for (int i = 0; i < 3; ++i)
+            triangles_[k].badEdges |= static_cast<uint8_t>((table[slots[k][i]].good ? 0u : 1u) << i);
 }
 
 void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
@@ -115,7 +119,8 @@ void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
     };
     for (uint32_t k = 0; k < triangles_.size(); ++k) {
         const CellOverlap overlap(cornersOf(triangles_[k]), kCertificateMarginCells);
-        const glm::ivec3 low = glm::max(overlap.lower(), -kBorder), high = glm::min(overlap.upper(), cells_ + kBorder - 1);
+        const glm::ivec3 low = glm::max(overlap.lower(), -kBorder),
+                         high = glm::min(overlap.upper(), cells_ + kBorder - 1);
         if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
         overlap.classify(low, high, met);
         bool touchesPage = false;
@@ -153,7 +158,8 @@ void PageGeometry::trianglesOf(const NodeBox& box, std::vector<uint32_t>& around
     inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
 }
 
-void PageGeometry::filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around, std::vector<uint32_t>& inside) const {
+void PageGeometry::filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around,
+                          std::vector<uint32_t>& inside) const {
     around.clear();
     inside.clear();
     const double half = box.edgeCells() / 2;
@@ -193,9 +199,10 @@ void PageGeometry::split(const NodeBox& box, std::span<const uint32_t> candidate
 const CornerVector& PageGeometry::corner(glm::ivec3 subcells) {
     const glm::ivec3 cell = subcells / kSubcells;
     const size_t side = static_cast<size_t>(cells_) + 1;
-    uint32_t& number = cell * kSubcells == subcells
-                           ? gridCorner_[cell.x + side * (cell.y + side * cell.z)]
-                           : subcellCorner_[uint64_t(subcells.x) | uint64_t(subcells.y) << 20 | uint64_t(subcells.z) << 40];
+    uint32_t& number =
+        cell * kSubcells == subcells
+            ? gridCorner_[cell.x + side * (cell.y + side * cell.z)]
+            : subcellCorner_[uint64_t(subcells.x) | uint64_t(subcells.y) << 20 | uint64_t(subcells.z) << 40];
     if (number == 0) {
         corners_.push_back(searchCorner(glm::dvec3(subcells) / double(kSubcells)));
         number = static_cast<uint32_t>(corners_.size());
@@ -249,7 +256,8 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x) {
-                    if (x >= doneLow.x && x <= doneHigh.x && y >= doneLow.y && y <= doneHigh.y && z >= doneLow.z && z <= doneHigh.z) {
+                    if (x >= doneLow.x && x <= doneHigh.x && y >= doneLow.y && y <= doneHigh.y && z >= doneLow.z &&
+                        z <= doneHigh.z) {
                         x = doneHigh.x;
                         continue;
                     }
@@ -287,7 +295,8 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
     if (!mesh_.colours.empty()) {
         for (int c = 0; c < 4; ++c) {
             double sum = 0.5;
-            for (int i = 0; i < 3; ++i) sum += best.weights[i] * double(mesh_.colours[vertices_[bestTriangle][i]] >> 8 * c & 255u);
+            for (int i = 0; i < 3; ++i)
+                sum += best.weights[i] * double(mesh_.colours[vertices_[bestTriangle][i]] >> 8 * c & 255u);
             corner.colour |= static_cast<uint32_t>(std::clamp(sum, 0.0, 255.0)) << 8 * c;
         }
     }

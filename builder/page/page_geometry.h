@@ -59,7 +59,8 @@ public:
     /// that touch the closed box itself in `inside`. Boxes of at least a cell.
     void trianglesOf(const NodeBox& box, std::vector<uint32_t>& around, std::vector<uint32_t>& inside);
     /// The same for a smaller box, from the triangles around its parent.
-    void filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around, std::vector<uint32_t>& inside) const;
+    void filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around,
+                std::vector<uint32_t>& inside) const;
 
     /// The same for the eight children of a box.
     struct ChildTriangles {
@@ -92,7 +93,9 @@ private:
         glm::vec3 centre;  ///< a point of the triangle
         float radius;      ///< all of it is so close to the centre
     };
-    static Triangle3 cornersOf(const Triangle& t) { return {glm::dvec3(t.corners[0]), glm::dvec3(t.corners[1]), glm::dvec3(t.corners[2])}; }
+    static Triangle3 cornersOf(const Triangle& t) {
+        return {glm::dvec3(t.corners[0]), glm::dvec3(t.corners[1]), glm::dvec3(t.corners[2])};
+    }
 
     void loadTriangles(std::span<const uint32_t> triangles);
     void markBadEdges();
@@ -123,8 +126,8 @@ private:
         float least;     ///< it is not closer than this
         double squared;  ///< distance, once measured
     };
-    std::vector<Found> found_;                              ///< candidates of a search
-    std::vector<uint32_t> gridCorner_;                      ///< corners of cells: number in corners_ + 1, 0: not searched
+    std::vector<Found> found_;          ///< candidates of a search
+    std::vector<uint32_t> gridCorner_;  ///< corners of cells: number in corners_ + 1, 0: not searched
     std::unordered_map<uint64_t, uint32_t> subcellCorner_;  ///< the same for corners within cells
     std::vector<CornerVector> corners_;
 };

@@ -23,19 +23,23 @@ struct Moments {
 };
 
 /// The frame's rows are u, v and n.
-WIDER_CLONES void sumMoments(const float* x, const float* y, const float* z, size_t count, const glm::vec3* frame, Moments& moments) {
+WIDER_CLONES void sumMoments(const float* x, const float* y, const float* z, size_t count, const glm::vec3* frame,
+                             Moments& moments) {
     const glm::vec3 u = frame[0], v = frame[1], n = frame[2];
     float sum[21][kLanes] = {};
     for (size_t first = 0; first < count; first += kLanes)
         for (size_t i = 0; i < kLanes; ++i) {
             const float px = x[first + i] - 0.5f, py = y[first + i] - 0.5f, pz = z[first + i] - 0.5f;
-            const float a = u.x * px + u.y * py + u.z * pz, b = v.x * px + v.y * py + v.z * pz, h = n.x * px + n.y * py + n.z * pz;
+            const float a = u.x * px + u.y * py + u.z * pz, b = v.x * px + v.y * py + v.z * pz,
+                        h = n.x * px + n.y * py + n.z * pz;
             const float aa = a * a, ab = a * b, bb = b * b;
             sum[0][i] += a, sum[1][i] += b;
             sum[2][i] += aa, sum[3][i] += ab, sum[4][i] += bb;
             sum[5][i] += aa * a, sum[6][i] += aa * b, sum[7][i] += a * bb, sum[8][i] += bb * b;
-            sum[9][i] += aa * aa, sum[10][i] += aa * ab, sum[11][i] += aa * bb, sum[12][i] += ab * bb, sum[13][i] += bb * bb;
-            sum[14][i] += h, sum[15][i] += h * a, sum[16][i] += h * b, sum[17][i] += h * aa, sum[18][i] += h * ab, sum[19][i] += h * bb;
+            sum[9][i] += aa * aa, sum[10][i] += aa * ab, sum[11][i] += aa * bb, sum[12][i] += ab * bb,
+                sum[13][i] += bb * bb;
+            sum[14][i] += h, sum[15][i] += h * a, sum[16][i] += h * b, sum[17][i] += h * aa, sum[18][i] += h * ab,
+                sum[19][i] += h * bb;
             sum[20][i] += h * h;
         }
     double total[21] = {};

@@ -35,9 +35,11 @@ Result<PageBytes> pageOf(const PaperCaster& octree) {
     header.emptyNodes = static_cast<uint32_t>(tree.emptyNodes);
     const PaperSections sections = paperSections(header);
     if (sections.end > kMostPageBytes)
-        return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("the octree takes {} bytes, and of this method a file holds {} at most; use larger cells (--cell)", sections.end,
-                                            kMostPageBytes)};
+        return Error{
+            .code = ErrorCode::Limit,
+            .message = fmt::format(
+                "the octree takes {} bytes, and of this method a file holds {} at most; use larger cells (--cell)",
+                sections.end, kMostPageBytes)};
     PageBytes page;
     page.geometry.resize(sections.end / 16);
     auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
@@ -67,8 +69,10 @@ SoupMeasures measuresOf(const IndexedMesh& mesh) {
     for (uint64_t t = 0; t < m.triangles; ++t) {
         const auto [a, b, c] = mesh.corners(t);
         const double twice = glm::length(glm::cross(b - a, c - a));
-        if (twice > 0) m.area += twice / 2;
-        else ++m.degenerateTriangles;
+        if (twice > 0)
+            m.area += twice / 2;
+        else
+            ++m.degenerateTriangles;
         for (const glm::dvec3 p : {a, b, c}) {
             m.boundsMin = glm::min(m.boundsMin, p);
             m.boundsMax = glm::max(m.boundsMax, p);
@@ -86,7 +90,8 @@ FileHeader headerOf(const PaperCaster& octree, const SoupMeasures& mesh) {
     header.cell = grid.cell;
     header.levels = 1;
     header.pages = 1;
-    header.log2Cells = static_cast<uint32_t>(std::bit_width(static_cast<uint32_t>(std::max({cells.x, cells.y, cells.z}) - 1)));
+    header.log2Cells =
+        static_cast<uint32_t>(std::bit_width(static_cast<uint32_t>(std::max({cells.x, cells.y, cells.z}) - 1)));
     for (int axis = 0; axis < 3; ++axis) {
         header.origin[axis] = grid.low[axis];
         header.boundsMin[axis] = mesh.boundsMin[axis];
@@ -106,7 +111,8 @@ class Stages {
 public:
     explicit Stages(const BuildOptions& options) : options_(options) {}
     Result<void> at(const char* stage, double fraction, uint64_t triangles = 0) const {
-        if (!options_.progress || options_.progress({.stage = stage, .fraction = fraction, .triangles = triangles})) return {};
+        if (!options_.progress || options_.progress({.stage = stage, .fraction = fraction, .triangles = triangles}))
+            return {};
         return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
     }
 
@@ -150,7 +156,10 @@ Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptio
     const auto mesh = loadMesh(*inputs);
     if (!mesh) return mesh.error();
     const SoupMeasures measures = measuresOf(*mesh);
-    if (!(measures.area > 0)) return Error{.code = ErrorCode::InvalidInput, .message = "its triangles have no area", .file = options.inputs.front().string()};
+    if (!(measures.area > 0))
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "its triangles have no area",
+                     .file = options.inputs.front().string()};
     const auto frame = chooseFrame(options, measures);
     if (!frame) return frame.error();
     VCP_TRY(stages.at("sorting", 0.2, measures.triangles));

@@ -10,9 +10,10 @@
 //   memory traffic  the parent of the last node and the vectors of the last leaf are remembered (4.2)
 //
 // Each rule can be switched, so that its effect can be measured (PaperOptions). Where the paper is silent: epsilon, the
-// merging threshold, k, and the longest vector (we take the longest that is stored). Where we deviate: the distance to a
-// triangle is exact (region_growing.h); a vector of length 0 has no plane (their formula divides 0 by 0); trigonometry
-// is tabulated here, one entry a code, and computed on the GPU (octree/shared/paper_math.h, which holds what both share).
+// merging threshold, k, and the longest vector (we take the longest that is stored). Where we deviate: the distance to
+// a triangle is exact (region_growing.h); a vector of length 0 has no plane (their formula divides 0 by 0);
+// trigonometry is tabulated here, one entry a code, and computed on the GPU (octree/shared/paper_math.h, which holds
+// what both share).
 #pragma once
 
 #include <cmath>
@@ -28,8 +29,8 @@ using paper::LeafVectors;
 
 struct PaperOptions {
     PaperMarch march;
-    float band = 3.4641016f;       ///< t, cells: twice the diagonal
-    float mergeThreshold = 0.05f;  ///< cells; below 0: no merging
+    float band = 3.4641016f;                        ///< t, cells: twice the diagonal
+    float mergeThreshold = 0.05f;                   ///< cells; below 0: no merging
     PaperScheme mergeScheme = PaperScheme::Longer;  ///< that merging is judged by
     PaperPacking packing = PaperPacking::Spherical;
     /// k: rounds of region growing, or CornerOctreeOptions::kExactPoints. 5 reach every point of the default band.
@@ -49,8 +50,7 @@ uint32_t packPaperVector(glm::vec3 v, float longest, PaperPacking packing);
 /// Decodes what packPaperVector packed.
 class PaperDecoder {
 public:
-    PaperDecoder(float longest, PaperPacking packing)
-        : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
+    PaperDecoder(float longest, PaperPacking packing) : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
     [[nodiscard]] glm::vec3 operator()(uint32_t code) const {
         const float root = static_cast<float>(code & 8191u) * perStep_;
         return root * root * (packing_ == PaperPacking::Spherical ? spherical(code) : paper::octahedralDirection(code));

@@ -96,11 +96,13 @@ private:
         size_t count = 0;
         for (int k = 0; k < 27; ++k) {
             const glm::ivec3 q = p + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
-            const auto neighbour = k == 13 || glm::min(q, glm::ivec3(0)) != glm::ivec3(0) ? std::nullopt : points_.slotAt(q);
+            const auto neighbour =
+                k == 13 || glm::min(q, glm::ivec3(0)) != glm::ivec3(0) ? std::nullopt : points_.slotAt(q);
             if (!neighbour) continue;
             const uint32_t triangle = owners_[*neighbour].triangle;
             const auto end = tried.begin() + static_cast<std::ptrdiff_t>(count);
-            if (triangle == kNoTriangle || triangle == owners_[slot].triangle || std::find(tried.begin(), end, triangle) != end)
+            if (triangle == kNoTriangle || triangle == owners_[slot].triangle ||
+                std::find(tried.begin(), end, triangle) != end)
                 continue;
             tried[count++] = triangle;
             offer(slot, best, triangle);

@@ -1,10 +1,10 @@
 #include "builder/spill/journal.h"
 
+#include <unistd.h>
 #include <cerrno>
 #include <span>
 #include <sstream>
 #include <string>
-#include <unistd.h>
 #include <vector>
 
 #include <fmt/format.h>

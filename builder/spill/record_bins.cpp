@@ -63,8 +63,13 @@ void fromPlanes(const std::byte* planes, size_t count, size_t recordBytes, std::
 }  // namespace
 
 RawBins::RawBins(TempSpace& space, std::string name, size_t recordBytes, size_t bins, uint64_t bufferBytes)
-    : file_(space, name + ".spill"), recordBytes_(recordBytes),
-      blockRecords_(std::clamp<size_t>(bufferBytes / std::max<size_t>(bins, 1) / recordBytes, kMinBlockRecords, kMaxBlockRecords)), open_(bins), blocks_(bins), counts_(bins, 0) {}
+    : file_(space, name + ".spill"),
+      recordBytes_(recordBytes),
+      blockRecords_(std::clamp<size_t>(bufferBytes / std::max<size_t>(bins, 1) / recordBytes, kMinBlockRecords,
+                                       kMaxBlockRecords)),
+      open_(bins),
+      blocks_(bins),
+      counts_(bins, 0) {}
 
 Result<void> RawBins::append(size_t bin, const std::byte* records, size_t count) {
     while (count > 0) {
@@ -96,7 +101,8 @@ Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& recor
     std::vector<std::byte> planes(records.size());
     toPlanes(records.data(), count, recordBytes_, planes.data());
     std::vector<std::byte> coded(sizeof(BlockHeader) + ZSTD_compressBound(planes.size()));
-    const size_t stored = ZSTD_compress(coded.data() + sizeof(BlockHeader), coded.size() - sizeof(BlockHeader), planes.data(), planes.size(), kFastCompression);
+    const size_t stored = ZSTD_compress(coded.data() + sizeof(BlockHeader), coded.size() - sizeof(BlockHeader),
+                                        planes.data(), planes.size(), kFastCompression);
     BlockHeader header;
     header.bin = static_cast<uint32_t>(bin);
     header.records = static_cast<uint32_t>(count);

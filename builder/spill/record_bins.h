@@ -48,7 +48,9 @@ public:
         uint32_t records;
         uint32_t storedBytes;
     };
-    [[nodiscard]] std::span<const Block> blocks(size_t bin) const { return bin < blocks_.size() ? std::span<const Block>(blocks_[bin]) : std::span<const Block>(); }
+    [[nodiscard]] std::span<const Block> blocks(size_t bin) const {
+        return bin < blocks_.size() ? std::span<const Block>(blocks_[bin]) : std::span<const Block>();
+    }
     [[nodiscard]] size_t blockRecords() const { return blockRecords_; }
     /// Decodes a block to `out` (block.records records).
     Result<void> read(const Block& block, std::byte* out) const;
@@ -69,7 +71,8 @@ class RecordBins {
     static_assert(std::is_trivially_copyable_v<Record> && sizeof(Record) % 4 == 0);
 
 public:
-    RecordBins(TempSpace& space, std::string name, size_t bins, uint64_t bufferBytes) : raw_(space, std::move(name), sizeof(Record), bins, bufferBytes) {}
+    RecordBins(TempSpace& space, std::string name, size_t bins, uint64_t bufferBytes)
+        : raw_(space, std::move(name), sizeof(Record), bins, bufferBytes) {}
 
     Result<void> append(size_t bin, std::span<const Record> records) {
         return raw_.append(bin, reinterpret_cast<const std::byte*>(records.data()), records.size());

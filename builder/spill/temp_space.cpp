@@ -1,9 +1,9 @@
 #include "builder/spill/temp_space.h"
 
+#include <unistd.h>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <unistd.h>
 
 #include "octree/durable_file.h"
 
@@ -11,14 +11,17 @@ namespace vcp {
 
 namespace {
 
-Error tempError(const std::filesystem::path& file, const char* what, int code) { return systemError(file, what, code, kWhenTempIsFull); }
+Error tempError(const std::filesystem::path& file, const char* what, int code) {
+    return systemError(file, what, code, kWhenTempIsFull);
+}
 
 }  // namespace
 
 void TempSpace::addDisk(int64_t bytes) {
     const uint64_t now = disk_ += static_cast<uint64_t>(bytes);
     uint64_t peak = peakDisk_;
-    while (now > peak && !peakDisk_.compare_exchange_weak(peak, now)) {}
+    while (now > peak && !peakDisk_.compare_exchange_weak(peak, now)) {
+    }
 }
 
 Result<void> TempSpace::spill() {
@@ -125,7 +128,9 @@ Result<void> TempFile::reopen(uint64_t bytes) {
     file_ = *file;
     const off_t size = file_ < 0 ? -1 : ::lseek(file_, 0, SEEK_END);
     if (size < 0 || static_cast<uint64_t>(size) < bytes)
-        return Error{.code = ErrorCode::InvalidInput, .message = "is shorter than the journal says; build again without --resume", .file = path().string()};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "is shorter than the journal says; build again without --resume",
+                     .file = path().string()};
     if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
     flushed_ = end_ = bytes;
     space_.addDisk(static_cast<int64_t>(bytes));

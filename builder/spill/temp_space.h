@@ -29,7 +29,8 @@ class TempFile;
 class TempSpace {
 public:
     /// Nothing is created before it is needed. `memoryBytes`: what all files together may hold in memory.
-    TempSpace(std::filesystem::path folder, uint64_t memoryBytes) : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
+    TempSpace(std::filesystem::path folder, uint64_t memoryBytes)
+        : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
 
     /// Taken before files go there, and given back with the space.
     [[nodiscard]] TempFolder& folder() { return folder_; }

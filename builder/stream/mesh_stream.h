@@ -85,8 +85,8 @@ public:
 };
 
 struct MeshOpenOptions {
-    /// One of meshFormats() (open_mesh.h), without regard to case; empty: told by content, then by extension. What content tells
-    /// beyond doubt goes before it; a pipe needs it where content does not tell.
+    /// One of meshFormats() (open_mesh.h), without regard to case; empty: told by content, then by extension. What
+    /// content tells beyond doubt goes before it; a pipe needs it where content does not tell.
     std::string format;
     bool materials = true;  ///< false: MTL files are not looked for, chunks carry no uvs
     /// Where what must be read more than once is put (texture coordinates of a large OBJ, a piped GLB), as a

@@ -152,7 +152,9 @@ Result<void> Spool::load(uint64_t piece) {
     piece_.resize(kPieceBytes);
     VCP_TRY(readFully(file_, piece * kPieceBytes, piece_.data(), kPieceBytes));
     if (XXH3_64bits(piece_.data(), kPieceBytes) != hashes_[piece])
-        return Error{.code = ErrorCode::InvalidInput, .message = "what was kept of it in a temporary file came back damaged; check the disk of " + folder_.string()};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "what was kept of it in a temporary file came back damaged; check the disk of " +
+                                folder_.string()};
     pieceNumber_ = piece;
     return {};
 }

@@ -7,7 +7,8 @@
 namespace vcp {
 
 bool MaterialColours::hasImages() const {
-    return std::any_of(materials_.begin(), materials_.end(), [](const Material& material) { return material.image.exists(); });
+    return std::any_of(materials_.begin(), materials_.end(),
+                       [](const Material& material) { return material.image.exists(); });
 }
 
 Rgba8 MaterialColours::at(uint32_t material, glm::vec2 uv, float footprint) {

@@ -17,7 +17,8 @@ namespace vcp {
 class MaterialColours {
 public:
     /// `textureBytes`: memory for images.
-    MaterialColours(std::vector<Material> materials, uint64_t textureBytes) : materials_(std::move(materials)), textures_(textureBytes) {}
+    MaterialColours(std::vector<Material> materials, uint64_t textureBytes)
+        : materials_(std::move(materials)), textures_(textureBytes) {}
 
     [[nodiscard]] bool hasImages() const;
     /// The colour of `material` (numbered from 1; 0: white) at `uv`, averaged over a square of edge `footprint`.

@@ -72,8 +72,10 @@ INLINE LeafField decodeLeaf(uint4 face0, uint4 face1, uint axis) {
     Real3 m2 = decodeDirection(face1.z >> 11), m3 = decodeDirection(face1.w >> 11);
     Real4 s0 = Real4(decodeSide(face0.x), decodeSide(face0.y), decodeSide(face0.z), decodeSide(face0.w));
     Real4 s1 = Real4(decodeSide(face1.x), decodeSide(face1.y), decodeSide(face1.z), decodeSide(face1.w));
-    Real4 d0 = Real4(decodeDistance(face0.x), decodeDistance(face0.y), decodeDistance(face0.z), decodeDistance(face0.w));
-    Real4 d1 = Real4(decodeDistance(face1.x), decodeDistance(face1.y), decodeDistance(face1.z), decodeDistance(face1.w));
+    Real4 d0 =
+        Real4(decodeDistance(face0.x), decodeDistance(face0.y), decodeDistance(face0.z), decodeDistance(face0.w));
+    Real4 d1 =
+        Real4(decodeDistance(face1.x), decodeDistance(face1.y), decodeDistance(face1.z), decodeDistance(face1.w));
     Real4 h0 = s0 * Real(0.5), h1 = s1 * Real(0.5);
     LeafField leaf;
     leaf.axis = axis;
@@ -85,12 +87,12 @@ INLINE LeafField decodeLeaf(uint4 face0, uint4 face1, uint axis) {
     leaf.gz1 = Real4(m0.z, m1.z, m2.z, m3.z) * h1;
     // a_i = D_i - 1/2 N_i . p_i. The corner p_i has, by axis, 0 or 1 along it and these along the next two.
     Real4 next = Real4(0.0, 1.0, 0.0, 1.0), last = Real4(0.0, 0.0, 1.0, 1.0);
-    Real4 along0 = axis == 0u ? leaf.gy0 * next + leaf.gz0 * last
-                 : axis == 1u ? leaf.gz0 * next + leaf.gx0 * last
-                              : leaf.gx0 * next + leaf.gy0 * last;
-    Real4 along1 = axis == 0u ? leaf.gx1 + leaf.gy1 * next + leaf.gz1 * last
-                 : axis == 1u ? leaf.gy1 + leaf.gz1 * next + leaf.gx1 * last
-                              : leaf.gz1 + leaf.gx1 * next + leaf.gy1 * last;
+    Real4 along0 = axis == 0u   ? leaf.gy0 * next + leaf.gz0 * last
+                   : axis == 1u ? leaf.gz0 * next + leaf.gx0 * last
+                                : leaf.gx0 * next + leaf.gy0 * last;
+    Real4 along1 = axis == 0u   ? leaf.gx1 + leaf.gy1 * next + leaf.gz1 * last
+                   : axis == 1u ? leaf.gy1 + leaf.gz1 * next + leaf.gx1 * last
+                                : leaf.gz1 + leaf.gx1 * next + leaf.gy1 * last;
     leaf.a0 = d0 * s0 - along0;
     leaf.a1 = d1 * s1 - along1;
     return leaf;
@@ -134,8 +136,8 @@ INLINE Real3 facingNormal(Real3 n, Real3 d, Real first) {
     return away ? -n : n;
 }
 
-// f on the segment p + u d, u in [0, 1]: sum c_k u^k + fourth u^4. At the end it is `last`: taken from the corners, so that two
-// leaves agree on it at the wall between them.
+// f on the segment p + u d, u in [0, 1]: sum c_k u^k + fourth u^4. At the end it is `last`: taken from the corners, so
+// that two leaves agree on it at the wall between them.
 struct RayField {
     Real4 c;
     Real fourth, last;
@@ -166,8 +168,8 @@ INLINE RayField blendOnRay(Real4 value0, Real4 slope0, Real4 value1, Real4 slope
     Real4 low = blendParabolas(low0, low1, r.z, s.z), high = blendParabolas(high0, high1, r.z, s.z);
     Real4 e = high - low;
     RayField ray;
-    ray.c = Real4((Real(1.0) - r.x) * low.x + r.x * high.x, low.y + r.x * e.y + s.x * e.x, low.z + r.x * e.z + s.x * e.y,
-                  low.w + r.x * e.w + s.x * e.z);
+    ray.c = Real4((Real(1.0) - r.x) * low.x + r.x * high.x, low.y + r.x * e.y + s.x * e.x,
+                  low.z + r.x * e.z + s.x * e.y, low.w + r.x * e.w + s.x * e.z);
     ray.fourth = s.x * e.w;
     Real3 t = r + s;
     Real4 w = faceWeights(t.y, t.z);
@@ -185,8 +187,8 @@ INLINE RayField restrictToRay(uint4 face0, uint4 face1, uint axis, Real3 p, Real
     Real2 v100 = cornerOnRay(face1.x, mix(p, q, along), d), v110 = cornerOnRay(face1.y, mix(q, p, last), d);
     Real2 v101 = cornerOnRay(face1.z, mix(q, p, next), d), v111 = cornerOnRay(face1.w, q, d);
     return blendOnRay(Real4(v000.x, v010.x, v001.x, v011.x), Real4(v000.y, v010.y, v001.y, v011.y),
-                      Real4(v100.x, v110.x, v101.x, v111.x), Real4(v100.y, v110.y, v101.y, v111.y), rotateToAxis(p, axis),
-                      rotateToAxis(d, axis));
+                      Real4(v100.x, v110.x, v101.x, v111.x), Real4(v100.y, v110.y, v101.y, v111.y),
+                      rotateToAxis(p, axis), rotateToAxis(d, axis));
 }
 
 INLINE Real rayValue(RayField ray, Real u) {

@@ -49,7 +49,8 @@ INLINE vec3 interpolateVectors(CONST_REF(LeafVectors) corners, float size, vec3 
     for (int k = 0; k < 8; ++k) {
         weight[k] = (k >= 4 ? at.x : wx0) * ((k & 1) != 0 ? at.y : wy0) * ((k & 2) != 0 ? at.z : wz0);
         // From the point to the corner's closest point, along the corner's vector.
-        float ox = (float(k >> 2) - at.x) * size, oy = (float(k & 1) - at.y) * size, oz = (float((k >> 1) & 1) - at.z) * size;
+        float ox = (float(k >> 2) - at.x) * size, oy = (float(k & 1) - at.y) * size,
+              oz = (float((k >> 1) & 1) - at.z) * size;
         float x = corners.x[k], y = corners.y[k], z = corners.z[k];
         squared[k] = x * x + y * y + z * z;
         along[k] = x * (x + ox) + y * (y + oy) + z * (z + oz);

@@ -9,8 +9,10 @@ namespace vcp {
 
 Result<void> ComposeTarget::resize(Device& device, PictureSize size) {
     if (size == size_) return {};
-    auto depths = device.createBuffer((size.pixels() + 1) * 4,
-        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    auto depths = device.createBuffer(
+        (size.pixels() + 1) * 4,
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+        MemoryUse::Local);
     if (!depths) return depths.error();
     depths_ = std::move(*depths);
     size_ = size;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr uint64_t kRayWords = uint64_t{frame::kFeedbackRays} * frame::kFeedbackRayWords;
 constexpr uint32_t kGroupSize = 64;
-static_assert(frame::kFeedbackRays == frame::kFeedbackWidth * frame::kFeedbackHeight && frame::kFeedbackRays % kGroupSize == 0);
+static_assert(frame::kFeedbackRays == frame::kFeedbackWidth * frame::kFeedbackHeight &&
+              frame::kFeedbackRays % kGroupSize == 0);
 
 }  // namespace
 
@@ -21,7 +22,8 @@ FeedbackPass::FeedbackPass() : pipelines_(kFeedbackSpirv) {}
 Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
     if (buffer_.bytes() >= words * 4) return {};
     const uint64_t bytes = std::bit_ceil(words) * 4;
-    constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    constexpr VkBufferUsageFlags kUsage =
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     auto buffer = device.createBuffer(bytes, kUsage, MemoryUse::Local);
     if (!buffer) return buffer.error();
     if (buffer->mapped() == nullptr) {
@@ -33,7 +35,8 @@ Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
     return {};
 }
 
-Result<void> FeedbackPass::prepare(Device& device, FrameResources& resources, const PassConstants& constants, std::span<const glm::uvec4> table) {
+Result<void> FeedbackPass::prepare(Device& device, FrameResources& resources, const PassConstants& constants,
+                                   std::span<const glm::uvec4> table) {
     const size_t records = table.size() / frame::kRecordTexels;
     VCP_TRY(reserve(device, kRayWords + records));
     resources.setFeedback(&buffer_);
@@ -73,7 +76,9 @@ RayFeedback FeedbackPass::read() const {
         feedback.hits.push_back({pages_[w[3] - 1], glm::ivec3(w[0], w[1], w[2]), ray});
     }
     for (size_t record = 0; record < pages_.size(); ++record)
-        if (words[kRayWords + record] != 0) feedback.passed.push_back({pages_[record], double(words[kRayWords + record]) / double(frame::kNearnessOne)});
+        if (words[kRayWords + record] != 0)
+            feedback.passed.push_back(
+                {pages_[record], double(words[kRayWords + record]) / double(frame::kNearnessOne)});
     return feedback;
 }
 

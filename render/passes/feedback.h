@@ -18,7 +18,8 @@ class FeedbackPass {
 public:
     FeedbackPass();
     /// `table`: of the frame. Makes pipeline and buffers on first use. Errors: Device.
-    Result<void> prepare(Device& device, FrameResources& resources, const PassConstants& constants, std::span<const glm::uvec4> table);
+    Result<void> prepare(Device& device, FrameResources& resources, const PassConstants& constants,
+                         std::span<const glm::uvec4> table);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands);
     /// Of the last frame that had this pass. Precondition: it is done.
@@ -37,7 +38,7 @@ private:
     Result<void> reserve(Device& device, uint64_t words);
 
     PipelineVariants pipelines_;
-    Buffer buffer_, readback_;  // the latter where the former is not mapped
+    Buffer buffer_, readback_;     // the latter where the former is not mapped
     std::vector<uint64_t> pages_;  // by record of the table; of the cut only
     uint64_t passes_ = 0;
 };

@@ -21,12 +21,18 @@ struct Binding {
 };
 constexpr Binding kBindings[] = {
     {kUniform, 1},
-    {kTexels, frame::kMaxPoolChunks}, {kStorage, frame::kMaxPoolChunks},
-    {kTexels, frame::kMaxPoolChunks}, {kStorage, frame::kMaxPoolChunks},
-    {kTexels, 1}, {kStorage, 1},
-    {kStorage, 1}, {kTexels, 1},
-    {kStorage, 1}, {kTexels, 1},
-    {kStorage, 1}, {kTexels, 1},
+    {kTexels, frame::kMaxPoolChunks},
+    {kStorage, frame::kMaxPoolChunks},
+    {kTexels, frame::kMaxPoolChunks},
+    {kStorage, frame::kMaxPoolChunks},
+    {kTexels, 1},
+    {kStorage, 1},
+    {kStorage, 1},
+    {kTexels, 1},
+    {kStorage, 1},
+    {kTexels, 1},
+    {kStorage, 1},
+    {kTexels, 1},
     {kStorage, 1},
     {kStorage, 1},
     {kStorage, 1},
@@ -40,11 +46,15 @@ constexpr uint32_t kBindingCount = std::size(kBindings);
 Result<std::unique_ptr<FrameResources>> FrameResources::create(Device& device) {
     std::unique_ptr<FrameResources> made(new FrameResources(device));
     VCP_TRY(made->createLayout());
-    auto constants = device.createBuffer(sizeof(frame::FrameConstants), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    auto constants =
+        device.createBuffer(sizeof(frame::FrameConstants),
+                            VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
     if (!constants) return constants.error();
     made->constants_ = std::move(*constants);
-    auto counters = device.createBuffer(sizeof(frame::FrameCounters),
-        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Local);
+    auto counters = device.createBuffer(
+        sizeof(frame::FrameCounters),
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+        MemoryUse::Local);
     if (!counters) return counters.error();
     made->counters_ = std::move(*counters);
     auto none = made->wordBuffer(16, 0, VK_FORMAT_R32G32B32A32_UINT);
@@ -91,7 +101,9 @@ FrameResources::~FrameResources() {
 
 Result<WordBuffer> FrameResources::wordBuffer(uint64_t words, VkBufferUsageFlags more, VkFormat format) const {
     WordBuffer made;
-    auto buffer = device_.createBuffer(words * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | more, MemoryUse::Local);
+    auto buffer = device_.createBuffer(
+        words * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | more,
+        MemoryUse::Local);
     if (!buffer) return buffer.error();
     made.buffer = std::move(*buffer);
     auto view = device_.createTexelView(made.buffer, format, words * 4);
@@ -105,11 +117,16 @@ Result<void> FrameResources::resize(PictureSize size, uint32_t hitPlanes) {
     const uint64_t tiles = uint64_t{size.tilesX()} * size.tilesY();
     auto starts = wordBuffer(tiles, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
     if (!starts) return starts.error();
-    auto list = wordBuffer(frame::kTileListHeader + tiles, VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT);
+    auto list =
+        wordBuffer(frame::kTileListHeader + tiles, VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                                                       VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT);
     if (!list) return list.error();
     auto hits = wordBuffer(size.pixels() * hitPlanes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
     if (!hits) return hits.error();
-    auto picture = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    auto picture = device_.createBuffer(
+        size.pixels() * 4,
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+        MemoryUse::Local);
     if (!picture) return picture.error();
     auto background = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
     if (!background) return background.error();
@@ -167,7 +184,8 @@ void FrameResources::setFeedback(const Buffer* feedback) {
 }
 
 void FrameResources::setTarget(const Buffer* picture, const Buffer* depths) {
-    const VkBuffer handles[2] = {picture != nullptr ? picture->handle() : VK_NULL_HANDLE, depths != nullptr ? depths->handle() : VK_NULL_HANDLE};
+    const VkBuffer handles[2] = {picture != nullptr ? picture->handle() : VK_NULL_HANDLE,
+                                 depths != nullptr ? depths->handle() : VK_NULL_HANDLE};
     if (handles[0] == targetHandles_[0] && handles[1] == targetHandles_[1]) return;
     targetPicture_ = picture;
     targetDepths_ = depths;
@@ -179,7 +197,8 @@ void FrameResources::writeSet() {
     VkDescriptorBufferInfo buffers[kBindingCount][frame::kMaxPoolChunks] = {};
     VkBufferView views[kBindingCount][frame::kMaxPoolChunks] = {};
     const auto useBuffer = [&](uint32_t binding, uint32_t i, const Buffer& buffer) {
-        buffers[binding][i] = {buffer.handle(), 0, std::min<uint64_t>(buffer.bytes(), device_.limits().maxStorageBufferRange)};
+        buffers[binding][i] = {buffer.handle(), 0,
+                               std::min<uint64_t>(buffer.bytes(), device_.limits().maxStorageBufferRange)};
     };
     const auto usePool = [&](uint32_t binding, const PagePool* pool) {
         for (uint32_t i = 0; i < frame::kMaxPoolChunks; ++i) {
@@ -237,8 +256,10 @@ Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv
     return ComputePipeline::create(device_, layout_, spirv, constants);
 }
 
-Result<void> PipelineVariants::choose(FrameResources& resources, const PassConstants& c, std::initializer_list<uint32_t> more) {
-    std::vector<uint32_t> values{c.access == PageAccess::TexelBuffer, c.poolChunks, c.chunkShift, c.colour, c.countSteps, c.falseColour};
+Result<void> PipelineVariants::choose(FrameResources& resources, const PassConstants& c,
+                                      std::initializer_list<uint32_t> more) {
+    std::vector<uint32_t> values{
+        c.access == PageAccess::TexelBuffer, c.poolChunks, c.chunkShift, c.colour, c.countSteps, c.falseColour};
     values.insert(values.end(), more.begin(), more.end());
     ComputePipeline& variant = variants_[values];
     if (variant.handle() == VK_NULL_HANDLE) {

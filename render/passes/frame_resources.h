@@ -51,7 +51,8 @@ class PipelineVariants {
 public:
     explicit PipelineVariants(std::span<const uint32_t> spirv) : spirv_(spirv) {}
     /// Makes a variant the current one. `more`: values of the constants that this shader alone has. Errors: Device.
-    Result<void> choose(FrameResources& resources, const PassConstants& constants, std::initializer_list<uint32_t> more = {});
+    Result<void> choose(FrameResources& resources, const PassConstants& constants,
+                        std::initializer_list<uint32_t> more = {});
     /// Precondition: choose().
     [[nodiscard]] VkPipeline current() const { return current_; }
     /// Forgets all variants: pools with another layout are to come.

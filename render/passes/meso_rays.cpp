@@ -34,7 +34,8 @@ Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const mes
     auto none = resources_.storage(16);
     if (!none) return none.error();
     none_ = std::move(*none);
-    auto constants = device_.createBuffer(sizeof values_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    auto constants = device_.createBuffer(
+        sizeof values_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
     if (!constants) return constants.error();
     constants_ = std::move(*constants);
     values_.record = arrays.record;
@@ -64,7 +65,8 @@ Result<std::vector<meso::MarchResult>> MesoRaysPass::read() {
     for (uint32_t i = 0; i < count_; ++i) {
         const uint32_t* w = words->data() + size_t{kResultWords} * i;
         const auto real = [&](int k) { return std::bit_cast<float>(w[k]); };
-        results[i] = {static_cast<meso::MarchState>(w[0]), double(real(1)), {real(2), real(3), real(4)}, w[5], w[6], w[7]};
+        results[i] = {
+            static_cast<meso::MarchState>(w[0]), double(real(1)), {real(2), real(3), real(4)}, w[5], w[6], w[7]};
     }
     return results;
 }

@@ -1,5 +1,5 @@
-// Lists of rays through one asset (shaders/meso_rays.comp): what is measured and compared with the reference. Reads the asset
-// and the rays; writes the results. Ends with barrierComputeToReadback.
+// Lists of rays through one asset (shaders/meso_rays.comp): what is measured and compared with the reference. Reads the
+// asset and the rays; writes the results. Ends with barrierComputeToReadback.
 #pragma once
 
 #include "mesostructure/march.h"

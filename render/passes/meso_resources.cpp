@@ -12,7 +12,8 @@ namespace {
 
 constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
 constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-constexpr VkDescriptorType kBindings[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kTexels};
+constexpr VkDescriptorType kBindings[] = {
+    VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kTexels};
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
 }  // namespace
@@ -25,7 +26,8 @@ Result<std::unique_ptr<MesoResources>> MesoResources::create(Device& device) {
 
 Result<void> MesoResources::createLayout() {
     std::vector<VkDescriptorSetLayoutBinding> bindings;
-    for (uint32_t i = 0; i < kBindingCount; ++i) bindings.push_back({i, kBindings[i], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+    for (uint32_t i = 0; i < kBindingCount; ++i)
+        bindings.push_back({i, kBindings[i], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
     VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
     set.bindingCount = kBindingCount;
     set.pBindings = bindings.data();
@@ -43,7 +45,8 @@ MesoResources::~MesoResources() {
 }
 
 Result<Buffer> MesoResources::upload(std::span<const std::byte> bytes) {
-    auto buffer = device_.createBuffer(bytes.size(), VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+    auto buffer = device_.createBuffer(
+        bytes.size(), VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
     if (!buffer) return buffer;
     if (std::byte* mapped = buffer->mapped()) {
         std::memcpy(mapped, bytes.data(), bytes.size());
@@ -61,7 +64,9 @@ Result<Buffer> MesoResources::upload(std::span<const std::byte> bytes) {
 
 Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     if (words.size() > device_.limits().maxTexelBufferElements)
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("a mesostructure of {} words; this device reads {} at most", words.size(), device_.limits().maxTexelBufferElements)};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("a mesostructure of {} words; this device reads {} at most", words.size(),
+                                            device_.limits().maxTexelBufferElements)};
     MesoTexels made;
     auto buffer = upload(std::as_bytes(words));
     if (!buffer) return buffer.error();
@@ -75,10 +80,13 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     return made;
 }
 
-Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format, const char* what) {
+Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format,
+                                         const char* what) {
     const uint64_t count = bytes.size() / texelBytes;
     if (count > device_.limits().maxTexelBufferElements)
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} texels of {}; this device reads {} at most", count, what, device_.limits().maxTexelBufferElements)};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("{} texels of {}; this device reads {} at most", count, what,
+                                            device_.limits().maxTexelBufferElements)};
     MesoTexels made;
     auto buffer = upload(bytes);
     if (!buffer) return buffer.error();
@@ -99,8 +107,13 @@ Result<MesoTexels> MesoResources::halfs(std::span<const uint64_t> halfs) {
 
 Result<Buffer> MesoResources::storage(uint64_t bytes) const {
     if (bytes > device_.limits().maxStorageBufferRange)
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("{} bytes of hits; this device has {} at most: a smaller picture, or fewer rays", bytes, device_.limits().maxStorageBufferRange)};
-    return device_.createBuffer(bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+        return Error{
+            .code = ErrorCode::Limit,
+            .message = fmt::format("{} bytes of hits; this device has {} at most: a smaller picture, or fewer rays",
+                                   bytes, device_.limits().maxStorageBufferRange)};
+    return device_.createBuffer(
+        bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+        MemoryUse::Local);
 }
 
 Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
@@ -118,9 +131,16 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
     allocation.pSetLayouts = &setLayout_;
     VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &owner.set);
 
-    const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE, bound.words->view.handle(), bound.words->quads.handle(), bound.input->view.handle(),
-                                                VK_NULL_HANDLE, VK_NULL_HANDLE, VK_NULL_HANDLE, (bound.look != nullptr ? bound.look : bound.input)->view.handle()};
-    const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr, nullptr, nullptr, bound.hits, bound.picture, bound.counters, nullptr};
+    const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE,
+                                               bound.words->view.handle(),
+                                               bound.words->quads.handle(),
+                                               bound.input->view.handle(),
+                                               VK_NULL_HANDLE,
+                                               VK_NULL_HANDLE,
+                                               VK_NULL_HANDLE,
+                                               (bound.look != nullptr ? bound.look : bound.input)->view.handle()};
+    const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr,       nullptr,        nullptr,
+                                                  bound.hits,      bound.picture, bound.counters, nullptr};
     VkDescriptorBufferInfo infos[kBindingCount] = {};
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {

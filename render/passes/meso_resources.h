@@ -1,4 +1,5 @@
-// What the mesostructure passes share: one descriptor set layout, its pipelines, and asset buffers (shaders/meso_bindings.glsl).
+// What the mesostructure passes share: one descriptor set layout, its pipelines, and asset buffers
+// (shaders/meso_bindings.glsl).
 //
 // binding   what                          written by              read by
 //  0        MesoRecord, MesoView          copies                  all

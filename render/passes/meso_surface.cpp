@@ -40,8 +40,10 @@ static_assert(frame::kMesoFarViews == meso::Appearance::kViews && frame::kMesoFa
 
 double shadowLift(const MesoArrays& arrays, double tileEdge) {
     const frame::MesoRecord& r = arrays.record;
-    const bool isExact = arrays.constants[0] == frame::kMesoPyramid || arrays.constants[2] == frame::kMesoHeights || arrays.constants[2] == frame::kMesoField;
-    if (r.fine.x > 0 && (isExact || arrays.constants[0] == frame::kMesoRelief)) return (isExact ? 0.25 : 1.5) * tileEdge / r.fine.x;
+    const bool isExact = arrays.constants[0] == frame::kMesoPyramid || arrays.constants[2] == frame::kMesoHeights ||
+                         arrays.constants[2] == frame::kMesoField;
+    if (r.fine.x > 0 && (isExact || arrays.constants[0] == frame::kMesoRelief))
+        return (isExact ? 0.25 : 1.5) * tileEdge / r.fine.x;
     return 0.5 * tileEdge * double(r.cell.x);
 }
 
@@ -49,7 +51,8 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
     surfaces_.clear();
     ++version_;
     std::map<const MesoArrays*, std::shared_ptr<MesoTexels>> uploaded;
-    std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, std::shared_ptr<MesoTexels>> looks;
+    std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, std::shared_ptr<MesoTexels>>
+        looks;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
         Placed made;
@@ -103,13 +106,15 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
     if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.handle()) {
         // Nothing has a size until all is made.
         target = {};
-        for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4), std::pair(&target.counters, uint64_t{16})}) {
+        for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
+                                            std::pair(&target.counters, uint64_t{16})}) {
             auto made = resources_.storage(bytes);
             if (!made) return made.error();
             *buffer = std::move(*made);
         }
         for (const Placed& surface : surfaces_) {
-            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits, &picture, &target.counters, surface.look.get()});
+            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits,
+                                           &picture, &target.counters, surface.look.get()});
             if (!set) return set.error();
             target.sets.push_back(*std::move(set));
         }
@@ -118,7 +123,8 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
     for (Placed& surface : surfaces_) {
         std::vector<uint32_t> constants(surface.arrays->constants.begin(), surface.arrays->constants.end());
         constants.push_back(0);
-        constants.push_back((surface.view.colours.w > 0 ? frame::kMesoColours : 0) | (surface.view.normals.w > 0 ? frame::kMesoNormals : 0));
+        constants.push_back((surface.view.colours.w > 0 ? frame::kMesoColours : 0) |
+                            (surface.view.normals.w > 0 ? frame::kMesoNormals : 0));
         constants.push_back(surface.isFarDrawn ? 1 : 0);
         auto cast = resources_.pipeline(kMesoSurfaceSpirv, constants);
         if (!cast) return cast.error();
@@ -140,15 +146,18 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize si
     MesoConstants c{surface.arrays->record, surface.view};
     const PictureTile& tile = look.tile;
     const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
-    const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth), stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
-    const glm::dvec3 corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + double(tile.x) * stepX + double(tile.y) * stepY;
+    const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth),
+                     stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
+    const glm::dvec3 corner =
+        basis.up * basis.halfHeight - basis.right * basis.halfWidth + double(tile.x) * stepX + double(tile.y) * stepY;
     const glm::dvec3 eye = look.camera.eye - surface.origin;
     if (look.camera.projection == Projection::Orthographic) {
         c.view.eye = toVec4(eye + corner), c.view.eyeX = toVec4(stepX), c.view.eyeY = toVec4(stepY);
         c.view.forward = toVec4(basis.forward);
     } else {
         c.view.eye = toVec4(eye);
-        c.view.forward = toVec4(basis.forward + corner), c.view.forwardX = toVec4(stepX), c.view.forwardY = toVec4(stepY);
+        c.view.forward = toVec4(basis.forward + corner), c.view.forwardX = toVec4(stepX),
+        c.view.forwardY = toVec4(stepY);
     }
     c.view.picture.x = size.width, c.view.picture.y = size.height;
     c.view.light = toVec4(look.light, surface.view.light.w);
@@ -157,14 +166,17 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize si
     return c;
 }
 
-void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const {
+void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target,
+                               size_t surface) const {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &target.sets[surface].set, 0, nullptr);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1,
+                            &target.sets[surface].set, 0, nullptr);
     vkCmdDispatch(commands, (target.size.width + 7) / 8, (target.size.height + 7) / 8, 1);
     barrierComputeToCompute(commands);
 }
 
-void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths) {
+void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look,
+                             const Buffer& depths) {
     const uint64_t plane = target.size.pixels() * 4;
     const VkBufferCopy region{0, 0, plane};
     vkCmdCopyBuffer(commands, depths.handle(), target.hits.handle(), 1, &region);

@@ -1,7 +1,7 @@
-// Mesostructure on surfaces, over the picture that the datasets left (shaders/meso_surface.comp, meso_shade.comp): for each
-// surface a dispatch that finds first hits in its shell and keeps the nearest of all, then one that casts shadow rays, then
-// one that shades. Normals are as the other passes pack them; depths are in world units, as those of the compose pass, from
-// which they start.
+// Mesostructure on surfaces, over the picture that the datasets left (shaders/meso_surface.comp, meso_shade.comp): for
+// each surface a dispatch that finds first hits in its shell and keeps the nearest of all, then one that casts shadow
+// rays, then one that shades. Normals are as the other passes pack them; depths are in world units, as those of the
+// compose pass, from which they start.
 //
 // Reads shells, assets and the composed depths; writes hits, picture, counters. Barriers are recorded here; ends with
 // barrierComputeToReadback. Without surfaces nothing is made: no pipeline, no buffer.
@@ -25,13 +25,13 @@ namespace vcp {
 struct MesoSurface {
     std::shared_ptr<const MesoArrays> arrays;  ///< surfaces may share them
     meso::Shell shell;
-    glm::vec3 colour{0.8f};   ///< encoded, as the screen has it
-    bool withBase = true;     ///< the base is drawn where rays come through to it
-    double lift = 0;          ///< world units by which shadow rays start above a hit
+    glm::vec3 colour{0.8f};  ///< encoded, as the screen has it
+    bool withBase = true;    ///< the base is drawn where rays come through to it
+    double lift = 0;         ///< world units by which shadow rays start above a hit
     /// Over the tile, at the hit's place in it; surfaces may share them. Colours are light, in place of `colour`.
     std::shared_ptr<const MesoTexture> colours;
-    /// Unit vectors, x and y along the tile, z out of what the texture lies on, which is the mesostructure: they bend its shading
-    /// normals.
+    /// Unit vectors, x and y along the tile, z out of what the texture lies on, which is the mesostructure: they bend
+    /// its shading normals.
     std::shared_ptr<const MesoTexture> normals;
     std::shared_ptr<const meso::Appearance> far;  ///< what is seen of it from far; null: it is marched from everywhere
 };
@@ -47,34 +47,36 @@ enum class MesoShading : uint32_t {
 };
 
 struct MesoLook {
-    Camera camera;                     ///< of the whole, where the picture is a tile
+    Camera camera;  ///< of the whole, where the picture is a tile
     PictureTile tile;
     glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light, unit
     glm::dvec3 up{0, 0, 1};            ///< of the sky, unit
     bool shadows = false;
     MesoShading shading = MesoShading::Lit;
-    double errorPixels = 0.5;          ///< surfaces that stray less from their mean height are not marched (MesoSurface::far); 0: all are
+    double errorPixels =
+        0.5;  ///< surfaces that stray less from their mean height are not marched (MesoSurface::far); 0: all are
 };
 
 /// What one view's pictures of the surfaces are drawn into.
 struct MesoTarget {
-    PictureSize size;          ///< 0: nothing is made
-    uint64_t surfaces = 0;     ///< MesoSurfacePass::version() that the sets are of
+    PictureSize size;       ///< 0: nothing is made
+    uint64_t surfaces = 0;  ///< MesoSurfacePass::version() that the sets are of
     Buffer hits, counters;
     VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
-    std::vector<MesoSet> sets;  ///< of each surface
+    std::vector<MesoSet> sets;          ///< of each surface
 };
 
 class MesoSurfacePass {
 public:
     MesoSurfacePass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
 
-    /// Replaces the surfaces; waits for nothing: no frame may be in flight. On an error there are none. Errors: Device, Limit.
+    /// Replaces the surfaces; waits for nothing: no frame may be in flight. On an error there are none. Errors: Device,
+    /// Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
     /// Makes buffers and pipelines. Precondition: there are surfaces. Errors: Device, Limit.
     Result<void> prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows);
-    /// Precondition: prepare(); the picture is as it shall be where there is no mesostructure. `depths`: a float a pixel,
-    /// world units along the unit ray, of what is there already.
+    /// Precondition: prepare(); the picture is as it shall be where there is no mesostructure. `depths`: a float a
+    /// pixel, world units along the unit ray, of what is there already.
     void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths);
 
     [[nodiscard]] uint64_t version() const { return version_; }

@@ -12,7 +12,8 @@ class PaperTracePass {
 public:
     PaperTracePass();
     /// Makes the variant's pipeline on first use. Errors: Device.
-    Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool sections, const PaperMarch& march);
+    Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool sections,
+                         const PaperMarch& march);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
     /// Pools with another layout are to come.

@@ -53,7 +53,7 @@ struct FrameConstants {
     vec4 pixel;
     // The hits' plane of light or false colours (0: none), section planes, occlusion rays a pixel, shadows.
     uvec4 extra;
-    vec4 march;  // x: of the method `paper`: epsilon, finest cells. y: world units a finest cell
+    vec4 march;     // x: of the method `paper`: epsilon, finest cells. y: world units a finest cell
     vec4 rotation;  // quaternion: world from the dataset's axes
     // Kept is where dot(xyz, p) + w >= 0, p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];

@@ -18,8 +18,8 @@ Error vulkanError(const char* call, VkResult result);
 }  // namespace vcp
 
 /// Returns an Error from the enclosing function unless the call gives VK_SUCCESS.
-#define VCP_VK(function, ...)                                              \
-    do {                                                                   \
+#define VCP_VK(function, ...)                                                  \
+    do {                                                                       \
         if (const VkResult vcpVk = function(__VA_ARGS__); vcpVk != VK_SUCCESS) \
-            return ::vcp::vulkanError(#function, vcpVk);                   \
+            return ::vcp::vulkanError(#function, vcpVk);                       \
     } while (false)

@@ -7,8 +7,8 @@
 
 namespace vcp {
 
-Result<ComputePipeline> ComputePipeline::create(const Device& device, VkPipelineLayout layout, std::span<const uint32_t> spirv,
-                                                std::span<const uint32_t> constants) {
+Result<ComputePipeline> ComputePipeline::create(const Device& device, VkPipelineLayout layout,
+                                                std::span<const uint32_t> spirv, std::span<const uint32_t> constants) {
     VkShaderModuleCreateInfo moduleInfo{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
     moduleInfo.codeSize = spirv.size_bytes();
     moduleInfo.pCode = spirv.data();
@@ -17,7 +17,8 @@ Result<ComputePipeline> ComputePipeline::create(const Device& device, VkPipeline
 
     std::vector<VkSpecializationMapEntry> entries;
     for (uint32_t i = 0; i < constants.size(); ++i) entries.push_back({i, i * 4, 4});
-    const VkSpecializationInfo specialization{static_cast<uint32_t>(entries.size()), entries.data(), constants.size_bytes(), constants.data()};
+    const VkSpecializationInfo specialization{static_cast<uint32_t>(entries.size()), entries.data(),
+                                              constants.size_bytes(), constants.data()};
     VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
     info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO};
     info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
@@ -27,7 +28,8 @@ Result<ComputePipeline> ComputePipeline::create(const Device& device, VkPipeline
     info.layout = layout;
     ComputePipeline made;
     made.device_ = device.handle();
-    const VkResult result = vkCreateComputePipelines(device.handle(), device.pipelineCache(), 1, &info, nullptr, &made.pipeline_);
+    const VkResult result =
+        vkCreateComputePipelines(device.handle(), device.pipelineCache(), 1, &info, nullptr, &made.pipeline_);
     vkDestroyShaderModule(device.handle(), module, nullptr);
     if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
     return made;
@@ -47,7 +49,8 @@ void ComputePipeline::destroy() {
 
 namespace {
 
-void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags wrote, VkPipelineStageFlags to, VkAccessFlags reads) {
+void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags wrote, VkPipelineStageFlags to,
+             VkAccessFlags reads) {
     VkMemoryBarrier memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER};
     memory.srcAccessMask = wrote;
     memory.dstAccessMask = reads;
@@ -73,11 +76,13 @@ void barrierComputeToCompute(VkCommandBuffer commands) {
 
 void barrierComputeToReadback(VkCommandBuffer commands) {
     barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
-            VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_HOST_READ_BIT);
+            VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_HOST_BIT,
+            VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_HOST_READ_BIT);
 }
 
 void barrierTransferToHost(VkCommandBuffer commands) {
-    barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+    barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
+            VK_ACCESS_HOST_READ_BIT);
 }
 
 }  // namespace vcp

@@ -14,8 +14,8 @@ namespace vcp {
 class ComputePipeline {
 public:
     /// `constants[i]` is the value of constant_id i. Errors: Device.
-    static Result<ComputePipeline> create(const Device& device, VkPipelineLayout layout, std::span<const uint32_t> spirv,
-                                          std::span<const uint32_t> constants);
+    static Result<ComputePipeline> create(const Device& device, VkPipelineLayout layout,
+                                          std::span<const uint32_t> spirv, std::span<const uint32_t> constants);
     ComputePipeline() = default;
     ~ComputePipeline() { destroy(); }
     ComputePipeline(ComputePipeline&& other) noexcept { *this = std::move(other); }

@@ -48,8 +48,8 @@ void Device::describe(VkPhysicalDevice physical, const DeviceInfo& info) {
     vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
 }
 
-Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface, bool forWindows,
-                                               const DeviceFaults& faults) {
+Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice,
+                                               VkSurfaceKHR surface, bool forWindows, const DeviceFaults& faults) {
     auto physical = instance.physicalDevices();
     if (!physical) return physical.error();
     std::vector<DeviceInfo> infos;
@@ -68,16 +68,22 @@ Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const s
 }
 
 Result<std::unique_ptr<Device>> Device::borrow(const HostDevice& host, const DeviceFaults& faults) {
-    if (host.instance == VK_NULL_HANDLE || host.physical == VK_NULL_HANDLE || host.device == VK_NULL_HANDLE || host.queue == VK_NULL_HANDLE)
-        return Error{.code = ErrorCode::Usage, .message = "the host's device lacks its instance, physical device, device or queue"};
+    if (host.instance == VK_NULL_HANDLE || host.physical == VK_NULL_HANDLE || host.device == VK_NULL_HANDLE ||
+        host.queue == VK_NULL_HANDLE)
+        return Error{.code = ErrorCode::Usage,
+                     .message = "the host's device lacks its instance, physical device, device or queue"};
     std::unique_ptr<Device> made(new Device);
     made->borrowed_ = true;
     made->faults_ = faults;
     made->describe(host.physical, describeDevice(host.physical, 0));
-    if (!made->info_.usable) return Error{.code = ErrorCode::Device, .message = "device '" + made->info_.name + "' has no Vulkan 1.2 with compute"};
+    if (!made->info_.usable)
+        return Error{.code = ErrorCode::Device,
+                     .message = "device '" + made->info_.name + "' has no Vulkan 1.2 with compute"};
     const auto families = made->queueFamilies();
     if (host.queueFamily >= families.size() || (families[host.queueFamily].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0)
-        return Error{.code = ErrorCode::Device, .message = "queue family " + std::to_string(host.queueFamily) + " of device '" + made->info_.name + "' does not compute"};
+        return Error{.code = ErrorCode::Device,
+                     .message = "queue family " + std::to_string(host.queueFamily) + " of device '" + made->info_.name +
+                                "' does not compute"};
     made->useFamily(host.queueFamily, families[host.queueFamily]);
     made->device_ = host.device;
     made->queue_ = host.queue;
@@ -102,7 +108,8 @@ void Device::useFamily(uint32_t index, const VkQueueFamilyProperties& family) {
 
 Result<void> Device::chooseQueue(VkSurfaceKHR surface, bool forWindows) {
     const auto families = queueFamilies();
-    // Pictures are scaled to windows and to the host's images on queues with graphics: these are the first choice anyhow.
+    // Pictures are scaled to windows and to the host's images on queues with graphics: these are the first choice
+    // anyhow.
     for (const bool graphics : {true, false}) {
         for (uint32_t i = 0; i < families.size(); ++i) {
             const VkQueueFlags wanted = graphics ? VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT : VK_QUEUE_COMPUTE_BIT;
@@ -115,26 +122,31 @@ Result<void> Device::chooseQueue(VkSurfaceKHR surface, bool forWindows) {
         }
         if (forWindows) break;
     }
-    return Error{.code = ErrorCode::Device, .message = "device '" + info_.name + "' has no queue that computes and shows pictures"};
+    return Error{.code = ErrorCode::Device,
+                 .message = "device '" + info_.name + "' has no queue that computes and shows pictures"};
 }
 
 bool Device::shows(VkSurfaceKHR surface) const {
     VkBool32 shows = VK_FALSE;
-    return hasSwapchain_ && vkGetPhysicalDeviceSurfaceSupportKHR(physical_, family_, surface, &shows) == VK_SUCCESS && shows == VK_TRUE;
+    return hasSwapchain_ && vkGetPhysicalDeviceSurfaceSupportKHR(physical_, family_, surface, &shows) == VK_SUCCESS &&
+           shows == VK_TRUE;
 }
 
 /// One that does nothing but copy, beside the processors: a discrete GPU's.
 void Device::chooseCopyFamily() {
     const auto families = queueFamilies();
     for (uint32_t i = 0; i < families.size() && !copyFamily_; ++i)
-        if ((families[i].queueFlags & (VK_QUEUE_TRANSFER_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT)) == VK_QUEUE_TRANSFER_BIT) copyFamily_ = i;
+        if ((families[i].queueFlags & (VK_QUEUE_TRANSFER_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT)) ==
+            VK_QUEUE_TRANSFER_BIT)
+            copyFamily_ = i;
     if (faults_.separateCopies && !copyFamily_) copyFamily_ = family_;
 }
 
 Result<void> Device::createDevice() {
     const float priority = 1;
     chooseCopyFamily();
-    std::vector<VkDeviceQueueCreateInfo> queues(copyFamily_.value_or(family_) != family_ ? 2 : 1, {VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO});
+    std::vector<VkDeviceQueueCreateInfo> queues(copyFamily_.value_or(family_) != family_ ? 2 : 1,
+                                                {VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO});
     for (VkDeviceQueueCreateInfo& queue : queues) {
         queue.queueFamilyIndex = &queue == &queues[0] ? family_ : *copyFamily_;
         queue.queueCount = 1;
@@ -201,12 +213,14 @@ Device::~Device() {
 
 Result<uint32_t> Device::memoryType(uint32_t allowed, MemoryUse use) const {
     constexpr VkMemoryPropertyFlags kLocal = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-    constexpr VkMemoryPropertyFlags kMapped = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    constexpr VkMemoryPropertyFlags kMapped =
+        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
     // Local memory is mapped only where it is all one memory: a discrete device's mapped window is small.
     const bool unified = (info_.software || info_.type == "integrated") && !faults_.separateMemory;
     std::vector<VkMemoryPropertyFlags> wishes;
-    if (use == MemoryUse::Local) wishes = unified ? std::vector{kLocal | kMapped | kCached, kLocal | kMapped, kLocal} : std::vector{kLocal};
+    if (use == MemoryUse::Local)
+        wishes = unified ? std::vector{kLocal | kMapped | kCached, kLocal | kMapped, kLocal} : std::vector{kLocal};
     if (use == MemoryUse::Upload) wishes = {kMapped};
     if (use == MemoryUse::Readback) wishes = {kMapped | kCached, kMapped};
     for (const VkMemoryPropertyFlags wish : wishes)
@@ -244,7 +258,8 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
     allocation.allocationSize = needs.size;
     allocation.memoryTypeIndex = *type;
     const bool fits = made.bytes_ <= faults_.memoryBytes && allocated_ <= faults_.memoryBytes - made.bytes_;
-    const VkResult allocated = fits ? vkAllocateMemory(device_, &allocation, nullptr, &made.memory_) : VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    const VkResult allocated =
+        fits ? vkAllocateMemory(device_, &allocation, nullptr, &made.memory_) : VK_ERROR_OUT_OF_DEVICE_MEMORY;
     if (allocated != VK_SUCCESS) {
         made.memory_ = VK_NULL_HANDLE;
         outOfMemory_ = true;
@@ -303,7 +318,8 @@ Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
 }
 
 Result<void> Device::submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence fence) {
-    const VkResult done = ++submissions_ == faults_.lostAtSubmission ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue, 1, &submit, fence);
+    const VkResult done =
+        ++submissions_ == faults_.lostAtSubmission ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue, 1, &submit, fence);
     lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
     return done == VK_SUCCESS ? Result<void>() : vulkanError("vkQueueSubmit", done);
 }

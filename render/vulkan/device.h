@@ -68,9 +68,10 @@ enum class MemoryUse { Local, Upload, Readback };
 
 class Device {
 public:
-    /// `choice` as in RendererOptions::device. `forWindows` asks for the swapchain extension and a queue with graphics, a
-    /// surface for a queue that can show pictures in it. Errors: Device.
-    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice, VkSurfaceKHR surface, bool forWindows,
+    /// `choice` as in RendererOptions::device. `forWindows` asks for the swapchain extension and a queue with graphics,
+    /// a surface for a queue that can show pictures in it. Errors: Device.
+    static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice,
+                                                  VkSurfaceKHR surface, bool forWindows,
                                                   const DeviceFaults& faults = {});
     /// The host's device, which it keeps. Errors: Usage (something is missing), Device (too old, no such queue).
     static Result<std::unique_ptr<Device>> borrow(const HostDevice& host, const DeviceFaults& faults = {});
@@ -115,8 +116,8 @@ public:
     /// With semaphores: waits for `wait` before transfers, signals `signal`.
     Result<void> endCommandsAndWait(VkSemaphore wait = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
 
-    /// Copies between buffers, done before anything that is submitted after them. On a queue of their own they run beside what
-    /// the CPU does next, and waitForCopies() waits for them; elsewhere they are done on return.
+    /// Copies between buffers, done before anything that is submitted after them. On a queue of their own they run
+    /// beside what the CPU does next, and waitForCopies() waits for them; elsewhere they are done on return.
     template <class Record>
     Result<void> submitCopies(Record record) {
         if (copyQueue_ == VK_NULL_HANDLE) return submitAndWait(record);
@@ -153,8 +154,8 @@ private:
     VkQueue copyQueue_ = VK_NULL_HANDLE;  // null: copies go to queue_
     VkCommandPool copyPool_ = VK_NULL_HANDLE;
     VkCommandBuffer copyCommands_ = VK_NULL_HANDLE;
-    VkFence copyFence_ = VK_NULL_HANDLE;          // of the copies that run
-    VkSemaphore copiesDone_ = VK_NULL_HANDLE;     // signalled by copies, waited for by what is submitted next
+    VkFence copyFence_ = VK_NULL_HANDLE;              // of the copies that run
+    VkSemaphore copiesDone_ = VK_NULL_HANDLE;         // signalled by copies, waited for by what is submitted next
     bool copiesRun_ = false, copiesAwaited_ = false;  // since when nobody has waited: the fence, the semaphore
     std::optional<uint32_t> copyFamily_;
     double timestampNanoseconds_ = 0;

@@ -19,7 +19,8 @@ VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
 
 VkDebugUtilsMessengerCreateInfoEXT messengerInfo(ValidationLog* log) {
     VkDebugUtilsMessengerCreateInfoEXT info{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
-    info.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
     info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT;
     info.pfnUserCallback = onMessage;
     info.pUserData = log;
@@ -28,11 +29,16 @@ VkDebugUtilsMessengerCreateInfoEXT messengerInfo(ValidationLog* log) {
 
 const char* typeName(VkPhysicalDeviceType type) {
     switch (type) {
-        case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU: return "discrete";
-        case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU: return "integrated";
-        case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU: return "virtual";
-        case VK_PHYSICAL_DEVICE_TYPE_CPU: return "cpu";
-        default: return "other";
+        case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+            return "discrete";
+        case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+            return "integrated";
+        case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+            return "virtual";
+        case VK_PHYSICAL_DEVICE_TYPE_CPU:
+            return "cpu";
+        default:
+            return "other";
     }
 }
 
@@ -41,7 +47,8 @@ bool hasComputeQueue(VkPhysicalDevice device) {
     vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
     vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
-    return std::any_of(families.begin(), families.end(), [](const auto& f) { return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0; });
+    return std::any_of(families.begin(), families.end(),
+                       [](const auto& f) { return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0; });
 }
 
 int typeScore(const DeviceInfo& device) {
@@ -51,16 +58,20 @@ int typeScore(const DeviceInfo& device) {
 }
 
 std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return text;
 }
 
 Error noDevice(const std::vector<DeviceInfo>& devices, const std::string& what) {
     std::string text = what;
-    if (devices.empty()) text += "; install a Vulkan driver (mesa-vulkan-drivers has one for machines without a GPU)";
-    else text += "; there is";
+    if (devices.empty())
+        text += "; install a Vulkan driver (mesa-vulkan-drivers has one for machines without a GPU)";
+    else
+        text += "; there is";
     for (const DeviceInfo& device : devices)
-        text += (device.index == 0 ? " " : ", ") + std::to_string(device.index) + ": " + device.name + (device.usable ? "" : " (no Vulkan 1.2)");
+        text += (device.index == 0 ? " " : ", ") + std::to_string(device.index) + ": " + device.name +
+                (device.usable ? "" : " (no Vulkan 1.2)");
     return {.code = ErrorCode::Device, .message = text};
 }
 

@@ -38,8 +38,8 @@ Result<std::vector<double>> PassTimer::read() const {
     std::vector<double> ms(marks_ - 1, 0.0);
     if (!hasClock()) return ms;
     std::vector<uint64_t> t(marks_);
-    VCP_VK(vkGetQueryPoolResults, device_->handle(), pool_, 0, marks_, t.size() * sizeof(uint64_t), t.data(), sizeof(uint64_t),
-           VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
+    VCP_VK(vkGetQueryPoolResults, device_->handle(), pool_, 0, marks_, t.size() * sizeof(uint64_t), t.data(),
+           sizeof(uint64_t), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
     for (uint32_t i = 0; i + 1 < marks_; ++i) ms[i] = double(t[i + 1] - t[i]) * device_->timestampNanoseconds() * 1e-6;
     return ms;
 }

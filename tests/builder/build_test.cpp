@@ -27,8 +27,10 @@ namespace fs = std::filesystem;
 /// Little endian binary PLY in doubles, so that nothing is rounded.
 void writePly(const IndexedMesh& mesh, const fs::path& path, const std::vector<uint32_t>& colours = {}) {
     std::ofstream out(path, std::ios::binary);
-    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << mesh.positions.size() << "\nproperty double x\nproperty double y\nproperty double z\n";
-    if (!colours.empty()) out << "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
+    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << mesh.positions.size()
+        << "\nproperty double x\nproperty double y\nproperty double z\n";
+    if (!colours.empty())
+        out << "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
     out << "element face " << mesh.triangles.size() << "\nproperty list uchar uint vertex_indices\nend_header\n";
     for (size_t v = 0; v < mesh.positions.size(); ++v) {
         out.write(reinterpret_cast<const char*>(&mesh.positions[v]), 24);
@@ -246,12 +248,14 @@ TEST_F(Build, LevelsAreLinkedAndTheirErrorsGrow) {
     }
     for (const PageEntry& e : d.pages) {
         EXPECT_LE(double(e.certifiedError), d.header.level[e.level].certifiedError);
-        EXPECT_EQ(e.childMask == 0, e.level + 1u == d.header.levels) << "all branches reach the finest level of a mesh that is dense";
+        EXPECT_EQ(e.childMask == 0, e.level + 1u == d.header.levels)
+            << "all branches reach the finest level of a mesh that is dense";
     }
 }
 
 TEST_F(Build, TwoInputsAreJoined) {
-    const IndexedMesh torus = test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30), box = test::boxMesh({3, -1, -1}, {4, 1, 1}, 6);
+    const IndexedMesh torus = test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30),
+                      box = test::boxMesh({3, -1, -1}, {4, 1, 1}, 6);
     IndexedMesh both = torus;
     test::append(both, box);
     ASSERT_TRUE(buildOctree(options({ply(torus, "a.ply"), ply(box, "b.ply")}, "joined.vcp")).ok());
@@ -535,11 +539,13 @@ TEST_F(Build, FailureKeepsTheOldFile) {
     const fs::path good = ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 40, 20));
     ASSERT_TRUE(buildOctree(options({good})).ok());
     const std::string before = contentOf(folder_ / "out.vcp");
-    std::ofstream(folder_ / "bad.ply") << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                                          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n";
+    std::ofstream(folder_ / "bad.ply")
+        << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+           "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n";
     BuildOptions cancelled = options({good});
     cancelled.progress = [](const BuildProgress&) { return false; };
-    for (const BuildOptions& o : {options({folder_ / "bad.ply"}), options({folder_ / "none.ply"}), options({good, folder_ / "bad.ply"}), options({}), cancelled}) {
+    for (const BuildOptions& o : {options({folder_ / "bad.ply"}), options({folder_ / "none.ply"}),
+                                  options({good, folder_ / "bad.ply"}), options({}), cancelled}) {
         EXPECT_FALSE(buildOctree(o).ok());
         EXPECT_TRUE(contentOf(folder_ / "out.vcp") == before);
         EXPECT_FALSE(fs::exists(folder_ / "out.vcp.partial"));

@@ -70,26 +70,26 @@ int ftruncate(int fd, off_t size) { return fails() ? -1 : REAL(ftruncate)(fd, si
 int ftruncate64(int fd, off64_t size) { return fails() ? -1 : REAL(ftruncate64)(fd, size); }
 int mkdir(const char* path, mode_t mode) { return fails() ? -1 : REAL(mkdir)(path, mode); }
 
-#define OPEN(name)                                                   \
-    int name(const char* path, int flags, ...) {                     \
-        va_list rest;                                                \
-        va_start(rest, flags);                                       \
+#define OPEN(name)                                                      \
+    int name(const char* path, int flags, ...) {                        \
+        va_list rest;                                                   \
+        va_start(rest, flags);                                          \
         const mode_t mode = flags & O_CREAT ? va_arg(rest, mode_t) : 0; \
-        va_end(rest);                                                \
-        if (flags & O_CREAT && fails()) return -1;                   \
-        return REAL(name)(path, flags, mode);                        \
+        va_end(rest);                                                   \
+        if (flags & O_CREAT && fails()) return -1;                      \
+        return REAL(name)(path, flags, mode);                           \
     }
 OPEN(open)
 OPEN(open64)
 
-#define OPENAT(name)                                                 \
-    int name(int folder, const char* path, int flags, ...) {         \
-        va_list rest;                                                \
-        va_start(rest, flags);                                       \
+#define OPENAT(name)                                                    \
+    int name(int folder, const char* path, int flags, ...) {            \
+        va_list rest;                                                   \
+        va_start(rest, flags);                                          \
         const mode_t mode = flags & O_CREAT ? va_arg(rest, mode_t) : 0; \
-        va_end(rest);                                                \
-        if (flags & O_CREAT && fails()) return -1;                   \
-        return REAL(name)(folder, path, flags, mode);                \
+        va_end(rest);                                                   \
+        if (flags & O_CREAT && fails()) return -1;                      \
+        return REAL(name)(folder, path, flags, mode);                   \
     }
 OPENAT(openat)
 OPENAT(openat64)

@@ -18,9 +18,11 @@ public:
     FlippedFile(const std::string& bytes, uint64_t bit) : bytes_(bytes), bit_(bit) {}
 
     Result<void> read(uint64_t offset, std::span<std::byte> out) const override {
-        if (offset > bytes_.size() || out.size() > bytes_.size() - offset) return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
+        if (offset > bytes_.size() || out.size() > bytes_.size() - offset)
+            return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
         if (!out.empty()) std::memcpy(out.data(), bytes_.data() + offset, out.size());
-        if (bit_ / 8 >= offset && bit_ / 8 - offset < out.size()) out[bit_ / 8 - offset] ^= std::byte{1} << static_cast<int>(bit_ % 8);
+        if (bit_ / 8 >= offset && bit_ / 8 - offset < out.size())
+            out[bit_ / 8 - offset] ^= std::byte{1} << static_cast<int>(bit_ % 8);
         return {};
     }
     [[nodiscard]] uint64_t size() const override { return bytes_.size(); }

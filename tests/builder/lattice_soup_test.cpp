@@ -24,7 +24,8 @@ TEST(LatticeSnapper, SnapsToTheNearestPoint) {
             const LatticeSnapper snapper({.origin = origin, .cell = cell});
             for (int i = 0; i < 500; ++i) {
                 WorldTriangle<double> t{};
-                for (auto& p : t.corner) p = origin + cell * 100.0 * glm::dvec3(unit(random), unit(random), unit(random));
+                for (auto& p : t.corner)
+                    p = origin + cell * 100.0 * glm::dvec3(unit(random), unit(random), unit(random));
                 for (uint32_t& c : t.colour) c = static_cast<uint32_t>(random());
                 int pieces = 0;
                 snapper.add(t, [&](const LatticeTriangle& s) {
@@ -71,7 +72,8 @@ void expectShortEdges(const LatticeMesh& mesh) {
     const double limit = double(kMaxEdgeCells) * kLatticePerCell;
     for (const auto& t : mesh.triangles)
         for (int i = 0; i < 3; ++i)
-            ASSERT_LE(glm::length(glm::dvec3(mesh.positions[t[i]]) - glm::dvec3(mesh.positions[t[(i + 1) % 3]])), limit);
+            ASSERT_LE(glm::length(glm::dvec3(mesh.positions[t[i]]) - glm::dvec3(mesh.positions[t[(i + 1) % 3]])),
+                      limit);
 }
 
 TEST(SplitLongEdges, LeavesShortEdgesAlone) {
@@ -83,7 +85,8 @@ TEST(SplitLongEdges, LeavesShortEdgesAlone) {
 }
 
 TEST(SplitLongEdges, ClosedStaysClosedAndKeepsItsArea) {
-    for (const glm::dvec3 high : {glm::dvec3(3000, 2000, 1000), glm::dvec3(700, 701, 703), glm::dvec3(5000, 3, 2), glm::dvec3(257, 257, 257)}) {
+    for (const glm::dvec3 high :
+         {glm::dvec3(3000, 2000, 1000), glm::dvec3(700, 701, 703), glm::dvec3(5000, 3, 2), glm::dvec3(257, 257, 257)}) {
         IndexedMesh box = test::boxMesh(glm::dvec3(0), high, 1);
         if (high.x < 1000) {
             test::rotate(box, high / 2.0, {1, 2, 3}, 0.7);
@@ -92,7 +95,8 @@ TEST(SplitLongEdges, ClosedStaysClosedAndKeepsItsArea) {
         const double area = test::areaOf(box);
         const LatticeMesh mesh = meshFrom(box);
         expectShortEdges(mesh);
-        EXPECT_EQ(test::edgeUses(mesh.triangles), (std::map<int, int>{{2, static_cast<int>(mesh.triangles.size() * 3 / 2)}}));
+        EXPECT_EQ(test::edgeUses(mesh.triangles),
+                  (std::map<int, int>{{2, static_cast<int>(mesh.triangles.size() * 3 / 2)}}));
         EXPECT_NEAR(test::areaOf(test::inCells(mesh)), area, 2e-4 * area);
         // No corner of the pieces is farther from the old mesh than its stray.
         const MeshBvh bvh(box);
@@ -117,7 +121,9 @@ TEST(SplitLongEdges, RandomClosedMeshesOfLongTriangles) {
         const LatticeMesh lattice = meshFrom(mesh);
         ASSERT_GT(lattice.triangles.size(), mesh.triangles.size());
         expectShortEdges(lattice);
-        EXPECT_EQ(test::edgeUses(lattice.triangles), (std::map<int, int>{{2, static_cast<int>(lattice.triangles.size() * 3 / 2)}})) << seed;
+        EXPECT_EQ(test::edgeUses(lattice.triangles),
+                  (std::map<int, int>{{2, static_cast<int>(lattice.triangles.size() * 3 / 2)}}))
+            << seed;
         EXPECT_NEAR(test::areaOf(test::inCells(lattice)), area, 1e-5 * area) << seed;
     }
 }

@@ -18,7 +18,8 @@ TEST(MemoryPlan, SharesFitTheCap) {
             EXPECT_LE(plan->vertexBytes + plan->tempBytes + plan->bufferBytes, cap);
             EXPECT_LE(plan->pageBytes + plan->tempBytes + plan->bufferBytes + plan->bufferBytes / 4, cap);
             EXPECT_LE(plan->binTriangles * 260 + plan->tempBytes + plan->bufferBytes + plan->bufferBytes / 4, cap);
-            for (const uint64_t share : {plan->vertexBytes, plan->tempBytes, plan->bufferBytes, plan->pageBytes}) EXPECT_GT(share, cap / 40);
+            for (const uint64_t share : {plan->vertexBytes, plan->tempBytes, plan->bufferBytes, plan->pageBytes})
+                EXPECT_GT(share, cap / 40);
         }
 }
 
@@ -48,9 +49,7 @@ TEST(MemoryPlan, TooLittleSaysWhatIsEnough) {
     }
 }
 
-TEST(MemoryPlan, DefaultIsPartOfTheMachine) {
-    EXPECT_GT(defaultMemoryBytes(), 64 * kMiB);
-}
+TEST(MemoryPlan, DefaultIsPartOfTheMachine) { EXPECT_GT(defaultMemoryBytes(), 64 * kMiB); }
 
 }  // namespace
 }  // namespace vcp

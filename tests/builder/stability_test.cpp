@@ -41,13 +41,19 @@ std::vector<Ray> raysAt(const Built& built, size_t count, uint64_t seed) {
         glm::dvec3 target = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
         glm::dvec3 direction = unitVector(random);
         switch (rays.size() % 6) {
-            case 0: break;
-            case 1: target = t[random() % 3]; break;  // a vertex
-            case 2: target = t[0] + u * (t[1] - t[0]); break;  // an edge
-            case 3: {  // grazing: nearly in the triangle's plane
+            case 0:
+                break;
+            case 1:
+                target = t[random() % 3];
+                break;  // a vertex
+            case 2:
+                target = t[0] + u * (t[1] - t[0]);
+                break;  // an edge
+            case 3: {   // grazing: nearly in the triangle's plane
                 const glm::dvec3 in = t[1] - t[0], normal = glm::cross(in, t[2] - t[0]);
                 if (glm::length(in) > 0 && glm::length(normal) > 0)
-                    direction = glm::normalize(glm::normalize(in) + std::pow(10.0, -1 - 7 * unit(random)) * glm::normalize(normal));
+                    direction = glm::normalize(glm::normalize(in) +
+                                               std::pow(10.0, -1 - 7 * unit(random)) * glm::normalize(normal));
                 break;
             }
             case 4: {  // along an axis, in a plane of the grid
@@ -55,10 +61,12 @@ std::vector<Ray> raysAt(const Built& built, size_t count, uint64_t seed) {
                 direction = glm::dvec3(0);
                 direction[axis] = random() % 2 ? 1 : -1;
                 const int across = (axis + 1) % 3;
-                target[across] = origin[across] + std::round((target[across] - origin[across]) / dataset.header.cell) * dataset.header.cell;
+                target[across] = origin[across] + std::round((target[across] - origin[across]) / dataset.header.cell) *
+                                                      dataset.header.cell;
                 break;
             }
-            default: target += radius * 0.3 * unitVector(random);
+            default:
+                target += radius * 0.3 * unitVector(random);
         }
         rays.push_back({target - 3.0 * radius * direction, direction});
     }
@@ -78,14 +86,18 @@ void expectRight(const Built& built, size_t rays = 6000, uint32_t coarsest = 0) 
         EXPECT_LE(certified, 2 * dataset.cellOf(level)) << "level " << level;
         const RayJudge judge(built.bvh(), dataset.cellOf(level), certified);
         for (const bool single : {false, true}) {
-            SCOPED_TRACE(testing::Message() << "level " << level << " of " << built.levels() << (single ? ", float" : ""));
-            const auto caster = ReferenceCaster::create(built.cache(), cut, {.singlePrecision = single, .steps = single ? 8 : 64});
+            SCOPED_TRACE(testing::Message()
+                         << "level " << level << " of " << built.levels() << (single ? ", float" : ""));
+            const auto caster =
+                ReferenceCaster::create(built.cache(), cut, {.singlePrecision = single, .steps = single ? 8 : 64});
             ASSERT_TRUE(caster.ok());
             RayClassTable table;
             for (const Ray& ray : raysAt(built, rays, level)) {
                 const auto hit = caster->cast({ray.origin, ray.direction});
                 const double slack = single && hit ? kFloatSlack * hit->t : 0;
-                table.add(judge.judge(ray.origin, ray.direction, hit ? std::optional(SurfaceHit{hit->t, hit->normal, hit->certifiedError + slack}) : std::nullopt));
+                table.add(judge.judge(
+                    ray.origin, ray.direction,
+                    hit ? std::optional(SurfaceHit{hit->t, hit->normal, hit->certifiedError + slack}) : std::nullopt));
             }
             EXPECT_EQ(table.holes(), 0u);
             EXPECT_EQ(table.tooFar(), 0u);
@@ -106,7 +118,8 @@ IndexedMesh sheet(uint32_t n, double noise = 0, uint64_t seed = 1) {
     for (uint32_t j = 0; j <= n; ++j)
         for (uint32_t i = 0; i <= n; ++i) {
             const double x = double(i) / n, y = double(j) / n;
-            mesh.positions.push_back(glm::dvec3(x, y, 0.1 * std::sin(7 * x) * std::cos(5 * y)) + noise / n * glm::dvec3(unit(random), unit(random), unit(random)));
+            mesh.positions.push_back(glm::dvec3(x, y, 0.1 * std::sin(7 * x) * std::cos(5 * y)) +
+                                     noise / n * glm::dvec3(unit(random), unit(random), unit(random)));
         }
     for (uint32_t j = 0; j < n; ++j)
         for (uint32_t i = 0; i < n; ++i) {
@@ -138,7 +151,9 @@ TEST(Stability, SliversInASurface) {
             const glm::dvec3 pa = mesh.positions[a], pb = mesh.positions[b], pc = mesh.positions[c];
             const auto m = static_cast<uint32_t>(mesh.positions.size());
             mesh.positions.push_back(0.4 * pa + 0.6 * pc + height * (pb - pa));
-            for (const std::array<uint32_t, 3> t : {std::array{a, b, m}, std::array{b, c, m}, std::array{a, m, c}, mesh.triangles[k + 1]}) triangles.push_back(t);
+            for (const std::array<uint32_t, 3> t :
+                 {std::array{a, b, m}, std::array{b, c, m}, std::array{a, m, c}, mesh.triangles[k + 1]})
+                triangles.push_back(t);
         }
         mesh.triangles = triangles;
         test::rotate(mesh, {0.5, 0.5, 0}, {1, 2, 3}, 0.6);
@@ -166,7 +181,8 @@ TEST(Stability, NeedlesThinnerThanTheLattice) {
     for (uint32_t i = 0; i < 24; ++i) {
         const glm::dvec3 from(unit(random), unit(random), unit(random)), across = unitVector(random);
         const glm::dvec3 along = i < 16 ? unitVector(random) : 3e-7 * unitVector(random);
-        for (const glm::dvec3 p : {from, from + along, from + (i % 2 ? 0.4 : 0.0) * along + 3e-7 * across}) mesh.positions.push_back(p);
+        for (const glm::dvec3 p : {from, from + along, from + (i % 2 ? 0.4 : 0.0) * along + 3e-7 * across})
+            mesh.positions.push_back(p);
         mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
     const Built built(mesh, 0.03);
@@ -204,7 +220,8 @@ TEST(Stability, PointAndSegmentTriangles) {
 
 TEST(Stability, OriginsFarAway) {
     // UTM coordinates, and an origin ten million cells away, in cells that are no power of two.
-    for (const glm::dvec3 origin : {glm::dvec3(483920.25, 5430128.5, 312.125), glm::dvec3(-4e5, 4e5, 0), glm::dvec3(4e5 / 3)}) {
+    for (const glm::dvec3 origin :
+         {glm::dvec3(483920.25, 5430128.5, 312.125), glm::dvec3(-4e5, 4e5, 0), glm::dvec3(4e5 / 3)}) {
         IndexedMesh mesh = sheet(24, 0.3);
         test::append(mesh, test::boxMesh({0.3, 0.3, 0.2}, {0.7, 0.6, 0.5}, 4));
         for (glm::dvec3& p : mesh.positions) p += origin;
@@ -259,13 +276,15 @@ TEST(Stability, NonOrientable) {
         }
     expectRight(mesh, 0.05);
     // A Klein bottle: closed, non-orientable, through itself.
-    expectRight(test::gridSurface(60, 60, false,
-                                  [](double u, double v) {
-                                      const double a = u * test::kTwoPi, b = v * test::kTwoPi;
-                                      const double r = 2 + std::cos(b / 2) * std::sin(a) - std::sin(b / 2) * std::sin(2 * a);
-                                      return glm::dvec3(r * std::cos(b), r * std::sin(b), std::sin(b / 2) * std::sin(a) + std::cos(b / 2) * std::sin(2 * a));
-                                  }),
-                0.12);
+    expectRight(
+        test::gridSurface(60, 60, false,
+                          [](double u, double v) {
+                              const double a = u * test::kTwoPi, b = v * test::kTwoPi;
+                              const double r = 2 + std::cos(b / 2) * std::sin(a) - std::sin(b / 2) * std::sin(2 * a);
+                              return glm::dvec3(r * std::cos(b), r * std::sin(b),
+                                                std::sin(b / 2) * std::sin(a) + std::cos(b / 2) * std::sin(2 * a));
+                          }),
+        0.12);
 }
 
 TEST(Stability, Open) {
@@ -301,7 +320,8 @@ TEST(Stability, Duplicated) {
 TEST(Stability, Nested) {
     // Shells that are less than a cell apart.
     IndexedMesh mesh;
-    for (const double radius : {0.5, 0.51, 0.55, 0.9, 0.9001}) test::append(mesh, test::sphereMesh({0.1, 0.2, 0.3}, radius, 16));
+    for (const double radius : {0.5, 0.51, 0.55, 0.9, 0.9001})
+        test::append(mesh, test::sphereMesh({0.1, 0.2, 0.3}, radius, 16));
     expectRight(mesh, 0.06);
 }
 

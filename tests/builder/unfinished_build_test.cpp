@@ -62,7 +62,8 @@ protected:
         EXPECT_NE(report.error().line().find("--resume"), std::string::npos) << report.error().line();
         fs::remove(output());
         left_.clear();
-        for (const auto& entry : fs::directory_iterator(temp())) left_[entry.path().filename().string()] = contentOf(entry.path());
+        for (const auto& entry : fs::directory_iterator(temp()))
+            left_[entry.path().filename().string()] = contentOf(entry.path());
         for (const char* name : {"journal", kTempMark}) EXPECT_TRUE(left_.contains(name)) << name;
     }
 
@@ -129,7 +130,8 @@ TEST_F(UnfinishedBuild, FlippedBitsAreFoundOrHarmless) {
             std::string damaged = file->second;
             damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ 1 << bit % 8);
             std::ofstream(temp() / file->first, std::ios::binary) << damaged;
-            expectSameOrError(fmt::format("{}: {}, bit {} of {}", stages[stage], file->first, bit, damaged.size() * 8), endings);
+            expectSameOrError(fmt::format("{}: {}, bit {} of {}", stages[stage], file->first, bit, damaged.size() * 8),
+                              endings);
         }
         fs::remove_all(temp());
         fs::remove(output());
@@ -189,9 +191,11 @@ TEST_F(UnfinishedBuild, ATornLastLineOfTheJournalCountsAsAbsent) {
 }
 
 /// All that one could say instead of one of the journal's fields.
-void forOtherValues(json& root, json& value, const std::function<void(const std::string&, bool isWrongType)>& visit, const std::string& name) {
+void forOtherValues(json& root, json& value, const std::function<void(const std::string&, bool isWrongType)>& visit,
+                    const std::string& name) {
     const json before = value;
-    for (const json& other : {json(), json("text"), json(-7), json(0.5), json(1e300), json(uint64_t{1} << 62), json(0), json(true), json::array(), json::object()}) {
+    for (const json& other : {json(), json("text"), json(-7), json(0.5), json(1e300), json(uint64_t{1} << 62), json(0),
+                              json(true), json::array(), json::object()}) {
         const bool isNumber = before.is_number() && other.is_number();
         value = other;
         visit(name + " " + other.dump(), before.type_name() != std::string(other.type_name()) && !isNumber);
@@ -238,7 +242,8 @@ TEST_F(UnfinishedBuild, JournalsThatSaySomethingElse) {
                 // Some of it cannot be told from the truth, but all of it ends well.
                 const auto report = resume();
                 ++tried;
-                const bool isNeeded = what.find("pass") == std::string::npos && what.find("bin") == std::string::npos && what.find("partition") == std::string::npos;
+                const bool isNeeded = what.find("pass") == std::string::npos && what.find("bin") == std::string::npos &&
+                                      what.find("partition") == std::string::npos;
                 if (isWrongType && (isNeeded || std::string(stage) != "sorting")) {
                     ASSERT_FALSE(report.ok()) << stage << what;
                 }

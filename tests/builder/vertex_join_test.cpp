@@ -70,7 +70,8 @@ protected:
     /// How a file brings its parts: vertices and triangles in chunks, the one before the other or in turns.
     enum class Order { VerticesFirst, TrianglesFirst, InTurns };
 
-    Result<std::vector<World>> join(const Indexed& mesh, Order order, uint64_t vertexBytes, uint64_t seed, bool withColour = true, bool withUv = true) {
+    Result<std::vector<World>> join(const Indexed& mesh, Order order, uint64_t vertexBytes, uint64_t seed,
+                                    bool withColour = true, bool withUv = true) {
         std::filesystem::remove_all(folder_ / "temp");  // what one that failed left
         TempSpace space(folder_ / "temp", vertexBytes > 1 << 22 ? 1 << 30 : 0);
         std::vector<World> joined;
@@ -82,8 +83,12 @@ protected:
         size_t v = 0, k = 0;
         while (v < mesh.positions.size() || k < mesh.triangles.size()) {
             MeshChunk chunk;
-            const bool wantsVertices = order == Order::VerticesFirst ? v < mesh.positions.size() : order == Order::InTurns ? true : k == mesh.triangles.size();
-            const bool wantsTriangles = order == Order::TrianglesFirst ? k < mesh.triangles.size() : order == Order::InTurns ? true : v == mesh.positions.size();
+            const bool wantsVertices = order == Order::VerticesFirst ? v < mesh.positions.size()
+                                       : order == Order::InTurns     ? true
+                                                                     : k == mesh.triangles.size();
+            const bool wantsTriangles = order == Order::TrianglesFirst ? k < mesh.triangles.size()
+                                        : order == Order::InTurns      ? true
+                                                                       : v == mesh.positions.size();
             if (wantsVertices)
                 for (size_t end = std::min(mesh.positions.size(), v + 1 + random() % 60000); v < end; ++v) {
                     chunk.positions.push_back(mesh.positions[v]);
@@ -106,7 +111,8 @@ protected:
         return joined;
     }
 
-    void expectJoined(const Indexed& mesh, Order order, uint64_t vertexBytes, uint64_t seed, bool withColour = true, bool withUv = true) {
+    void expectJoined(const Indexed& mesh, Order order, uint64_t vertexBytes, uint64_t seed, bool withColour = true,
+                      bool withUv = true) {
         const auto have = join(mesh, order, vertexBytes, seed, withColour, withUv);
         ASSERT_TRUE(have.ok()) << have.error().line();
         const std::vector<World> want = directJoin(mesh, withColour, withUv, 100);
@@ -119,7 +125,8 @@ protected:
 
 TEST_F(Join, FitsMemory) {
     const Indexed mesh = randomMesh(20000, 50000, 20000, 1);
-    for (const Order order : {Order::VerticesFirst, Order::TrianglesFirst, Order::InTurns}) expectJoined(mesh, order, uint64_t{1} << 30, 1);
+    for (const Order order : {Order::VerticesFirst, Order::TrianglesFirst, Order::InTurns})
+        expectJoined(mesh, order, uint64_t{1} << 30, 1);
 }
 
 TEST_F(Join, ManyChunks) {
@@ -151,7 +158,8 @@ TEST_F(Join, VerticesThatNeverCame) {
                 const auto joined = join(mesh, order, 0, 1);
                 ASSERT_FALSE(joined.ok()) << vertices << ' ' << wrong;
                 EXPECT_EQ(joined.error().code, ErrorCode::InvalidInput);
-                EXPECT_NE(joined.error().line().find("a vertex that the file does not have"), std::string::npos) << joined.error().line();
+                EXPECT_NE(joined.error().line().find("a vertex that the file does not have"), std::string::npos)
+                    << joined.error().line();
                 EXPECT_NE(joined.error().line().find("mesh.ply"), std::string::npos) << joined.error().line();
             }
 }
@@ -182,7 +190,8 @@ TEST_F(Join, VerticesThatComeBackDamaged) {
 
 TEST_F(Join, ErrorsOfTheSinkComeThrough) {
     TempSpace space(folder_ / "temp", 1 << 20);
-    VertexJoin join(space, 0, [&](const World&) { return Result<void>(Error{.code = ErrorCode::Io, .message = "full"}); });
+    VertexJoin join(space, 0,
+                    [&](const World&) { return Result<void>(Error{.code = ErrorCode::Io, .message = "full"}); });
     MeshChunk chunk;
     chunk.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     chunk.triangles = {{0, 1, 2}};

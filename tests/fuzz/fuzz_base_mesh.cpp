@@ -1,5 +1,5 @@
-// What a hostile base mesh may do: it is read as it stands, or refused in one line; what was read has a shell of finite numbers,
-// or none.
+// What a hostile base mesh may do: it is read as it stands, or refused in one line; what was read has a shell of finite
+// numbers, or none.
 #include <cmath>
 
 #include "mesostructure/shell.h"
@@ -19,7 +19,8 @@ void checkShell(const vcp::meso::BaseSurface& base) {
     if (!shell) return require(shell.error().line().find('\n') == std::string::npos, "an error is one line");
     require(shell->pieces > 0 && shell->pieces <= 3 * base.triangles.size(), "three pieces a triangle at most");
     require(shell->texels.size() == size_t{2} * shell->nodes + size_t{7} * shell->pieces, "nodes and pieces");
-    for (const glm::vec4& texel : shell->texels) require(std::isfinite(texel.x + texel.y + texel.z + texel.w), "a shell is finite");
+    for (const glm::vec4& texel : shell->texels)
+        require(std::isfinite(texel.x + texel.y + texel.z + texel.w), "a shell is finite");
 }
 
 }  // namespace
@@ -33,7 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         require(base.error().line().find('\n') == std::string::npos, "an error is one line");
         return 0;
     }
-    require(base->positions == cut->positions && base->triangles == cut->triangles && base->uvs == cut->uvs, "nor the surface");
+    require(base->positions == cut->positions && base->triangles == cut->triangles && base->uvs == cut->uvs,
+            "nor the surface");
     require(!base->triangles.empty() && base->uvs.size() == base->triangles.size(), "a map of each triangle");
     for (const auto& triangle : base->triangles)
         for (const uint32_t corner : triangle) require(corner < base->positions.size(), "corners are in range");

@@ -34,7 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     require(again.ok(), "a page can be stored");
     const auto view = vcp::parsePage(std::as_bytes(std::span(*again)));
     require(view.ok(), "a stored page comes back");
-    require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves, "with its leaves");
+    require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves,
+            "with its leaves");
     (void)vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page);
     return 0;
 }

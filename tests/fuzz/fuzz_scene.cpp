@@ -22,11 +22,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     require(scene->sections.size() <= vcp::kMostSections, "sections are as many as can be drawn");
     for (const vcp::SceneDataset& dataset : scene->datasets) {
         require(!dataset.file.empty(), "a dataset has a file");
-        require(isFinite(dataset.placement.translation) && dataset.placement.scale > 0 && std::isfinite(dataset.placement.scale), "places are finite");
+        require(isFinite(dataset.placement.translation) && dataset.placement.scale > 0 &&
+                    std::isfinite(dataset.placement.scale),
+                "places are finite");
         const glm::dquat q = dataset.placement.rotation;
         require(std::abs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-6, "rotations are unit quaternions");
     }
     for (const vcp::MesoSurfaceDescription& surface : scene->surfaces)
-        require(isFinite(surface.place) && surface.tiles > 0 && surface.scale > 0 && surface.heightScale > 0, "surfaces have a place and a size");
+        require(isFinite(surface.place) && surface.tiles > 0 && surface.scale > 0 && surface.heightScale > 0,
+                "surfaces have a place and a size");
     return 0;
 }

@@ -27,7 +27,9 @@ struct Outside {
 const std::vector<Outside>& outsideRules() {
     static const std::vector<Outside> rules{
         {std::regex("vulkan/.*|vk_.*|volk.*"), {"render", "viewer"}, "Vulkan belongs to render/ and viewer/"},
-        {std::regex("GLFW/.*|.*imgui.*"), {"viewer/window", "viewer/examples"}, "GLFW and ImGui belong to viewer/window/"},
+        {std::regex("GLFW/.*|.*imgui.*"),
+         {"viewer/window", "viewer/examples"},
+         "GLFW and ImGui belong to viewer/window/"},
         {std::regex("CLI/.*"), {"viewer/command"}, "CLI11 belongs to viewer/command/"},
         {std::regex("thread|mutex|shared_mutex|condition_variable|future|stop_token|semaphore|latch|barrier|execution|"
                     "pthread\\.h|tbb/.*|oneapi/.*"),
@@ -46,7 +48,8 @@ std::string brokenBy(const Room& room, const std::string& header) {
     }
     for (const Outside& rule : outsideRules()) {
         if (!std::regex_match(header, rule.header)) continue;
-        const bool isThere = std::ranges::any_of(rule.places, [&](const std::string& place) { return (room.path + "/").starts_with(place + "/"); });
+        const bool isThere = std::ranges::any_of(
+            rule.places, [&](const std::string& place) { return (room.path + "/").starts_with(place + "/"); });
         if (!isThere) return header + ": " + rule.what;
     }
     return "";
@@ -54,7 +57,9 @@ std::string brokenBy(const Room& room, const std::string& header) {
 
 /// Whether a line of code names a stream of the process.
 bool prints(std::string_view code) {
-    const auto isPartOfName = [&](size_t at) { return at < code.size() && (std::isalnum(static_cast<unsigned char>(code[at])) || code[at] == '_'); };
+    const auto isPartOfName = [&](size_t at) {
+        return at < code.size() && (std::isalnum(static_cast<unsigned char>(code[at])) || code[at] == '_');
+    };
     for (const std::string_view stream : {"stdout", "stderr", "std::cout", "std::cerr"})
         for (size_t at = code.find(stream); at != std::string_view::npos; at = code.find(stream, at + 1))
             if (!(at > 0 && isPartOfName(at - 1)) && !isPartOfName(at + stream.size())) return true;
@@ -105,9 +110,12 @@ std::vector<RoomTarget> roomTargets(std::string_view cmakeText) {
         words >> word;
         target.name = "vcp_" + word;
         while (words >> word) {
-            if (word == "OF" || word == "SOURCES" || word == "LINKS") part = word;
-            else if (part == "OF") target.library = word;
-            else if (part == "LINKS") target.links.push_back(word);
+            if (word == "OF" || word == "SOURCES" || word == "LINKS")
+                part = word;
+            else if (part == "OF")
+                target.library = word;
+            else if (part == "LINKS")
+                target.links.push_back(word);
         }
         targets.push_back(std::move(target));
     }
@@ -126,7 +134,9 @@ std::vector<std::string> linkViolations(std::string_view room, const RoomTarget&
             continue;
         }
         for (const std::string& other : known->second)
-            if (!here || !mayInclude(*here, *roomOf(other))) found.push_back(target.name + " links " + link + ", but " + std::string(room) + "/ may not include " + other + "/");
+            if (!here || !mayInclude(*here, *roomOf(other)))
+                found.push_back(target.name + " links " + link + ", but " + std::string(room) + "/ may not include " +
+                                other + "/");
     }
     return found;
 }

@@ -23,8 +23,8 @@ struct RoomTarget {
 };
 std::vector<RoomTarget> roomTargets(std::string_view cmakeText);
 
-/// Links of the target of `room` that no arrow of its allows. `roomsOf`: the rooms that a target or library of ours stands
-/// for, by its name.
+/// Links of the target of `room` that no arrow of its allows. `roomsOf`: the rooms that a target or library of ours
+/// stands for, by its name.
 std::vector<std::string> linkViolations(std::string_view room, const RoomTarget& target,
                                         const std::map<std::string, std::vector<std::string>>& roomsOf);
 

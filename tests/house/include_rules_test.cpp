@@ -126,7 +126,8 @@ TEST(IncludeRules, SamplesAreJudged) {
         {"render", "#include <vulkan/vulkan.h>\n#include \"streaming/page_source.h\"\n", 0},
         {"render/passes", "#include \"render/vulkan/device.h\"\n#include \"viewer/viewer.h\"\n", 1},
         {"render", "#include \"builder/build.h\"\n#include <GLFW/glfw3.h>\n#include <future>\n", 3},
-        {"render", "#include \"viewer/window/window.h\"\n#include <imgui.h>\n#include <backends/imgui_impl_vulkan.h>\n", 3},
+        {"render", "#include \"viewer/window/window.h\"\n#include <imgui.h>\n#include <backends/imgui_impl_vulkan.h>\n",
+         3},
         {"viewer", "#include \"render/renderer.h\"\n#include <thread>\n", 0},
         {"viewer", "#include <GLFW/glfw3.h>\n#include \"viewer/window/window.h\"\n", 2},
         {"viewer", "#include \"tests/house/include_rules.h\"\n", 1},
@@ -135,7 +136,8 @@ TEST(IncludeRules, SamplesAreJudged) {
         {"viewer/scene", "    std::fprintf(stderr, \"done\");\n", 1},
         {"viewer/command", "#include <CLI/CLI.hpp>\n    std::fprintf(stderr, \"done\");  // stderr\n", 0},
         {"viewer/window", "#include <GLFW/glfw3.h>\n#include \"viewer/viewer.h\"\n// on stdout\n", 0},
-        {"viewer/bench/peers", "#include \"builder/paper/paper_octree.h\"\n#include \"viewer/bench/rays/bench_tracer.h\"\n", 1},
+        {"viewer/bench/peers",
+         "#include \"builder/paper/paper_octree.h\"\n#include \"viewer/bench/rays/bench_tracer.h\"\n", 1},
         {"datasets_scripts", "#include \"builder/stream/mesh_stream.h\"\n#include \"viewer/scene.h\"\n", 1},
         {"octree", "// #include \"viewer/window/window.h\"\n", 0},
     };
@@ -147,8 +149,9 @@ TEST(IncludeRules, SamplesAreJudged) {
 }
 
 TEST(IncludeRules, LinksAreJudged) {
-    const auto targets = roomTargets("# Pages.\nvcp_room(builder_page OF vcp_builder\n    SOURCES\n        a.cpp\n    LINKS\n"
-                                     "        vcp_builder_lattice\n        vcp_builder_level\n        TBB::tbb\n        vcp_made_up)\n");
+    const auto targets = roomTargets(
+        "# Pages.\nvcp_room(builder_page OF vcp_builder\n    SOURCES\n        a.cpp\n    LINKS\n"
+        "        vcp_builder_lattice\n        vcp_builder_level\n        TBB::tbb\n        vcp_made_up)\n");
     ASSERT_EQ(targets.size(), 1u);
     EXPECT_EQ(targets[0].name, "vcp_builder_page");
     EXPECT_EQ(targets[0].library, "vcp_builder");

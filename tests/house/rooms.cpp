@@ -18,8 +18,8 @@ const std::vector<Room>& rooms() {
         {"builder/level", {"octree", "builder/lattice", "builder/spill"}},
         {"builder/measure", {"octree", "builder/stream", "builder/mesh"}},
         {"builder",
-         {"octree", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice", "builder/page",
-          "builder/level"}},
+         {"octree", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice",
+          "builder/page", "builder/level"}},
         {"builder/paper", {"octree", "builder", "builder/mesh", "builder/measure"}},
 
         {"mesostructure", {"octree"}},
@@ -31,19 +31,23 @@ const std::vector<Room>& rooms() {
         {"viewer/picture", {"octree", "render"}},
         {"viewer/asset", {"octree", "builder/", "mesostructure"}},
         {"viewer", {"octree", "render", "viewer/camera", "viewer/scene"}},
-        {"viewer/widget", {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
-        {"viewer/window", {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
+        {"viewer/widget",
+         {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
+        {"viewer/window",
+         {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
         {"viewer/bench/report", {"octree"}},
         {"viewer/bench/peers", {"octree", "builder/", "streaming", "render"}},
-        {"viewer/bench/rays", {"octree", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/peers"}},
+        {"viewer/bench/rays",
+         {"octree", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/peers"}},
         {"viewer/bench/stress",
-         {"octree", "builder/", "streaming", "render", "viewer/camera", "viewer/scene", "viewer/bench/report", "viewer/bench/rays"}},
+         {"octree", "builder/", "streaming", "render", "viewer/camera", "viewer/scene", "viewer/bench/report",
+          "viewer/bench/rays"}},
         {"viewer/bench",
          {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/scene", "viewer", "viewer/bench/report",
           "viewer/bench/rays"}},
         {"viewer/command",
-         {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/camera", "viewer/scene", "viewer/picture",
-          "viewer/asset", "viewer", "viewer/window", "viewer/bench/"}},
+         {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/camera", "viewer/scene",
+          "viewer/picture", "viewer/asset", "viewer", "viewer/window", "viewer/bench/"}},
         {"viewer/examples", {}},
 
         {"datasets_scripts", {"octree", "builder/"}},
@@ -54,7 +58,8 @@ const std::vector<Room>& rooms() {
 const Room* roomOf(std::string_view path) {
     const Room* deepest = nullptr;
     for (const Room& room : rooms()) {
-        const bool isInside = path.starts_with(room.path) && (path.size() == room.path.size() || path[room.path.size()] == '/');
+        const bool isInside =
+            path.starts_with(room.path) && (path.size() == room.path.size() || path[room.path.size()] == '/');
         if (isInside && (!deepest || room.path.size() > deepest->path.size())) deepest = &room;
     }
     return deepest;

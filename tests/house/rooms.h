@@ -16,7 +16,8 @@ struct Room {
 /// In reading order: arrows run upward in this table only, so there is no circle.
 const std::vector<Room>& rooms();
 
-/// The room that a file or folder is in; null where it is in none. A header on a different path, like <vector>, is in none.
+/// The room that a file or folder is in; null where it is in none. A header on a different path, like <vector>, is in
+/// none.
 const Room* roomOf(std::string_view path);
 
 /// Whether a file of `room` may include one of `other`.

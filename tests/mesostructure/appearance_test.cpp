@@ -1,8 +1,8 @@
 // Light of mesostructure from far, against means over many rays.
 #include <cmath>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "mesostructure/appearance.h"
 #include "tests/support/meso_rays.h"

@@ -28,7 +28,8 @@ Asset small(const std::string& solid) {
     Asset asset;
     asset.name = "small";
     asset.solid = solid;
-    const auto built = buildAsset(asset, {.cells = {8, 8, 2}, .samples = 1, .distances = {.cones = {2, 1}}, .factors = {2}});
+    const auto built =
+        buildAsset(asset, {.cells = {8, 8, 2}, .samples = 1, .distances = {.cones = {2, 1}}, .factors = {2}});
     EXPECT_TRUE(built.ok()) << built.error().line();
     return asset;
 }
@@ -42,8 +43,11 @@ TEST(AssetFile, GivesBackWhatWasWritten) {
         if (kind == 1) asset.solid = "beads", asset.seed = 9;
         if (kind == 2) {
             // A box of twelve triangles, normals outwards.
-            const auto corner = [](int i) { return glm::dvec3(i & 1 ? 0.7 : 0.3, i & 2 ? 0.7 : 0.3, i & 4 ? 0.2 : 0.1); };
-            for (const auto& [a, b, c, d] : std::initializer_list<std::array<int, 4>>{{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+            const auto corner = [](int i) {
+                return glm::dvec3(i & 1 ? 0.7 : 0.3, i & 2 ? 0.7 : 0.3, i & 4 ? 0.2 : 0.1);
+            };
+            for (const auto& [a, b, c, d] : std::initializer_list<std::array<int, 4>>{
+                     {0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
                 asset.triangles.push_back({corner(a), corner(b), corner(c)});
                 asset.triangles.push_back({corner(a), corner(c), corner(d)});
             }
@@ -62,7 +66,8 @@ TEST(AssetFile, GivesBackWhatWasWritten) {
         EXPECT_EQ(read->patches->rows, asset.patches->rows);
         EXPECT_EQ(read->triangles, asset.triangles);
         EXPECT_EQ(read->compressed->bytes(), asset.compressed->bytes());
-        EXPECT_EQ(read->heights ? read->heights->texels : std::vector<uint16_t>(), asset.heights ? asset.heights->texels : std::vector<uint16_t>());
+        EXPECT_EQ(read->heights ? read->heights->texels : std::vector<uint16_t>(),
+                  asset.heights ? asset.heights->texels : std::vector<uint16_t>());
         // The same again, byte for byte.
         ASSERT_TRUE(writeAsset(folder / "b.meso", *read).ok());
         EXPECT_EQ(contentOf(folder / "a.meso"), contentOf(folder / "b.meso"));
@@ -76,7 +81,8 @@ TEST(AssetFile, EveryTruncationAndEveryFlippedBitIsRefused) {
     ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
     Bytes bytes = bytesOf(folder / "a.meso");
     ASSERT_TRUE(parseAsset(bytes, "a").ok());
-    for (size_t size = 0; size < bytes.size(); ++size) ASSERT_FALSE(parseAsset(std::span(bytes).first(size), "a").ok()) << size;
+    for (size_t size = 0; size < bytes.size(); ++size)
+        ASSERT_FALSE(parseAsset(std::span(bytes).first(size), "a").ok()) << size;
     for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
         bytes[bit / 8] ^= std::byte(1 << bit % 8);
         ASSERT_FALSE(parseAsset(bytes, "a").ok()) << "bit " << bit;

@@ -15,7 +15,8 @@ namespace {
 Occupancy randomOccupancy(glm::ivec3 cells, glm::dvec3 extent, double part, uint32_t seed) {
     std::mt19937 random(seed);
     std::bernoulli_distribution coin(part);
-    Occupancy occupancy{TileGrid(cells, extent), std::vector<uint8_t>(size_t(cells.x) * size_t(cells.y) * size_t(cells.z))};
+    Occupancy occupancy{TileGrid(cells, extent),
+                        std::vector<uint8_t>(size_t(cells.x) * size_t(cells.y) * size_t(cells.z))};
     for (uint8_t& cell : occupancy.cells) cell = coin(random);
     return occupancy;
 }
@@ -33,7 +34,9 @@ double byDefinition(const Occupancy& occupancy, glm::ivec3 at, glm::ivec3 sign, 
                 double square = 0;
                 for (int axis = 0; axis < 3; ++axis) {
                     ordered = ordered && apart[axis] * sign[axis] >= 0;
-                    const double gap = (betweenCentres ? std::abs(apart[axis]) : std::max(0, std::abs(apart[axis]) - 1)) * grid.cell[axis];
+                    const double gap =
+                        (betweenCentres ? std::abs(apart[axis]) : std::max(0, std::abs(apart[axis]) - 1)) *
+                        grid.cell[axis];
                     square += gap * gap;
                 }
                 if (ordered) best = std::min(best, std::sqrt(square));
@@ -52,7 +55,9 @@ TEST(DistanceMap, SignedConesAreExactInAnyGrid) {
                     const glm::ivec3 signs(sign % 3 - 1, sign / 3 % 3 - 1, sign / 9 - 1);
                     const std::vector<float> found = signedConeDistances(occupancy, signs, betweenCentres);
                     for (size_t i = 0; i < found.size(); ++i)
-                        ASSERT_FLOAT_EQ(found[i], float(byDefinition(occupancy, occupancy.grid.at(i), signs, betweenCentres))) << "seed " << seed << " sign " << sign << " cell " << i;
+                        ASSERT_FLOAT_EQ(found[i],
+                                        float(byDefinition(occupancy, occupancy.grid.at(i), signs, betweenCentres)))
+                            << "seed " << seed << " sign " << sign << " cell " << i;
                 }
             }
 }
@@ -65,18 +70,22 @@ TEST(DistanceMap, SearchFindsWhatTheTransformsFind) {
         // The search keeps off a little at walls.
         for (size_t i = 0; i < exact.steps.size(); ++i) {
             ASSERT_LE(searched.steps[i], exact.steps[i]) << cones.azimuth << "x" << cones.elevation << " cell " << i;
-            ASSERT_GE(searched.steps[i] + 1, exact.steps[i]) << cones.azimuth << "x" << cones.elevation << " cell " << i;
+            ASSERT_GE(searched.steps[i] + 1, exact.steps[i])
+                << cones.azimuth << "x" << cones.elevation << " cell " << i;
         }
     }
 }
 
 TEST(DistanceMap, MoreConesNeverShortenLengths) {
     const Occupancy occupancy = test::occupied(*test::solid("beads"), {32, 32, 8});
-    const DistanceMap one = test::distances(occupancy, {.cones = {1, 1}}), four = test::distances(occupancy, {.cones = {4, 1}}), eight = test::distances(occupancy, {.cones = {8, 1}});
+    const DistanceMap one = test::distances(occupancy, {.cones = {1, 1}}),
+                      four = test::distances(occupancy, {.cones = {4, 1}}),
+                      eight = test::distances(occupancy, {.cones = {8, 1}});
     double sums[3] = {};
     for (size_t i = 0; i < occupancy.cells.size(); ++i)
         for (int cone = 0; cone < 8; ++cone) {
-            const uint8_t plain = one.steps[i], quarter = four.steps[size_t(cone / 2) * occupancy.cells.size() + i], narrow = eight.steps[size_t(cone) * occupancy.cells.size() + i];
+            const uint8_t plain = one.steps[i], quarter = four.steps[size_t(cone / 2) * occupancy.cells.size() + i],
+                          narrow = eight.steps[size_t(cone) * occupancy.cells.size() + i];
             ASSERT_LE(plain, quarter);
             sums[0] += plain, sums[1] += quarter, sums[2] += narrow;
         }
@@ -89,8 +98,10 @@ TEST(DistanceMap, ConesOfDirectionsAreClosedUnderTheirSigns) {
         std::mt19937 random(3);
         for (int i = 0; i < 1000; ++i) {
             const glm::dvec3 d = test::rayAnywhere(random, glm::dvec3(1)).direction;
-            const double turn = std::atan2(d.y, d.x) < 0 ? std::atan2(d.y, d.x) + 2 * M_PI : std::atan2(d.y, d.x), height = std::asin(d.z);
-            const int expected = int((height / M_PI + 0.5) * cones.elevation) * cones.azimuth + int(turn / (2 * M_PI) * cones.azimuth);
+            const double turn = std::atan2(d.y, d.x) < 0 ? std::atan2(d.y, d.x) + 2 * M_PI : std::atan2(d.y, d.x),
+                         height = std::asin(d.z);
+            const int expected =
+                int((height / M_PI + 0.5) * cones.elevation) * cones.azimuth + int(turn / (2 * M_PI) * cones.azimuth);
             ASSERT_EQ(coneOf(ConeBorders(cones), glm::vec3(d)), expected) << i;
         }
     }
@@ -98,8 +109,8 @@ TEST(DistanceMap, ConesOfDirectionsAreClosedUnderTheirSigns) {
     EXPECT_EQ(coneOf(ConeBorders({4, 2}), {1, 0, 0}), 4);
 }
 
-/// Directions close to the borders: never farther outside the cone that is found than its header says, and in the right one from
-/// there on.
+/// Directions close to the borders: never farther outside the cone that is found than its header says, and in the right
+/// one from there on.
 TEST(DistanceMap, ConesAreFoundToAFewUnitsOfTheLastPlace) {
     constexpr double kBound = 4e-7;
     static_assert(kBound < kConeSlack);
@@ -113,14 +124,19 @@ TEST(DistanceMap, ConesAreFoundToAFewUnitsOfTheLastPlace) {
             for (int i = 0; i < 400; ++i) {
                 const double off = (i % 2 == 0 ? 1e-6 : 6e-6) * (unit(random) - 0.5);
                 // On a border of azimuth, anywhere in elevation, or the other way round.
-                const double turn = (i / 2 % 2 == 0 ? std::floor(unit(random) * azimuths) * wedge + off : unit(random) * 2 * M_PI);
-                const double height = (i / 2 % 2 == 1 ? -M_PI / 2 + std::floor(unit(random) * elevations) * band + off : (unit(random) - 0.5) * M_PI);
+                const double turn =
+                    (i / 2 % 2 == 0 ? std::floor(unit(random) * azimuths) * wedge + off : unit(random) * 2 * M_PI);
+                const double height = (i / 2 % 2 == 1 ? -M_PI / 2 + std::floor(unit(random) * elevations) * band + off
+                                                      : (unit(random) - 0.5) * M_PI);
                 // As the rounded direction has it.
-                const glm::vec3 d(std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn), std::sin(height));
-                const double x = d.x, y = d.y, z = d.z, isTurn = std::atan2(y, x), isHeight = std::atan2(z, std::hypot(x, y));
+                const glm::vec3 d(std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn),
+                                  std::sin(height));
+                const double x = d.x, y = d.y, z = d.z, isTurn = std::atan2(y, x),
+                             isHeight = std::atan2(z, std::hypot(x, y));
                 const int cone = coneOf(borders, d);
                 const double middle = (cone % azimuths + 0.5) * wedge, low = -M_PI / 2 + cone / azimuths * band;
-                ASSERT_LE(std::abs(std::remainder(isTurn - middle, 2 * M_PI)), wedge / 2 + kBound) << azimuths << "x" << elevations << " ray " << i;
+                ASSERT_LE(std::abs(std::remainder(isTurn - middle, 2 * M_PI)), wedge / 2 + kBound)
+                    << azimuths << "x" << elevations << " ray " << i;
                 ASSERT_GE(isHeight, low - kBound) << azimuths << "x" << elevations << " ray " << i;
                 ASSERT_LE(isHeight, low + band + kBound) << azimuths << "x" << elevations << " ray " << i;
             }
@@ -139,7 +155,8 @@ Oversteps countOversteps(const Shape& shape, const DistanceMap& map, uint32_t se
         const MarchRay ray = test::rayAnywhere(random, shape.extent());
         const glm::ivec3 cell(glm::floor(ray.origin / map.grid.cell));
         const int cone = coneOf(ConeBorders(map.cones), glm::vec3(ray.direction));
-        if (cell.z >= map.grid.cells.z || map.steps[map.slot(cone, cell)] == kOccupied || shape.field(ray.origin) <= 0) continue;
+        if (cell.z >= map.grid.cells.z || map.steps[map.slot(cone, cell)] == kOccupied || shape.field(ray.origin) <= 0)
+            continue;
         const TruthHit truth = shape.trace(ray.origin, ray.direction, 2);
         const double length = map.length(cone, cell);
         ++result.rays;
@@ -155,7 +172,8 @@ TEST(DistanceMap, NoStepPassesTheSurface) {
         for (const Cones cones : {Cones{1, 1}, Cones{4, 1}, Cones{4, 2}, Cones{8, 1}, Cones{6, 3}}) {
             const Oversteps found = countOversteps(*shape, test::distances(occupancy, {.cones = cones}), 9, 1500);
             EXPECT_GT(found.rays, 300u) << name;
-            EXPECT_EQ(found.over, 0u) << name << " " << cones.azimuth << "x" << cones.elevation << " by " << found.worst;
+            EXPECT_EQ(found.over, 0u) << name << " " << cones.azimuth << "x" << cones.elevation << " by "
+                                      << found.worst;
         }
     }
 }
@@ -163,8 +181,16 @@ TEST(DistanceMap, NoStepPassesTheSurface) {
 TEST(DistanceMap, ThePapersRuleOversteps) {
     const auto shape = test::solid("beads");
     const Occupancy occupancy = test::occupied(*shape, {24, 24, 8});
-    EXPECT_GT(countOversteps(*shape, test::distances(occupancy, {.cones = {4, 1}, .rule = DistanceRule::Paper}, shape.get()), 2, 20000).over, 0u);
-    EXPECT_EQ(countOversteps(*shape, test::distances(occupancy, {.cones = {4, 1}, .rule = DistanceRule::PaperSafe}, shape.get()), 2, 20000).over, 0u);
+    EXPECT_GT(
+        countOversteps(*shape, test::distances(occupancy, {.cones = {4, 1}, .rule = DistanceRule::Paper}, shape.get()),
+                       2, 20000)
+            .over,
+        0u);
+    EXPECT_EQ(countOversteps(
+                  *shape, test::distances(occupancy, {.cones = {4, 1}, .rule = DistanceRule::PaperSafe}, shape.get()),
+                  2, 20000)
+                  .over,
+              0u);
 }
 
 TEST(DistanceMap, RefusesWhatItCannotBuild) {
@@ -192,7 +218,8 @@ TEST(OctantBoxes, AreEmptyAndCannotGrow) {
             const uint16_t box = boxes.boxes[size_t(octant) * occupancy.cells.size() + i];
             ASSERT_EQ(box >> 15, occupancy.cells[i]);
             if (box >> 15) continue;
-            const glm::ivec3 sign(octant & 1 ? -1 : 1, octant & 2 ? -1 : 1, octant & 4 ? -1 : 1), extent(box & 31, box >> 5 & 31, box >> 10 & 31), at = occupancy.grid.at(i);
+            const glm::ivec3 sign(octant & 1 ? -1 : 1, octant & 2 ? -1 : 1, octant & 4 ? -1 : 1),
+                extent(box & 31, box >> 5 & 31, box >> 10 & 31), at = occupancy.grid.at(i);
             ASSERT_TRUE(isEmpty(at, sign, extent)) << "cell " << i << " octant " << octant;
             for (int axis = 0; axis < 3; ++axis) {
                 glm::ivec3 more = extent;

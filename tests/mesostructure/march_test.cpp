@@ -18,7 +18,8 @@ struct Judged {
 
 /// `far`: hits off by more than `tolerance`, tile units.
 template <class Truth>
-Judged judge(const Marcher& marcher, glm::dvec3 extent, const Truth& truth, double tolerance, int rays, double lowest = 5) {
+Judged judge(const Marcher& marcher, glm::dvec3 extent, const Truth& truth, double tolerance, int rays,
+             double lowest = 5) {
     std::mt19937 random(17);
     Judged judged;
     for (int i = 0; i < rays; ++i) {
@@ -47,8 +48,10 @@ TEST(March, ExactCellsOfHeightFieldsMissNothing) {
         const OctantBoxes boxes = buildOctantBoxes(occupancy);
         const DistanceMap distances = test::distances(occupancy, {.cones = {4, 1}});
         uint64_t all = 0, skipped = 0;
-        for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}}) {
-            const Judged judged = judge(*test::walk(skipping, {.heights = &map}), shape->extent(), truth, 2e-3, 1500, 2);
+        for (const Skipping& skipping :
+             {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}}) {
+            const Judged judged =
+                judge(*test::walk(skipping, {.heights = &map}), shape->extent(), truth, 2e-3, 1500, 2);
             EXPECT_EQ(judged.missed + judged.falseHits + judged.unresolved, 0) << name;
             EXPECT_GT(judged.hits, 1400) << name;
             (skipping.occupancy ? all : skipped) = judged.fetches;
@@ -73,7 +76,8 @@ TEST(March, SampledFieldsMissNothingOfThemselves) {
         const DistanceMap distances = test::distances(occupancy, {.cones = {8, 1}, .cap = 0.2});
         const CompressedMap compressed = *compressMap(distances, std::vector{4});
         uint64_t unmarked = 0, fewest = 0;
-        for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.compressed = &compressed}, Skipping{.boxes = &boxes}, Skipping{.boxes = &marked}}) {
+        for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.compressed = &compressed},
+                                         Skipping{.boxes = &boxes}, Skipping{.boxes = &marked}}) {
             const Judged judged = judge(*test::walk(skipping, {.field = &field}), shape->extent(), truth, 2e-3, 800);
             EXPECT_EQ(judged.missed, 0) << name;
             EXPECT_EQ(judged.falseHits + judged.unresolved, 0) << name;
@@ -83,7 +87,8 @@ TEST(March, SampledFieldsMissNothingOfThemselves) {
     }
 }
 
-/// Trilinear distances would miss rays at the silhouettes of what is convex; samples that are right on average over a cell do not.
+/// Trilinear distances would miss rays at the silhouettes of what is convex; samples that are right on average over a
+/// cell do not.
 TEST(March, SampledSolidsAreAsLargeAsTheirShapes) {
     const auto shape = test::solid("ball");
     const glm::ivec3 cells(32, 32, int(std::ceil(32 * shape->extent().z)));
@@ -163,16 +168,17 @@ TEST(March, AwkwardRays) {
     const double top = map.range;
     const double grazing = std::sqrt(1 - 1e-12);
     const MarchRay rays[] = {
-        {{0.5, 0.5, top}, {0, 0, -1}},                         // AxisAlignedOnGridPlanes
-        {{0.5, 0.25, top}, {-1, 0, 0}},                        // along the top
-        {{0.0, 0.0, top * 0.999}, {1, 0, 0}},                  // Horizontal
+        {{0.5, 0.5, top}, {0, 0, -1}},         // AxisAlignedOnGridPlanes
+        {{0.5, 0.25, top}, {-1, 0, 0}},        // along the top
+        {{0.0, 0.0, top * 0.999}, {1, 0, 0}},  // Horizontal
         {{0.5, 0.5, top}, {std::sqrt(0.5), 0, -std::sqrt(0.5)}},
         {{1e5 + 0.3, -1e5 + 0.7, top}, {0, -std::sqrt(0.5), -std::sqrt(0.5)}},  // OriginFarAway
-        {{0.1, 0.1, top}, {grazing, 0, -1e-6}},                // GrazingRays
-        {{0.3, 0.3, top}, {0, 0, 1}},                          // away
-        {{0.9, 0.9, 0.0}, {0, 0, -1}},                         // below
+        {{0.1, 0.1, top}, {grazing, 0, -1e-6}},                                 // GrazingRays
+        {{0.3, 0.3, top}, {0, 0, 1}},                                           // away
+        {{0.9, 0.9, 0.0}, {0, 0, -1}},                                          // below
     };
-    for (const Skipping& skipping : {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}}) {
+    for (const Skipping& skipping :
+         {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}}) {
         const auto marcher = test::walk(skipping, {.heights = &map});
         for (size_t i = 0; i < std::size(rays); ++i) {
             MarchRay ray = rays[i];
@@ -190,7 +196,8 @@ TEST(March, CapsAreUnresolved) {
     const HeightMap map = *makeHeightField("needle", 16, 1);
     const auto shape = test::heights(map);
     const auto few = sphereMarcher(*buildSphereMap(*shape, {.cells = {16, 16, 4}, .steps = 2}));
-    EXPECT_EQ(few->march({{0.1, 0.1, map.range}, glm::normalize(glm::dvec3(1, 0.1, -0.05))}).state, MarchState::Unresolved);
+    EXPECT_EQ(few->march({{0.1, 0.1, map.range}, glm::normalize(glm::dvec3(1, 0.1, -0.05))}).state,
+              MarchState::Unresolved);
     // Between the needles for ever: more cells than iterations.
     const Occupancy occupancy = test::occupied(*shape, {16, 16, 4});
     const auto cells = test::walk({.occupancy = &occupancy}, {.heights = &map});
@@ -201,8 +208,13 @@ TEST(March, ReliefRefinementsFindTheBracketsRoot) {
     const HeightMap map = *makeHeightField("hemispheres", 128, 1);
     const auto shape = test::heights(map);
     double mean[5] = {};
-    for (const Refinement refinement : {Refinement::None, Refinement::Binary, Refinement::Secant, Refinement::SecantAsPrinted, Refinement::Illinois}) {
-        const auto marcher = reliefMarcher(map, {.steps = 64, .refinement = refinement, .refinements = 20, .tolerance = refinement == Refinement::SecantAsPrinted ? 0.01f : 1e-5f});
+    for (const Refinement refinement : {Refinement::None, Refinement::Binary, Refinement::Secant,
+                                        Refinement::SecantAsPrinted, Refinement::Illinois}) {
+        const auto marcher =
+            reliefMarcher(map, {.steps = 64,
+                                .refinement = refinement,
+                                .refinements = 20,
+                                .tolerance = refinement == Refinement::SecantAsPrinted ? 0.01f : 1e-5f});
         std::mt19937 random(4);
         int counted = 0;
         for (int i = 0; i < 1000; ++i) {

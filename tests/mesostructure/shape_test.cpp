@@ -16,7 +16,8 @@ TEST(Shape, FieldsBoundTheDistanceAndRepeat) {
         std::mt19937 random(7);
         for (int i = 0; i < 2000; ++i) {
             const MarchRay a = test::rayAnywhere(random, shape->extent());
-            const double fa = shape->field(a.origin), step = 0.07 * (i % 10 + 1) / 10, fb = shape->field(a.origin + step * a.direction);
+            const double fa = shape->field(a.origin), step = 0.07 * (i % 10 + 1) / 10,
+                         fb = shape->field(a.origin + step * a.direction);
             ASSERT_LE(std::abs(fa - fb), step * (1 + 1e-9)) << name << " " << i;
             ASSERT_NEAR(fa, shape->field(a.origin + glm::dvec3(-3, 5, 0)), 1e-9) << name;
         }
@@ -33,7 +34,8 @@ TEST(Shape, HeightFieldTruthIsTheFirstCrossing) {
             const TruthHit hit = shape->trace(ray.origin, ray.direction, 100);
             ASSERT_TRUE(hit.hit) << name << i;
             ASSERT_NEAR(shape->field(ray.origin + hit.t * ray.direction), 0, 1e-9) << name << i;
-            for (double t = 0; t < hit.t - 1e-9; t += hit.t / 200) ASSERT_GT(shape->field(ray.origin + t * ray.direction), -1e-12) << name << i;
+            for (double t = 0; t < hit.t - 1e-9; t += hit.t / 200)
+                ASSERT_GT(shape->field(ray.origin + t * ray.direction), -1e-12) << name << i;
         }
     }
 }
@@ -63,7 +65,8 @@ TEST(Shape, MeshEqualsTheBallItWasMadeOf) {
         double least = 9;
         p.x -= std::floor(p.x), p.y -= std::floor(p.y);
         for (const double x : {-1.0, 0.0, 1.0})
-            for (const double y : {-1.0, 0.0, 1.0}) least = std::min(least, glm::length(p - centre - glm::dvec3(x, y, 0)) - 0.1);
+            for (const double y : {-1.0, 0.0, 1.0})
+                least = std::min(least, glm::length(p - centre - glm::dvec3(x, y, 0)) - 0.1);
         return least;
     };
     std::mt19937 random(3);

@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
+#include <gtest/gtest.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 namespace vcp::meso {
 namespace {
@@ -32,7 +32,8 @@ Shell shellOf(const BaseSurface& surface, double height) {
 struct Piece {
     glm::vec3 v0, r[3], q0, t[3];
     Piece(const Shell& shell, uint32_t i) {
-        const glm::vec4* at = shell.texels.data() + Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{i};
+        const glm::vec4* at =
+            shell.texels.data() + Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{i};
         v0 = glm::vec3(at[0]);
         for (int k = 0; k < 3; ++k) r[k] = glm::vec3(at[1 + k]), q0[k] = at[1 + k].w, t[k] = glm::vec3(at[4 + k]);
     }
@@ -41,7 +42,9 @@ struct Piece {
         const glm::vec3 w(glm::dot(r[0], p - v0), glm::dot(r[1], p - v0), glm::dot(r[2], p - v0));
         return std::min({w.x, w.y, w.z, 1 - w.x - w.y - w.z});
     }
-    [[nodiscard]] glm::vec3 tile(glm::vec3 p) const { return q0 + glm::vec3(glm::dot(t[0], p - v0), glm::dot(t[1], p - v0), glm::dot(t[2], p - v0)); }
+    [[nodiscard]] glm::vec3 tile(glm::vec3 p) const {
+        return q0 + glm::vec3(glm::dot(t[0], p - v0), glm::dot(t[1], p - v0), glm::dot(t[2], p - v0));
+    }
 };
 
 TEST(Shell, BasesFaceOutwardsAndHaveSoundShells) {
@@ -60,7 +63,9 @@ TEST(Shell, BasesFaceOutwardsAndHaveSoundShells) {
         for (const glm::dvec3 p : surface.positions) low = glm::min(low, p), high = glm::max(high, p);
         EXPECT_NEAR(shell.high.z, high.z + 0.05, 0.01) << name;
         EXPECT_LT(shell.low.x, name == "quad" ? low.x + 1e-3 : low.x - 0.03) << name;
-        EXPECT_EQ(shell.texels.size(), Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{shell.pieces}) << name;
+        EXPECT_EQ(shell.texels.size(),
+                  Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{shell.pieces})
+            << name;
     }
 }
 
@@ -119,10 +124,15 @@ TEST(Shell, CountsWhatMapsAndSurfacesHave) {
     EXPECT_EQ(shellOf(sliver, 0.1).withoutArea, 1u);
 
     // A gutter, narrower than the shell is high.
-    BaseSurface gutter = {.positions = {{-1, 0, 1}, {-1, 4, 1}, {-0.1, 0, 0}, {-0.1, 4, 0}, {0.1, 0, 0}, {0.1, 4, 0}, {1, 0, 1}, {1, 4, 1}}, .triangles = {}, .uvs = {}};
+    BaseSurface gutter = {
+        .positions =
+            {{-1, 0, 1}, {-1, 4, 1}, {-0.1, 0, 0}, {-0.1, 4, 0}, {0.1, 0, 0}, {0.1, 4, 0}, {1, 0, 1}, {1, 4, 1}},
+        .triangles = {},
+        .uvs = {}};
     for (uint32_t i = 0; i < 6; i += 2)
         for (const std::array<uint32_t, 3> t : {std::array<uint32_t, 3>{i, i + 2, i + 3}, {i, i + 3, i + 1}})
-            gutter.triangles.push_back(t), gutter.uvs.push_back(mapped(glm::dvec2(t[0], 0), glm::dvec2(t[1], 1), glm::dvec2(t[2], 2)));
+            gutter.triangles.push_back(t),
+                gutter.uvs.push_back(mapped(glm::dvec2(t[0], 0), glm::dvec2(t[1], 1), glm::dvec2(t[2], 2)));
     EXPECT_EQ(shellOf(gutter, 0.05).inverted, 0u);
     EXPECT_GT(shellOf(gutter, 1.0).inverted, 0u);
 }
@@ -131,7 +141,10 @@ TEST(Shell, KnowsWhereItIsCut) {
     const auto cutFaces = [](const BaseSurface& surface) {
         const Shell shell = shellOf(surface, 0.1);
         int cut = 0;
-        for (uint32_t i = 0; i < shell.pieces; ++i) cut += std::popcount(uint32_t(shell.texels[Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{i}].w) & 15u);
+        for (uint32_t i = 0; i < shell.pieces; ++i)
+            cut += std::popcount(
+                uint32_t(shell.texels[Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{i}].w) &
+                15u);
         return cut;
     };
     // Two faces a side: of the four sides on the border, and of the two on a seam.

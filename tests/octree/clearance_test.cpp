@@ -28,9 +28,12 @@ TEST(Clearance, IsThatOfTheNearestOccupiedCell) {
             int expected = n;  // cells between the two boxes along the axis that parts them most
             for (const auto& [low, size] : boxes) {
                 int gap = -1;
-                for (int axis = 0; axis < 3; ++axis) gap = std::max({gap, low[axis] - (lower[axis] + edge), lower[axis] - (low[axis] + size)});
-                if (gap >= 0) expected = std::min(expected, gap);
-                else expected = std::min(expected, 0);
+                for (int axis = 0; axis < 3; ++axis)
+                    gap = std::max({gap, low[axis] - (lower[axis] + edge), lower[axis] - (low[axis] + size)});
+                if (gap >= 0)
+                    expected = std::min(expected, gap);
+                else
+                    expected = std::min(expected, 0);
             }
             ASSERT_EQ(clearance.of(lower, edge), expected);
         }

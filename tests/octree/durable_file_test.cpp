@@ -89,7 +89,8 @@ std::atomic<int> signals = 0;
 
 // A pipe takes as much as it has room for, and a signal ends a write that waits: with what it took, or with EINTR.
 TEST_F(DurableFile, InterruptedWritesGoOn) {
-    struct sigaction action {}, before {};
+    struct sigaction action {
+    }, before{};
     action.sa_handler = [](int) { ++signals; };
     ASSERT_EQ(sigaction(SIGUSR1, &action, &before), 0);
     int ends[2];
@@ -129,8 +130,10 @@ TEST_F(DurableFile, ErrorsSayWhatAndWhatToDo) {
         EXPECT_EQ(result.error().line(), file_.string() + ": write failed: Bad file descriptor");
     }
     EXPECT_EQ(systemError("a/b", "cannot do", EACCES).line(), "a/b: cannot do: Permission denied");
-    EXPECT_EQ(systemError("a/b", "cannot do", ENOSPC).line(), "a/b: cannot do: No space left on device; free some space or choose another folder");
-    EXPECT_EQ(systemError("a/b", "cannot do", EDQUOT, "do this").line(), "a/b: cannot do: Disk quota exceeded; do this");
+    EXPECT_EQ(systemError("a/b", "cannot do", ENOSPC).line(),
+              "a/b: cannot do: No space left on device; free some space or choose another folder");
+    EXPECT_EQ(systemError("a/b", "cannot do", EDQUOT, "do this").line(),
+              "a/b: cannot do: Disk quota exceeded; do this");
     if (!fs::exists("/dev/full")) return;
     const Opened full("/dev/full", O_WRONLY);
     const auto result = writeAll(full, 0, bytes, "/dev/full", "do that");

@@ -138,7 +138,9 @@ TEST(LeafMath, RayValueIsTheValueOnTheRay) {
         const double u = r.unit(r.random);
         const double f = f64::leafValue(leaf, a + u * (b - a));
         ASSERT_NEAR(f64::rayValue(f64::restrictToRay(faces[0], faces[1], axis, a, b - a), u), f, 1e-13);
-        ASSERT_NEAR(f32::rayValue(f32::restrictToRay(faces[0], faces[1], axis, glm::vec3(a), glm::vec3(b - a)), float(u)), f, 3e-6);
+        ASSERT_NEAR(
+            f32::rayValue(f32::restrictToRay(faces[0], faces[1], axis, glm::vec3(a), glm::vec3(b - a)), float(u)), f,
+            3e-6);
     }
 }
 
@@ -253,7 +255,8 @@ TEST(LeafMath, ContinuousOverFacesOfAllAxes) {
             // A ray that leaves one enters the other with the same value.
             const glm::vec3 from(r.inside()), to(r.inside());
             const f32::RayField leaving = f32::restrictToRay(facesA[0], facesA[1], axisA, from, glm::vec3(x) - from);
-            const f32::RayField entering = f32::restrictToRay(facesB[0], facesB[1], axisB, glm::vec3(y), to - glm::vec3(y));
+            const f32::RayField entering =
+                f32::restrictToRay(facesB[0], facesB[1], axisB, glm::vec3(y), to - glm::vec3(y));
             ASSERT_NEAR(leaving.last, entering.c.x, float(kWallRounding));
         }
     }
@@ -327,8 +330,9 @@ TEST(LeafMath, WallsCountWithinTheirTolerance) {
     const f64::LeafField leaf = exactLeaf(corners, 0);
     const auto cross = [&](double from, double to, double wallIn, double wallOut) {
         const glm::dvec3 p(0.3, 0.3, from), d(0, 0, to - from);
-        const f64::RayField ray = f64::blendOnRay(leaf.a0 + leaf.gx0 * p.x + leaf.gy0 * p.y + leaf.gz0 * p.z, leaf.gz0 * d.z,
-                                                  leaf.a1 + leaf.gx1 * p.x + leaf.gy1 * p.y + leaf.gz1 * p.z, leaf.gz1 * d.z, p, d);
+        const f64::RayField ray =
+            f64::blendOnRay(leaf.a0 + leaf.gx0 * p.x + leaf.gy0 * p.y + leaf.gz0 * p.z, leaf.gz0 * d.z,
+                            leaf.a1 + leaf.gx1 * p.x + leaf.gy1 * p.y + leaf.gz1 * p.z, leaf.gz1 * d.z, p, d);
         return f64::firstCrossing(ray, wallIn, wallOut, 0.02, 32);
     };
     EXPECT_NEAR(cross(0.9, 0.1, 0, 0), 0.5, 1e-12);

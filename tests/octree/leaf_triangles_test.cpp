@@ -43,14 +43,16 @@ TEST(CubeTest, AgreesWithClipping) {
         SCOPED_TRACE(i);
         const int range = 1 << (2 + i % 10);
         const auto any = [&] { return static_cast<int>(random() % static_cast<unsigned>(2 * range)) - range; };
-        const std::array<glm::i32vec3, 3> t{glm::i32vec3(any(), any(), any()), glm::i32vec3(any(), any(), any()), glm::i32vec3(any(), any(), any())};
+        const std::array<glm::i32vec3, 3> t{glm::i32vec3(any(), any(), any()), glm::i32vec3(any(), any(), any()),
+                                            glm::i32vec3(any(), any(), any())};
         const glm::i32vec3 lower(any(), any(), any());
         const int edge = 1 + static_cast<int>(random() % static_cast<unsigned>(range));
         const Touch expected = clipped(t, lower, edge);
         // The bounding boxes must overlap.
         bool boxes = true;
         for (int axis = 0; axis < 3; ++axis)
-            boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edge && std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
+            boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edge &&
+                    std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
         if (!boxes) continue;
         const bool touches = CubeTest(t).touches(lower, edge);
         ASSERT_TRUE(touches || !expected.certain);
@@ -72,7 +74,8 @@ TEST(CubeTest, TouchingCounts) {
     // The largest triangle and page that there may be.
     const int far = kMaxEdgeSteps;
     const glm::i32vec3 corner(-far / 2, -far / 2, -far / 2);
-    EXPECT_TRUE(CubeTest({corner, corner + glm::i32vec3(far, far, 0), corner + glm::i32vec3(far, 0, far)}).touches(glm::i32vec3(0), kLatticePerCell << 7));
+    EXPECT_TRUE(CubeTest({corner, corner + glm::i32vec3(far, far, 0), corner + glm::i32vec3(far, 0, far)})
+                    .touches(glm::i32vec3(0), kLatticePerCell << 7));
 }
 
 }  // namespace

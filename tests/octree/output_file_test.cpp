@@ -1,15 +1,15 @@
 #include "octree/output_file.h"
 
-#include <cstdlib>
 #include <fcntl.h>
-#include <fstream>
 #include <gtest/gtest.h>
-#include <iterator>
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 
 #include "tests/support/test_folder.h"
 
@@ -28,7 +28,9 @@ protected:
         std::ifstream file(path, std::ios::binary);
         return {std::istreambuf_iterator<char>(file), {}};
     }
-    size_t files() const { return static_cast<size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator())); }
+    size_t files() const {
+        return static_cast<size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
+    }
     static std::string refusal(const Result<void>& result) { return result ? "" : result.error().line(); }
 
     const std::string png_ = "\x89PNG\r\n\x1a\nold";
@@ -54,8 +56,10 @@ TEST_F(OutputFiles, NeverReplaceWhatIsRead) {
     fs::create_symlink(input, folder_ / "link.png");
     fs::create_hard_link(input, folder_ / "hard.png");
     fs::create_directory(folder_ / "d");
-    for (const fs::path& name : {input, folder_ / "link.png", folder_ / "hard.png", folder_ / "d/../in.png", fs::relative(input)}) {
-        const auto refused = writeFile(name, OutputKind::Png, png_ + "new", {.overwrite = true, .inputs = {folder_ / "missing", input}});
+    for (const fs::path& name :
+         {input, folder_ / "link.png", folder_ / "hard.png", folder_ / "d/../in.png", fs::relative(input)}) {
+        const auto refused =
+            writeFile(name, OutputKind::Png, png_ + "new", {.overwrite = true, .inputs = {folder_ / "missing", input}});
         EXPECT_NE(refusal(refused).find(" give another name"), std::string::npos) << name;
         EXPECT_FALSE(checkOutput(name, OutputKind::Png, {.overwrite = true, .inputs = {input}}).ok());
     }
@@ -73,7 +77,8 @@ TEST_F(OutputFiles, InputsThatComeLaterAreSeenAtTheEnd) {
 
 TEST_F(OutputFiles, OtherKindsAreReplacedWhenAskedFor) {
     const fs::path ply = put("a.ply", "ply\nformat");
-    EXPECT_NE(refusal(writeFile(ply, OutputKind::Dataset, std::string_view("x"))).find("is not a dataset"), std::string::npos);
+    EXPECT_NE(refusal(writeFile(ply, OutputKind::Dataset, std::string_view("x"))).find("is not a dataset"),
+              std::string::npos);
     EXPECT_EQ(contentOf(ply), "ply\nformat");
     EXPECT_TRUE(writeFile(ply, OutputKind::JsonText, "{}", {.overwrite = true}).ok());
     EXPECT_EQ(contentOf(ply), "{}\n");
@@ -143,7 +148,8 @@ TEST_F(OutputFiles, LeftoversOfInterruptedWritersGo) {
     {
         const int holder = ::open(left.c_str(), O_RDONLY);
         ASSERT_EQ(::flock(holder, LOCK_EX | LOCK_NB), 0);
-        EXPECT_NE(refusal(checkOutput(out, OutputKind::Dataset, {})).find("another build is writing"), std::string::npos);
+        EXPECT_NE(refusal(checkOutput(out, OutputKind::Dataset, {})).find("another build is writing"),
+                  std::string::npos);
         ::close(holder);
     }
     EXPECT_TRUE(fs::exists(left));

@@ -31,10 +31,12 @@ std::vector<Triangle> trianglesOf(const PageView& page, uint32_t word) {
     for (uint32_t r = range.first; r < range.first + range.count; ++r) {
         const glm::u32vec2 record = page.triangles[r];
         Triangle t;
-        const uint32_t vertices[] = {f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y), f64::decodeIndex2(record.y)};
+        const uint32_t vertices[] = {f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
+                                     f64::decodeIndex2(record.y)};
         for (size_t i = 0; i < 3; ++i) {
             const uint32_t v = vertices[i];
-            t[i] = {page.vertices[v].x, page.vertices[v].y, page.normals[v], page.vertexColours.empty() ? 0 : page.vertexColours[v]};
+            t[i] = {page.vertices[v].x, page.vertices[v].y, page.normals[v],
+                    page.vertexColours.empty() ? 0 : page.vertexColours[v]};
         }
         std::sort(t.begin(), t.end());
         triangles.push_back(t);
@@ -50,7 +52,8 @@ void expectSameNode(const PageView& a, uint32_t wordA, const PageView& b, uint32
         return;
     }
     if (nodeType(wordA) == kNodeInternal) {
-        for (uint32_t o = 0; o < 8 && !testing::Test::HasFatalFailure(); ++o) expectSameNode(a, a.nodes[8 * wordA + o], b, b.nodes[8 * wordB + o]);
+        for (uint32_t o = 0; o < 8 && !testing::Test::HasFatalFailure(); ++o)
+            expectSameNode(a, a.nodes[8 * wordA + o], b, b.nodes[8 * wordB + o]);
         return;
     }
     if (nodeType(wordA) == kNodeEmpty) {
@@ -111,7 +114,9 @@ TEST(PageCodec, SoftPagesComeBack) {
         for (uint32_t axis = 0; axis < 3; ++axis) {
             SCOPED_TRACE(log2Cells * 10 + axis);
             const double n = std::exp2(log2Cells);
-            for (const auto& field : {test::sphere(glm::dvec3(n * 0.45), n * 0.4), test::plane(glm::normalize(glm::dvec3(1, 2, 3)), n), test::torus(glm::dvec3(n * 0.5), n * 0.3, n * 0.11)}) {
+            for (const auto& field :
+                 {test::sphere(glm::dvec3(n * 0.45), n * 0.4), test::plane(glm::normalize(glm::dvec3(1, 2, 3)), n),
+                  test::torus(glm::dvec3(n * 0.5), n * 0.3, n * 0.11)}) {
                 WholePage page = analyticPage(field, log2Cells, axis);
                 expectRoundTrip(page, kCoded);
                 page.colour = randomColours(page.view(), log2Cells);
@@ -125,7 +130,10 @@ TEST(PageCodec, TriangleSoupsComeBack) {
         SCOPED_TRACE(seed);
         std::mt19937 random(seed);
         const uint32_t log2Cells = 1 + seed % 3, depth = log2Cells + seed % (kMaxSubcellDepth + 1);
-        expectRoundTrip(soup(seed, log2Cells, std::min(depth, 4u), 8 + static_cast<uint32_t>(random() % 30), 1 + static_cast<uint32_t>(random() % 40)).build(seed), kCoded);
+        expectRoundTrip(soup(seed, log2Cells, std::min(depth, 4u), 8 + static_cast<uint32_t>(random() % 30),
+                             1 + static_cast<uint32_t>(random() % 40))
+                            .build(seed),
+                        kCoded);
     }
 }
 
@@ -195,7 +203,8 @@ TEST(PageCodec, SmoothSurfaceCostsLittle) {
 // Else files written before can no longer be read: raise kFileVersion.
 TEST(PageCodec, GoldenBytes) {
     const WholePage soft = analyticPage(test::sphere({7.2, 8.1, 7.7}, 6), 4, 1), hard = sheet(1, 2, 3, 9).build(1);
-    const PackedPage a = packPage(asBytes(soft.geometry), {}), b = packPage(asBytes(hard.geometry), asBytes(hard.colour));
+    const PackedPage a = packPage(asBytes(soft.geometry), {}),
+                     b = packPage(asBytes(hard.geometry), asBytes(hard.colour));
     EXPECT_EQ(hashBytes(a.geometry), 10564386174724560174u);
     EXPECT_EQ(hashBytes(b.geometry), 1920278069947240605u);
     EXPECT_EQ(hashBytes(b.colour), 2651053299021788687u);
@@ -218,7 +227,8 @@ TEST(PageCodec, EveryTruncationIsRefused) {
     const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
     for (size_t size = 0; size < packed.geometry.size(); ++size) {
         // A copy of its own, so that a read behind the end is seen.
-        const std::vector<std::byte> part(packed.geometry.begin(), packed.geometry.begin() + static_cast<std::ptrdiff_t>(size));
+        const std::vector<std::byte> part(packed.geometry.begin(),
+                                          packed.geometry.begin() + static_cast<std::ptrdiff_t>(size));
         // The last bytes may be rounding that a decoder does not need.
         const bool decoded = decodes(part, page);
         EXPECT_TRUE(!decoded || size + 4 >= packed.geometry.size()) << size;
@@ -239,18 +249,22 @@ TEST(PageCodec, EveryTruncationIsRefused) {
 }
 
 TEST(PageCodec, HostileBytesAreHarmless) {
-    for (const WholePage& page : {sheet(3, 2, 3, 8).build(3), soup(4, 2, 4, 20, 25).build(4), analyticPage(test::sphere({4, 4, 4}, 3), 3, 0)}) {
+    for (const WholePage& page :
+         {sheet(3, 2, 3, 8).build(3), soup(4, 2, 4, 20, 25).build(4), analyticPage(test::sphere({4, 4, 4}, 3), 3, 0)}) {
         const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
         std::mt19937 random(11);
         for (int i = 0; i < 3000; ++i) {
             std::vector<std::byte> bytes = packed.geometry;
             // Mostly behind the counts, which lie in the first bytes of either stream.
-            for (auto k = 1 + random() % 3; k > 0; --k) bytes[1 + random() % (bytes.size() - 1)] ^= static_cast<std::byte>(1u << random() % 8);
+            for (auto k = 1 + random() % 3; k > 0; --k)
+                bytes[1 + random() % (bytes.size() - 1)] ^= static_cast<std::byte>(1u << random() % 8);
             decodes(bytes, page);
             if (page.colour.empty()) continue;
             std::vector<std::byte> colour = packed.colour;
             colour[1 + random() % (colour.size() - 1)] ^= static_cast<std::byte>(1u << random() % 8);
-            const auto decoded = unpackColour(colour, page.colour.size() * 16, *parsePage(asBytes(*unpackGeometry(packed.geometry, page.geometry.size() * 16))));
+            const auto decoded =
+                unpackColour(colour, page.colour.size() * 16,
+                             *parsePage(asBytes(*unpackGeometry(packed.geometry, page.geometry.size() * 16))));
             EXPECT_TRUE(!decoded.ok() || decoded->size() == page.colour.size());
         }
         for (int i = 0; i < 3000; ++i) {

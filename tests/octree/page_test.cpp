@@ -17,7 +17,9 @@ namespace {
 
 constexpr uint32_t word(uint32_t type, uint32_t payload) { return type << kNodeTypeShift | payload; }
 constexpr uint32_t softLeaf(uint32_t face, uint32_t axis) { return word(kNodeSoft, axis << kSoftAxisShift | face); }
-constexpr uint32_t hardLeaf(uint32_t first, uint32_t count) { return word(kNodeHard, count << kHardCountShift | first); }
+constexpr uint32_t hardLeaf(uint32_t first, uint32_t count) {
+    return word(kNodeHard, count << kHardCountShift | first);
+}
 
 /// The parts of a page, from which its bytes are laid out whatever they claim.
 struct PageParts {
@@ -76,7 +78,8 @@ PageParts smallPage() {
     p.triangles = {pack21(0, 1, 2), pack21(0, 2, 3), {3u, 0u}, pack21(0, 1, 3), pack21(1, 2, 3), pack21(3, 2, 0)};
     for (uint32_t i = 0; i < 4; ++i) {
         const uint32_t far = kLatticeBias + 900;
-        p.vertices.push_back(pack21(i == 1 ? far : kLatticeBias, i == 2 ? far : kLatticeBias, i == 3 ? far : kLatticeBias));
+        p.vertices.push_back(
+            pack21(i == 1 ? far : kLatticeBias, i == 2 ? far : kLatticeBias, i == 3 ? far : kLatticeBias));
         p.normals.push_back(packNormal({0, 0, 1}, i == 2));
     }
     p.count();
@@ -103,7 +106,8 @@ private:
         const uint32_t index = node & kLeafIndexMask;
         switch (nodeType(node)) {
             case kNodeInternal:
-                for (uint32_t i = 0; i < 8; ++i) visit(page_.nodes[8 * uint64_t{node & kNodePayloadMask} + i], depth + 1);
+                for (uint32_t i = 0; i < 8; ++i)
+                    visit(page_.nodes[8 * uint64_t{node & kNodePayloadMask} + i], depth + 1);
                 return;
             case kNodeSoft: {
                 const uint32_t axis = node >> kSoftAxisShift & 3u;
@@ -114,10 +118,12 @@ private:
             case kNodeHard: {
                 const TriangleRange range = hardLeafTriangles(page_, node);
                 ASSERT_GT(range.count, 0u);
-                for (uint64_t t = range.first; t < uint64_t{range.first} + range.count; ++t) triangle(page_.triangles[t]);
+                for (uint64_t t = range.first; t < uint64_t{range.first} + range.count; ++t)
+                    triangle(page_.triangles[t]);
                 return;
             }
-            default: sum += static_cast<uint64_t>(nodeClearance(node));
+            default:
+                sum += static_cast<uint64_t>(nodeClearance(node));
         }
     }
 
@@ -233,7 +239,8 @@ TEST(Page, NoRandomDamageLeadsOutOfThePage) {
             // Mostly node words, mostly near what is valid: else nothing but the first check is reached.
             const size_t at = random() % 4 == 0 ? random() % (block.size() * 4) : 16 + random() % 16;
             const auto any = [&](uint32_t below) { return static_cast<uint32_t>(random() % below); };
-            words[at] = any(2) == 0 ? word(any(4), any(8) | any(3) << kHardCountShift) : static_cast<uint32_t>(random());
+            words[at] =
+                any(2) == 0 ? word(any(4), any(8) | any(3) << kHardCountShift) : static_cast<uint32_t>(random());
         }
         parseAndWalk(changed);
         if (HasFailure()) return;
@@ -277,14 +284,17 @@ TEST(Page, NestingIsBounded) {
                 p.nodes.resize(p.nodes.size() + 7, emptyNode(0));
             }
             p.count();
-            if (extra == 0) EXPECT_TRUE(parseAndWalk(p.bytes())) << log2Cells;
-            else expectRefused(p, "nested too deeply");
+            if (extra == 0)
+                EXPECT_TRUE(parseAndWalk(p.bytes())) << log2Cells;
+            else
+                expectRefused(p, "nested too deeply");
         }
 }
 
 TEST(Page, LyingCountsAreRefused) {
     for (const uint32_t lie : {5u, 1u << 22, 1u << 27, 1u << 28, 1u << 29, 0x80000000u, 0xffffffffu})
-        for (uint32_t PageHeader::*const field : {&PageHeader::groups, &PageHeader::faces, &PageHeader::triangles, &PageHeader::vertices}) {
+        for (uint32_t PageHeader::*const field :
+             {&PageHeader::groups, &PageHeader::faces, &PageHeader::triangles, &PageHeader::vertices}) {
             PageParts p = smallPage();
             p.header.*field = lie;
             const std::vector<uint4> block = p.bytes();

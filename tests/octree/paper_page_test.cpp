@@ -140,9 +140,12 @@ TEST_F(PaperFileTest, ParametersThatNoMethodHasAreRefused) {
     expectRefused(at + 16, "merge scheme", [&](FileHeader& h) { h.paper.mergeScheme = 3; });
     expectRefused(at + 20, "empty nodes", [&](FileHeader& h) { h.paper.safeEmpty = 2; });
     expectRefused(at + 24, "reserved", [&](FileHeader& h) { h.paper.reserved[0] = 1; });
-    const auto page = [&](const std::function<void(FileHeader&)>& change) { return verifyFile(**openFile(write(change))).error().line(); };
+    const auto page = [&](const std::function<void(FileHeader&)>& change) {
+        return verifyFile(**openFile(write(change))).error().line();
+    };
     EXPECT_NE(page([](FileHeader& h) { h.paper.packing = 1; }).find("its packing differs"), std::string::npos);
-    EXPECT_NE(page([](FileHeader& h) { h.leaves = 13; }).find("13 leaves, but the pages of the finest level have 14"), std::string::npos);
+    EXPECT_NE(page([](FileHeader& h) { h.leaves = 13; }).find("13 leaves, but the pages of the finest level have 14"),
+              std::string::npos);
 }
 
 TEST_F(PaperFileTest, ComesBackAndIsNoCertifiedDataset) {

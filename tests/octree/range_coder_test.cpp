@@ -28,13 +28,19 @@ Item randomItem(std::mt19937& random, double skew) {
     const auto magnitude = [&] { return static_cast<int64_t>(random() >> (3 + random() % 29)); };
     const bool rare = std::generate_canonical<double, 32>(random) < skew;
     switch (kind) {
-        case 0: return {kind, rare ? 1 : 0};
-        case 1: return {kind, rare ? static_cast<int64_t>(random() % 16) : 15};
-        case 2: return {kind, static_cast<int64_t>(random() % 3)};
-        case 3: return {kind, magnitude()};
+        case 0:
+            return {kind, rare ? 1 : 0};
+        case 1:
+            return {kind, rare ? static_cast<int64_t>(random() % 16) : 15};
+        case 2:
+            return {kind, static_cast<int64_t>(random() % 3)};
+        case 3:
+            return {kind, magnitude()};
         case 4:
-        case 5: return {kind, rare ? -magnitude() : magnitude() % 200};
-        default: return {kind, static_cast<int64_t>(random() % 8192)};
+        case 5:
+            return {kind, rare ? -magnitude() : magnitude() % 200};
+        default:
+            return {kind, static_cast<int64_t>(random() % 8192)};
     }
 }
 
@@ -44,13 +50,27 @@ int64_t code(Coder& coder, Models& m, int kind, int64_t value) {
     uint32_t u = static_cast<uint32_t>(value);
     int32_t s = static_cast<int32_t>(value);
     switch (kind) {
-        case 0: coder.bit(m.bit[0], b); return b ? 1 : 0;
-        case 1: coder.symbol(m.symbol, u); return u;
-        case 2: coder.symbol(m.few, u); return u;
-        case 3: m.number.code(coder, u); return u;
-        case 4: m.large.code(coder, s); return s;
-        case 5: m.small.code(coder, s); return s;
-        default: coder.raw(u, 13); return u;
+        case 0:
+            coder.bit(m.bit[0], b);
+            return b ? 1 : 0;
+        case 1:
+            coder.symbol(m.symbol, u);
+            return u;
+        case 2:
+            coder.symbol(m.few, u);
+            return u;
+        case 3:
+            m.number.code(coder, u);
+            return u;
+        case 4:
+            m.large.code(coder, s);
+            return s;
+        case 5:
+            m.small.code(coder, s);
+            return s;
+        default:
+            coder.raw(u, 13);
+            return u;
     }
 }
 
@@ -67,7 +87,8 @@ TEST(RangeCoder, EverythingComesBack) {
         encoder.finish(bytes);
         RangeDecoder decoder(bytes);
         Models fresh;
-        for (size_t i = 0; i < items.size(); ++i) ASSERT_EQ(code(decoder, fresh, items[i].kind, 0), items[i].value) << i;
+        for (size_t i = 0; i < items.size(); ++i)
+            ASSERT_EQ(code(decoder, fresh, items[i].kind, 0), items[i].value) << i;
         EXPECT_TRUE(decoder.complete());
     }
 }

@@ -4,8 +4,8 @@
 
 #include <atomic>
 #include <cmath>
-#include <cstring>
 #include <csignal>
+#include <cstring>
 #include <limits>
 #include <random>
 #include <thread>
@@ -41,12 +41,15 @@ Bytes bytesOf(const fs::path& path) {
 class MemoryFile final : public ByteReader {
 public:
     static constexpr uint64_t kIntact = ~uint64_t{0};
-    explicit MemoryFile(std::span<const std::byte> bytes, uint64_t wrongBit = kIntact) : bytes_(bytes), wrongBit_(wrongBit) {}
+    explicit MemoryFile(std::span<const std::byte> bytes, uint64_t wrongBit = kIntact)
+        : bytes_(bytes), wrongBit_(wrongBit) {}
 
     Result<void> read(uint64_t offset, std::span<std::byte> out) const override {
-        if (offset > bytes_.size() || out.size() > bytes_.size() - offset) return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
+        if (offset > bytes_.size() || out.size() > bytes_.size() - offset)
+            return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
         if (!out.empty()) std::memcpy(out.data(), bytes_.data() + offset, out.size());
-        if (wrongBit_ / 8 >= offset && wrongBit_ / 8 - offset < out.size()) out[wrongBit_ / 8 - offset] ^= std::byte{1} << int(wrongBit_ % 8);
+        if (wrongBit_ / 8 >= offset && wrongBit_ / 8 - offset < out.size())
+            out[wrongBit_ / 8 - offset] ^= std::byte{1} << int(wrongBit_ % 8);
         return {};
     }
     [[nodiscard]] uint64_t size() const override { return bytes_.size(); }
@@ -66,7 +69,8 @@ PageEntry entryOf(const Dataset& dataset, size_t page) {
 
 /// Writes a sphere of two levels with colour; 4 cells a page edge keep it small. By default it is in all octants.
 void writeSphere(const fs::path& path, glm::dvec3 centre = {3, 3.2, 2.9}, double radius = 1.4) {
-    const auto made = test::analyticDataset(test::sphere(centre, radius), {.origin = {-1, -1, -1}, .levels = 2, .log2Cells = 2});
+    const auto made =
+        test::analyticDataset(test::sphere(centre, radius), {.origin = {-1, -1, -1}, .levels = 2, .log2Cells = 2});
     auto writer = VcpWriter::create(path, made.pages.size());
     ASSERT_TRUE(writer.ok()) << writer.error().line();
     FileHeader header = made.dataset.header;
@@ -92,7 +96,10 @@ struct Forgery {
         return *reinterpret_cast<T*>(bytes.data() + offset);
     }
     FileHeader& header() { return at<FileHeader>(0); }
-    PageEntry& entry(uint64_t i) { return at<PageEntry>(kDirectoryOffset + i / kEntriesPerBlock * kBlockBytes + i % kEntriesPerBlock * sizeof(PageEntry)); }
+    PageEntry& entry(uint64_t i) {
+        return at<PageEntry>(kDirectoryOffset + i / kEntriesPerBlock * kBlockBytes +
+                             i % kEntriesPerBlock * sizeof(PageEntry));
+    }
     CommitRecord& commit() { return at<CommitRecord>(bytes.size() - sizeof(CommitRecord)); }
 
     void seal(uint64_t blocks = 1) {
@@ -191,7 +198,8 @@ TEST_F(VcpFile, OriginsAndEdges) {
     for (size_t i = 1; i < 9; ++i) {
         const int octant = static_cast<int>(i - 1);
         EXPECT_EQ(dataset->edgeOf(dataset->pages[i]), 4);
-        EXPECT_EQ(dataset->originOf(dataset->pages[i]), glm::dvec3(-1) + 4.0 * glm::dvec3(octant & 1, octant >> 1 & 1, octant >> 2));
+        EXPECT_EQ(dataset->originOf(dataset->pages[i]),
+                  glm::dvec3(-1) + 4.0 * glm::dvec3(octant & 1, octant >> 1 & 1, octant >> 2));
     }
 }
 
@@ -209,8 +217,14 @@ TEST(VcpFileLayout, GoldenBytes) {
         for (size_t i = 0; i < page.colour.size(); ++i) page.colour[i] = std::byte(200 + i);
         page.geometryBytes = 1024;
         page.colourBytes = 64;
-        ASSERT_TRUE((*writer)->append({.firstChild = 1, .leaves = 3, .hardLeaves = 1, .certifiedError = 0.5f, .childMask = 0x20}, page).ok());
-        ASSERT_TRUE((*writer)->append({.morton = 5, .leaves = 2, .hardLeaves = 2, .certifiedError = 0.25f, .level = 1}, page).ok());
+        ASSERT_TRUE(
+            (*writer)
+                ->append({.firstChild = 1, .leaves = 3, .hardLeaves = 1, .certifiedError = 0.5f, .childMask = 0x20},
+                         page)
+                .ok());
+        ASSERT_TRUE((*writer)
+                        ->append({.morton = 5, .leaves = 2, .hardLeaves = 2, .certifiedError = 0.25f, .level = 1}, page)
+                        .ok());
         FileHeader h;
         h.origin[0] = -3;
         h.origin[1] = 450000.25;
@@ -227,8 +241,16 @@ TEST(VcpFileLayout, GoldenBytes) {
         ASSERT_TRUE((*writer)->commit(h).ok());
     }
     const Bytes bytes = bytesOf(folder / "golden.vcp");
-    const auto u32 = [&](size_t at) { uint32_t v; std::memcpy(&v, &bytes[at], 4); return v; };
-    const auto u64 = [&](size_t at) { uint64_t v; std::memcpy(&v, &bytes[at], 8); return v; };
+    const auto u32 = [&](size_t at) {
+        uint32_t v;
+        std::memcpy(&v, &bytes[at], 4);
+        return v;
+    };
+    const auto u64 = [&](size_t at) {
+        uint64_t v;
+        std::memcpy(&v, &bytes[at], 8);
+        return v;
+    };
     ASSERT_EQ(bytes.size(), 9792u);
     EXPECT_EQ(std::memcmp(bytes.data(), "VCP\r\n\x1a\n\0", 8), 0);
     EXPECT_EQ(u32(8), 2u);
@@ -238,11 +260,11 @@ TEST(VcpFileLayout, GoldenBytes) {
     EXPECT_EQ(u64(32), 0xc008000000000000u);  // -3
     EXPECT_EQ(u32(128), 2u);
     EXPECT_EQ(u64(144), 123456789012u);
-    EXPECT_EQ(u64(184 + 24), 1u);             // first entry of level 1
-    EXPECT_EQ(u64(4096 + 8), 8192u);          // the first page
-    EXPECT_EQ(u64(4096 + 24), 8704u);         // its colour: 300 bytes end on the second 256
+    EXPECT_EQ(u64(184 + 24), 1u);      // first entry of level 1
+    EXPECT_EQ(u64(4096 + 8), 8192u);   // the first page
+    EXPECT_EQ(u64(4096 + 24), 8704u);  // its colour: 300 bytes end on the second 256
     EXPECT_EQ(u32(4096 + 40), 300u);
-    EXPECT_EQ(u64(4096 + 80), 5u);            // Morton code of the second
+    EXPECT_EQ(u64(4096 + 80), 5u);  // Morton code of the second
     EXPECT_EQ(u64(4096 + 80 + 8), 8960u);
     EXPECT_EQ(std::memcmp(&bytes[9728], "VCPcommt", 8), 0);
     EXPECT_EQ(fmt::format("{:016x}", hashBytes(bytes)), "29af25f00054487d");
@@ -296,7 +318,9 @@ TEST_F(VcpFile, DamagedPageIsNamed) {
     EXPECT_TRUE(readPage(damaged, *dataset, 2, true).ok());
     const auto page = readPage(damaged, *dataset, 3, true);
     ASSERT_FALSE(page.ok());
-    EXPECT_NE(page.error().line().find(fmt::format("memory.vcp: page 3: byte {}: hash", dataset->pages[3].offset)), std::string::npos) << page.error().line();
+    EXPECT_NE(page.error().line().find(fmt::format("memory.vcp: page 3: byte {}: hash", dataset->pages[3].offset)),
+              std::string::npos)
+        << page.error().line();
 }
 
 TEST_F(VcpFile, AppendedBytesAreFound) {
@@ -340,7 +364,8 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
     expectRefused("levels or page size", [](F& f) { f.header().levels = kMaxLevels + 1; });
     expectRefused("levels or page size", [](F& f) { f.header().log2Cells = 0; });
     expectRefused("levels or page size", [](F& f) { f.header().log2Cells = 8; });
-    for (const double cell : {0.0, -1.0, nan, infinity}) expectRefused("not finite", [&](F& f) { f.header().cell = cell; });
+    for (const double cell : {0.0, -1.0, nan, infinity})
+        expectRefused("not finite", [&](F& f) { f.header().cell = cell; });
     expectRefused("not finite", [&](F& f) { f.header().origin[1] = nan; });
     expectRefused("not finite", [&](F& f) { f.header().boundsMax[2] = infinity; });
     expectRefused("page count", [](F& f) { f.header().pages = 0; });
@@ -360,14 +385,21 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
         f.header().level[2] = {2, 16, f.header().certifiedErrorMax};
     });
     for (const double error : {nan, infinity, -5.0, 0.0}) {
-        expectRefused(fmt::format("byte {}: certified error", offsetof(FileHeader, level) + 24 + 16), [&](F& f) { f.header().level[1].certifiedError = error == 0 ? nan : error; });
-        expectRefused(fmt::format("byte {}: certified error", offsetof(FileHeader, certifiedErrorMax)), [&](F& f) { f.header().certifiedErrorMax = error; });
-        if (error != 0) expectRefused(fmt::format("byte {}: error target", offsetof(FileHeader, errorTarget)), [&](F& f) { f.header().errorTarget = error; });
+        expectRefused(fmt::format("byte {}: certified error", offsetof(FileHeader, level) + 24 + 16),
+                      [&](F& f) { f.header().level[1].certifiedError = error == 0 ? nan : error; });
+        expectRefused(fmt::format("byte {}: certified error", offsetof(FileHeader, certifiedErrorMax)),
+                      [&](F& f) { f.header().certifiedErrorMax = error; });
+        if (error != 0)
+            expectRefused(fmt::format("byte {}: error target", offsetof(FileHeader, errorTarget)),
+                          [&](F& f) { f.header().errorTarget = error; });
     }
     expectRefused("cell is too large", [](F& f) { f.header().cell = 1e308; });
-    expectRefused("byte 80: the bounds end before they begin", [](F& f) { f.header().boundsMin[0] = f.header().boundsMax[0] + 1; });
-    expectRefused(fmt::format("byte {}: more hard leaves", offsetof(FileHeader, hardLeaves)), [](F& f) { f.header().hardLeaves = f.header().leaves + 1; });
-    expectRefused(fmt::format("byte {}: more triangles without area", offsetof(FileHeader, degenerateTriangles)), [](F& f) { f.header().degenerateTriangles = 1; });
+    expectRefused("byte 80: the bounds end before they begin",
+                  [](F& f) { f.header().boundsMin[0] = f.header().boundsMax[0] + 1; });
+    expectRefused(fmt::format("byte {}: more hard leaves", offsetof(FileHeader, hardLeaves)),
+                  [](F& f) { f.header().hardLeaves = f.header().leaves + 1; });
+    expectRefused(fmt::format("byte {}: more triangles without area", offsetof(FileHeader, degenerateTriangles)),
+                  [](F& f) { f.header().degenerateTriangles = 1; });
     expectRefused("byte 752: reserved", [](F& f) { f.bytes[sizeof(FileHeader)] = std::byte{1}; });
     expectRefused("byte 4095: reserved", [](F& f) { f.bytes[4095] = std::byte{1}; });
     expectRefused("reserved", [](F& f) { f.header().paper.packing = 1; });
@@ -378,7 +410,8 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
     const auto dataset = readDataset(MemoryFile(flags.bytes));
     ASSERT_FALSE(dataset.ok());
     EXPECT_EQ(dataset.error().code, ErrorCode::Unsupported);
-    EXPECT_EQ(dataset.error().line(), "memory.vcp: header: byte 136: flags 0x2 are not known to this program: use a newer program");
+    EXPECT_EQ(dataset.error().line(),
+              "memory.vcp: header: byte 136: flags 0x2 are not known to this program: use a newer program");
 }
 
 TEST_F(VcpFile, HugeCountsAllocateNothing) {
@@ -430,9 +463,14 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0x7f; });
     expectRefused("without a parent", [](F& f) { f.entry(0).childMask = 0, f.entry(0).firstChild = 0; });
     expectRefused("a first one where there are none", [](F& f) { f.entry(0).childMask = 0; });
-    const auto at = [](uint64_t entry, uint64_t field) { return fmt::format("directory entry {}: byte {}: ", entry, kDirectoryOffset + entry * sizeof(PageEntry) + field); };
-    expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger", [](F& f) { f.entry(1).certifiedError *= 2; });
-    expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger", [](F& f) { f.header().level[1].certifiedError = f.header().certifiedErrorMax = 0; });
+    const auto at = [](uint64_t entry, uint64_t field) {
+        return fmt::format("directory entry {}: byte {}: ", entry,
+                           kDirectoryOffset + entry * sizeof(PageEntry) + field);
+    };
+    expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger",
+                  [](F& f) { f.entry(1).certifiedError *= 2; });
+    expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger",
+                  [](F& f) { f.header().level[1].certifiedError = f.header().certifiedErrorMax = 0; });
     expectRefused(at(2, offsetof(PageEntry, leaves)) + "leaf counts", [](F& f) { f.entry(2).leaves = 0xffffffff; });
     expectRefused(at(3, offsetof(PageEntry, reserved) + 5) + "reserved", [](F& f) { f.entry(3).reserved[5] = 1; });
     expectRefused(at(0, offsetof(PageEntry, colourStoredBytes)) + "has colour", [](F& f) { f.header().flags = 0; });
@@ -442,9 +480,12 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     });
     expectRefused("outside", [](F& f) { f.entry(8).colourOffset = f.bytes.size() - sizeof(CommitRecord); });
     // One block holds nine entries here; its bytes behind them are nobody's.
-    expectRefused(fmt::format("directory block 0: byte {}: bytes behind", kDirectoryOffset + 9 * sizeof(PageEntry)), [](F& f) { f.entry(9).leaves = 0, f.entry(9).morton = 1; });
+    expectRefused(fmt::format("directory block 0: byte {}: bytes behind", kDirectoryOffset + 9 * sizeof(PageEntry)),
+                  [](F& f) { f.entry(9).leaves = 0, f.entry(9).morton = 1; });
     expectRefused("directory block 0: byte 8183: bytes behind", [](F& f) { f.bytes[8183] = std::byte{1}; });
-    expectRefused(fmt::format("commit record: byte {}: reserved", bytes_.size() - sizeof(CommitRecord) + offsetof(CommitRecord, reserved) + 8), [](F& f) { f.commit().reserved[1] = 1; });
+    expectRefused(fmt::format("commit record: byte {}: reserved",
+                              bytes_.size() - sizeof(CommitRecord) + offsetof(CommitRecord, reserved) + 8),
+                  [](F& f) { f.commit().reserved[1] = 1; });
 }
 
 TEST_F(VcpFile, LyingPageSizesAllocateNothing) {
@@ -515,11 +556,16 @@ TEST_F(VcpFile, VerifyFindsContradictions) {
     using F = Forgery;
     const auto header = [](uint64_t byte) { return fmt::format("memory.vcp: header: byte {}: ", byte); };
     expectFound(header(offsetof(FileHeader, leaves)) + "0 leaves, but the pages", [](F& f) { f.header().leaves = 0; });
-    expectFound(header(offsetof(FileHeader, hardLeaves)) + "1 hard leaves, but the pages", [](F& f) { f.header().hardLeaves = 1; });
-    expectFound(header(offsetof(FileHeader, level) + 16) + "certified error of level 0", [](F& f) { f.header().level[0].certifiedError *= 2; });
-    expectFound(header(offsetof(FileHeader, level) + 24 + 16) + "certified error of level 1", [](F& f) { f.header().certifiedErrorMax = f.header().level[1].certifiedError *= 2; });
-    expectFound(header(offsetof(FileHeader, boundsMin) + 8) + "the bounds begin outside", [](F& f) { f.header().boundsMin[1] = -1e9; });
-    expectFound(header(offsetof(FileHeader, boundsMax) + 16) + "the bounds end outside", [](F& f) { f.header().boundsMax[2] = 1e9; });
+    expectFound(header(offsetof(FileHeader, hardLeaves)) + "1 hard leaves, but the pages",
+                [](F& f) { f.header().hardLeaves = 1; });
+    expectFound(header(offsetof(FileHeader, level) + 16) + "certified error of level 0",
+                [](F& f) { f.header().level[0].certifiedError *= 2; });
+    expectFound(header(offsetof(FileHeader, level) + 24 + 16) + "certified error of level 1",
+                [](F& f) { f.header().certifiedErrorMax = f.header().level[1].certifiedError *= 2; });
+    expectFound(header(offsetof(FileHeader, boundsMin) + 8) + "the bounds begin outside",
+                [](F& f) { f.header().boundsMin[1] = -1e9; });
+    expectFound(header(offsetof(FileHeader, boundsMax) + 16) + "the bounds end outside",
+                [](F& f) { f.header().boundsMax[2] = 1e9; });
     expectFound("page 3: ", [](F& f) { f.entry(3).certifiedError = 0; });
     expectFound("its directory entry says", [](F& f) { f.entry(3).certifiedError *= 0.5f; });
     expectFound("page 4: ", [](F& f) { f.header().leaves -= 1, f.entry(4).leaves -= 1; });
@@ -527,7 +573,8 @@ TEST_F(VcpFile, VerifyFindsContradictions) {
     expectFound("page 0: ", [](F& f) { f.header().cell *= 2; });
 }
 
-/// A field of the header or of an entry, and whether any value of its kind is one that nothing else in the file contradicts.
+/// A field of the header or of an entry, and whether any value of its kind is one that nothing else in the file
+/// contradicts.
 struct Field {
     const char* name;
     uint64_t offset;
@@ -548,12 +595,36 @@ std::vector<Bytes> hostileCopies(const Bytes& bytes, uint64_t at, char kind) {
         put(copy, at, value);
         if (copy != bytes) copies.push_back(std::move(copy));
     };
-    constexpr double kDoubles[] = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), -5, 0, 1e-300, 1e300, -1e300};
+    constexpr double kDoubles[] = {std::numeric_limits<double>::quiet_NaN(),
+                                   std::numeric_limits<double>::infinity(),
+                                   -std::numeric_limits<double>::infinity(),
+                                   -5,
+                                   0,
+                                   1e-300,
+                                   1e300,
+                                   -1e300};
     for (const double value : kDoubles) {
         if (kind == 'd') add(value);
         if (kind == 'f') add(static_cast<float>(value));
     }
-    constexpr uint64_t kIntegers[] = {0, 1, 2, 7, 8, 31, 0x7f, 0x80, 0xff, 4096, 0x7fffffff, 0x80000000, 0xffffff00, 0xffffffff, 0x7fffffffffffffff, 0x8000000000000000, 0xffffffffffffff00, ~uint64_t{0}};
+    constexpr uint64_t kIntegers[] = {0,
+                                      1,
+                                      2,
+                                      7,
+                                      8,
+                                      31,
+                                      0x7f,
+                                      0x80,
+                                      0xff,
+                                      4096,
+                                      0x7fffffff,
+                                      0x80000000,
+                                      0xffffff00,
+                                      0xffffffff,
+                                      0x7fffffffffffffff,
+                                      0x8000000000000000,
+                                      0xffffffffffffff00,
+                                      ~uint64_t{0}};
     for (const uint64_t value : kIntegers) {
         if (kind == '1') add(static_cast<uint8_t>(value));
         if (kind == '4') add(static_cast<uint32_t>(value));
@@ -563,9 +634,22 @@ std::vector<Bytes> hostileCopies(const Bytes& bytes, uint64_t at, char kind) {
 }
 
 TEST_F(VcpFile, HostileFieldsAreRefused) {
-    std::vector<Field> header = {{"version", 8, '4'}, {"headerBytes", 12, '4'}, {"fileBytes", 16, '8'}, {"pages", 24, '8'}, {"cell", 56, 'd'}, {"errorTarget", 64, 'd', true},
-        {"certifiedErrorMax", 72, 'd'}, {"levels", 128, '4'}, {"log2Cells", 132, '4'}, {"flags", 136, '4'}, {"method", 140, '4'}, {"triangles", 144, '8', true},
-        {"degenerateTriangles", 152, '8'}, {"vertices", 160, '8', true}, {"leaves", 168, '8'}, {"hardLeaves", 176, '8'}};
+    std::vector<Field> header = {{"version", 8, '4'},
+                                 {"headerBytes", 12, '4'},
+                                 {"fileBytes", 16, '8'},
+                                 {"pages", 24, '8'},
+                                 {"cell", 56, 'd'},
+                                 {"errorTarget", 64, 'd', true},
+                                 {"certifiedErrorMax", 72, 'd'},
+                                 {"levels", 128, '4'},
+                                 {"log2Cells", 132, '4'},
+                                 {"flags", 136, '4'},
+                                 {"method", 140, '4'},
+                                 {"triangles", 144, '8', true},
+                                 {"degenerateTriangles", 152, '8'},
+                                 {"vertices", 160, '8', true},
+                                 {"leaves", 168, '8'},
+                                 {"hardLeaves", 176, '8'}};
     for (uint64_t i = 0; i < 3; ++i) {
         header.push_back({"origin", 32 + 8 * i, 'd', true});
         header.push_back({"boundsMin", 80 + 8 * i, 'd', true});
@@ -576,10 +660,14 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
         header.push_back({"level.pages", 184 + 24 * l + 8, '8'});
         header.push_back({"level.certifiedError", 184 + 24 * l + 16, 'd'});
     }
-    for (uint64_t byte = sizeof(FileHeader) - sizeof(PaperParameters); byte < kDirectoryOffset; byte += 200) header.push_back({"rest", byte, '8'});
-    const std::vector<Field> entry = {{"morton", 0, '8'}, {"offset", 8, '8'}, {"hash", 16, '8'}, {"colourOffset", 24, '8'}, {"colourHash", 32, '8'}, {"storedBytes", 40, '4'},
-        {"pageBytes", 44, '4'}, {"colourStoredBytes", 48, '4'}, {"colourBytes", 52, '4'}, {"firstChild", 56, '4'}, {"leaves", 60, '4'}, {"hardLeaves", 64, '4'},
-        {"certifiedError", 68, 'f'}, {"childMask", 72, '1'}, {"level", 73, '1'}, {"reserved", 74, '1'}, {"reserved", 79, '1'}};
+    for (uint64_t byte = sizeof(FileHeader) - sizeof(PaperParameters); byte < kDirectoryOffset; byte += 200)
+        header.push_back({"rest", byte, '8'});
+    const std::vector<Field> entry = {
+        {"morton", 0, '8'},          {"offset", 8, '8'},       {"hash", 16, '8'},      {"colourOffset", 24, '8'},
+        {"colourHash", 32, '8'},     {"storedBytes", 40, '4'}, {"pageBytes", 44, '4'}, {"colourStoredBytes", 48, '4'},
+        {"colourBytes", 52, '4'},    {"firstChild", 56, '4'},  {"leaves", 60, '4'},    {"hardLeaves", 64, '4'},
+        {"certifiedError", 68, 'f'}, {"childMask", 72, '1'},   {"level", 73, '1'},     {"reserved", 74, '1'},
+        {"reserved", 79, '1'}};
     const uint64_t before = peakBytes();
     uint64_t tried = 0;
     const auto sweep = [&](const std::vector<Field>& fields, uint64_t base) {
@@ -597,7 +685,9 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
                 EXPECT_TRUE(field.free) << field.name << " at byte " << base + field.offset << " was accepted";
                 // What is free is a number still.
                 const FileHeader& h = forgery.header();
-                for (const double value : {h.errorTarget, h.origin[0], h.origin[1], h.origin[2], h.boundsMin[0], h.boundsMax[0]}) EXPECT_TRUE(std::isfinite(value)) << field.name;
+                for (const double value :
+                     {h.errorTarget, h.origin[0], h.origin[1], h.origin[2], h.boundsMin[0], h.boundsMax[0]})
+                    EXPECT_TRUE(std::isfinite(value)) << field.name;
                 EXPECT_GE(h.errorTarget, 0);
             }
     };
@@ -703,14 +793,16 @@ TEST_F(VcpFile, WriterRefusesWrongPlaces) {
 
 TEST_F(VcpFile, UnwritableFolder) {
     fs::create_directory(folder_ / "locked");
-    fs::permissions(folder_ / "locked", fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_exec | fs::perms::others_read);
+    fs::permissions(folder_ / "locked",
+                    fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_exec | fs::perms::others_read);
     fs::permissions(folder_.path(), fs::perms::others_exec, fs::perm_options::add);
     // Root may write anywhere, so a child that is nobody tries.
     const pid_t child = fork();
     if (child == 0) {
         if (geteuid() == 0 && seteuid(65534) != 0) _exit(3);
         const auto writer = VcpWriter::create(folder_ / "locked" / "out.vcp", 1);
-        const bool said = !writer.ok() && writer.error().code == ErrorCode::Io && writer.error().line().find("Permission denied") != std::string::npos &&
+        const bool said = !writer.ok() && writer.error().code == ErrorCode::Io &&
+                          writer.error().line().find("Permission denied") != std::string::npos &&
                           writer.error().line().find("out.vcp") != std::string::npos;
         _exit(said ? 0 : 1);
     }

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "octree/leaf_math.h"
 #include "octree/packing.h"
@@ -45,7 +45,8 @@ TEST(VertexNormal, CreasesTurnByFortyDegrees) {
         const WideVector sum(0, 0, 1 << 20);
         const WideVector normal(static_cast<int64_t>(std::sin(a) * 1e6), 0, static_cast<int64_t>(std::cos(a) * 1e6));
         const std::vector<std::array<uint32_t, 3>> triangles{{0, 0, 0}};
-        EXPECT_EQ(creases(std::span(&normal, 1), std::span(&sum, 1), triangles)[0] != 0, degrees > 40 && degrees < 140) << degrees;
+        EXPECT_EQ(creases(std::span(&normal, 1), std::span(&sum, 1), triangles)[0] != 0, degrees > 40 && degrees < 140)
+            << degrees;
     }
 }
 

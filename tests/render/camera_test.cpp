@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "render/frame_setup.h"
 
@@ -27,7 +27,8 @@ TEST(Camera, FitShowsTheWholeBox) {
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> u(-1, 1);
     for (int i = 0; i < 1000; ++i) {
-        const glm::dvec3 lo(u(random) * 1e6, u(random), u(random)), hi = lo + glm::dvec3(1.1 + u(random), 1.1 + u(random), 1.1 + u(random));
+        const glm::dvec3 lo(u(random) * 1e6, u(random), u(random)),
+            hi = lo + glm::dvec3(1.1 + u(random), 1.1 + u(random), 1.1 + u(random));
         const Camera camera = fitCamera(lo, hi, {u(random), u(random), 1.5 + u(random)}, {0, 1, 0}, 0.6, 1.6);
         for (const Projection projection : {Projection::Perspective, Projection::Orthographic}) {
             FrameRequest request;
@@ -37,8 +38,11 @@ TEST(Camera, FitShowsTheWholeBox) {
             request.height = 1000;
             const SelectionView view = selectionView(request);
             for (int corner = 0; corner < 8; ++corner) {
-                const glm::dvec3 p = glm::dvec3(corner & 1 ? hi.x : lo.x, corner & 2 ? hi.y : lo.y, corner & 4 ? hi.z : lo.z) - camera.eye;
-                for (const glm::dvec4& plane : view.planes) EXPECT_GE(glm::dot(glm::dvec3(plane), p) + plane.w, -1e-6) << i;
+                const glm::dvec3 p =
+                    glm::dvec3(corner & 1 ? hi.x : lo.x, corner & 2 ? hi.y : lo.y, corner & 4 ? hi.z : lo.z) -
+                    camera.eye;
+                for (const glm::dvec4& plane : view.planes)
+                    EXPECT_GE(glm::dot(glm::dvec3(plane), p) + plane.w, -1e-6) << i;
             }
         }
     }

@@ -7,19 +7,27 @@ namespace vcp {
 namespace {
 
 DeviceInfo device(uint32_t index, std::string name, std::string type, bool usable = true) {
-    return {.index = index, .name = std::move(name), .type = std::move(type), .driver = {}, .software = false, .usable = usable, .chosen = false};
+    return {.index = index,
+            .name = std::move(name),
+            .type = std::move(type),
+            .driver = {},
+            .software = false,
+            .usable = usable,
+            .chosen = false};
 }
 
 TEST(DeviceChoice, BestTypeFirstOfEquals) {
-    const std::vector<DeviceInfo> all = {device(0, "llvmpipe", "cpu"), device(1, "Old", "discrete", false), device(2, "Iris", "integrated"),
-                                         device(3, "GeForce A", "discrete"), device(4, "GeForce B", "discrete")};
+    const std::vector<DeviceInfo> all = {device(0, "llvmpipe", "cpu"), device(1, "Old", "discrete", false),
+                                         device(2, "Iris", "integrated"), device(3, "GeForce A", "discrete"),
+                                         device(4, "GeForce B", "discrete")};
     EXPECT_EQ(*chooseDevice(all, ""), 3u);
     EXPECT_EQ(*chooseDevice({all[0], all[1], all[2]}, ""), 2u);
     EXPECT_EQ(*chooseDevice({all[0]}, ""), 0u);
 }
 
 TEST(DeviceChoice, ByIndexOrPartOfTheName) {
-    const std::vector<DeviceInfo> all = {device(0, "llvmpipe (LLVM 15)", "cpu"), device(1, "Old", "discrete", false), device(2, "NVIDIA B", "discrete")};
+    const std::vector<DeviceInfo> all = {device(0, "llvmpipe (LLVM 15)", "cpu"), device(1, "Old", "discrete", false),
+                                         device(2, "NVIDIA B", "discrete")};
     EXPECT_EQ(*chooseDevice(all, "0"), 0u);
     EXPECT_EQ(*chooseDevice(all, "LLVM"), 0u);
     EXPECT_EQ(*chooseDevice(all, "nvidia"), 2u);

@@ -31,7 +31,8 @@ Offsets offsetsIn(std::span<const uint32_t> spirv) {
     for (size_t at = 5; at < spirv.size(); at += spirv[at] >> 16) {
         const uint32_t op = spirv[at] & 0xffff;
         if (op == kOpName) names[spirv[at + 1]] = reinterpret_cast<const char*>(&spirv[at + 2]);
-        if (op == kOpMemberDecorate && spirv[at + 3] == kDecorationOffset) offsets[spirv[at + 1]][spirv[at + 2]] = spirv[at + 4];
+        if (op == kOpMemberDecorate && spirv[at + 3] == kDecorationOffset)
+            offsets[spirv[at + 1]][spirv[at + 2]] = spirv[at + 4];
     }
     Offsets result;
     for (const auto& [type, members] : offsets)
@@ -44,10 +45,12 @@ Offsets offsetsIn(std::span<const uint32_t> spirv) {
 void expectSameLayout(std::span<const uint32_t> spirv) {
     const Offsets offsets = offsetsIn(spirv);
     ASSERT_TRUE(offsets.contains("FrameConstants"));
-    EXPECT_EQ(offsets.at("FrameConstants"),
-              (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX), OFFSET(directionY),
-                                     OFFSET(originLattice), OFFSET(lattice), OFFSET(picture), OFFSET(mode), OFFSET(lightDirection),
-                                     OFFSET(upDirection), OFFSET(clay), OFFSET(cap), OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(rotation), OFFSET(sections)}));
+    EXPECT_EQ(
+        offsets.at("FrameConstants"),
+        (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX),
+                               OFFSET(directionY), OFFSET(originLattice), OFFSET(lattice), OFFSET(picture),
+                               OFFSET(mode), OFFSET(lightDirection), OFFSET(upDirection), OFFSET(clay), OFFSET(cap),
+                               OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(rotation), OFFSET(sections)}));
 }
 
 TEST(FrameLayout, Mesostructure) {
@@ -55,12 +58,17 @@ TEST(FrameLayout, Mesostructure) {
     ASSERT_TRUE(offsets.contains("MesoRecord") && offsets.contains("MesoView"));
     using frame::MesoRecord, frame::MesoView;
     const auto words = [](std::initializer_list<size_t> all) { return std::vector<uint32_t>(all.begin(), all.end()); };
-    EXPECT_EQ(offsets.at("MesoRecord"), words({offsetof(MesoRecord, extent), offsetof(MesoRecord, cell), offsetof(MesoRecord, cells), offsetof(MesoRecord, fine), offsetof(MesoRecord, ratio),
-                                               offsetof(MesoRecord, cones), offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale), offsetof(MesoRecord, levels),
-                                               offsetof(MesoRecord, borders)}));
-    EXPECT_EQ(offsets.at("MesoView"), words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward), offsetof(MesoView, forwardX),
-                                             offsetof(MesoView, forwardY), offsetof(MesoView, picture), offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up),
-                                             offsetof(MesoView, colours), offsetof(MesoView, normals), offsetof(MesoView, far)}));
+    EXPECT_EQ(offsets.at("MesoRecord"),
+              words({offsetof(MesoRecord, extent), offsetof(MesoRecord, cell), offsetof(MesoRecord, cells),
+                     offsetof(MesoRecord, fine), offsetof(MesoRecord, ratio), offsetof(MesoRecord, cones),
+                     offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale),
+                     offsetof(MesoRecord, levels), offsetof(MesoRecord, borders)}));
+    EXPECT_EQ(
+        offsets.at("MesoView"),
+        words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward),
+               offsetof(MesoView, forwardX), offsetof(MesoView, forwardY), offsetof(MesoView, picture),
+               offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up),
+               offsetof(MesoView, colours), offsetof(MesoView, normals), offsetof(MesoView, far)}));
 }
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }
@@ -73,9 +81,10 @@ TEST(FrameLayout, Trace) {
     expectSameLayout(kTraceSpirv);
     const Offsets offsets = offsetsIn(kTraceSpirv);
     ASSERT_TRUE(offsets.contains("FrameCounters"));
-    EXPECT_EQ(offsets.at("FrameCounters"),
-              (std::vector<uint32_t>{offsetof(frame::FrameCounters, hitPixels), offsetof(frame::FrameCounters, tracedTiles),
-                                     offsetof(frame::FrameCounters, steps), offsetof(frame::FrameCounters, fetches)}));
+    EXPECT_EQ(
+        offsets.at("FrameCounters"),
+        (std::vector<uint32_t>{offsetof(frame::FrameCounters, hitPixels), offsetof(frame::FrameCounters, tracedTiles),
+                               offsetof(frame::FrameCounters, steps), offsetof(frame::FrameCounters, fetches)}));
 }
 
 }  // namespace

@@ -27,9 +27,10 @@ protected:
     }
 
     /// Each ray as the reference marches it, counts and all, or as it marches one that differs by what single precision
-    /// rounds: shader and reference round in another order, and where a ray passes a wall, a corner or a bound by less than that, either
-    /// way is right.
-    void expectSame(const Asset& asset, const Shape& shape, const MethodOptions& options, std::span<const MarchRay> rays) {
+    /// rounds: shader and reference round in another order, and where a ray passes a wall, a corner or a bound by less
+    /// than that, either way is right.
+    void expectSame(const Asset& asset, const Shape& shape, const MethodOptions& options,
+                    std::span<const MarchRay> rays) {
         SCOPED_TRACE(asset.name + " " + options.name);
         const auto method = buildMethod(asset, shape, options);
         ASSERT_TRUE(method) << method.error().line();
@@ -55,17 +56,22 @@ protected:
     }
 
     static bool isSame(const MarchResult& a, const MarchResult& b) {
-        if (a.state != b.state || a.fetches != b.fetches || a.iterations != b.iterations || a.surfaceTests != b.surfaceTests) return false;
-        return a.state != MarchState::Hit || (std::abs(a.t - b.t) <= 1e-4 && glm::dot(a.normal, b.normal) >= 0.999f * glm::dot(a.normal, a.normal));
+        if (a.state != b.state || a.fetches != b.fetches || a.iterations != b.iterations ||
+            a.surfaceTests != b.surfaceTests)
+            return false;
+        return a.state != MarchState::Hit ||
+               (std::abs(a.t - b.t) <= 1e-4 && glm::dot(a.normal, b.normal) >= 0.999f * glm::dot(a.normal, a.normal));
     }
 
-    static bool isOfARayNearby(const Marcher& marcher, const MarchRay& ray, glm::dvec3 extent, const MarchResult& found, size_t seed) {
+    static bool isOfARayNearby(const Marcher& marcher, const MarchRay& ray, glm::dvec3 extent, const MarchResult& found,
+                               size_t seed) {
         std::mt19937 random{uint32_t(seed)};
         // A few units of the last place of a coordinate in the tile, and of the direction.
         std::uniform_real_distribution<double> place(-1e-6, 1e-6), turn(-3e-7, 3e-7);
         for (int i = 0; i < 400; ++i) {
             MarchRay nearby = ray;
-            for (int axis = 0; axis < 3; ++axis) nearby.origin[axis] += place(random), nearby.direction[axis] += turn(random);
+            for (int axis = 0; axis < 3; ++axis)
+                nearby.origin[axis] += place(random), nearby.direction[axis] += turn(random);
             // What starts on the slab's top does so exactly.
             if (ray.origin.z >= extent.z) nearby.origin.z = ray.origin.z;
             if (isSame(marcher.march(nearby), found)) return true;
@@ -74,7 +80,8 @@ protected:
     }
 
     static std::string textOf(const MarchResult& r) {
-        return fmt::format("state {}, t {}, normal {} {} {}, {} fetches, {} iterations, {} tests", int(r.state), r.t, r.normal.x, r.normal.y, r.normal.z, r.fetches, r.iterations, r.surfaceTests);
+        return fmt::format("state {}, t {}, normal {} {} {}, {} fetches, {} iterations, {} tests", int(r.state), r.t,
+                           r.normal.x, r.normal.y, r.normal.z, r.fetches, r.iterations, r.surfaceTests);
     }
 
     static std::vector<MarchRay> raysInto(glm::dvec3 extent) {
@@ -95,7 +102,8 @@ TEST_F(MesoMarch, HeightFieldsAsTheReference) {
         asset.heights = *makeHeightField(name, 32, 3);
         const auto shape = test::heights(*asset.heights);
         const auto rays = raysInto(shape->extent());
-        for (const auto method : methodNames()) expectSame(asset, *shape, {.name = std::string(method), .cells = 16, .steps = 16}, rays);
+        for (const auto method : methodNames())
+            expectSame(asset, *shape, {.name = std::string(method), .cells = 16, .steps = 16}, rays);
     }
 }
 
@@ -108,7 +116,8 @@ TEST_F(MesoMarch, SolidsAsTheReference) {
     for (const auto method : methodNames())
         if (methodFits(method, asset)) expectSame(asset, *shape, {.name = std::string(method), .cells = 16}, rays);
     // Other cones, and odd grids.
-    for (const Cones cones : {Cones{2, 1}, Cones{8, 1}, Cones{4, 2}, Cones{3, 3}}) expectSame(asset, *shape, {.name = "ddm", .cells = 13, .cones = cones}, rays);
+    for (const Cones cones : {Cones{2, 1}, Cones{8, 1}, Cones{4, 2}, Cones{3, 3}})
+        expectSame(asset, *shape, {.name = "ddm", .cells = 13, .cones = cones}, rays);
 }
 
 TEST_F(MesoMarch, CapsAreUnresolved) {

@@ -31,8 +31,8 @@ class MesoSurfaces : public vcp::test::RendererFixture {
 protected:
     void SetUp() override { start(); }
 
-    static MesoSurface surfaceOf(const Asset& asset, const std::string& method, std::string_view base, double height, double tiles = 2,
-                                 glm::dvec3 place = glm::dvec3(0)) {
+    static MesoSurface surfaceOf(const Asset& asset, const std::string& method, std::string_view base, double height,
+                                 double tiles = 2, glm::dvec3 place = glm::dvec3(0)) {
         const auto shape = shapeOf(asset);
         const auto made = buildMethod(asset, **shape, {.name = method, .cells = 8});
         EXPECT_TRUE(made) << made.error().line();
@@ -48,7 +48,11 @@ protected:
     static FrameRequest fromAbove() {
         FrameRequest request;
         request.width = request.height = kEdge;
-        request.camera = {.eye = {0, 0, 5}, .forward = {0, 0, -1}, .up = {0, 1, 0}, .projection = Projection::Orthographic, .orthographicHeight = 3};
+        request.camera = {.eye = {0, 0, 5},
+                          .forward = {0, 0, -1},
+                          .up = {0, 1, 0},
+                          .projection = Projection::Orthographic,
+                          .orthographicHeight = 3};
         return request;
     }
     FrameStats draw(const std::vector<MesoSurface>& surfaces, const FrameRequest& request) {
@@ -56,7 +60,9 @@ protected:
         return RendererFixture::draw(request);
     }
     /// Distance of a pixel's middle from the picture's, world units.
-    static glm::dvec2 placeOf(uint32_t x, uint32_t y) { return {(x + 0.5) / kEdge * 3 - 1.5, 1.5 - (y + 0.5) / kEdge * 3}; }
+    static glm::dvec2 placeOf(uint32_t x, uint32_t y) {
+        return {(x + 0.5) / kEdge * 3 - 1.5, 1.5 - (y + 0.5) / kEdge * 3};
+    }
 };
 
 TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
@@ -69,7 +75,10 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
         // Distance maps alone show whole cells.
         const bool isCells = method == "dm" || method == "ddm";
         // A hundredth of the slab for relief mapping; what a sampled distance may be too long for sphere tracing.
-        const double tolerance = isCells ? 0.13 : method.starts_with("relief") ? 0.006 : method == "sphere" ? 0.07 : 2e-3;
+        const double tolerance = isCells                        ? 0.13
+                                 : method.starts_with("relief") ? 0.006
+                                 : method == "sphere"           ? 0.07
+                                                                : 2e-3;
         for (uint32_t y = 0; y < kEdge; ++y)
             for (uint32_t x = 0; x < kEdge; ++x) {
                 const glm::dvec2 p = placeOf(x, y);
@@ -94,7 +103,8 @@ TEST_F(MesoSurfaces, BordersShowTheCut) {
             for (uint32_t x = 0; x < kEdge; ++x) {
                 const glm::dvec2 p = placeOf(x, y);  // y and z of the world
                 const size_t i = y * kEdge + x;
-                const bool isOver = std::abs(p.x) > 1 || p.y < 0 || p.y > 0.7, isIn = std::abs(p.x) < 0.95 && p.y > 0.02 && p.y < 0.5;
+                const bool isOver = std::abs(p.x) > 1 || p.y < 0 || p.y > 0.7,
+                           isIn = std::abs(p.x) < 0.95 && p.y > 0.02 && p.y < 0.5;
                 ASSERT_FALSE(isOver && std::isfinite(depths[i])) << x << ", " << y;
                 ASSERT_FALSE(isIn && std::abs(depths[i] - 4) > 1e-3f) << x << ", " << y << ": " << depths[i];
                 ASSERT_FALSE(isIn && normals[i].x < 0.99f) << x << ", " << y;
@@ -184,7 +194,11 @@ struct OverACube {
     FrameRequest request;
     OverACube() {
         request.width = request.height = kEdge;
-        request.camera = {.eye = {8, 8, 20}, .forward = {0, 0, -1}, .up = {0, 1, 0}, .projection = Projection::Orthographic, .orthographicHeight = 16};
+        request.camera = {.eye = {8, 8, 20},
+                          .forward = {0, 0, -1},
+                          .up = {0, 1, 0},
+                          .projection = Projection::Orthographic,
+                          .orthographicHeight = 16};
     }
     static size_t pixelOf(double x, double y) { return size_t((16 - y) / 16 * kEdge) * kEdge + size_t(x / 16 * kEdge); }
 };
@@ -194,12 +208,15 @@ TEST_F(MesoSurfaces, NearerOfDatasetAndSurfaceIsSeen) {
     show(over.scene);
     const FrameStats alone = RendererFixture::draw(over.request);
     const auto cube = *renderer_->readPicture();
-    const FrameStats stats = draw({surfaceOf(plateau(), "boxes", "quad", 1, 2, {6, 8, 11.9}), surfaceOf(plateau(), "boxes", "quad", 1, 2, {10, 8, 10}),
-                                   surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})}, over.request);
+    const FrameStats stats = draw({surfaceOf(plateau(), "boxes", "quad", 1, 2, {6, 8, 11.9}),
+                                   surfaceOf(plateau(), "boxes", "quad", 1, 2, {10, 8, 10}),
+                                   surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})},
+                                  over.request);
     const auto picture = *renderer_->readPicture();
     const auto depths = *renderer_->readDepth();
     const auto normals = *renderer_->readNormals();
-    const size_t on = OverACube::pixelOf(6, 8), within = OverACube::pixelOf(10, 8), beside = OverACube::pixelOf(14, 8), nothing = OverACube::pixelOf(1, 1);
+    const size_t on = OverACube::pixelOf(6, 8), within = OverACube::pixelOf(10, 8), beside = OverACube::pixelOf(14, 8),
+                 nothing = OverACube::pixelOf(1, 1);
     EXPECT_NEAR(depths[on], 20 - 12.5, 1e-3);
     EXPECT_NEAR(depths[within], 8, 1e-3);
     EXPECT_NEAR(depths[beside], 20 - 10.6, 1e-3);
@@ -233,7 +250,9 @@ TEST_F(MesoSurfaces, TilesAreCutFromTheWhole) {
         const auto tile = *renderer_->readPicture();
         int largest = 0;
         for (uint32_t y = 0; y < 24; ++y)
-            for (uint32_t i = 0; i < 160; ++i) largest = std::max(largest, std::abs(int(tile.rgba[y * 160 + i]) - int(whole.rgba[4 * ((y + 32) * kEdge + 48) + i])));
+            for (uint32_t i = 0; i < 160; ++i)
+                largest = std::max(
+                    largest, std::abs(int(tile.rgba[y * 160 + i]) - int(whole.rgba[4 * ((y + 32) * kEdge + 48) + i])));
         EXPECT_LE(largest, 2);
     }
 }
@@ -309,7 +328,8 @@ TEST_F(MesoSurfaces, SceneWithoutMesostructurePaysNothing) {
 
 TEST_F(MesoSurfaces, OnePipelineAMethod) {
     const Asset asset = plateau();
-    const MesoSurface boxes = surfaceOf(asset, "boxes", "quad", 0.5), pyramid = surfaceOf(asset, "pyramid", "quad", 0.5);
+    const MesoSurface boxes = surfaceOf(asset, "boxes", "quad", 0.5),
+                      pyramid = surfaceOf(asset, "pyramid", "quad", 0.5);
     const uint32_t one = draw({boxes}, fromAbove()).pipelines;
     EXPECT_EQ(draw({boxes, boxes}, fromAbove()).pipelines, one);
     EXPECT_EQ(draw({boxes, pyramid}, fromAbove()).pipelines, one + 1);
@@ -317,7 +337,9 @@ TEST_F(MesoSurfaces, OnePipelineAMethod) {
 }
 
 /// The picture's light at a pixel, from 0 to 1, as shade and texture encode it.
-double lightAt(const Picture& picture, size_t pixel, int channel = 1) { return std::pow(picture.rgba[4 * pixel + size_t(channel)] / 255.0, 2.2); }
+double lightAt(const Picture& picture, size_t pixel, int channel = 1) {
+    return std::pow(picture.rgba[4 * pixel + size_t(channel)] / 255.0, 2.2);
+}
 
 TEST_F(MesoSurfaces, TexturesLieOverTheTile) {
     // Columns are red, rows green: texel (i, j) of the tile's lower row first.
@@ -339,7 +361,9 @@ TEST_F(MesoSurfaces, TexturesLieOverTheTile) {
     draw({surface}, request);
     const Picture textured = *renderer_->readPicture();
     const double lit = white.rgba[4 * (kEdge / 2 * kEdge + kEdge / 2)];
-    const auto encoded = [](double light) { return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055; };
+    const auto encoded = [](double light) {
+        return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+    };
     for (int j = -2; j < 2; ++j)
         for (int i = -2; i < 2; ++i) {
             // World (i, j) / 4 is texel (i, j) modulo 4, and the middle of a pixel.
@@ -375,14 +399,17 @@ TEST_F(MesoSurfaces, TexturesAreAveragedAsLight) {
 
 TEST_F(MesoSurfaces, NormalTexturesBendWhatIsThere) {
     const float bend = 0.4f;
-    const auto texture = [](glm::vec3 n) { return std::make_shared<const MesoTexture>(makeMesoTexture({2, 2}, std::vector<glm::vec4>(4, glm::vec4(n, 0)))); };
+    const auto texture = [](glm::vec3 n) {
+        return std::make_shared<const MesoTexture>(makeMesoTexture({2, 2}, std::vector<glm::vec4>(4, glm::vec4(n, 0))));
+    };
     const auto normalsOf = [&](std::string_view base, const std::shared_ptr<const MesoTexture>& normals) {
         MesoSurface surface = surfaceOf(plateau(), "pyramid", base, 0.1, 3);
         surface.normals = normals;
         draw({surface}, fromAbove());
         return *renderer_->readNormals();
     };
-    const auto alongX = normalsOf("quad", texture({std::sin(bend), 0, std::cos(bend)})), alongY = normalsOf("quad", texture({0, std::sin(bend), std::cos(bend)}));
+    const auto alongX = normalsOf("quad", texture({std::sin(bend), 0, std::cos(bend)})),
+               alongY = normalsOf("quad", texture({0, std::sin(bend), std::cos(bend)}));
     for (const auto& n : alongX)
         if (n != glm::vec3(0)) {
             ASSERT_LT(glm::length(n - glm::vec3(std::sin(bend), 0, std::cos(bend))), 0.01f);
@@ -391,7 +418,8 @@ TEST_F(MesoSurfaces, NormalTexturesBendWhatIsThere) {
         if (n != glm::vec3(0)) {
             ASSERT_LT(glm::length(n - glm::vec3(0, std::sin(bend), std::cos(bend))), 0.01f);
         }
-    const auto plain = normalsOf("sphere", nullptr), flat = normalsOf("sphere", texture({0, 0, 1})), bent = normalsOf("sphere", texture({std::sin(bend), 0, std::cos(bend)}));
+    const auto plain = normalsOf("sphere", nullptr), flat = normalsOf("sphere", texture({0, 0, 1})),
+               bent = normalsOf("sphere", texture({std::sin(bend), 0, std::cos(bend)}));
     size_t seen = 0;
     for (size_t i = 0; i < plain.size(); ++i) {
         if (plain[i].z < 0.7f) continue;
@@ -410,7 +438,9 @@ BaseSurface denseStrip() {
     constexpr uint32_t kColumns = 2048, kRows = 8;
     BaseSurface strip;
     for (uint32_t j = 0; j <= kRows; ++j)
-        for (uint32_t i = 0; i <= kColumns; ++i) strip.positions.push_back(turned({(double(i) - kColumns / 2.0) / 1024, (double(j) - kRows / 2.0) / 1024, 0}));
+        for (uint32_t i = 0; i <= kColumns; ++i)
+            strip.positions.push_back(
+                turned({(double(i) - kColumns / 2.0) / 1024, (double(j) - kRows / 2.0) / 1024, 0}));
     const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
         strip.triangles.push_back({a, b, c});
         const auto map = [&](uint32_t k) { return glm::dvec2(k % (kColumns + 1), k / (kColumns + 1)) / 16.0; };
@@ -448,7 +478,8 @@ TEST_F(MesoSurfaces, DenseBasesHaveNoGapsAlongTheirWalls) {
 std::vector<double> smaller(const Picture& picture) {
     std::vector<double> means(size_t{kEdge} * kEdge);
     for (uint32_t y = 0; y < 8 * kEdge; ++y)
-        for (uint32_t x = 0; x < 8 * kEdge; ++x) means[y / 8 * kEdge + x / 8] += lightAt(picture, size_t{y} * 8 * kEdge + x) / 64;
+        for (uint32_t x = 0; x < 8 * kEdge; ++x)
+            means[y / 8 * kEdge + x / 8] += lightAt(picture, size_t{y} * 8 * kEdge + x) / 64;
     return means;
 }
 
@@ -459,8 +490,10 @@ TEST_F(MesoSurfaces, FromFarTheMeanLightIsSeenWithoutMarching) {
                 SCOPED_TRACE(testing::Message() << name << ", " << elevation << (shadows ? ", shadows" : ""));
                 Asset asset;
                 asset.name = name;
-                if (std::string_view(name) == "beads") asset.solid = name, asset.extent = meso::test::solid(name)->extent();
-                else asset = heightAsset(name, *makeHeightField(name, 64, 1));
+                if (std::string_view(name) == "beads")
+                    asset.solid = name, asset.extent = meso::test::solid(name)->extent();
+                else
+                    asset = heightAsset(name, *makeHeightField(name, 64, 1));
                 // A tile is narrower than a pixel by no simple part, and the slab less high than half of one.
                 const double edge = 0.83 * 3.0 / kEdge, tall = std::min(1.0, 0.4 / asset.extent.z);
                 MesoSurface surface = surfaceOf(asset, "boxes", "quad", tall * edge * asset.extent.z, 2 / edge);
@@ -468,8 +501,10 @@ TEST_F(MesoSurfaces, FromFarTheMeanLightIsSeenWithoutMarching) {
                 surface.far = std::make_shared<const Appearance>(appearanceOf(**shape, tall));
                 FrameRequest request = fromAbove();
                 const double rise = elevation * M_PI / 180;
-                request.camera.forward = {0, std::cos(rise), -std::sin(rise)}, request.camera.eye = -5.0 * request.camera.forward;
-                request.shading.lightFollowsCamera = false, request.shading.lightDirection = {0.5f, -0.4f, 0.6f}, request.shading.shadows = shadows;
+                request.camera.forward = {0, std::cos(rise), -std::sin(rise)},
+                request.camera.eye = -5.0 * request.camera.forward;
+                request.shading.lightFollowsCamera = false, request.shading.lightDirection = {0.5f, -0.4f, 0.6f},
+                request.shading.shadows = shadows;
                 request.errorPixels = 0;
                 request.width = request.height = 8 * kEdge;
                 EXPECT_EQ(draw({surface}, request).farHits, 0u);
@@ -489,10 +524,13 @@ TEST_F(MesoSurfaces, FromFarTheMeanLightIsSeenWithoutMarching) {
                         // Borders show cuts, and are a matter of where pixels lie.
                         const size_t i = size_t{y} * kEdge + x;
                         bool isInside = true;
-                        for (const int step : {-1, 1}) isInside = isInside && std::isfinite(depths[i + size_t(step)]) && std::isfinite(depths[i + size_t(step * int(kEdge))]);
+                        for (const int step : {-1, 1})
+                            isInside = isInside && std::isfinite(depths[i + size_t(step)]) &&
+                                       std::isfinite(depths[i + size_t(step * int(kEdge))]);
                         if (!isInside) continue;
                         ++seen;
-                        ofMarched += std::abs(lightAt(marched, i) - truth[i]), ofFar += std::abs(lightAt(far, i) - truth[i]);
+                        ofMarched += std::abs(lightAt(marched, i) - truth[i]),
+                            ofFar += std::abs(lightAt(far, i) - truth[i]);
                     }
                 EXPECT_GT(seen, 800u);
                 EXPECT_GE(stats.farHits, seen);

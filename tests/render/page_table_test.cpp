@@ -24,7 +24,9 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
     std::vector<uint64_t> cut;
     for (uint64_t page = 0; page < dataset.pages.size(); ++page) {
         if (dataset.pages[page].level == 1 && page != 1) cut.push_back(page);
-        if (page >= dataset.pages[1].firstChild && page < dataset.pages[1].firstChild + uint64_t(std::popcount(dataset.pages[1].childMask))) cut.push_back(page);
+        if (page >= dataset.pages[1].firstChild &&
+            page < dataset.pages[1].firstChild + uint64_t(std::popcount(dataset.pages[1].childMask)))
+            cut.push_back(page);
     }
     std::vector<ResidentPage> resident(dataset.pages.size());
     for (uint64_t page = 0; page < resident.size(); ++page) {
@@ -57,7 +59,8 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
 }
 
 TEST(PageTable, WithoutACutTheRootIsEmpty) {
-    const auto table = pageTable(sphereDataset().dataset, {}, [](uint64_t) -> std::optional<ResidentPage> { std::abort(); });
+    const auto table =
+        pageTable(sphereDataset().dataset, {}, [](uint64_t) -> std::optional<ResidentPage> { std::abort(); });
     ASSERT_EQ(table.size(), frame::kRecordTexels);
     EXPECT_EQ(table[0].x, 0u);
 }

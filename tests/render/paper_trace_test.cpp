@@ -35,7 +35,9 @@ struct PaperScene {
     PaperDataset dataset;
 };
 
-IndexedMesh ball(glm::dvec3 centre = {0.31, -0.17, 0.23}, double radius = 1) { return test::sphereMesh(centre, radius, 48); }
+IndexedMesh ball(glm::dvec3 centre = {0.31, -0.17, 0.23}, double radius = 1) {
+    return test::sphereMesh(centre, radius, 48);
+}
 
 struct Comparison {
     uint64_t hits = 0, different = 0, stepsDifferent = 0;
@@ -61,13 +63,17 @@ protected:
         for (uint32_t y = 0; y < kHeight; ++y)
             for (uint32_t x = 0; x < kWidth; ++x) {
                 const CameraRay ray = cameraRay(request.camera, kWidth, kHeight, x + 0.5, y + 0.5);
-                const GridRay grid = GridRays::along(caster.frame().gridFromWorld(ray.origin), ray.direction, caster.frame().cells());
+                const GridRay grid =
+                    GridRays::along(caster.frame().gridFromWorld(ray.origin), ray.direction, caster.frame().cells());
                 RayWork work;
                 const GridHit expected = caster.cast(grid, work);
                 const size_t at = size_t{y} * kWidth + x;
-                const double shown = double((*depth)[at]) / caster.frame().cell, known = grid.tStart + double(expected.t);
+                const double shown = double((*depth)[at]) / caster.frame().cell,
+                             known = grid.tStart + double(expected.t);
                 const bool both = std::isfinite(shown) && std::isfinite(known);
-                const bool same = both ? std::abs(shown - known) < 0.1 : std::isinf(shown) == std::isinf(known) && std::isnan(shown) == std::isnan(known);
+                const bool same =
+                    both ? std::abs(shown - known) < 0.1
+                         : std::isinf(shown) == std::isinf(known) && std::isnan(shown) == std::isnan(known);
                 c.hits += both ? 1 : 0;
                 c.different += same ? 0 : 1;
                 c.stepsDifferent += (*steps)[at] != work.steps ? 1 : 0;
@@ -108,7 +114,9 @@ TEST_P(PaperTraceAccess, EveryCameraShowsWhatTheCpuDoes) {
     expectSame(scene, parallel);
 }
 INSTANTIATE_TEST_SUITE_P(Access, PaperTraceAccess, testing::Values(PageAccess::TexelBuffer, PageAccess::StorageBuffer),
-                         [](const auto& named) { return named.param == PageAccess::TexelBuffer ? "Texel" : "Storage"; });
+                         [](const auto& named) {
+                             return named.param == PageAccess::TexelBuffer ? "Texel" : "Storage";
+                         });
 
 TEST_F(PaperTrace, EveryRuleIsTheCpus) {
     start();
@@ -189,7 +197,8 @@ TEST_F(PaperTrace, WorkIsCounted) {
         for (uint32_t x = 0; x < kWidth; ++x) {
             const CameraRay ray = cameraRay(request.camera, kWidth, kHeight, x + 0.5, y + 0.5);
             RayWork work;
-            (void)caster.cast(GridRays::along(caster.frame().gridFromWorld(ray.origin), ray.direction, caster.frame().cells()), work);
+            (void)caster.cast(
+                GridRays::along(caster.frame().gridFromWorld(ray.origin), ray.direction, caster.frame().cells()), work);
             cells += work.cells;
             fetches += work.fetches;
         }

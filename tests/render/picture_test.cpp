@@ -19,7 +19,9 @@ protected:
         fs::create_directory(folder_);
     }
     void TearDown() override { fs::remove_all(folder_); }
-    [[nodiscard]] size_t files() const { return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator())); }
+    [[nodiscard]] size_t files() const {
+        return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+    }
     fs::path folder_;
 };
 

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
-#include <set>
 #include <cmath>
+#include <condition_variable>
 #include <map>
 #include <mutex>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include <gtest/gtest.h>
@@ -37,8 +37,11 @@ std::vector<NamedCamera> cameras(const Scene& scene) {
     const glm::dvec3 lo = scene.boxMin, hi = scene.boxMax, middle = (lo + hi) * 0.5;
     const double edge = hi.x - lo.x;
     const auto fit = [&](glm::dvec3 forward) { return fitCamera(lo, hi, forward, {0.1, 1, 0.2}, 0.6, 4.0 / 3); };
-    std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})}, {"along -z", fit({0, 0, -1})}, {"along +x", fit({1, 0, 0})},
-                                     {"along -y", fit({0, -1, 0})}, {"diagonal", fit({1, 1, 1})}};
+    std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})},
+                                     {"along -z", fit({0, 0, -1})},
+                                     {"along +x", fit({1, 0, 0})},
+                                     {"along -y", fit({0, -1, 0})},
+                                     {"diagonal", fit({1, 1, 1})}};
     Camera parallel = fit({0.5, -0.3, 0.7});
     parallel.projection = Projection::Orthographic;
     list.push_back({"parallel", parallel});
@@ -94,7 +97,8 @@ Comparison compare(Renderer& renderer, const Scene& scene, const FrameRequest& r
             ++c.hit;
             c.depthSum += error;
             c.depthMax = std::max(c.depthMax, error);
-            c.normalMax = std::max(c.normalMax, std::acos(std::min(1.0, glm::dot(glm::dvec3((*normals)[at]), expected->normal))));
+            c.normalMax =
+                std::max(c.normalMax, std::acos(std::min(1.0, glm::dot(glm::dvec3((*normals)[at]), expected->normal))));
         }
     return c;
 }
@@ -121,7 +125,8 @@ TEST_P(RendererAgainstReference, EveryCamera) {
             EXPECT_LE(stats.hitPixels, c.hit + c.wrong + 2);
             EXPECT_GE(stats.hitPixels + 2, c.hit + c.wrong);
             // Far away, single precision along the ray is what limits depth.
-            const double reach = glm::length(named.camera.eye - (scene.boxMin + scene.boxMax) * 0.5) / scene.dataset->header.cell;
+            const double reach =
+                glm::length(named.camera.eye - (scene.boxMin + scene.boxMax) * 0.5) / scene.dataset->header.cell;
             EXPECT_LT(c.depthSum / double(std::max<uint64_t>(c.hit, 1)), 2e-4 + 1e-7 * reach);
             EXPECT_LT(c.depthMax, 0.3) << "grazing rays, a few steps of false position";
         }
@@ -129,8 +134,10 @@ TEST_P(RendererAgainstReference, EveryCamera) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Access, RendererAgainstReference, testing::Values(PageAccess::TexelBuffer, PageAccess::StorageBuffer),
-                         [](const auto& named) { return named.param == PageAccess::TexelBuffer ? "Texel" : "Storage"; });
+INSTANTIATE_TEST_SUITE_P(Access, RendererAgainstReference,
+                         testing::Values(PageAccess::TexelBuffer, PageAccess::StorageBuffer), [](const auto& named) {
+                             return named.param == PageAccess::TexelBuffer ? "Texel" : "Storage";
+                         });
 
 TEST_F(RendererTest, BeamChangesNoPixel) {
     start();
@@ -282,7 +289,9 @@ public:
         freed_.wait(lock, [&] { return isFree_; });
         return Error{.code = ErrorCode::Cancelled, .message = "closed"};
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override { return source_->bytesToRead(page, withColour); }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override {
+        return source_->bytesToRead(page, withColour);
+    }
     void interrupt() const override {
         const std::lock_guard lock(mutex_);
         isFree_ = true;
@@ -302,7 +311,8 @@ TEST_F(RendererTest, AsManyThreadsReadAsTheSourceNeeds) {
     FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 4.0 / 3));
     request.errorPixels = 0.001;
     // As it says; shared with another; as the options say, whatever it says.
-    for (const auto& [datasets, asked, threads] : {std::tuple(1u, 0u, 5u), std::tuple(2u, 0u, 2u), std::tuple(1u, 3u, 3u)}) {
+    for (const auto& [datasets, asked, threads] :
+         {std::tuple(1u, 0u, 5u), std::tuple(2u, 0u, 2u), std::tuple(1u, 3u, 3u)}) {
         RendererOptions options;
         options.loaderThreads = asked;
         start(options);
@@ -321,7 +331,8 @@ TEST_F(RendererTest, AsManyThreadsReadAsTheSourceNeeds) {
 }
 
 /// Pages of a sphere around `centre` in the order they were read; one page an update, each update drawn.
-std::vector<uint64_t> readInOrder(LoadOrder order, PageAccess access, const Scene& scene, const FrameRequest& request, std::vector<std::string>& messages) {
+std::vector<uint64_t> readInOrder(LoadOrder order, PageAccess access, const Scene& scene, const FrameRequest& request,
+                                  std::vector<std::string>& messages) {
     RendererOptions options;
     options.order = order;
     options.access = access;
@@ -355,7 +366,10 @@ TEST(RendererFeedback, WhatRaysMeetIsReadFirst) {
         // Of the finest pages: the rays see those in front.
         std::vector<double> front;
         for (const uint64_t page : read)
-            if (scene.dataset->pages[page].level == 2) front.push_back(scene.dataset->originOf(scene.dataset->pages[page]).z >= (scene.boxMin.z + scene.boxMax.z) / 2 ? 1 : 0);
+            if (scene.dataset->pages[page].level == 2)
+                front.push_back(
+                    scene.dataset->originOf(scene.dataset->pages[page]).z >= (scene.boxMin.z + scene.boxMax.z) / 2 ? 1
+                                                                                                                   : 0);
         const size_t half = front.size() / 2;
         const double early = std::accumulate(front.begin(), front.begin() + std::ptrdiff_t(half), 0.0);
         const double late = std::accumulate(front.begin() + std::ptrdiff_t(half), front.end(), 0.0);
@@ -499,7 +513,8 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
         bool separateMemory, separateCopies;
         int at;
     };
-    for (const auto& [separateMemory, separateCopies, lostAt] : {Loss{false, false, 2}, {true, false, 2}, {true, false, 5}, {true, true, 3}, {true, true, 4}}) {
+    for (const auto& [separateMemory, separateCopies, lostAt] :
+         {Loss{false, false, 2}, {true, false, 2}, {true, false, 5}, {true, true, 3}, {true, true, 4}}) {
         SCOPED_TRACE(lostAt);
         options.faults.separateMemory = separateMemory;
         options.faults.separateCopies = separateCopies;
@@ -553,7 +568,8 @@ Picture alonePicture(const Scene& scene, const FrameRequest& request, uint64_t b
 }
 
 /// Pictures of views of one renderer, updated and drawn in turn until all have settled.
-std::vector<Picture> drawTogether(std::span<const std::unique_ptr<Renderer>> views, std::span<const FrameRequest> requests, bool& relaxed) {
+std::vector<Picture> drawTogether(std::span<const std::unique_ptr<Renderer>> views,
+                                  std::span<const FrameRequest> requests, bool& relaxed) {
     for (bool settled = false; !settled;) {
         settled = true;
         for (size_t i = 0; i < views.size(); ++i) {
@@ -630,12 +646,14 @@ TEST_F(RendererTest, ADirectoryInPartsGivesTheSamePicture) {
     std::vector<Picture> pictures[2];
     start();
     for (const bool inParts : {false, true}) {
-        const auto dataset = std::make_shared<const Dataset>(*(inParts ? readDatasetStart(*reader, kDirectoryOffset + kBlockBytes) : readDataset(*reader)));
+        const auto dataset = std::make_shared<const Dataset>(
+            *(inParts ? readDatasetStart(*reader, kDirectoryOffset + kBlockBytes) : readDataset(*reader)));
         const bool isWhole = dataset->pages.blocksKnown() == dataset->pages.blocks();
         EXPECT_NE(isWhole, inParts);
         ASSERT_TRUE(renderer_->open(dataset, std::make_shared<FilePageSource>(reader, dataset)));
         for (const double errorPixels : {1.0, 0.02}) {
-            const glm::dvec3 low = dataset->originOf(dataset->pages[0]), high = low + dataset->edgeOf(dataset->pages[0]);
+            const glm::dvec3 low = dataset->originOf(dataset->pages[0]),
+                             high = low + dataset->edgeOf(dataset->pages[0]);
             FrameRequest request = requestOf(fitCamera(low, high, {-0.3, -0.5, -1}, {0, 1, 0}, 0.6, 4.0 / 3), 64, 48);
             request.errorPixels = errorPixels;
             EXPECT_GT(draw(request).hitPixels, 100u);
@@ -660,11 +678,13 @@ TEST_F(RendererTest, ABrokenPageIsReportedOnceAndDrawnFromItsParent) {
     EXPECT_EQ(update->problems[0].message, "broken");
     // A page that was on its way when its parent was given up may be reported later: once, too.
     std::set<std::string> reported;
-    for (const Error& problem : update->problems) EXPECT_TRUE(reported.insert(problem.element).second) << problem.line();
+    for (const Error& problem : update->problems)
+        EXPECT_TRUE(reported.insert(problem.element).second) << problem.line();
     for (int i = 0; i < 5; ++i) {
         const auto later = renderer_->update(request);
         ASSERT_TRUE(later);
-        for (const Error& problem : later->problems) EXPECT_TRUE(reported.insert(problem.element).second) << problem.line();
+        for (const Error& problem : later->problems)
+            EXPECT_TRUE(reported.insert(problem.element).second) << problem.line();
     }
     const auto stats = renderer_->render(request);
     ASSERT_TRUE(stats);

@@ -28,16 +28,19 @@ protected:
 };
 
 FrameRequest requestFor(const Scene& scene, glm::dvec3 forward = kView) {
-    return requestOf(fitCamera(scene.boxMin, scene.boxMax, forward, {0, 1, 0}, 0.6, double(kWidth) / kHeight), kWidth, kHeight);
+    return requestOf(fitCamera(scene.boxMin, scene.boxMax, forward, {0, 1, 0}, 0.6, double(kWidth) / kHeight), kWidth,
+                     kHeight);
 }
 
 // Nothing stands between a convex body and its light: not the body itself either.
 TEST_F(ShadingTest, AConvexBodyCastsNoShadowOnItself) {
     start();
-    for (const Scene& scene : {test::sphereScene(), test::sphereScene(3, glm::dvec3(4e6, -3e6, 1e6), 0.01), test::cubeScene(0)}) {
+    for (const Scene& scene :
+         {test::sphereScene(), test::sphereScene(3, glm::dvec3(4e6, -3e6, 1e6), 0.01), test::cubeScene(0)}) {
         show(scene);
         for (const double errorPixels : {0.2, 20.0})
-            for (const glm::vec3 light : {glm::vec3(-0.35, 0.55, 0.75), glm::vec3(-1, 0.05, 0.1), glm::vec3(0.2, 1, -0.6)}) {
+            for (const glm::vec3 light :
+                 {glm::vec3(-0.35, 0.55, 0.75), glm::vec3(-1, 0.05, 0.1), glm::vec3(0.2, 1, -0.6)}) {
                 FrameRequest request = requestFor(scene);
                 request.errorPixels = errorPixels;
                 request.shading.lightDirection = light;

@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include <gtest/gtest.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include "tests/support/renderer_fixture.h"
 
@@ -27,7 +27,8 @@ protected:
         const auto opened = renderer_->open(std::move(datasets));
         EXPECT_TRUE(opened) << opened.error().line();
         const FrameStats stats = draw(request);
-        return {renderer_->readPicture().value(), renderer_->readDepth().value(), renderer_->readNormals().value(), stats};
+        return {renderer_->readPicture().value(), renderer_->readDepth().value(), renderer_->readNormals().value(),
+                stats};
     }
 };
 
@@ -47,7 +48,8 @@ TEST_F(SeveralDatasets, TheNearestIsSeen) {
     for (const ShadingMode mode : {ShadingMode::Lit, ShadingMode::Normals}) {
         request.shading.mode = mode;
         request.shading.shadows = mode == ShadingMode::Lit;
-        const Shown a = shown({first}, request), b = shown({second}, request), both = shown({first, second}, request), other = shown({second, first}, request);
+        const Shown a = shown({first}, request), b = shown({second}, request), both = shown({first, second}, request),
+                    other = shown({second, first}, request);
         size_t fromFirst = 0, fromSecond = 0, hits = 0;
         for (size_t i = 0; i < a.depth.size(); ++i) {
             const bool isFirst = a.depth[i] <= b.depth[i];
@@ -84,11 +86,13 @@ TEST_F(SeveralDatasets, APlacedSphereIsWhereItIsPlaced) {
     placed.scale = 250;
     placed.translation = {1e5, -2e5, 3e4};
     const glm::dvec3 corners[2] = {placed.toWorld(scene.boxMin), placed.toWorld(scene.boxMax)};
-    const FrameRequest request = requestOf(fitCamera(glm::min(corners[0], corners[1]), glm::max(corners[0], corners[1]), {1, 0.2, -1}, {0, 1, 0}, 0.8, 4.0 / 3));
+    const FrameRequest request = requestOf(fitCamera(glm::min(corners[0], corners[1]), glm::max(corners[0], corners[1]),
+                                                     {1, 0.2, -1}, {0, 1, 0}, 0.8, 4.0 / 3));
     const FrameRequest local = requestIn(placed, request);
     shown({{scene.dataset, scene.source, placed}}, request);
     std::vector<std::optional<PixelHit>> hits;
-    for (uint32_t i = 0; i < request.width * request.height; i += 37) hits.push_back(renderer_->pick(i % request.width, i / request.width).value());
+    for (uint32_t i = 0; i < request.width * request.height; i += 37)
+        hits.push_back(renderer_->pick(i % request.width, i / request.width).value());
     shown({{scene.dataset, scene.source, {}}}, local);
     size_t found = 0;
     for (uint32_t i = 0, k = 0; i < request.width * request.height; i += 37, ++k) {
@@ -108,7 +112,8 @@ TEST_F(SeveralDatasets, ShareTheBudgetAndSurviveALostDevice) {
     options.faults.lostAtSubmission = 20;
     start(options);
     const test::Scene scene = test::sphereScene();
-    const PlacedDataset first{scene.dataset, scene.source, {}}, second{scene.dataset, scene.source, besideAndSmaller(scene)};
+    const PlacedDataset first{scene.dataset, scene.source, {}},
+        second{scene.dataset, scene.source, besideAndSmaller(scene)};
     FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {-0.3, -0.4, -1}, {0, 1, 0}, 0.8, 4.0 / 3));
     const Shown before = shown({first, second}, request);
     uint32_t losses = 0;
@@ -134,7 +139,8 @@ TEST_F(SeveralDatasets, TakeNoMoreThanTheBudgetTogether) {
     options.budgetBytes = 1 << 20;
     start(options);
     const test::Scene scene = test::sphereScene(4);
-    const PlacedDataset first{scene.dataset, scene.source, {}}, second{scene.dataset, scene.source, besideAndSmaller(scene)};
+    const PlacedDataset first{scene.dataset, scene.source, {}},
+        second{scene.dataset, scene.source, besideAndSmaller(scene)};
     ASSERT_TRUE(renderer_->open({first, second}));
     FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {-0.3, -0.4, -1}, {0, 1, 0}, 0.8, 4.0 / 3));
     request.errorPixels = 0.001;
@@ -151,7 +157,8 @@ TEST_F(SeveralDatasets, TakeNoMoreThanTheBudgetTogether) {
     const auto refused = renderer_->open({first, second});
     EXPECT_TRUE(refused) << refused.error().line();
     ASSERT_TRUE(renderer_->setBudgets(1 << 20, 4 << 10));
-    EXPECT_EQ(renderer_->open({first, second}).error().code, ErrorCode::Limit) << "no memory to read the coarsest pages";
+    EXPECT_EQ(renderer_->open({first, second}).error().code, ErrorCode::Limit)
+        << "no memory to read the coarsest pages";
 }
 
 TEST(BudgetShares, WhatSmallOnesDoNotNeedGoesToTheLarge) {
@@ -172,9 +179,12 @@ TEST(SimilarityOfAMatrix, OnlySimilarities) {
     EXPECT_LT(glm::distance(moved->toWorld({1, 0, 0}), glm::dvec3(10, 22, 30)), 1e-12);
     EXPECT_LT(glm::distance(moved->fromWorld({10, 22, 30}), glm::dvec3(1, 0, 0)), 1e-12);
     const std::pair<std::array<double, 16>, const char*> wrong[] = {
-        {{2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "stretches"},  {{1, 0.1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "shears"},
-        {{-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "mirrors"},   {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1}, "flattens"},
-        {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0.1, 1}, "last row"}, {{1, 0, 0, NAN, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "finite"},
+        {{2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "stretches"},
+        {{1, 0.1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "shears"},
+        {{-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "mirrors"},
+        {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1}, "flattens"},
+        {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0.1, 1}, "last row"},
+        {{1, 0, 0, NAN, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "finite"},
     };
     for (const auto& [rows, word] : wrong) {
         const auto refused = of(rows);

@@ -1,5 +1,5 @@
-// Directories that come in parts: what a first view reads does not depend on the file's size, what a view settles on does
-// not depend on what is known, and what lies is found.
+// Directories that come in parts: what a first view reads does not depend on the file's size, what a view settles on
+// does not depend on what is known, and what lies is found.
 #include <algorithm>
 #include <random>
 #include <set>
@@ -21,7 +21,9 @@ struct Scan {
     std::shared_ptr<test::CountedFile> file;
     std::shared_ptr<const Dataset> whole;
 
-    [[nodiscard]] std::shared_ptr<const Dataset> start() const { return std::make_shared<const Dataset>(readDatasetStart(*file, kLead).value()); }
+    [[nodiscard]] std::shared_ptr<const Dataset> start() const {
+        return std::make_shared<const Dataset>(readDatasetStart(*file, kLead).value());
+    }
 };
 
 /// `lastBytes`: of the last page, which few views want.
@@ -41,8 +43,8 @@ struct Settled {
 };
 
 /// Places pages unread, in any order; blocks come from the file.
-Settled settle(const std::shared_ptr<const Dataset>& dataset, const test::CountedFile& file, const SelectionView& view, uint64_t budget, uint64_t seed,
-               uint64_t chunkBytes = uint64_t{1} << 40) {
+Settled settle(const std::shared_ptr<const Dataset>& dataset, const test::CountedFile& file, const SelectionView& view,
+               uint64_t budget, uint64_t seed, uint64_t chunkBytes = uint64_t{1} << 40) {
     const auto reader = std::shared_ptr<const ByteReader>(&file, [](const ByteReader*) {});
     const FilePageSource source(reader, dataset);
     const bool colour = dataset->hasColour();
@@ -55,14 +57,18 @@ Settled settle(const std::shared_ptr<const Dataset>& dataset, const test::Counte
         if (wishes.size() > 5) wishes.resize(5);
         std::vector<uint64_t> pages;
         for (const PageRequest& wish : wishes) {
-            if (!isBlock(wish.page)) pages.push_back(wish.page);
-            else if (source.read(wish.page, colour)) ++settled.blocks;
-            else if (policy.giveUp(wish.page)) ++settled.problems;
+            if (!isBlock(wish.page))
+                pages.push_back(wish.page);
+            else if (source.read(wish.page, colour))
+                ++settled.blocks;
+            else if (policy.giveUp(wish.page))
+                ++settled.problems;
         }
         policy.look(view, round);
         for (const uint64_t page : pages) policy.place(page);
         const PolicyOutcome outcome = policy.finish();
-        for (const PageRequest& wish : outcome.wishes) EXPECT_TRUE(isBlock(wish.page) || dataset->pages.knows(wish.page));
+        for (const PageRequest& wish : outcome.wishes)
+            EXPECT_TRUE(isBlock(wish.page) || dataset->pages.knows(wish.page));
         wishes = outcome.wishes;
         settled.cut = outcome.drawable;
         EXPECT_EQ(outcome.drawable.complete, outcome.missing == 0);
@@ -138,12 +144,15 @@ TEST(DirectoryParts, AMovingViewAsksForBlocksOfWhatComesLater) {
     int now = 0, ahead = 0;
     for (int i = 0; i < 10; ++i) {
         const auto start = scan.start();
-        ResidencyPolicy policy(start, start->hasColour(), poolShapeFor(*start, start->hasColour(), uint64_t{1} << 30, uint64_t{1} << 40));
+        ResidencyPolicy policy(start, start->hasColour(),
+                               poolShapeFor(*start, start->hasColour(), uint64_t{1} << 30, uint64_t{1} << 40));
         SelectionView view = test::randomView(random, 0.5);
         const auto blocksWished = [&](double seconds, bool urgent) {
             policy.look(view, seconds);
             const auto wishes = policy.finish().wishes;
-            return std::count_if(wishes.begin(), wishes.end(), [&](const PageRequest& wish) { return isBlock(wish.page) && (wish.priority > 1e6) == urgent; });
+            return std::count_if(wishes.begin(), wishes.end(), [&](const PageRequest& wish) {
+                return isBlock(wish.page) && (wish.priority > 1e6) == urgent;
+            });
         };
         blocksWished(0, true);
         now += static_cast<int>(blocksWished(0.1, true));
@@ -168,7 +177,8 @@ TEST(DirectoryParts, ABrokenBlockIsReportedOnceAndDrawnFromItsParents) {
     const Settled settled = settle(start, *scan.file, all, uint64_t{1} << 40, 1);
     EXPECT_EQ(settled.problems, 1u);
     EXPECT_EQ(start->pages.blocksKnown(), start->pages.blocks() - 1);
-    EXPECT_TRUE(std::none_of(settled.cut.cut.begin(), settled.cut.cut.end(), [&](uint64_t page) { return page / kEntriesPerBlock == last; }));
+    EXPECT_TRUE(std::none_of(settled.cut.cut.begin(), settled.cut.cut.end(),
+                             [&](uint64_t page) { return page / kEntriesPerBlock == last; }));
     EXPECT_FALSE(settled.cut.cut.empty());
 }
 
@@ -177,8 +187,10 @@ TEST(DirectoryParts, TheLoaderReadsBlocksTogetherAndTriesAgain) {
     const auto start = scan.start();
     scan.file->bytes[blockOffset(5) + 9] ^= std::byte{1};
     scan.file->reads = 0;
-    PageLoader loader(std::make_shared<FilePageSource>(scan.file, start),
-                      {.threads = 1, .retry = {.attempts = 3, .damagedAttempts = 3, .firstDelaySeconds = 0.001, .longestDelaySeconds = 0.001}});
+    PageLoader loader(
+        std::make_shared<FilePageSource>(scan.file, start),
+        {.threads = 1,
+         .retry = {.attempts = 3, .damagedAttempts = 3, .firstDelaySeconds = 0.001, .longestDelaySeconds = 0.001}});
     loader.request({{numberOfBlock(2), 1}, {numberOfBlock(3), 1}, {numberOfBlock(4), 1}, {numberOfBlock(5), 1}});
     std::vector<LoadedPage> came;
     while (loader.pending() > 0) {
@@ -187,7 +199,8 @@ TEST(DirectoryParts, TheLoaderReadsBlocksTogetherAndTriesAgain) {
     }
     ASSERT_EQ(came.size(), 4u);
     for (const LoadedPage& block : came) EXPECT_EQ(block.bytes.ok(), block.page != numberOfBlock(5));
-    EXPECT_NE(came.back().bytes.error().line().find("directory block 5"), std::string::npos) << came.back().bytes.error().line();
+    EXPECT_NE(came.back().bytes.error().line().find("directory block 5"), std::string::npos)
+        << came.back().bytes.error().line();
     EXPECT_EQ(scan.file->reads, 3u) << "four blocks together, then one twice more";
     EXPECT_EQ(loader.stats().heldBytes, 0u);
     for (const uint64_t block : {2u, 3u, 4u}) EXPECT_TRUE(start->pages.knowsBlock(block));
@@ -203,7 +216,8 @@ Result<void> admitAll(const std::vector<std::byte>& bytes, uint64_t seed) {
     for (uint64_t b = 0; b < blocks.size(); ++b) blocks[b] = b;
     std::mt19937_64 random(seed);
     std::shuffle(blocks.begin(), blocks.end(), random);
-    for (const uint64_t b : blocks) VCP_TRY(admitBlock(*start, file.name(), b, std::span(file.bytes).subspan(blockOffset(b), kBlockBytes)));
+    for (const uint64_t b : blocks)
+        VCP_TRY(admitBlock(*start, file.name(), b, std::span(file.bytes).subspan(blockOffset(b), kBlockBytes)));
     for (uint64_t page = 0; page < start->pages.size(); ++page) EXPECT_TRUE(start->pages.knows(page));
     return {};
 }
@@ -217,7 +231,8 @@ TEST(DirectoryParts, WhatWasRefusedIsNotKept) {
     lie.childMask = 0xff;
     std::memcpy(&scan.file->bytes[blockOffset(block)], &lie, sizeof lie);
     test::sealFile(scan.file->bytes);
-    EXPECT_FALSE(admitBlock(*start, "lie.vcp", block, std::span(scan.file->bytes).subspan(blockOffset(block), kBlockBytes)));
+    EXPECT_FALSE(
+        admitBlock(*start, "lie.vcp", block, std::span(scan.file->bytes).subspan(blockOffset(block), kBlockBytes)));
     for (uint64_t i = page; i < start->pages.size(); ++i) EXPECT_EQ(start->pages[i].childMask, 0) << i;
 }
 
@@ -244,7 +259,8 @@ TEST(DirectoryParts, LiesBehindValidHashesAreFoundInAnyOrder) {
             std::vector<std::byte> bytes = scan.file->bytes;
             PageEntry entry = d.pages[page];
             change(entry);
-            std::memcpy(&bytes[blockOffset(page / kEntriesPerBlock) + page % kEntriesPerBlock * sizeof entry], &entry, sizeof entry);
+            std::memcpy(&bytes[blockOffset(page / kEntriesPerBlock) + page % kEntriesPerBlock * sizeof entry], &entry,
+                        sizeof entry);
             test::sealFile(bytes);
             const auto admitted = admitAll(bytes, seed);
             ASSERT_FALSE(admitted) << words;

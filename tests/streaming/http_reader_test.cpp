@@ -28,7 +28,8 @@ protected:
     void SetUp() override { ASSERT_TRUE(server_->runs()); }
 
     [[nodiscard]] fs::path file() const { return folder_ / "scan.vcp"; }
-    [[nodiscard]] Result<std::shared_ptr<HttpReader>> open(const std::string& name, const HttpOptions& options = {}) const {
+    [[nodiscard]] Result<std::shared_ptr<HttpReader>> open(const std::string& name,
+                                                           const HttpOptions& options = {}) const {
         return HttpReader::open(server_->url(name), options);
     }
     /// One line that begins with the address and says `what`.
@@ -49,7 +50,8 @@ TEST_F(HttpReaderTest, EveryRangeIsThatOfTheFile) {
     EXPECT_EQ((*reader)->size(), content.size());
     std::mt19937_64 random(1);
     for (int i = 0; i < 60; ++i) {
-        const size_t offset = random() % content.size(), size = 1 + random() % std::min<size_t>(content.size() - offset, 20000);
+        const size_t offset = random() % content.size(),
+                     size = 1 + random() % std::min<size_t>(content.size() - offset, 20000);
         std::vector<std::byte> bytes(size);
         const auto read = (*reader)->read(offset, bytes);
         ASSERT_TRUE(read) << read.error().line();
@@ -78,7 +80,8 @@ TEST_F(HttpReaderTest, TheFirstViewOfALargeFileTakesTwoRequestsToo) {
     Dataset tree = test::randomTree(1, 6, 0.7, 256);
     const std::vector<std::byte> bytes = test::directoryFile(tree);
     ASSERT_GT(tree.pages.blocks() * kBlockBytes, wholeDirectoryBytes(kLeadBytes));
-    std::ofstream(folder_ / "large.vcp", std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    std::ofstream(folder_ / "large.vcp", std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     const auto reader = open("large.vcp");
     ASSERT_TRUE(reader) << reader.error().line();
     const auto dataset = readDatasetStart(**reader);
@@ -112,7 +115,8 @@ TEST_F(HttpReaderTest, VerifiesWholeFilesFromManyThreads) {
     std::vector<std::thread> threads;
     for (int i = 0; i < 6; ++i)
         threads.emplace_back([&] {
-            for (uint64_t page = next++; page < dataset->pages.size(); page = next++) good += readPage(**reader, *dataset, page, true).ok();
+            for (uint64_t page = next++; page < dataset->pages.size(); page = next++)
+                good += readPage(**reader, *dataset, page, true).ok();
         });
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(good, dataset->pages.size());
@@ -143,7 +147,8 @@ TEST_F(HttpReaderTest, WhatIsWrongAtOpeningIsOneClearLine) {
     const auto empty = open("empty.vcp");
     ASSERT_FALSE(empty);
     expectError(empty.error(), "status 416");
-    for (const auto& [url, what] : {std::pair("http://127.0.0.1:1/x.vcp", "no connection"), std::pair("http://no.such.name.invalid/x.vcp", "name is not known"),
+    for (const auto& [url, what] : {std::pair("http://127.0.0.1:1/x.vcp", "no connection"),
+                                    std::pair("http://no.such.name.invalid/x.vcp", "name is not known"),
                                     std::pair("http://", "is not an address")}) {
         const auto reader = HttpReader::open(url);
         ASSERT_FALSE(reader);
@@ -153,8 +158,12 @@ TEST_F(HttpReaderTest, WhatIsWrongAtOpeningIsOneClearLine) {
 
 TEST_F(HttpReaderTest, WhatGoesWrongLaterIsNoBytes) {
     const std::pair<const char*, const char*> cases[] = {
-        {"shifted", "another range than was asked for"}, {"short", "ended before"},         {"long", "longer than"},
-        {"whole", "does not answer range requests"},     {"status-500", "answers with status 500"}, {"unnamed", "another range"},
+        {"shifted", "another range than was asked for"},
+        {"short", "ended before"},
+        {"long", "longer than"},
+        {"whole", "does not answer range requests"},
+        {"status-500", "answers with status 500"},
+        {"unnamed", "another range"},
     };
     for (const auto& [fault, what] : cases) {
         SCOPED_TRACE(fault);
@@ -219,8 +228,10 @@ TEST_F(HttpReaderTest, AFileThatChangesIsNoticed) {
 
 TEST_F(HttpReaderTest, TlsIsVerified) {
     const std::string key = (folder_ / "key.pem").string(), certificate = (folder_ / "certificate.pem").string();
-    const std::string make = "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=test "
-                             "-addext subjectAltName=IP:127.0.0.1 -keyout " + key + " -out " + certificate + " 2>/dev/null";
+    const std::string make =
+        "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=test "
+        "-addext subjectAltName=IP:127.0.0.1 -keyout " +
+        key + " -out " + certificate + " 2>/dev/null";
     ASSERT_EQ(std::system(make.c_str()), 0) << "openssl makes no certificate";
     const test::RangeServer secure(folder_.path(), {certificate, key});
     ASSERT_TRUE(secure.runs());
@@ -240,13 +251,16 @@ TEST(HttpExchange, ContentRange) {
     ASSERT_TRUE(good);
     EXPECT_EQ(good->range, (ByteRange{5, 99}));
     EXPECT_EQ(good->fileBytes, 1234u);
-    for (const char* bad : {"", "bytes", "bytes 5-99", "bytes 5-99/", "bytes 9-5/1234", "bytes 0-1234/1234", "bytes */1234", "bytes 0-1/*", "lines 0-1/9",
-                            "bytes 0-1/99999999999999999999", "bytes -1/9", "bytes 0-1/9 "})
+    for (const char* bad :
+         {"", "bytes", "bytes 5-99", "bytes 5-99/", "bytes 9-5/1234", "bytes 0-1234/1234", "bytes */1234",
+          "bytes 0-1/*", "lines 0-1/9", "bytes 0-1/99999999999999999999", "bytes -1/9", "bytes 0-1/9 "})
         EXPECT_FALSE(parseContentRange(bad)) << bad;
 }
 
 TEST(HttpExchange, PartsOfABodyAndEveryDamage) {
-    const std::string body = "\r\n--ab\r\nContent-Range: bytes 2-5/90\r\n\r\n--ab\r\n--ab\r\ncontent-range: bytes 88-89/90\r\nX: y\r\n\r\nzz\r\n--ab--\r\n";
+    const std::string body =
+        "\r\n--ab\r\nContent-Range: bytes 2-5/90\r\n\r\n--ab\r\n--ab\r\ncontent-range: bytes 88-89/90\r\nX: "
+        "y\r\n\r\nzz\r\n--ab--\r\n";
     const auto parts = [](const std::string& text, const std::string& type = "multipart/byteranges; boundary=ab") {
         return parseBodyParts(std::as_bytes(std::span(text)), type);
     };

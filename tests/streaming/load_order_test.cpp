@@ -17,9 +17,13 @@ struct Fixture {
     std::vector<uint64_t> units, parents;
     SelectionView view;
 
-    explicit Fixture(Dataset made) : dataset(std::make_shared<const Dataset>(std::move(made))), units(dataset->pages.size(), 2), parents(dataset->pages.size(), 0) {
+    explicit Fixture(Dataset made)
+        : dataset(std::make_shared<const Dataset>(std::move(made))),
+          units(dataset->pages.size(), 2),
+          parents(dataset->pages.size(), 0) {
         for (uint64_t page = 0; page < parents.size(); ++page)
-            for (uint32_t i = 0; i < uint32_t(std::popcount(dataset->pages[page].childMask)); ++i) parents[dataset->pages[page].firstChild + i] = page;
+            for (uint32_t i = 0; i < uint32_t(std::popcount(dataset->pages[page].childMask)); ++i)
+                parents[dataset->pages[page].firstChild + i] = page;
         view.eye = {0.5, 0.5, -1};
         view.pixelsPerUnit = 1000;
         view.errorPixels = 0.5;
@@ -47,7 +51,8 @@ std::map<uint64_t, double> byPage(const std::vector<WantedPage>& pages) {
 }
 
 TEST(LoadOrder, NamesGoBothWays) {
-    for (const LoadOrder order : {LoadOrder::Feedback, LoadOrder::Error, LoadOrder::Nearest, LoadOrder::Breadth, LoadOrder::Random})
+    for (const LoadOrder order :
+         {LoadOrder::Feedback, LoadOrder::Error, LoadOrder::Nearest, LoadOrder::Breadth, LoadOrder::Random})
         EXPECT_EQ(loadOrderNamed(nameOf(order)), order);
     EXPECT_FALSE(loadOrderNamed("newest"));
 }
@@ -59,7 +64,8 @@ TEST(LoadOrder, EveryOrderHasAllPagesAndParentsFirst) {
         std::mt19937_64 random(seed);
         f.view = test::randomView(random, 0.5);
         const auto missing = f.missing(1);
-        for (const LoadOrder order : {LoadOrder::Feedback, LoadOrder::Error, LoadOrder::Nearest, LoadOrder::Breadth, LoadOrder::Random}) {
+        for (const LoadOrder order :
+             {LoadOrder::Feedback, LoadOrder::Error, LoadOrder::Nearest, LoadOrder::Breadth, LoadOrder::Random}) {
             SCOPED_TRACE(nameOf(order));
             LoadPriorities priorities = f.priorities(order);
             RayFeedback feedback;
@@ -98,13 +104,16 @@ TEST(LoadOrder, EveryOrderHasAllPagesAndParentsFirst) {
 
 TEST(LoadOrder, ARayGainsWhatRefinementTakesOffItsError) {
     Dataset tree = test::randomTree(2, 3, 1, 16384);
-    for (size_t i = 0; i < tree.pages.size(); ++i) tree.pages[i].certifiedError = float(0.016 * std::pow(0.25, tree.pages[i].level));
+    for (size_t i = 0; i < tree.pages.size(); ++i)
+        tree.pages[i].certifiedError = float(0.016 * std::pow(0.25, tree.pages[i].level));
     Fixture f(std::move(tree));
     LoadPriorities priorities = f.priorities(LoadOrder::Feedback);
     const uint64_t finest = f.units.size() - 1, above = f.parents[finest];
     const glm::ivec3 place = f.middleOf(finest);
     const double distance = glm::length(glm::dvec3(place) * std::ldexp(1.0, -30) - f.view.eye);
-    const auto pixels = [&](uint64_t page) { return double(f.dataset->pages[page].certifiedError) * f.view.pixelsPerUnit / distance; };
+    const auto pixels = [&](uint64_t page) {
+        return double(f.dataset->pages[page].certifiedError) * f.view.pixelsPerUnit / distance;
+    };
     ASSERT_GT(pixels(above), f.view.errorPixels);
     priorities.hear({.hits = {{0, place}}, .passed = {}}, f.view);
     EXPECT_NEAR(priorities.gainOf(0), pixels(0) - pixels(above), 1e-9);
@@ -123,12 +132,16 @@ TEST(LoadOrder, RequestsThenCountersThenTheRest) {
     LoadPriorities priorities = f.priorities(LoadOrder::Feedback);
     const uint64_t hit = 3, passedOften = 5, passed = 7, untouched = 8;
     priorities.hear({.hits = {{hit, f.middleOf(hit)}}, .passed = {{passed, 1}, {passedOften, 9}, {hit, 0.1}}}, f.view);
-    const auto first = [&](uint64_t page) { return byPage(priorities.ordered(f.missing(2), {&f.view, 1})).at(f.dataset->pages[page].firstChild); };
+    const auto first = [&](uint64_t page) {
+        return byPage(priorities.ordered(f.missing(2), {&f.view, 1})).at(f.dataset->pages[page].firstChild);
+    };
     EXPECT_GT(first(hit), first(passedOften));
     EXPECT_GT(first(passedOften), first(passed));
     EXPECT_GT(first(passed), first(untouched));
     // The more rays ask, the sooner; for more bytes, the later.
-    priorities.hear({.hits = {{passed, f.middleOf(passed)}, {passed, f.middleOf(passed)}, {passed, f.middleOf(passed)}}, .passed = {}}, f.view);
+    priorities.hear({.hits = {{passed, f.middleOf(passed)}, {passed, f.middleOf(passed)}, {passed, f.middleOf(passed)}},
+                     .passed = {}},
+                    f.view);
     EXPECT_GT(first(passed), first(hit));
     for (uint32_t i = 0; i < 8; ++i) f.units[f.dataset->pages[passed].firstChild + i] = 200;
     LoadPriorities dear = f.priorities(LoadOrder::Feedback);

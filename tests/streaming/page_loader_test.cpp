@@ -1,11 +1,11 @@
 // Loader threads with a fake source. Run under TSan as well.
 #include "streaming/page_loader.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
 #include <algorithm>
 #include <atomic>
 #include <set>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,9 @@ public:
         if (withColour) bytes.colour.assign(1, uint4(7));
         return bytes;
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t, bool withColour) const override { return (words_ + (withColour ? 1 : 0)) * sizeof(uint4); }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t, bool withColour) const override {
+        return (words_ + (withColour ? 1 : 0)) * sizeof(uint4);
+    }
     void hold(bool held) {
         const std::lock_guard lock(mutex_);
         held_ = held;

@@ -56,7 +56,9 @@ struct Input {
     std::vector<uint64_t> bytes;
     std::vector<uint8_t> resident, unavailable;
     explicit Input(Dataset d, bool allResident = true)
-        : dataset(std::move(d)), bytes(dataset.pages.size(), kPageBytes), resident(dataset.pages.size(), allResident ? 1 : 0),
+        : dataset(std::move(d)),
+          bytes(dataset.pages.size(), kPageBytes),
+          resident(dataset.pages.size(), allResident ? 1 : 0),
           unavailable(dataset.pages.size(), 0) {}
     [[nodiscard]] Selection select(const SelectionView& view, uint64_t budget = UINT64_MAX) const {
         return selectPages(dataset, view, budget, bytes, resident, unavailable);
@@ -125,7 +127,9 @@ TEST(PageSelection, ParentsAreWantedBeforeChildren) {
     for (const WantedPage& wanted : selection.wanted) {
         if (wanted.page != 0) {
             uint64_t parent = 0;
-            while (wanted.page < in.dataset.pages[parent].firstChild || wanted.page >= in.dataset.pages[parent].firstChild + 8u) ++parent;
+            while (wanted.page < in.dataset.pages[parent].firstChild ||
+                   wanted.page >= in.dataset.pages[parent].firstChild + 8u)
+                ++parent;
             EXPECT_TRUE(seen.contains(parent));
         }
         EXPECT_TRUE(seen.insert(wanted.page).second) << "wanted twice";
@@ -174,11 +178,14 @@ TEST(PageSelection, FrustumNeverLosesAPointInView) {
     std::uniform_real_distribution<double> unit(0, 1), wide(-3, 3);
     for (int i = 0; i < 20000; ++i) {
         SelectionView view = viewFrom({wide(random), wide(random), wide(random)});
-        for (glm::dvec4& plane : view.planes) plane = {wide(random), wide(random), wide(random), i % 2 != 0 ? 0 : wide(random)};
+        for (glm::dvec4& plane : view.planes)
+            plane = {wide(random), wide(random), wide(random), i % 2 != 0 ? 0 : wide(random)};
         const PageEntry& entry = in.dataset.pages[random() % in.dataset.pages.size()];
-        const glm::dvec3 p = in.dataset.originOf(entry) + in.dataset.edgeOf(entry) * glm::dvec3(unit(random), unit(random), unit(random)) - view.eye;
+        const glm::dvec3 p = in.dataset.originOf(entry) +
+                             in.dataset.edgeOf(entry) * glm::dvec3(unit(random), unit(random), unit(random)) - view.eye;
         bool inside = true;
-        for (const glm::dvec4& plane : view.planes) inside = inside && plane.x * p.x + plane.y * p.y + plane.z * p.z + plane.w >= 0;
+        for (const glm::dvec4& plane : view.planes)
+            inside = inside && plane.x * p.x + plane.y * p.y + plane.z * p.z + plane.w >= 0;
         if (inside) {
             EXPECT_TRUE(inFrustum(in.dataset, entry, view)) << i;
         }

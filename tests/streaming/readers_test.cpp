@@ -24,7 +24,8 @@ public:
     static std::byte at(uint64_t offset) { return static_cast<std::byte>(offset * 2654435761u >> 13); }
 
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
-        if (offset > size_ || bytes.size() > size_ - offset) return Error{.code = ErrorCode::Io, .message = "past the end"};
+        if (offset > size_ || bytes.size() > size_ - offset)
+            return Error{.code = ErrorCode::Io, .message = "past the end"};
         for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = at(offset + i);
         ++reads;
         read_ += bytes.size();
@@ -70,7 +71,8 @@ TEST(FaultyReader, FaultsFollowFromSeedOffsetAndAttempt) {
     EXPECT_NEAR(corrupt, 160, 50);
     // Another order of offsets, the same attempts.
     for (uint64_t offset = 500; offset-- > 0;)
-        for (uint64_t attempt = 0; attempt < 4; ++attempt) EXPECT_EQ(bytesAt(b, offset * 100, 100), first[attempt * 500 + offset]);
+        for (uint64_t attempt = 0; attempt < 4; ++attempt)
+            EXPECT_EQ(bytesAt(b, offset * 100, 100), first[attempt * 500 + offset]);
     Faults other = faults;
     other.seed = 6;
     const FaultyReader c(file, other);
@@ -124,7 +126,8 @@ TEST(CachingReader, ReadsOnceAndForLater) {
         const auto cache = CachingReader::open(file, "a", folder.path(), 1 << 20);
         ASSERT_TRUE(cache) << cache.error().line();
         for (int i = 0; i < 200; ++i) {
-            const uint64_t offset = random() % file->size(), size = 1 + random() % std::min<uint64_t>(file->size() - offset, 100000);
+            const uint64_t offset = random() % file->size(),
+                           size = 1 + random() % std::min<uint64_t>(file->size() - offset, 100000);
             const auto bytes = bytesAt(**cache, offset, size);
             ASSERT_TRUE(bytes);
             EXPECT_TRUE(isRight(*bytes, offset));
@@ -235,7 +238,8 @@ TEST(PageSource, RunsGiveTheSamePagesInFewerReads) {
                 ASSERT_TRUE(read[i] && alone);
                 EXPECT_EQ(read[i]->geometry, alone->geometry);
                 EXPECT_EQ(read[i]->colour, alone->colour);
-                EXPECT_GE(source.bytesToRead(page + i, true), read[i]->geometryBytes().size() + read[i]->colourBytes().size());
+                EXPECT_GE(source.bytesToRead(page + i, true),
+                          read[i]->geometryBytes().size() + read[i]->colourBytes().size());
             }
             page += count;
         }
@@ -258,7 +262,8 @@ TEST(PageSource, WhatIsKeptIsNotReadAgain) {
             const uint64_t before = reader->reads;
             const auto alone = readPage(*reader, *dataset, first + i, withColour);
             reader->reads = before;
-            EXPECT_TRUE(pages[i] && alone && pages[i]->geometry == alone->geometry && pages[i]->colour == alone->colour) << first + i;
+            EXPECT_TRUE(pages[i] && alone && pages[i]->geometry == alone->geometry && pages[i]->colour == alone->colour)
+                << first + i;
         }
         return reader->reads;
     };

@@ -51,7 +51,8 @@ TEST(RequestQueue, StaleWishesAreGone) {
 }
 
 TEST(RequestQueue, BackOffGrowsToALimitThenThePageIsGivenUpForGood) {
-    const RetryPolicy policy{.attempts = 6, .damagedAttempts = 6, .firstDelaySeconds = 1, .growth = 2, .longestDelaySeconds = 5};
+    const RetryPolicy policy{
+        .attempts = 6, .damagedAttempts = 6, .firstDelaySeconds = 1, .growth = 2, .longestDelaySeconds = 5};
     RequestQueue queue(policy);
     queue.replace({{7, 1}});
     double now = 100;
@@ -129,7 +130,8 @@ TEST(RequestQueue, AnyHistoryEnds) {
                 const uint64_t page = *at;
                 underWay.erase(at);
                 const bool fails = random() % 3 == 0;
-                const bool ends = !fails || queue.failed(page, random() % 2 == 0 ? ErrorCode::Io : ErrorCode::InvalidInput, now);
+                const bool ends =
+                    !fails || queue.failed(page, random() % 2 == 0 ? ErrorCode::Io : ErrorCode::InvalidInput, now);
                 if (ends) {
                     queue.delivered(page);
                     over[page] = 1;

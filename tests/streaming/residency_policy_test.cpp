@@ -30,9 +30,13 @@ struct Conditions {
 class Simulation {
 public:
     Simulation(std::shared_ptr<const Dataset> dataset, Conditions conditions)
-        : dataset_(std::move(dataset)), c_(std::move(conditions)), random_(c_.seed),
+        : dataset_(std::move(dataset)),
+          c_(std::move(conditions)),
+          random_(c_.seed),
           shape_(poolShapeFor(*dataset_, dataset_->hasColour(), c_.budgetBytes, c_.chunkBytes)),
-          policy(dataset_, dataset_->hasColour(), shape_, c_.order), queue_({.attempts = 12, .damagedAttempts = 12}), content_(shape_.units, kNothing) {
+          policy(dataset_, dataset_->hasColour(), shape_, c_.order),
+          queue_({.attempts = 12, .damagedAttempts = 12}),
+          content_(shape_.units, kNothing) {
         EXPECT_LE(shape_.units * kPoolUnitBytes, c_.budgetBytes);
     }
 
@@ -59,7 +63,10 @@ public:
         policy.look(view, now_, number);
         for (const uint64_t page : read) carryOut(page, policy.place(page));
         // Rays may ask for anything.
-        if (c_.failRate > 0) policy.hear({.hits = {{random_() % dataset_->pages.size(), glm::ivec3(int(random_() >> 34))}}, .passed = {{random_() % dataset_->pages.size(), 1}}}, view);
+        if (c_.failRate > 0)
+            policy.hear({.hits = {{random_() % dataset_->pages.size(), glm::ivec3(int(random_() >> 34))}},
+                         .passed = {{random_() % dataset_->pages.size(), 1}}},
+                        view);
         outcome = policy.finish(number);
         queue_.replace(outcome.wishes);
         check();
@@ -93,8 +100,8 @@ public:
     }
 
     uint64_t reads = 0;
-    uint64_t mostBytes = 0;    // of the policy
-    size_t mostEntries = 0;    // of the queue
+    uint64_t mostBytes = 0;  // of the policy
+    size_t mostEntries = 0;  // of the queue
 
 private:
     static constexpr uint64_t kNothing = UINT64_MAX;
@@ -185,7 +192,13 @@ TEST(ResidencyPolicy, MovesLittleMoreThanItLoads) {
     uint64_t loaded = 0, moved = 0;
     for (uint64_t seed = 0; seed < 6; ++seed) {
         const auto dataset = std::make_shared<const Dataset>(test::randomTree(seed, 5, 0.6, 6 * 16384));
-        Simulation fly(dataset, {.budgetBytes = allBytes(*dataset) / 4, .failRate = 0, .bad = {}, .seed = seed, .perRound = 40, .order = LoadOrder::Feedback, .chunkBytes = uint64_t{1} << 40});
+        Simulation fly(dataset, {.budgetBytes = allBytes(*dataset) / 4,
+                                 .failRate = 0,
+                                 .bad = {},
+                                 .seed = seed,
+                                 .perRound = 40,
+                                 .order = LoadOrder::Feedback,
+                                 .chunkBytes = uint64_t{1} << 40});
         std::mt19937_64 random(seed);
         SelectionView view = test::randomView(random, 0.1);
         for (int i = 0; i < 60; ++i) {
@@ -213,7 +226,11 @@ TEST(ResidencyPolicy, SettlesOnTheSamePagesWhateverTheHistoryOrderAndFaults) {
         if (!plain.policy.hasRoom()) continue;
         plain.settle(view);
         for (uint64_t other = 0; other < 5; ++other) {
-            Simulation wild(dataset, {.budgetBytes = budget, .failRate = 0.2, .bad = {}, .seed = seed * 10 + other, .perRound = 1 + random() % 5,
+            Simulation wild(dataset, {.budgetBytes = budget,
+                                      .failRate = 0.2,
+                                      .bad = {},
+                                      .seed = seed * 10 + other,
+                                      .perRound = 1 + random() % 5,
                                       .order = static_cast<LoadOrder>(other)});
             SelectionView moving = view;
             for (int i = 0; i < 40; ++i) {
@@ -226,7 +243,8 @@ TEST(ResidencyPolicy, SettlesOnTheSamePagesWhateverTheHistoryOrderAndFaults) {
             EXPECT_EQ(wild.outcome.drawable.errorPixels, plain.outcome.drawable.errorPixels);
         }
         const bool same = plain.outcome.drawable.cut == idealCut(*dataset, view, {});
-        EXPECT_EQ(same, !plain.outcome.drawable.isRelaxed) << "relaxed is said where, and only where, the budget is too small";
+        EXPECT_EQ(same, !plain.outcome.drawable.isRelaxed)
+            << "relaxed is said where, and only where, the budget is too small";
         differentFromIdeal += same ? 0 : 1;
         relaxed += plain.outcome.drawable.isRelaxed ? 1 : 0;
     }
@@ -275,7 +293,8 @@ TEST(ResidencyPolicy, AShakingViewDoesNotThrash) {
             views[i].pixelsPerUnit = 1000;
             for (glm::dvec4& plane : views[i].planes) plane = {i == 0 ? 1 : -1, 0, 0, -0.01};
         }
-        Simulation sim(dataset, {.budgetBytes = allBytes(*dataset) / 3, .failRate = 0, .bad = {}, .seed = seed, .perRound = 50});
+        Simulation sim(dataset,
+                       {.budgetBytes = allBytes(*dataset) / 3, .failRate = 0, .bad = {}, .seed = seed, .perRound = 50});
         if (!sim.policy.hasRoom()) continue;
         sim.settle(views[0]);
         const uint64_t before = sim.policy.counts().loads;
@@ -304,7 +323,8 @@ TEST(ResidencyPolicy, LooksAheadAlongTheMotionOnly) {
     sim.round(view);
     EXPECT_GT(sim.outcome.wishes.size(), sim.outcome.missing) << "nearer pages, which this view does not want yet";
     const auto wishes = sim.outcome.wishes;
-    EXPECT_TRUE(std::is_sorted(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.priority > b.priority; }));
+    EXPECT_TRUE(std::is_sorted(wishes.begin(), wishes.end(),
+                               [](const auto& a, const auto& b) { return a.priority > b.priority; }));
     sim.round(view);
     EXPECT_EQ(sim.outcome.wishes.size(), sim.outcome.missing) << "it stands still";
     EXPECT_GE(sim.policy.counts().loads, still);
@@ -316,7 +336,8 @@ TEST(ResidencyPolicy, ChildrenGoBeforeParentsAndTheCoarsestStays) {
         std::mt19937_64 random(seed);
         std::vector<uint64_t> parent(dataset->pages.size(), 0);
         for (uint64_t page = 0; page < dataset->pages.size(); ++page)
-            for (uint32_t i = 0; i < uint32_t(std::popcount(dataset->pages[page].childMask)); ++i) parent[dataset->pages[page].firstChild + i] = page;
+            for (uint32_t i = 0; i < uint32_t(std::popcount(dataset->pages[page].childMask)); ++i)
+                parent[dataset->pages[page].firstChild + i] = page;
         Simulation sim(dataset, {.budgetBytes = allBytes(*dataset) / 2, .failRate = 0, .bad = {}, .seed = seed});
         if (!sim.policy.hasRoom()) continue;
         sim.settle(test::randomView(random, 0.5));
@@ -372,7 +393,8 @@ std::vector<SelectionView> manyViews(std::mt19937_64& random, size_t count) {
 std::vector<DrawableCut> settleAll(Simulation& sim, std::span<const SelectionView> views) {
     const auto all = [&] {
         bool settled = true;
-        for (ViewNumber number = 0; number < views.size(); ++number) settled = sim.round(views[number], number) && settled;
+        for (ViewNumber number = 0; number < views.size(); ++number)
+            settled = sim.round(views[number], number) && settled;
         return settled;
     };
     for (int i = 0; !all(); ++i)
@@ -441,7 +463,8 @@ TEST(ResidencyPolicy, WhatJustCameStaysForAWhileInSeconds) {
     // Two views in turn, each of which wants all of the pool: what one brought the other may not take before its time.
     const auto dataset = std::make_shared<const Dataset>(test::randomTree(1, 4, 0.9, 16384));
     const uint64_t budget = allBytes(*dataset) / 3;
-    ResidencyPolicy policy(dataset, dataset->hasColour(), poolShapeFor(*dataset, dataset->hasColour(), budget, kChunkBytes));
+    ResidencyPolicy policy(dataset, dataset->hasColour(),
+                           poolShapeFor(*dataset, dataset->hasColour(), budget, kChunkBytes));
     SelectionView views[2];
     for (int i = 0; i < 2; ++i) {
         views[i].eye = {0.5, 0.4, 0.6};
@@ -471,7 +494,9 @@ TEST(ResidencyPolicy, NoThrashingAtAnyBudgetDownToTheCoarsestLevel) {
         const uint64_t least = pageUnits(dataset->pages[0], dataset->hasColour()) * kPoolUnitBytes;
         for (uint64_t part = 0; part <= 24; ++part) {
             SCOPED_TRACE(part);
-            Simulation sim(dataset, {.budgetBytes = least + allBytes(*dataset) * part / 24, .failRate = 0.1, .bad = {}, .seed = seed});
+            Simulation sim(
+                dataset,
+                {.budgetBytes = least + allBytes(*dataset) * part / 24, .failRate = 0.1, .bad = {}, .seed = seed});
             if (!sim.policy.hasRoom()) continue;
             sim.settle(other);
             sim.settle(view);
@@ -485,7 +510,9 @@ TEST(ResidencyPolicy, NoThrashingAtAnyBudgetDownToTheCoarsestLevel) {
 
 TEST(ResidencyPolicy, MemoryIsFlatOverAHundredThousandFrames) {
     const auto dataset = std::make_shared<const Dataset>(test::randomTree(2, 3, 0.9, 16384));
-    Simulation sim(dataset, {.budgetBytes = allBytes(*dataset) / 3, .failRate = 0.05, .bad = {dataset->pages.size() - 1}, .seed = 2});
+    Simulation sim(
+        dataset,
+        {.budgetBytes = allBytes(*dataset) / 3, .failRate = 0.05, .bad = {dataset->pages.size() - 1}, .seed = 2});
     ASSERT_TRUE(sim.policy.hasRoom());
     std::mt19937_64 random(2);
     SelectionView view = test::randomView(random, 4);

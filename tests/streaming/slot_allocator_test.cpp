@@ -27,7 +27,8 @@ TEST(SlotAllocator, NeverOverlapsNeverExceedsNeverCrossesAChunk) {
                 ASSERT_EQ(*first / chunk, (*first + size - 1) / chunk) << seed;
                 const auto after = taken.lower_bound(*first);
                 ASSERT_TRUE(after == taken.end() || *first + size <= after->first) << seed;
-                ASSERT_TRUE(after == taken.begin() || std::prev(after)->first + std::prev(after)->second <= *first) << seed;
+                ASSERT_TRUE(after == taken.begin() || std::prev(after)->first + std::prev(after)->second <= *first)
+                    << seed;
                 taken[*first] = size;
                 sum += size;
             } else if (!taken.empty()) {

@@ -14,7 +14,8 @@ class CountedFile final : public ByteReader {
 public:
     explicit CountedFile(std::vector<std::byte> content) : bytes(std::move(content)) {}
     Result<void> read(uint64_t offset, std::span<std::byte> to) const override {
-        if (offset > bytes.size() || to.size() > bytes.size() - offset) return Error{.code = ErrorCode::Io, .message = "past the end", .file = name_};
+        if (offset > bytes.size() || to.size() > bytes.size() - offset)
+            return Error{.code = ErrorCode::Io, .message = "past the end", .file = name_};
         std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset), to.size(), to.begin());
         ++reads;
         bytesRead += to.size();
@@ -37,7 +38,8 @@ inline void sealFile(std::vector<std::byte>& bytes) {
     const uint64_t blocks = (header.pages + kEntriesPerBlock - 1) / kEntriesPerBlock;
     const std::span all(bytes);
     const auto put = [&](uint64_t at, uint64_t hash) { std::memcpy(&bytes[at], &hash, sizeof hash); };
-    for (uint64_t b = 0; b < blocks; ++b) put(blockOffset(b + 1) - 8, hashBytes(all.subspan(blockOffset(b), kBlockBytes - 8)));
+    for (uint64_t b = 0; b < blocks; ++b)
+        put(blockOffset(b + 1) - 8, hashBytes(all.subspan(blockOffset(b), kBlockBytes - 8)));
     put(offsetof(FileHeader, hash), 0);
     put(offsetof(FileHeader, hash), hashBytes(all.first(kDirectoryOffset)));
     std::memcpy(&header, bytes.data(), sizeof header);
@@ -75,7 +77,8 @@ inline std::vector<std::byte> directoryFile(Dataset& tree) {
     std::vector<std::byte> bytes(h.fileBytes);
     std::memcpy(bytes.data(), &h, sizeof h);
     for (uint64_t i = 0; i < h.pages; ++i)
-        std::memcpy(&bytes[blockOffset(i / kEntriesPerBlock) + i % kEntriesPerBlock * sizeof(PageEntry)], &tree.pages[i], sizeof(PageEntry));
+        std::memcpy(&bytes[blockOffset(i / kEntriesPerBlock) + i % kEntriesPerBlock * sizeof(PageEntry)],
+                    &tree.pages[i], sizeof(PageEntry));
     sealFile(bytes);
     return bytes;
 }

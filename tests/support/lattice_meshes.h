@@ -22,7 +22,9 @@ inline std::vector<LatticeTriangle> soupOf(const IndexedMesh& mesh, const std::v
             t.corner[i] = mesh.positions[mesh.triangles[k][i]];
             t.colour[i] = colours.empty() ? 0xffffffffu : colours[mesh.triangles[k][i]];
         }
-        snapper.add(t, [&](const LatticeTriangle& piece) { if (hasArea(piece.corner[0], piece.corner[1], piece.corner[2])) soup.push_back(piece); });
+        snapper.add(t, [&](const LatticeTriangle& piece) {
+            if (hasArea(piece.corner[0], piece.corner[1], piece.corner[2])) soup.push_back(piece);
+        });
     }
     return soup;
 }

@@ -5,8 +5,8 @@
 #include <memory>
 #include <random>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "mesostructure/march.h"
 #include "mesostructure/solids.h"
@@ -25,7 +25,9 @@ inline MarchRay rayFromTop(std::mt19937& random, glm::dvec3 extent, double low =
 inline MarchRay rayAnywhere(std::mt19937& random, glm::dvec3 extent) {
     std::uniform_real_distribution<double> unit(0, 1);
     std::normal_distribution<double> bell;
-    return {{unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z}, glm::normalize(glm::dvec3(bell(random), bell(random), bell(random))), 20};
+    return {{unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z},
+            glm::normalize(glm::dvec3(bell(random), bell(random), bell(random))),
+            20};
 }
 
 inline std::unique_ptr<Shape> solid(const std::string& name) {

@@ -18,9 +18,11 @@ namespace vcp::test {
 class RangeServer {
 public:
     /// `tls`: certificate and key, as paths; empty: plain http.
-    explicit RangeServer(const std::filesystem::path& folder, const std::vector<std::string>& tls = {}) : tls_(!tls.empty()) {
+    explicit RangeServer(const std::filesystem::path& folder, const std::vector<std::string>& tls = {})
+        : tls_(!tls.empty()) {
         // What is asked here stays on this machine.
-        for (const char* name : {"http_proxy", "https_proxy", "all_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"}) ::unsetenv(name);
+        for (const char* name : {"http_proxy", "https_proxy", "all_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"})
+            ::unsetenv(name);
         int out[2];
         if (::pipe(out) != 0) return;
         std::vector<std::string> words = {"python3", VCP_SOURCE_DIR "/tests/support/range_server.py", folder.string()};
@@ -37,7 +39,8 @@ public:
         }
         ::close(out[1]);
         FILE* lines = ::fdopen(out[0], "r");
-        if (std::fscanf(lines, "port %d", &port_) != 1) ADD_FAILURE() << "python3 with tests/support/range_server.py does not start";
+        if (std::fscanf(lines, "port %d", &port_) != 1)
+            ADD_FAILURE() << "python3 with tests/support/range_server.py does not start";
         std::fclose(lines);
     }
     ~RangeServer() {

@@ -50,13 +50,15 @@ public:
         std::mt19937 random(seed);
         sums_.assign(positions_.size(), WideVector(0));
         for (const auto& t : triangles_)
-            for (const uint32_t v : t) addNormal(sums_[v], areaNormal(positions_[t[0]], positions_[t[1]], positions_[t[2]]));
+            for (const uint32_t v : t)
+                addNormal(sums_[v], areaNormal(positions_[t[0]], positions_[t[1]], positions_[t[2]]));
         std::vector<std::pair<glm::i32vec3, uint32_t>> queue;  // internal nodes, breadth first
         header_.root = node(glm::i32vec3(0), 0, queue);
         for (size_t i = 0; i < queue.size(); ++i)
             for (int o = 0; o < 8; ++o) {
                 const int edge = edgeAt(queue[i].second + 1);
-                nodes_.push_back(node(queue[i].first + edge * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), queue[i].second + 1, queue));
+                nodes_.push_back(
+                    node(queue[i].first + edge * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), queue[i].second + 1, queue));
             }
         header_.groups = static_cast<uint32_t>(nodes_.size() / 8);
         header_.triangles = static_cast<uint32_t>(records_.size());
@@ -71,11 +73,13 @@ public:
         auto* normals = reinterpret_cast<uint32_t*>(out + s.normals);
         for (const auto& [v, number] : numbers_) {
             const glm::i32vec3 p = positions_[v] + kLatticeBias;
-            vertices[number] = pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
+            vertices[number] =
+                pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
             // As computed, near that, or any at all.
             NormalGridPoint point = normalGridPoint(sums_[v]);
             if (random() % 4 == 0) point.u = static_cast<uint32_t>(random() % (kNormalSteps + 1));
-            normals[number] = random() % 8 == 0 ? static_cast<uint32_t>(random()) : packGridNormal(point, random() % 5 == 0);
+            normals[number] =
+                random() % 8 == 0 ? static_cast<uint32_t>(random()) : packGridNormal(point, random() % 5 == 0);
         }
         page.colour = randomColours(*parsePage(asBytes(page.geometry)), seed);
         return page;
@@ -89,10 +93,12 @@ private:
     uint32_t node(glm::i32vec3 lower, uint32_t depth, std::vector<std::pair<glm::i32vec3, uint32_t>>& queue) {
         std::vector<uint32_t> inside;
         for (uint32_t k = 0; k < triangles_.size(); ++k) {
-            const std::array<glm::i32vec3, 3> t{positions_[triangles_[k][0]], positions_[triangles_[k][1]], positions_[triangles_[k][2]]};
+            const std::array<glm::i32vec3, 3> t{positions_[triangles_[k][0]], positions_[triangles_[k][1]],
+                                                positions_[triangles_[k][2]]};
             bool boxes = true;
             for (int axis = 0; axis < 3; ++axis)
-                boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edgeAt(depth) && std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
+                boxes = boxes && std::min({t[0][axis], t[1][axis], t[2][axis]}) <= lower[axis] + edgeAt(depth) &&
+                        std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
             if (boxes && CubeTest(t).touches(lower, edgeAt(depth))) inside.push_back(k);
         }
         if (inside.empty()) return emptyNode(0.25 * double(depth));
@@ -109,7 +115,8 @@ private:
         if (count >= kHardCountLong) records_.emplace_back(count, 0u);
         for (const uint32_t k : inside) {
             uint32_t v[3];
-            for (size_t i = 0; i < 3; ++i) v[i] = numbers_.try_emplace(triangles_[k][i], static_cast<uint32_t>(numbers_.size())).first->second;
+            for (size_t i = 0; i < 3; ++i)
+                v[i] = numbers_.try_emplace(triangles_[k][i], static_cast<uint32_t>(numbers_.size())).first->second;
             records_.push_back(pack21(v[0], v[1], v[2]));
         }
         return kNodeHard << kNodeTypeShift | std::min(count, kHardCountLong) << kHardCountShift | first;
@@ -155,7 +162,9 @@ inline SoupPage sheet(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_
     const int edge = kLatticePerCell << log2Cells;
     for (uint32_t y = 0; y <= n; ++y)
         for (uint32_t x = 0; x <= n; ++x)
-            page.vertex({static_cast<int>(x) * edge / static_cast<int>(n), static_cast<int>(y) * edge / static_cast<int>(n), edge / 2 + static_cast<int>(random() % 300)});
+            page.vertex({static_cast<int>(x) * edge / static_cast<int>(n),
+                         static_cast<int>(y) * edge / static_cast<int>(n),
+                         edge / 2 + static_cast<int>(random() % 300)});
     for (uint32_t y = 0; y < n; ++y)
         for (uint32_t x = 0; x < n; ++x) {
             const uint32_t a = x + (n + 1) * y, b = a + 1, c = a + n + 1, d = c + 1;

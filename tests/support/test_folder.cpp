@@ -47,7 +47,8 @@ void writeBall(const fs::path& path, int rings, int sectors) {
         file << "3 " << last << ' ' << at(rings - 1, sector) << ' ' << at(rings - 1, sector + 1) << '\n';
         for (int ring = 1; ring + 1 < rings; ++ring) {
             file << "3 " << at(ring, sector) << ' ' << at(ring, sector + 1) << ' ' << at(ring + 1, sector) << '\n';
-            file << "3 " << at(ring, sector + 1) << ' ' << at(ring + 1, sector + 1) << ' ' << at(ring + 1, sector) << '\n';
+            file << "3 " << at(ring, sector + 1) << ' ' << at(ring + 1, sector + 1) << ' ' << at(ring + 1, sector)
+                 << '\n';
         }
     }
 }

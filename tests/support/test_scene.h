@@ -22,12 +22,16 @@ class MemorySource final : public PageSource {
 public:
     explicit MemorySource(std::vector<PageBytes> pages) : pages_(std::move(pages)) {}
     Result<PageBytes> read(uint64_t page, bool withColour) const override {
-        if (broken.contains(page)) return Error{.code = ErrorCode::InvalidInput, .message = "broken", .element = "page " + std::to_string(page)};
+        if (broken.contains(page))
+            return Error{
+                .code = ErrorCode::InvalidInput, .message = "broken", .element = "page " + std::to_string(page)};
         PageBytes bytes = pages_[page];
         if (!withColour) bytes.colour.clear();
         return bytes;
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool) const override { return pages_[page].geometryBytes().size() + pages_[page].colourBytes().size(); }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool) const override {
+        return pages_[page].geometryBytes().size() + pages_[page].colourBytes().size();
+    }
     std::set<uint64_t> broken;
 
 private:
@@ -46,7 +50,9 @@ public:
         read_.push_back(page);
         return source_->read(page, withColour);
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override { return source_->bytesToRead(page, withColour); }
+    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override {
+        return source_->bytesToRead(page, withColour);
+    }
     void interrupt() const override {
         const std::lock_guard lock(mutex_);
         open_ = true;
@@ -119,7 +125,9 @@ inline Scene cubeScene(uint32_t split) {
     std::vector<glm::u32vec2> vertices, triangles;
     std::vector<uint32_t> normals;
     for (uint32_t corner = 0; corner < 8; ++corner) {
-        const auto at = [&](uint32_t bit) { return static_cast<uint32_t>(((corner >> bit & 1) != 0 ? 12 : 4) * kLatticePerCell + kLatticeBias); };
+        const auto at = [&](uint32_t bit) {
+            return static_cast<uint32_t>(((corner >> bit & 1) != 0 ? 12 : 4) * kLatticePerCell + kLatticeBias);
+        };
         vertices.push_back(pack21(at(0), at(1), at(2)));
         normals.push_back(packNormal({0, 0, 1}, true));
     }
@@ -145,7 +153,8 @@ inline Scene cubeScene(uint32_t split) {
         header.root = 0;
         uint32_t groupsInLayer = 1, firstOfNext = 1;
         for (uint32_t layer = 0; layer < split; ++layer, groupsInLayer *= 8)
-            for (uint32_t node = 0; node < groupsInLayer * 8; ++node) nodes.push_back(layer + 1 < split ? firstOfNext++ : leaf());
+            for (uint32_t node = 0; node < groupsInLayer * 8; ++node)
+                nodes.push_back(layer + 1 < split ? firstOfNext++ : leaf());
         leaves = groupsInLayer;
     }
     header.groups = static_cast<uint32_t>(nodes.size() / 8);

@@ -14,7 +14,8 @@
 namespace vcp {
 
 pid_t VcpProgram::start(const std::vector<std::string>& arguments, const std::string& out, bool smallFiles) const {
-    const std::filesystem::path outFile = out[0] == '/' ? std::filesystem::path(out) : folder_ / out, errFile = folder_ / "stderr";
+    const std::filesystem::path outFile = out[0] == '/' ? std::filesystem::path(out) : folder_ / out,
+                                errFile = folder_ / "stderr";
     const pid_t child = fork();
     if (child != 0) return child;
     dup2(open(outFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);

@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "tests/support/built_ball.h"
 

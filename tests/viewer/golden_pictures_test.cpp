@@ -22,7 +22,7 @@ namespace vcp {
 namespace {
 
 constexpr uint32_t kWidth = 160, kHeight = 120;
-constexpr int kSame = 6;             // of 255: a channel that differs by no more is the same
+constexpr int kSame = 6;              // of 255: a channel that differs by no more is the same
 constexpr double kMostPixels = 0.01;  // of the picture may differ by more
 
 class GoldenPictures : public testing::Test {
@@ -31,9 +31,12 @@ protected:
         folder_ = std::make_unique<TestFolder>("vcp_golden_pictures_test");
         writeBall(*folder_ / "ball.ply", 60, 120);
         const std::string makeScan = (std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan").string();
-        ASSERT_EQ(std::system((makeScan + " --triangles 30000 --colour -o " + path("statue.ply") + " >/dev/null").c_str()), 0);
+        ASSERT_EQ(
+            std::system((makeScan + " --triangles 30000 --colour -o " + path("statue.ply") + " >/dev/null").c_str()),
+            0);
         for (const char* name : {"statue", "ball"}) {
-            const Ran built = VcpProgram(*folder_).runWords(fmt::format("build {0}.ply -o {0}.vcp --progress none", path(name)));
+            const Ran built =
+                VcpProgram(*folder_).runWords(fmt::format("build {0}.ply -o {0}.vcp --progress none", path(name)));
             ASSERT_EQ(built.status, 0) << built.err;
         }
     }
@@ -46,22 +49,24 @@ protected:
 
     /// Drawn with `options`, and as it was.
     Picture draw(const std::string& name, const std::string& options, const std::string& input = path("statue.vcp")) {
-        const Ran ran = VcpProgram(*folder_).runWords(fmt::format("render {} -o {} --size {}x{} --progress none --depth {} --normals {} {}", input, path(name + ".png"),
-                                                             kWidth, kHeight, path("depth.pfm"), path("normals.pfm"), options));
+        const Ran ran = VcpProgram(*folder_).runWords(
+            fmt::format("render {} -o {} --size {}x{} --progress none --depth {} --normals {} {}", input,
+                        path(name + ".png"), kWidth, kHeight, path("depth.pfm"), path("normals.pfm"), options));
         EXPECT_EQ(ran.status, 0) << ran.err;
         const auto picture = readPng(path(name + ".png"));
         EXPECT_TRUE(picture) << picture.error().line();
         const std::string kept = VCP_SOURCE_DIR "/tests/viewer/golden/" + name + ".png";
         if (std::getenv("VCP_KEEP_GOLDEN") != nullptr) {
-        EXPECT_TRUE(writePng(*picture, kept).ok());
-    }
+            EXPECT_TRUE(writePng(*picture, kept).ok());
+        }
         const auto golden = readPng(kept);
         EXPECT_TRUE(golden) << golden.error().line();
         EXPECT_EQ(picture->rgba.size(), golden->rgba.size());
         size_t different = 0;
         for (size_t i = 0; i < picture->rgba.size(); i += 4) {
             int most = 0;
-            for (size_t c = i; c < i + 4; ++c) most = std::max(most, std::abs(int(picture->rgba[c]) - int(golden->rgba[c])));
+            for (size_t c = i; c < i + 4; ++c)
+                most = std::max(most, std::abs(int(picture->rgba[c]) - int(golden->rgba[c])));
             different += most > kSame;
         }
         EXPECT_LE(double(different), kMostPixels * kWidth * kHeight) << name << ": compare " << kept;
@@ -73,10 +78,13 @@ protected:
         const std::string bytes = contentOf(path(name));
         const size_t row = kWidth * channels * sizeof(float), at = bytes.size() - row * kHeight;
         std::vector<float> values(kWidth * channels * kHeight);
-        for (size_t y = 0; y < kHeight; ++y) std::memcpy(&values[y * kWidth * channels], &bytes[at + (kHeight - 1 - y) * row], row);
+        for (size_t y = 0; y < kHeight; ++y)
+            std::memcpy(&values[y * kWidth * channels], &bytes[at + (kHeight - 1 - y) * row], row);
         return values;
     }
-    static int brightness(const Picture& p, size_t pixel) { return p.rgba[4 * pixel] + p.rgba[4 * pixel + 1] + p.rgba[4 * pixel + 2]; }
+    static int brightness(const Picture& p, size_t pixel) {
+        return p.rgba[4 * pixel] + p.rgba[4 * pixel + 1] + p.rgba[4 * pixel + 2];
+    }
 
     static std::unique_ptr<TestFolder> folder_;
 };

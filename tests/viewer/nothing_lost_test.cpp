@@ -24,16 +24,23 @@ protected:
         writeBall(folder_ / "ball.ply", 20, 40);
         writeBall(folder_ / "second.ply", 12, 24);
         write("wall.mtl", "newmtl wall\nKd 1 1 1\nmap_Kd wall.png\n");
-        write("wall.obj", "mtllib wall.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n");
+        write("wall.obj",
+              "mtllib wall.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 "
+              "2/2 3/3\nf 1/1 3/3 4/4\n");
         EXPECT_TRUE(writePng({2, 2, std::vector<uint8_t>(16, 200)}, folder_ / "wall.png").ok());
     }
 
-    void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
-    [[nodiscard]] Ran run(const std::vector<std::string>& arguments) const { return VcpProgram(folder_).run(arguments); }
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+    [[nodiscard]] Ran run(const std::vector<std::string>& arguments) const {
+        return VcpProgram(folder_).run(arguments);
+    }
 
     /// `file` under the names that lead to it. Made anew at each call.
     [[nodiscard]] std::vector<std::string> namesOf(const std::string& file, const std::string& extension) const {
-        const fs::path link = folder_ / ("link" + extension), hard = folder_ / ("hard" + extension), detour = folder_ / "detour";
+        const fs::path link = folder_ / ("link" + extension), hard = folder_ / ("hard" + extension),
+                       detour = folder_ / "detour";
         fs::remove(link);
         fs::remove(hard);
         fs::remove(detour);
@@ -110,10 +117,17 @@ TEST_F(NothingLost, InputsAmongTheTemporaryFilesAreKept) {
 
 TEST_F(NothingLost, ExtensionsSayWhatIsWritten) {
     const std::string ball = folder_ / "ball.ply";
-    for (const auto& [command, name] : std::vector<std::pair<std::string, std::string>>{
-             {"build", "x.ply"}, {"build", "x"}, {"build", "-"}, {"render", "x.jpg"}, {"render", "x"}, {"render", "x.vcp"}, {"meso build", "x.png"}, {"meso render", "x.jpg"}}) {
+    for (const auto& [command, name] : std::vector<std::pair<std::string, std::string>>{{"build", "x.ply"},
+                                                                                        {"build", "x"},
+                                                                                        {"build", "-"},
+                                                                                        {"render", "x.jpg"},
+                                                                                        {"render", "x"},
+                                                                                        {"render", "x.vcp"},
+                                                                                        {"meso build", "x.png"},
+                                                                                        {"meso render", "x.jpg"}}) {
         const std::string out = name == "-" ? name : std::string(folder_ / name);
-        const Ran ran = VcpProgram(folder_).runWords(command + " " + (command.starts_with("meso") ? "ball" : ball) + " -o " + out);
+        const Ran ran =
+            VcpProgram(folder_).runWords(command + " " + (command.starts_with("meso") ? "ball" : ball) + " -o " + out);
         EXPECT_EQ(ran.status, 2) << command << " " << name << ran.err;
         EXPECT_EQ(ran.errLines(), 1u) << ran.err;
         EXPECT_FALSE(fs::exists(out)) << command << " " << name;
@@ -127,22 +141,29 @@ TEST_F(NothingLost, RenderKeepsItsInputs) {
     expectKept({"render", ball, "--size", "16x16"}, "ball.ply");
     // A PNG may replace a PNG; not one that the mesh is painted with, whether the octree is in the cache or not.
     for (int i = 0; i < 2; ++i) expectKept({"render", wall, "--size", "16x16"}, "wall.png");
-    write("scene.json", R"({"datasets": [{"file": "ball.vcp"}], "surfaces": [{"asset": "ball", "base": "quad", "texture": "wall.png"}]})");
+    write(
+        "scene.json",
+        R"({"datasets": [{"file": "ball.vcp"}], "surfaces": [{"asset": "ball", "base": "quad", "texture": "wall.png"}]})");
     expectKept({"render", folder_ / "scene.json", "--size", "16x16"}, "wall.png");
     // Other outputs than -o.
     for (const char* option : {"--depth", "--normals"}) {
         const std::string before = contentOf(folder_ / "wall.png");
-        const Ran ran = run({"render", folder_ / "scene.json", "--size", "16x16", "-o", folder_ / "new.png", option, folder_ / "wall.png"});
+        const Ran ran = run({"render", folder_ / "scene.json", "--size", "16x16", "-o", folder_ / "new.png", option,
+                             folder_ / "wall.png"});
         EXPECT_EQ(ran.status, 1) << ran.err;
         EXPECT_EQ(contentOf(folder_ / "wall.png"), before);
         EXPECT_FALSE(fs::exists(folder_ / "new.png"));
-        EXPECT_EQ(run({"render", dataset, "--size", "16x16", "-o", folder_ / "new.png", option, folder_ / "new.png"}).status, 2);
+        EXPECT_EQ(
+            run({"render", dataset, "--size", "16x16", "-o", folder_ / "new.png", option, folder_ / "new.png"}).status,
+            2);
     }
     // Pictures of a sequence have names of their own.
     fs::copy_file(folder_ / "wall.png", folder_ / "turn-0002.png");
     write("turn.json", R"({"surfaces": [{"asset": "ball", "base": "quad", "texture": "turn-0002.png"}]})");
     const std::string before = contentOf(folder_ / "turn-0002.png");
-    EXPECT_EQ(run({"render", folder_ / "turn.json", "--size", "16x16", "--turntable", "3", "-o", folder_ / "turn.png"}).status, 1);
+    EXPECT_EQ(run({"render", folder_ / "turn.json", "--size", "16x16", "--turntable", "3", "-o", folder_ / "turn.png"})
+                  .status,
+              1);
     EXPECT_EQ(contentOf(folder_ / "turn-0002.png"), before);
     EXPECT_FALSE(fs::exists(folder_ / "turn-0001.png"));
 }
@@ -165,7 +186,9 @@ TEST_F(NothingLost, ReportsKeepWhatTheyAreOf) {
     EXPECT_EQ(run({"verify", folder_ / "ball.vcp"}).status, 0);
     // A benchmark's datasets do not replace those beside its report.
     fs::copy_file(folder_ / "ball.ply", out / "ball.vcp");
-    EXPECT_EQ(run({"bench", "build", folder_ / "ball.ply", "--out", out, "--repetitions", "1", "--samples", "1000"}).status, 0);
+    EXPECT_EQ(
+        run({"bench", "build", folder_ / "ball.ply", "--out", out, "--repetitions", "1", "--samples", "1000"}).status,
+        0);
     EXPECT_EQ(contentOf(out / "ball.vcp"), contentOf(folder_ / "ball.ply"));
 }
 
@@ -173,7 +196,8 @@ TEST_F(NothingLost, SpecialFilesStayWhatTheyAre) {
     ASSERT_EQ(::mkfifo((folder_ / "pipe.png").c_str(), 0600), 0);
     fs::create_symlink("/dev/null", folder_ / "null.png");
     fs::create_symlink("/dev/null", folder_ / "null.vcp");
-    for (const char* name : {"pipe.png", "null.png"}) EXPECT_EQ(run({"render", folder_ / "ball.ply", "--size", "16x16", "-o", folder_ / name}).status, 1) << name;
+    for (const char* name : {"pipe.png", "null.png"})
+        EXPECT_EQ(run({"render", folder_ / "ball.ply", "--size", "16x16", "-o", folder_ / name}).status, 1) << name;
     EXPECT_EQ(run({"build", folder_ / "ball.ply", "-o", folder_ / "null.vcp"}).status, 1);
     EXPECT_TRUE(fs::is_fifo(folder_ / "pipe.png"));
     EXPECT_TRUE(fs::is_character_file("/dev/null"));

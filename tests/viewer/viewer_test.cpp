@@ -6,8 +6,8 @@
 #include <cmath>
 #include <thread>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "tests/support/built_ball.h"
 
@@ -22,7 +22,8 @@ protected:
         if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
     }
 
-    void openViewer(double movingFrameMs = 0, const std::filesystem::path& file = *folder_ / "ball.vcp", double moveSeconds = 0) {
+    void openViewer(double movingFrameMs = 0, const std::filesystem::path& file = *folder_ / "ball.vcp",
+                    double moveSeconds = 0) {
         ViewerOptions options;
         options.renderer.budgetBytes = 64 << 20;
         options.movingFrameMs = movingFrameMs;
@@ -37,7 +38,10 @@ protected:
         const auto shared = std::make_shared<const Dataset>(*dataset);
         const FileHeader& h = shared->header;
         OrbitCamera camera;
-        camera.look(View::Front, {{h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]}, {h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]}}, kSize);
+        camera.look(
+            View::Front,
+            {{h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]}, {h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]}},
+            kSize);
         ASSERT_TRUE(viewer_->open(shared, std::make_shared<FilePageSource>(*reader, shared), camera, "ball.ply"));
         viewer_->resize(kSize);
     }
@@ -112,7 +116,8 @@ TEST_F(ViewerTest, LooksAreSwitchedAndSwitchedBack) {
     openViewer();
     settle();
     const Picture plain = viewer_->renderer().readPicture().value();
-    for (const ViewerAction action : {ViewerAction::ToggleShadows, ViewerAction::ToggleOcclusion, ViewerAction::ToggleSection}) {
+    for (const ViewerAction action :
+         {ViewerAction::ToggleShadows, ViewerAction::ToggleOcclusion, ViewerAction::ToggleSection}) {
         viewer_->act(action);
         EXPECT_TRUE(turn(0.5));
         const Picture with = viewer_->renderer().readPicture().value();
@@ -201,7 +206,8 @@ TEST_F(ViewerTest, SectionAlongTheViewIsMovedUpAndDown) {
     viewer_->release(MouseButton::Left);
     settle();
     const double unitsPerPixel = viewer_->camera().viewHeight() / kSize.y;
-    EXPECT_NEAR(glm::dot(viewer_->pointAt(handle.foot).value() - before, viewer_->camera().forwardVector()), 30 * unitsPerPixel, 0.01);
+    EXPECT_NEAR(glm::dot(viewer_->pointAt(handle.foot).value() - before, viewer_->camera().forwardVector()),
+                30 * unitsPerPixel, 0.01);
 }
 
 TEST_F(ViewerTest, SectionIsTurnedByItsRingAboutItsFoot) {
@@ -210,14 +216,16 @@ TEST_F(ViewerTest, SectionIsTurnedByItsRingAboutItsFoot) {
     viewer_->setSections({{{0, 0, -1}, 0.2}});
     settle();
     const SectionHandle handle = viewer_->sectionHandles().front();
-    const glm::dvec2 grip = *std::max_element(handle.ring.begin(), handle.ring.end(), [](auto a, auto b) { return a.x < b.x; });
+    const glm::dvec2 grip =
+        *std::max_element(handle.ring.begin(), handle.ring.end(), [](auto a, auto b) { return a.x < b.x; });
     viewer_->press(MouseButton::Left, grip);
     EXPECT_EQ(viewer_->sectionGrab().grip, SectionGrip::Turn);
     viewer_->move(grip + glm::dvec2(24, 0));
     EXPECT_TRUE(turn(0.1));
     const SectionPlane turned = viewer_->sections().front();
     EXPECT_NEAR(glm::dot(turned.normal, handle.anchor), turned.offset, 1e-9);
-    EXPECT_NEAR(std::acos(glm::dot(turned.normal, glm::dvec3(0, 0, -1))), 0.5, 1e-9) << "half the ring's radius is half a radian";
+    EXPECT_NEAR(std::acos(glm::dot(turned.normal, glm::dvec3(0, 0, -1))), 0.5, 1e-9)
+        << "half the ring's radius is half a radian";
     EXPECT_NEAR(turned.normal.y, 0, 1e-6);
     viewer_->release(MouseButton::Left);
     EXPECT_LT(glm::distance(viewer_->sectionHandles().front().anchor, handle.anchor), 1e-9);
@@ -442,7 +450,8 @@ TEST_F(ViewerTest, LightStaysWhereItIsWhenItsTieChanges) {
     const Picture after = viewer_->renderer().readPicture().value();
     ASSERT_EQ(before.rgba.size(), after.rgba.size());
     int largest = 0;
-    for (size_t i = 0; i < before.rgba.size(); ++i) largest = std::max(largest, std::abs(before.rgba[i] - after.rgba[i]));
+    for (size_t i = 0; i < before.rgba.size(); ++i)
+        largest = std::max(largest, std::abs(before.rgba[i] - after.rgba[i]));
     EXPECT_LE(largest, 2);
     viewer_->act(ViewerAction::ViewFront);
     settle();
@@ -571,7 +580,8 @@ TEST_F(ViewerTest, TwoDatasetsAreOneScene) {
     auto reader = openFile(*folder_ / "ball.vcp").value();
     const auto source = [&] { return std::make_shared<FilePageSource>(reader, dataset); };
     const Similarity beside{glm::angleAxis(1.0, glm::dvec3(0, 0, 1)), 0.5, {3, 0, 0}};
-    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, {}, viewer_->camera(), "two balls"));
+    ASSERT_TRUE(
+        viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, {}, viewer_->camera(), "two balls"));
     EXPECT_EQ(viewer_->status().triangles, 2 * triangles);
     EXPECT_GT(viewer_->bounds().high.x, 3.4);
     viewer_->act(ViewerAction::Fit);
@@ -587,11 +597,13 @@ TEST_F(ViewerTest, TwoDatasetsAreOneScene) {
     for (const PageBox& page : pages) EXPECT_NEAR(glm::length(page.edges[0]), glm::length(page.edges[2]), 1e-9);
     EXPECT_FALSE(viewer_->renderer().feedbackPicture());
     viewer_->renderer().keepFeedback(true);
-    ASSERT_TRUE(viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, {}, viewer_->camera(), "two balls"));
+    ASSERT_TRUE(
+        viewer_->open({{dataset, source(), {}}, {dataset, source(), beside}}, {}, viewer_->camera(), "two balls"));
     settle();
     const auto& heard = viewer_->renderer().feedbackPicture();
     ASSERT_TRUE(heard) << "no frame missed pages";
-    EXPECT_GT(std::count_if(heard->errorPixels.begin(), heard->errorPixels.end(), [](float error) { return error > 0; }), 10);
+    EXPECT_GT(
+        std::count_if(heard->errorPixels.begin(), heard->errorPixels.end(), [](float error) { return error > 0; }), 10);
     EXPECT_LT(heard->errorPixels[0], 0) << "nothing is in the corner";
 }
 

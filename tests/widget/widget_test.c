@@ -7,12 +7,12 @@
 
 #include "vcp.h"
 
-#define CHECK(condition)                                                     \
-    do {                                                                     \
-        if (!(condition)) {                                                  \
-            fprintf(stderr, "line %d: %s\n", __LINE__, #condition);          \
-            exit(1);                                                         \
-        }                                                                    \
+#define CHECK(condition)                                            \
+    do {                                                            \
+        if (!(condition)) {                                         \
+            fprintf(stderr, "line %d: %s\n", __LINE__, #condition); \
+            exit(1);                                                \
+        }                                                           \
     } while (0)
 #define OK(call) check_ok(call, #call, __LINE__)
 
@@ -32,7 +32,8 @@ static void write_ball(double x) {
     const double pi = 3.14159265358979323846;
     FILE* file = fopen(ply, "w");
     CHECK(file);
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n", (RINGS + 1) * SECTORS);
+    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n",
+            (RINGS + 1) * SECTORS);
     fprintf(file, "element face %d\nproperty list uchar int vertex_indices\nend_header\n", 2 * RINGS * SECTORS);
     for (int i = 0; i <= RINGS; ++i)
         for (int j = 0; j < SECTORS; ++j) {
@@ -104,7 +105,8 @@ static void picture(void) {
     OK(vcp_view_stats(view, &stats));
     uint64_t hits = 0;
     for (int i = 0; i < PIXELS; ++i) hits += isfinite(depth[i]) ? 1 : 0;
-    CHECK(hits > 500 && hits == stats.hit_pixels && stats.rays == PIXELS && stats.settled && stats.frames == 1 && stats.frame_ms > 0);
+    CHECK(hits > 500 && hits == stats.hit_pixels && stats.rays == PIXELS && stats.settled && stats.frames == 1 &&
+          stats.frame_ms > 0);
     CHECK(isinf(depth[0]) && memcmp(rgba, rgba + 4 * (PIXELS / 2 + WIDTH / 2), 4) != 0 && rgba[3] == 255);
 
     vcp_camera camera = VCP_INIT(vcp_camera);
@@ -116,7 +118,8 @@ static void picture(void) {
     CHECK(pick.hit && fabs(pick.distance - depth[PIXELS / 2 + WIDTH / 2]) < 1e-4);
     const double* p = pick.position;
     const double radius = sqrt((p[0] - 1e6) * (p[0] - 1e6) + p[1] * p[1] + p[2] * p[2]);
-    CHECK(fabs(radius - 1) < 0.01 && pick.error > 0 && pick.error <= info.certified_error && pick.level == info.levels - 1);
+    CHECK(fabs(radius - 1) < 0.01 && pick.error > 0 && pick.error <= info.certified_error &&
+          pick.level == info.levels - 1);
     CHECK(fabs(pick.normal[2]) > 0.99 && camera.position[2] * pick.normal[2] > 0);
     OK(vcp_view_pick(view, 0, 0, &pick));
     CHECK(!pick.hit);
@@ -172,7 +175,8 @@ static void input(void) {
     wanted.position[2] = 5;
     OK(vcp_view_set_camera(view, &wanted));
     OK(vcp_view_get_camera(view, &after));
-    CHECK(after.position[2] == 5 && fabs(after.target[2]) < 1e-12 && after.up[1] > 0.999 && fabs(after.fov_y - 0.785398) < 1e-5 && !after.orthographic);
+    CHECK(after.position[2] == 5 && fabs(after.target[2]) < 1e-12 && after.up[1] > 0.999 &&
+          fabs(after.fov_y - 0.785398) < 1e-5 && !after.orthographic);
     OK(vcp_view_resize(view, 32, 16));
     OK(vcp_view_settle(view, 60));
     vcp_frame frame = VCP_INIT(vcp_frame);
@@ -340,7 +344,8 @@ static void wrong_calls(void) {
     CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE);
     window.display = &window;
     window.window = 1;
-    CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE && strstr(vcp_context_last_error(context), "without windows"));
+    CHECK(vcp_view_create(context, &window, &view) == VCP_USAGE &&
+          strstr(vcp_context_last_error(context), "without windows"));
 
     view = make_view(context);
     CHECK(vcp_context_destroy(context) == VCP_USAGE);
@@ -360,9 +365,11 @@ static void wrong_calls(void) {
     vcp_host_image image = VCP_INIT(vcp_host_image);
     CHECK(vcp_view_copy_to_image(view, NULL) == VCP_USAGE && vcp_view_copy_to_image(view, &image) == VCP_USAGE);
     CHECK(vcp_view_resize(view, 16385, 1) == VCP_USAGE);
-    CHECK(vcp_view_mouse_press(view, 17, 1, 1, 0) == VCP_USAGE && vcp_view_mouse_press(view, VCP_LEFT, NAN, 1, 0) == VCP_USAGE);
+    CHECK(vcp_view_mouse_press(view, 17, 1, 1, 0) == VCP_USAGE &&
+          vcp_view_mouse_press(view, VCP_LEFT, NAN, 1, 0) == VCP_USAGE);
     CHECK(vcp_view_mouse_move(view, INFINITY, 0) == VCP_USAGE && vcp_view_mouse_release(view, -1) == VCP_USAGE);
-    CHECK(vcp_view_mouse_scroll(view, 1, 1, NAN, 0) == VCP_USAGE && vcp_view_act(view, 999) == VCP_USAGE && vcp_view_act(view, -1) == VCP_USAGE);
+    CHECK(vcp_view_mouse_scroll(view, 1, 1, NAN, 0) == VCP_USAGE && vcp_view_act(view, 999) == VCP_USAGE &&
+          vcp_view_act(view, -1) == VCP_USAGE);
     OK(vcp_view_key(view, 0xffffffffu, 1));
     vcp_camera camera = VCP_INIT(vcp_camera);
     CHECK(vcp_view_set_camera(view, &camera) == VCP_USAGE && vcp_view_set_camera(view, NULL) == VCP_USAGE);
@@ -404,10 +411,12 @@ static void wrong_calls(void) {
     CHECK(vcp_build(&build, NULL) == VCP_IO && strstr(text, "/nowhere/\xef\xbf\xbd\xc3\xa9.ply"));
     build.error_text_size = 14;
     CHECK(vcp_build(&build, NULL) == VCP_IO && strcmp(text, "/nowhere/\xef\xbf\xbd") == 0);
-    CHECK(vcp_context_create(NULL, &context) == VCP_OK && vcp_context_open(context, "/nowhere/\xe9.vcp", NULL) == VCP_IO);
+    CHECK(vcp_context_create(NULL, &context) == VCP_OK &&
+          vcp_context_open(context, "/nowhere/\xe9.vcp", NULL) == VCP_IO);
     CHECK(strstr(vcp_context_last_error(context), "/nowhere/\xef\xbf\xbd.vcp"));
     OK(vcp_context_destroy(context));
-    CHECK(vcp_version()[0] && vcp_status_text(-5)[0] && vcp_context_last_error(NULL)[0] && vcp_view_last_error(NULL)[0]);
+    CHECK(vcp_version()[0] && vcp_status_text(-5)[0] && vcp_context_last_error(NULL)[0] &&
+          vcp_view_last_error(NULL)[0]);
 }
 
 /* Views of one context share its budget, and what one loads the other has. */
@@ -424,7 +433,8 @@ static void sharing(void) {
     OK(vcp_view_stats(first, &stats));
     OK(vcp_view_settle(second, 60));
     OK(vcp_view_stats(second, &again));
-    CHECK(stats.bytes_read > 0 && again.bytes_read == stats.bytes_read && again.pool_bytes == stats.pool_bytes && stats.pool_bytes <= options.gpu_bytes);
+    CHECK(stats.bytes_read > 0 && again.bytes_read == stats.bytes_read && again.pool_bytes == stats.pool_bytes &&
+          stats.pool_bytes <= options.gpu_bytes);
     static uint8_t a[4 * PIXELS], b[4 * PIXELS];
     static float depth[PIXELS];
     read_frame(first, a, depth);
@@ -473,9 +483,11 @@ static void placed(void) {
     CHECK(one.datasets == 1);
     open_two(context);
     OK(vcp_context_dataset(context, &info));
-    CHECK(info.datasets == 2 && info.triangles == 2 * one.triangles && info.levels == one.levels && info.certified_error == one.certified_error);
+    CHECK(info.datasets == 2 && info.triangles == 2 * one.triangles && info.levels == one.levels &&
+          info.certified_error == one.certified_error);
     CHECK(fabs(info.cell - 0.5 * one.cell) < 1e-12);
-    CHECK(fabs(info.bounds_min[0] - one.bounds_min[0]) < 1e-12 && fabs(info.bounds_max[0] - 3 - 0.5 * one.bounds_max[0]) < 1e-12);
+    CHECK(fabs(info.bounds_min[0] - one.bounds_min[0]) < 1e-12 &&
+          fabs(info.bounds_max[0] - 3 - 0.5 * one.bounds_max[0]) < 1e-12);
     /* All of both is in the picture. */
     OK(vcp_view_settle(view, 60));
     static float depth[PIXELS];
@@ -486,18 +498,23 @@ static void placed(void) {
     for (uint32_t i = 0; i < 2; ++i) {
         look_from(view, 3.0 * i);
         OK(vcp_view_pick(view, WIDTH / 2, HEIGHT / 2, &pick));
-        CHECK(pick.hit && pick.dataset == i && fabs(pick.position[0] - 3.0 * i) < 0.01 && fabs(pick.position[2] - (i ? 0.5 : 1)) < 0.01);
-        CHECK(fabs(pick.error - (i ? 0.5 : 1) * one.certified_error) < 1e-12 && fabs(pick.distance - (i ? 4.5 : 4)) < 0.01);
+        CHECK(pick.hit && pick.dataset == i && fabs(pick.position[0] - 3.0 * i) < 0.01 &&
+              fabs(pick.position[2] - (i ? 0.5 : 1)) < 0.01);
+        CHECK(fabs(pick.error - (i ? 0.5 : 1) * one.certified_error) < 1e-12 &&
+              fabs(pick.distance - (i ? 4.5 : 4)) < 0.01);
     }
 
     /* Wrong ones change nothing. */
     vcp_placed wrong[2] = {VCP_INIT(vcp_placed), VCP_INIT(vcp_placed)};
     wrong[0].path = wrong[1].path = tree;
-    CHECK(vcp_context_open_placed(context, NULL, 1, NULL) == VCP_USAGE && vcp_context_open_placed(NULL, wrong, 2, NULL) == VCP_USAGE);
-    CHECK(vcp_context_open_placed(context, wrong, 0, NULL) == VCP_USAGE && vcp_context_open_placed(context, wrong, 257, NULL) == VCP_USAGE);
+    CHECK(vcp_context_open_placed(context, NULL, 1, NULL) == VCP_USAGE &&
+          vcp_context_open_placed(NULL, wrong, 2, NULL) == VCP_USAGE);
+    CHECK(vcp_context_open_placed(context, wrong, 0, NULL) == VCP_USAGE &&
+          vcp_context_open_placed(context, wrong, 257, NULL) == VCP_USAGE);
     for (int i = 0; i < 16; ++i) wrong[1].world_from_dataset[i] = i % 5 ? 0 : 1;
     wrong[1].world_from_dataset[0] = -1;
-    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE && strstr(vcp_context_last_error(context), "dataset 1") && strstr(vcp_context_last_error(context), "mirrors"));
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE &&
+          strstr(vcp_context_last_error(context), "dataset 1") && strstr(vcp_context_last_error(context), "mirrors"));
     wrong[1].world_from_dataset[0] = NAN;
     CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE);
     wrong[1].world_from_dataset[0] = 1;
@@ -510,7 +527,8 @@ static void placed(void) {
     wrong[1].path = NULL;
     CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_USAGE);
     wrong[1].path = "/nowhere/at.vcp";
-    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_IO && strstr(vcp_context_last_error(context), "/nowhere/at.vcp"));
+    CHECK(vcp_context_open_placed(context, wrong, 2, NULL) == VCP_IO &&
+          strstr(vcp_context_last_error(context), "/nowhere/at.vcp"));
     OK(vcp_context_dataset(context, &info));
     CHECK(info.datasets == 2);
     OK(vcp_view_destroy(view));
@@ -523,8 +541,10 @@ static void scenes(void) {
     static char text[12288];
     const char* name = strrchr(tree, '/') + 1;
     snprintf(text, sizeof(text),
-             "{\"datasets\": [{\"file\": \"%s\"}, {\"file\": \"%s\", \"transform\": [[0.5, 0, 0, 3], [0, 0.5, 0, 0], [0, 0, 0.5, 0], [0, 0, 0, 1]]}], \"lights\": [{\"direction\": [0, 1, 0]}],"
-             "\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0]}, \"sections\": [{\"normal\": [1, 0, 0], \"offset\": 0.1}]}",
+             "{\"datasets\": [{\"file\": \"%s\"}, {\"file\": \"%s\", \"transform\": [[0.5, 0, 0, 3], [0, 0.5, 0, 0], "
+             "[0, 0, 0.5, 0], [0, 0, 0, 1]]}], \"lights\": [{\"direction\": [0, 1, 0]}],"
+             "\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0]}, \"sections\": [{\"normal\": [1, 0, 0], "
+             "\"offset\": 0.1}]}",
              name, name);
     write_scene(text);
     vcp_context* context = make_context(NULL);
@@ -557,7 +577,8 @@ static void scenes(void) {
 
     /* What was wrong leaves what is open. */
     write_scene("{\n\"datasets\": [{\"flie\": 1}]}");
-    CHECK(vcp_context_open(context, scene, NULL) == VCP_INVALID_INPUT && strstr(vcp_context_last_error(context), "line 2"));
+    CHECK(vcp_context_open(context, scene, NULL) == VCP_INVALID_INPUT &&
+          strstr(vcp_context_last_error(context), "line 2"));
     write_scene("{\"datasets\": [{\"file\": \"none.vcp\"}]}");
     CHECK(vcp_context_open(context, scene, NULL) == VCP_IO && strstr(vcp_context_last_error(context), "none.vcp"));
     snprintf(text, sizeof(text), "{\"datasets\": [{\"file\": \"%s\"}]}", strrchr(ply, '/') + 1);
@@ -656,7 +677,9 @@ int main(int argc, char** argv) {
     static const struct {
         const char* name;
         void (*run)(void);
-    } cases[] = {{"picture", picture}, {"input", input}, {"callbacks", callbacks}, {"progress", progress}, {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"placed", placed}, {"scenes", scenes}, {"cycles", cycles}, {"threads", threads}};
+    } cases[] = {{"picture", picture},         {"input", input},     {"callbacks", callbacks}, {"progress", progress},
+                 {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"placed", placed},       {"scenes", scenes},
+                 {"cycles", cycles},           {"threads", threads}};
     if (argc != 3) return 2;
     snprintf(ply, sizeof(ply), "%s/ball-%s.ply", argv[2], argv[1]);
     snprintf(tree, sizeof(tree), "%s/ball-%s.vcp", argv[2], argv[1]);

@@ -37,7 +37,8 @@ constexpr size_t kMostAttributes = 4096, kMostChannels = 64;
 constexpr uint64_t kBufferBytes = uint64_t{64} << 20, kBufferPictures = 4;
 /// A chunk has its place in a table, and names its lines and its size.
 constexpr uint64_t kLeastChunkBytes = 16;
-/// How many bytes of texels a byte of the file may stand for: deflate's most is 1032, of two bytes out of four. Flat DWA has more.
+/// How many bytes of texels a byte of the file may stand for: deflate's most is 1032, of two bytes out of four. Flat
+/// DWA has more.
 constexpr uint64_t kMostExpansion = 4096, kMostDwaExpansion = 65536;
 constexpr uint8_t kDwaa = 8;
 /// Of every compression by its number.
@@ -55,8 +56,10 @@ struct Known {
     std::string_view name, type;
     size_t bytes;
 };
-constexpr Known kKnown[] = {{"channels", "chlist", 0},          {"compression", "compression", 1}, {"dataWindow", "box2i", 16},        {"displayWindow", "box2i", 16},    {"lineOrder", "lineOrder", 1},
-                            {"pixelAspectRatio", "float", 4}, {"screenWindowCenter", "v2f", 8},  {"screenWindowWidth", "float", 4}, {"tiles", "tiledesc", 9}};
+constexpr Known kKnown[] = {
+    {"channels", "chlist", 0},        {"compression", "compression", 1}, {"dataWindow", "box2i", 16},
+    {"displayWindow", "box2i", 16},   {"lineOrder", "lineOrder", 1},     {"pixelAspectRatio", "float", 4},
+    {"screenWindowCenter", "v2f", 8}, {"screenWindowWidth", "float", 4}, {"tiles", "tiledesc", 9}};
 
 /// The number of names, with 16 bytes each, before an empty one; nothing where that is not all that there is.
 std::optional<size_t> countChannels(std::span<const std::byte> list) {
@@ -70,8 +73,8 @@ std::optional<size_t> countChannels(std::span<const std::byte> list) {
     return std::nullopt;
 }
 
-/// What a header says, read before the library allocates by it. Attributes that the library does not need get a type that it does not know, so
-/// that it passes over as many bytes as they say.
+/// What a header says, read before the library allocates by it. Attributes that the library does not need get a type
+/// that it does not know, so that it passes over as many bytes as they say.
 class HeaderWalk {
 public:
     explicit HeaderWalk(std::span<const std::byte> file) : file_(file) {}
@@ -82,7 +85,9 @@ public:
         uint32_t version = 0;
         at_ = kMagic.size();
         if (!take(&version, sizeof version)) return cut();
-        if ((version & (kDeep | kSeveralParts)) != 0) return wrong(ErrorCode::Unsupported, "is an EXR of several parts or of deep texels; save it as a plain one");
+        if ((version & (kDeep | kSeveralParts)) != 0)
+            return wrong(ErrorCode::Unsupported,
+                         "is an EXR of several parts or of deep texels; save it as a plain one");
         for (size_t count = 0; count < kMostAttributes; ++count) {
             const auto name = word();
             if (!name) return cut();
@@ -91,9 +96,12 @@ public:
             const auto type = word();
             uint32_t bytes = 0;
             if (!type || !take(&bytes, sizeof bytes) || bytes > file_.size() - at_) return cut();
-            const auto known = std::ranges::find_if(kKnown, [&](const Known& k) { return k.name == *name && k.type == *type; });
-            if (known == std::end(kKnown)) masked_.push_back({typeAt, type->size()});
-            else VCP_TRY(attribute(*known, file_.subspan(at_, bytes)));
+            const auto known =
+                std::ranges::find_if(kKnown, [&](const Known& k) { return k.name == *name && k.type == *type; });
+            if (known == std::end(kKnown))
+                masked_.push_back({typeAt, type->size()});
+            else
+                VCP_TRY(attribute(*known, file_.subspan(at_, bytes)));
             at_ += bytes;
         }
         return damaged("too many attributes");
@@ -118,9 +126,11 @@ private:
     }
     Result<void> attribute(const Known& known, std::span<const std::byte> value) {
         // The library joins lists of channels, and takes the last of what comes twice.
-        if (std::ranges::find(seen_, known.name) != seen_.end()) return damaged(fmt::format("it has {} twice", known.name));
+        if (std::ranges::find(seen_, known.name) != seen_.end())
+            return damaged(fmt::format("it has {} twice", known.name));
         seen_.push_back(known.name);
-        if (known.bytes > 0 && value.size() != known.bytes) return damaged(fmt::format("its {} has another size", known.name));
+        if (known.bytes > 0 && value.size() != known.bytes)
+            return damaged(fmt::format("its {} has another size", known.name));
         if (known.name == "dataWindow") {
             std::memcpy(window_.data(), value.data(), sizeof window_);
             hasWindow_ = true;
@@ -132,7 +142,8 @@ private:
         } else if (known.name == "channels") {
             const auto count = countChannels(value);
             if (!count) return damaged("its list of channels");
-            if (*count > kMostChannels) return wrong(ErrorCode::Limit, fmt::format("an EXR of {} channels; a height map needs one", *count));
+            if (*count > kMostChannels)
+                return wrong(ErrorCode::Limit, fmt::format("an EXR of {} channels; a height map needs one", *count));
             texelBytes_ = sizeof(float) * std::max<size_t>(*count, 1);
         }
         return {};
@@ -141,12 +152,17 @@ private:
         if (!hasWindow_) return damaged("no data window");
         const int64_t width = int64_t{window_[2]} - window_[0] + 1, height = int64_t{window_[3]} - window_[1] + 1;
         if (width < 1 || height < 1) return damaged("a data window without texels");
-        if (width > mostEdge || height > mostEdge) return wrong(ErrorCode::Limit, fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, mostEdge));
-        VCP_TRY(hasTiles_ ? checkTiles(uint64_t(width), uint64_t(height)) : checkLines(uint64_t(width), uint64_t(height)));
+        if (width > mostEdge || height > mostEdge)
+            return wrong(ErrorCode::Limit,
+                         fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, mostEdge));
+        VCP_TRY(hasTiles_ ? checkTiles(uint64_t(width), uint64_t(height))
+                          : checkLines(uint64_t(width), uint64_t(height)));
         const uint64_t expansion = compression_ >= kDwaa ? kMostDwaExpansion : kMostExpansion;
-        if (uint64_t(width * height) * texelBytes_ / expansion > file_.size()) return damaged(fmt::format("{} bytes cannot hold {} x {} texels", file_.size(), width, height));
+        if (uint64_t(width * height) * texelBytes_ / expansion > file_.size())
+            return damaged(fmt::format("{} bytes cannot hold {} x {} texels", file_.size(), width, height));
         header_.assign(file_.begin(), file_.begin() + std::ptrdiff_t(at_));
-        for (const auto& [first, count] : masked_) std::fill_n(header_.begin() + std::ptrdiff_t(first), count, std::byte{'?'});
+        for (const auto& [first, count] : masked_)
+            std::fill_n(header_.begin() + std::ptrdiff_t(first), count, std::byte{'?'});
         return glm::ivec2(int(width), int(height));
     }
 
@@ -156,18 +172,27 @@ private:
         if (x < 1 || y < 1) return damaged("tiles without texels");
         const uint64_t across = (width + x - 1) / x, down = (height + y - 1) / y;
         if (x > kMostTileEdge || y > kMostTileEdge || !fits(across * x * y, width * height))
-            return wrong(ErrorCode::Limit, fmt::format("an EXR of {} x {} texels in tiles of {} x {}; save it with smaller tiles, or in lines", width, height, x, y));
+            return wrong(
+                ErrorCode::Limit,
+                fmt::format("an EXR of {} x {} texels in tiles of {} x {}; save it with smaller tiles, or in lines",
+                            width, height, x, y));
         return checkChunks(across * down);
     }
     Result<void> checkLines(uint64_t width, uint64_t height) const {
         const uint64_t lines = compression_ < kLinesOfChunk.size() ? kLinesOfChunk[compression_] : kLinesOfChunk.back();
         if (!fits(width * lines, width * height))
-            return wrong(ErrorCode::Limit, fmt::format("an EXR of {} x {} texels of {} bytes, {} lines together; save it with fewer channels", width, height, texelBytes_, lines));
+            return wrong(
+                ErrorCode::Limit,
+                fmt::format("an EXR of {} x {} texels of {} bytes, {} lines together; save it with fewer channels",
+                            width, height, texelBytes_, lines));
         return checkChunks((height + lines - 1) / lines);
     }
-    [[nodiscard]] bool fits(uint64_t bufferTexels, uint64_t texels) const { return bufferTexels * texelBytes_ <= std::max(kBufferBytes, kBufferPictures * texels * texelBytes_); }
+    [[nodiscard]] bool fits(uint64_t bufferTexels, uint64_t texels) const {
+        return bufferTexels * texelBytes_ <= std::max(kBufferBytes, kBufferPictures * texels * texelBytes_);
+    }
     Result<void> checkChunks(uint64_t chunks) const {
-        if (chunks > file_.size() / kLeastChunkBytes) return damaged(fmt::format("{} bytes cannot hold {} blocks of texels", file_.size(), chunks));
+        if (chunks > file_.size() / kLeastChunkBytes)
+            return damaged(fmt::format("{} bytes cannot hold {} blocks of texels", file_.size(), chunks));
         return {};
     }
 
@@ -186,12 +211,15 @@ private:
 /// A file, and what stands for its beginning.
 class MemoryStream : public Imf::IStream {
 public:
-    MemoryStream(std::span<const std::byte> bytes, std::span<const std::byte> header) : Imf::IStream(""), bytes_(bytes), header_(header) {}
+    MemoryStream(std::span<const std::byte> bytes, std::span<const std::byte> header)
+        : Imf::IStream(""), bytes_(bytes), header_(header) {}
 
     bool read(char to[], int count) override {
-        if (count < 0 || at_ > bytes_.size() || size_t(count) > bytes_.size() - at_) throw Iex::InputExc("it ends too early");
+        if (count < 0 || at_ > bytes_.size() || size_t(count) > bytes_.size() - at_)
+            throw Iex::InputExc("it ends too early");
         std::memcpy(to, bytes_.data() + at_, size_t(count));
-        if (at_ < header_.size()) std::memcpy(to, header_.data() + at_, std::min(size_t(count), header_.size() - size_t(at_)));
+        if (at_ < header_.size())
+            std::memcpy(to, header_.data() + at_, std::min(size_t(count), header_.size() - size_t(at_)));
         at_ += size_t(count);
         return at_ < bytes_.size();
     }
@@ -227,14 +255,17 @@ Result<FloatPicture> decoded(std::span<const std::byte> file, std::span<const st
     const size_t texel = sizeof(float), row = texel * size_t(size.x);
     for (const std::string& name : channels) {
         const Imf::Channel& channel = *list.findChannel(name);
-        if (channel.xSampling != 1 || channel.ySampling != 1) return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
+        if (channel.xSampling != 1 || channel.ySampling != 1)
+            return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
         Imf::FrameBuffer frame;
         frame.insert(name, Imf::Slice::Make(Imf::FLOAT, plane.data(), window, texel, row));
         input.setFrameBuffer(frame);
         input.readPixels(window.min.y, window.max.y);
         for (size_t i = 0; i < plane.size(); ++i) {
             if (!std::isfinite(plane[i]))
-                return Error{.code = ErrorCode::InvalidInput, .message = "is no finite number", .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
+                return Error{.code = ErrorCode::InvalidInput,
+                             .message = "is no finite number",
+                             .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
             picture.values[i] += plane[i] / float(channels.size());
         }
     }
@@ -245,7 +276,9 @@ Result<FloatPicture> decoded(std::span<const std::byte> file, std::span<const st
 
 }  // namespace
 
-bool isExr(std::span<const std::byte> file) { return file.size() >= kMagic.size() && std::memcmp(file.data(), kMagic.data(), kMagic.size()) == 0; }
+bool isExr(std::span<const std::byte> file) {
+    return file.size() >= kMagic.size() && std::memcmp(file.data(), kMagic.data(), kMagic.size()) == 0;
+}
 
 #ifdef VCP_HAVE_OPENEXR
 
@@ -267,7 +300,10 @@ Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge) {
 
 bool readsExr() { return false; }
 
-Result<FloatPicture> decodeExr(std::span<const std::byte>, int) { return wrong(ErrorCode::Unsupported, "is an EXR picture, and this program was built without OpenEXR; save it as a PNG of 16 bits"); }
+Result<FloatPicture> decodeExr(std::span<const std::byte>, int) {
+    return wrong(ErrorCode::Unsupported,
+                 "is an EXR picture, and this program was built without OpenEXR; save it as a PNG of 16 bits");
+}
 
 #endif
 

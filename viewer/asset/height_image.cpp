@@ -150,7 +150,8 @@ Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double ra
     if (isExr(file)) return exrHeights(file, range);
     const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
     if (text.starts_with("\x89PNG\r\n\x1a\n")) return pngHeights(text, range);
-    return Error{.code = ErrorCode::InvalidInput, .message = text.empty() ? "the file is empty" : "is neither a PNG nor an EXR picture"};
+    return Error{.code = ErrorCode::InvalidInput,
+                 .message = text.empty() ? "the file is empty" : "is neither a PNG nor an EXR picture"};
 }
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {

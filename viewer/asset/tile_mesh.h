@@ -13,8 +13,8 @@ namespace vcp {
 
 struct TileMeshOptions {
     char up = 'z';  ///< the mesh's axis that points out of the base surface
-    /// After how much the mesh repeats along the tile's x and y, in the mesh's units; without one, the mesh stands alone
-    /// in the middle of a square tile, nine tenths of it wide.
+    /// After how much the mesh repeats along the tile's x and y, in the mesh's units; without one, the mesh stands
+    /// alone in the middle of a square tile, nine tenths of it wide.
     std::optional<glm::dvec2> period;
 };
 
@@ -23,8 +23,9 @@ struct TileMesh {
     glm::dvec3 extent{0};
 };
 
-/// Reads a mesh whole and puts it into a tile, with a fiftieth of a tile free below and above. Errors: those of the mesh
-/// readers; InvalidInput (no triangle, no size), Limit (10^7 triangles, a slab above 16 tiles), with the file's name.
+/// Reads a mesh whole and puts it into a tile, with a fiftieth of a tile free below and above. Errors: those of the
+/// mesh readers; InvalidInput (no triangle, no size), Limit (10^7 triangles, a slab above 16 tiles), with the file's
+/// name.
 Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshOptions& options);
 
 }  // namespace vcp

@@ -74,7 +74,8 @@ BuildOptions buildOptionsFor(const BenchBuildOptions& options, const Subject& su
 }
 
 /// Builds as often as asked for; fills the variant's row. With a cell of 0 the builder chooses.
-Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject, Variant& variant, const Report& report) {
+Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject, Variant& variant,
+                       const Report& report) {
     BenchBuildRow& row = variant.row;
     std::vector<double> seconds, cpuSeconds;
     const BuildOptions build = buildOptionsFor(options, subject, variant);
@@ -142,7 +143,8 @@ Result<std::string> judge(const BenchBuildOptions& options, const fs::path& mode
     const MeshBvh bvh(*mesh);
     for (size_t i = 0; i < files.size(); ++i) {
         const auto distance = distanceOf(files[i], bvh, options, [&](double fraction) {
-            return progress("measuring the distance", 0.5 + 0.5 * (static_cast<double>(i) + fraction) / static_cast<double>(files.size()));
+            return progress("measuring the distance",
+                            0.5 + 0.5 * (static_cast<double>(i) + fraction) / static_cast<double>(files.size()));
         });
         if (!distance) return distance.error();
         value += bytesOf(*distance);
@@ -151,26 +153,30 @@ Result<std::string> judge(const BenchBuildOptions& options, const fs::path& mode
 }
 
 /// Embree's time and the distances, into the rows.
-Result<void> judgeVariants(const BenchBuildOptions& options, const Subject& subject, std::vector<Variant>& variants, const Report& report) {
+Result<void> judgeVariants(const BenchBuildOptions& options, const Subject& subject, std::vector<Variant>& variants,
+                           const Report& report) {
     if (variants.front().row.triangles * kJudgeBytesPerTriangle > defaultMemoryBytes()) return {};
     std::vector<fs::path> files;
     if (options.samples > 0 && !subject.isGenerated)
         for (const Variant& variant : variants) files.push_back(variant.file);
     if (files.empty() && !benchHasEmbree()) return {};
-    const auto outcome = runInChild([&](const ChildProgress& progress) { return judge(options, subject.mesh, files, progress); },
-                                    asChildProgress(report, subject.name, 0, 1));
+    const auto outcome =
+        runInChild([&](const ChildProgress& progress) { return judge(options, subject.mesh, files, progress); },
+                   asChildProgress(report, subject.name, 0, 1));
     if (!outcome) return outcome.error();
     for (size_t i = 0; i < variants.size(); ++i) {
         BenchBuildRow& row = variants[i].row;
         row.embreeBvhSeconds = valueAt<double>(outcome->value, 0);
         row.ratioToEmbree = row.embreeBvhSeconds / row.seconds;
-        if (i < files.size()) row.distance = valueAt<SurfaceDistance>(outcome->value, sizeof(double) + i * sizeof(SurfaceDistance));
+        if (i < files.size())
+            row.distance = valueAt<SurfaceDistance>(outcome->value, sizeof(double) + i * sizeof(SurfaceDistance));
     }
     return {};
 }
 
 /// The default first: its cell is that of the others, which differ in the tolerance alone.
-Result<std::vector<BenchBuildRow>> measure(const BenchBuildOptions& options, const Subject& subject, const Report& report) {
+Result<std::vector<BenchBuildRow>> measure(const BenchBuildOptions& options, const Subject& subject,
+                                           const Report& report) {
     std::vector<double> errors = {0};
     if (!subject.isGenerated) errors.insert(errors.end(), options.errors.begin(), options.errors.end());
     std::vector<Variant> variants;
@@ -181,29 +187,32 @@ Result<std::vector<BenchBuildRow>> measure(const BenchBuildOptions& options, con
         variant.row.memoryBytes = options.memoryBytes;
         variant.row.cell = i == 0 ? options.cell : variants.front().row.cell;
         variant.row.errorCells = errors[i];
-        variant.file = subject.folder / (i == 0 ? subject.name + ".vcp" : fmt::format("{}_error_{:g}.vcp", subject.name, errors[i]));
+        variant.file = subject.folder /
+                       (i == 0 ? subject.name + ".vcp" : fmt::format("{}_error_{:g}.vcp", subject.name, errors[i]));
         const auto part = [&, i](const std::string& what, double fraction) {
             return report(what, 0.7 * (static_cast<double>(i) + fraction) / static_cast<double>(errors.size()));
         };
         VCP_TRY(timeBuild(options, subject, variant, part));
         variants.push_back(std::move(variant));
     }
-    VCP_TRY(judgeVariants(options, subject, variants,
-                          [&](const std::string& what, double fraction) { return report(what, 0.7 + 0.3 * fraction); }));
+    VCP_TRY(judgeVariants(options, subject, variants, [&](const std::string& what, double fraction) {
+        return report(what, 0.7 + 0.3 * fraction);
+    }));
     std::vector<BenchBuildRow> rows;
     for (Variant& variant : variants) rows.push_back(std::move(variant.row));
     return rows;
 }
 
-Result<std::vector<BenchBuildRow>> measureScan(const BenchBuildOptions& options, uint64_t triangles, const fs::path& folder,
-                                               const Report& report) {
+Result<std::vector<BenchBuildRow>> measureScan(const BenchBuildOptions& options, uint64_t triangles,
+                                               const fs::path& folder, const Report& report) {
     Subject subject;
     subject.name = "scan_" + scanSizeName(triangles);
     subject.folder = folder;
     subject.mesh = (options.temp.empty() ? folder : options.temp) / fmt::format("{}-{}.ply", subject.name, ::getpid());
     subject.isGenerated = true;
-    const auto made = runProgram({options.makeScan.string(), "--triangles", std::to_string(triangles), "-o", subject.mesh.string()},
-                                 [&] { return report(subject.name + ": making the scan", 0).ok(); });
+    const auto made =
+        runProgram({options.makeScan.string(), "--triangles", std::to_string(triangles), "-o", subject.mesh.string()},
+                   [&] { return report(subject.name + ": making the scan", 0).ok(); });
     if (!made) return made.error();
     auto rows = measure(options, subject,
                         [&](const std::string& what, double fraction) { return report(what, 0.1 + 0.9 * fraction); });
@@ -217,7 +226,9 @@ Result<BenchBuildReport> measureAll(const BenchBuildOptions& options, const fs::
     const size_t count = options.models.size() + options.generated.size();
     for (size_t i = 0; i < count; ++i) {
         const Report report = [&](const std::string& what, double fraction) -> Result<void> {
-            if (!options.progress || options.progress(what, (static_cast<double>(i) + fraction) / static_cast<double>(count))) return {};
+            if (!options.progress ||
+                options.progress(what, (static_cast<double>(i) + fraction) / static_cast<double>(count)))
+                return {};
             return Error{ErrorCode::Cancelled, "cancelled"};
         };
         const bool isModel = i < options.models.size();
@@ -237,7 +248,8 @@ Result<BenchBuildReport> measureAll(const BenchBuildOptions& options, const fs::
 
 Quantiles BenchBuildRow::distanceCells() const {
     const Quantiles &a = distance->meshToSurface, &b = distance->surfaceToMesh;
-    return {std::max(a.p50, b.p50) / cell, std::max(a.p95, b.p95) / cell, std::max(a.p99, b.p99) / cell, std::max(a.max, b.max) / cell};
+    return {std::max(a.p50, b.p50) / cell, std::max(a.p95, b.p95) / cell, std::max(a.p99, b.p99) / cell,
+            std::max(a.max, b.max) / cell};
 }
 
 std::string scanSizeName(uint64_t triangles) {

@@ -25,7 +25,7 @@ struct BenchBuildOptions {
     std::filesystem::path temp;       ///< as for vcp build; generated scans lie here too
     std::filesystem::path out;        ///< .vcp files are left here; empty: a temporary folder
     double cell = 0;                  ///< as for vcp build
-    uint64_t samples = 50'000;       ///< of the distance between a model and its surface; 0: not measured
+    uint64_t samples = 50'000;        ///< of the distance between a model and its surface; 0: not measured
     std::filesystem::path makeScan;   ///< the program make_scan
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -44,10 +44,10 @@ struct BenchBuildRow {
     double cpuSeconds = 0;        ///< of all threads, user and system
     uint64_t memoryBytes = 0;     ///< the cap; 0: the default
     uint64_t tempBytes = 0;
-    uint64_t leaves = 0, hardLeaves = 0;  ///< of the finest level
-    double cell = 0;                      ///< world units
-    double errorCells = 0;                ///< tolerated, in cells
-    double certifiedCells = 0;            ///< certified, in cells
+    uint64_t leaves = 0, hardLeaves = 0;      ///< of the finest level
+    double cell = 0;                          ///< world units
+    double errorCells = 0;                    ///< tolerated, in cells
+    double certifiedCells = 0;                ///< certified, in cells
     std::optional<SurfaceDistance> distance;  ///< measured; world units
 
     [[nodiscard]] double bytesPerTriangle() const {

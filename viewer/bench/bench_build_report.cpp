@@ -68,10 +68,11 @@ std::string benchBuildMarkdown(const BenchBuildReport& report) {
         "Embree | tolerance | certified | p50 | p99 | max cells |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for (const BenchBuildRow& row : report.rows) {
-        text += fmt::format("| {} | {} | {:.2f} | {:.3f} | {:.0f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ",
-                            row.model, row.triangles, row.seconds, row.trianglesPerSecond * 1e-6,
-                            static_cast<double>(row.peakRssBytes) * 1e-6, static_cast<double>(row.fileBytes) * 1e-6,
-                            row.bytesPerTriangle(), row.embreeBvhSeconds, row.ratioToEmbree, row.errorCells, row.certifiedCells);
+        text += fmt::format(
+            "| {} | {} | {:.2f} | {:.3f} | {:.0f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ", row.model,
+            row.triangles, row.seconds, row.trianglesPerSecond * 1e-6, static_cast<double>(row.peakRssBytes) * 1e-6,
+            static_cast<double>(row.fileBytes) * 1e-6, row.bytesPerTriangle(), row.embreeBvhSeconds, row.ratioToEmbree,
+            row.errorCells, row.certifiedCells);
         if (row.distance) {
             const Quantiles cells = row.distanceCells();
             text += fmt::format("| {:.4f} | {:.4f} | {:.4f} |\n", cells.p50, cells.p99, cells.max);
@@ -82,9 +83,18 @@ std::string benchBuildMarkdown(const BenchBuildReport& report) {
 }
 
 std::vector<std::pair<std::string, std::string>> benchBuildPlots(const BenchBuildReport& report) {
-    Plot cost{.title = "Cost of a build", .xName = "triangles", .yName = "microseconds a triangle", .logX = true, .logY = false};
-    Plot memory{.title = "Peak memory of a build", .xName = "triangles", .yName = "resident bytes", .logX = true, .logY = true};
-    Plot bytes{.title = "File size against measured error", .xName = "p99 distance, cells", .yName = "bytes a triangle", .logX = true, .logY = true};
+    Plot cost{.title = "Cost of a build",
+              .xName = "triangles",
+              .yName = "microseconds a triangle",
+              .logX = true,
+              .logY = false};
+    Plot memory{
+        .title = "Peak memory of a build", .xName = "triangles", .yName = "resident bytes", .logX = true, .logY = true};
+    Plot bytes{.title = "File size against measured error",
+               .xName = "p99 distance, cells",
+               .yName = "bytes a triangle",
+               .logX = true,
+               .logY = true};
     bytes.levels = {{"Nexus", 30}, {"Nanite", 13}, {"Nexus, compressed and quantised", 4}};
     const auto add = [](Plot& plot, const std::string& name, PlotPoint point) {
         const auto same = [&](const PlotSeries& series) { return series.name == name; };
@@ -102,12 +112,14 @@ std::vector<std::pair<std::string, std::string>> benchBuildPlots(const BenchBuil
             add(memory, series, {triangles, static_cast<double>(row.peakRssBytes)});
         }
         last = &row;
-        if (row.distance) add(bytes, row.model, {row.distanceCells().p99, row.bytesPerTriangle(), fmt::format("{:.3g}", row.errorCells)});
+        if (row.distance)
+            add(bytes, row.model,
+                {row.distanceCells().p99, row.bytesPerTriangle(), fmt::format("{:.3g}", row.errorCells)});
     }
     // In the order of the error, the default among the others.
-    for (PlotSeries& series : bytes.series)
-        std::ranges::sort(series.points, {}, &PlotPoint::x);
-    std::vector<std::pair<std::string, std::string>> plots = {{"bench_build_cost", plotSvg(cost)}, {"bench_build_memory", plotSvg(memory)}};
+    for (PlotSeries& series : bytes.series) std::ranges::sort(series.points, {}, &PlotPoint::x);
+    std::vector<std::pair<std::string, std::string>> plots = {{"bench_build_cost", plotSvg(cost)},
+                                                              {"bench_build_memory", plotSvg(memory)}};
     if (!bytes.series.empty()) plots.emplace_back("bench_build_bytes", plotSvg(bytes));
     return plots;
 }

@@ -32,13 +32,13 @@ struct RayView {
     bool isShadow = false;
 };
 constexpr std::array<RayView, 8> kViews = {{{"overhead", 89, 1},
-                                         {"45", 45, 1},
-                                         {"15", 15, 1},
-                                         {"5", 5, 1},
-                                         {"1", 1, 1},
-                                         {"close", 35, 0.05},
-                                         {"far", 35, 40},
-                                         {"shadow", 30, 1, true}}};
+                                            {"45", 45, 1},
+                                            {"15", 15, 1},
+                                            {"5", 5, 1},
+                                            {"1", 1, 1},
+                                            {"close", 35, 0.05},
+                                            {"far", 35, 40},
+                                            {"shadow", 30, 1, true}}};
 
 /// An asset with the data that methods share.
 struct Subject {
@@ -72,7 +72,8 @@ std::vector<MarchRay> raysOf(const Subject& subject, const RayView& view, int co
     for (int i = 0; i < side * side; ++i) {
         const double x = (i % side + unit(random)) / side, y = (i / side + unit(random)) / side;
         // A camera's spread: half a right angle across, a little up and down.
-        const double turn = (0.3 + 0.8 * x + (view.part > 1 ? 5 * unit(random) : 0)), elevation = view.elevation * (0.9 + 0.2 * y) * std::numbers::pi / 180;
+        const double turn = (0.3 + 0.8 * x + (view.part > 1 ? 5 * unit(random) : 0)),
+                     elevation = view.elevation * (0.9 + 0.2 * y) * std::numbers::pi / 180;
         const double down = std::min(elevation, 0.4999 * std::numbers::pi);
         MarchRay ray{{view.part * x * extent.x, view.part * y * extent.y, extent.z},
                      {std::cos(down) * std::cos(turn), std::cos(down) * std::sin(turn), -std::sin(down)},
@@ -81,7 +82,8 @@ std::vector<MarchRay> raysOf(const Subject& subject, const RayView& view, int co
             // From above what a steep ray hits, towards a light.
             const TruthHit hit = subject.shape->trace(ray.origin, glm::normalize(glm::dvec3(0.1, 0.2, -1)), 64);
             if (!hit.hit) continue;
-            const glm::dvec3 from = ray.origin + hit.t * glm::normalize(glm::dvec3(0.1, 0.2, -1)) + 1.5 * subject.texel * hit.normal;
+            const glm::dvec3 from =
+                ray.origin + hit.t * glm::normalize(glm::dvec3(0.1, 0.2, -1)) + 1.5 * subject.texel * hit.normal;
             ray = {from, -ray.direction, 64};
             if (from.z >= extent.z || subject.shape->field(from) <= 0) continue;
         }
@@ -112,41 +114,55 @@ struct Entry {
 std::vector<Entry> entries() {
     std::vector<Entry> all;
     for (const char* name : {"relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois"})
-        for (const int steps : {5, 10, 32, 64, 256}) all.push_back({fmt::format("steps {}", steps), steps == 32, {.name = name, .steps = steps}});
+        for (const int steps : {5, 10, 32, 64, 256})
+            all.push_back({fmt::format("steps {}", steps), steps == 32, {.name = name, .steps = steps}});
     all.push_back({"exact", true, {.name = "pyramid"}});
     for (const char* name : {"sphere", "dm"})
-        for (const int cells : {32, 64, 128}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = name, .cells = cells}});
+        for (const int cells : {32, 64, 128})
+            all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = name, .cells = cells}});
     for (const Cones cones : {Cones{2, 1}, Cones{4, 1}, Cones{8, 1}, Cones{4, 2}})
-        all.push_back({fmt::format("{}x{} grid 64", cones.azimuth, cones.elevation), cones.azimuth == 4 && cones.elevation == 1, {.name = "ddm", .cells = 64, .cones = cones}});
-    for (const int cells : {32, 128}) all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
-    for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
-    for (const int cells : {16, 32, 64}) all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
-    for (const int cells : {16, 32, 64, 128}) all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
+        all.push_back({fmt::format("{}x{} grid 64", cones.azimuth, cones.elevation),
+                       cones.azimuth == 4 && cones.elevation == 1,
+                       {.name = "ddm", .cells = 64, .cones = cones}});
+    for (const int cells : {32, 128})
+        all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128})
+        all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
+    for (const int cells : {16, 32, 64})
+        all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128})
+        all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
     all.push_back({"grid 64", true, {.name = "cells", .cells = 64}});
     return all;
 }
 
-/// Rounds over the methods, one after the other, so that whatever else the machine does falls on all; the first is a warm-up.
-std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const std::vector<MarchRay>& rays, int rounds) {
+/// Rounds over the methods, one after the other, so that whatever else the machine does falls on all; the first is a
+/// warm-up.
+std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const std::vector<MarchRay>& rays,
+                                   int rounds) {
     std::vector<MesoMarched> all(methods.size());
     for (int round = 0; round <= rounds; ++round)
         for (size_t m = 0; m < methods.size(); ++m) {
             all[m].results.resize(rays.size());
             const std::clock_t start = std::clock();
             for (size_t i = 0; i < rays.size(); ++i) all[m].results[i] = methods[m].marcher->march(rays[i]);
-            if (round > 0) all[m].nsPerRay.push_back(double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC / double(std::max<size_t>(1, rays.size())));
+            if (round > 0)
+                all[m].nsPerRay.push_back(double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC /
+                                          double(std::max<size_t>(1, rays.size())));
         }
     return all;
 }
 
-Result<std::vector<MesoMarched>> march(MesoMarcher* renderer, const std::vector<Measured>& methods, const std::vector<MarchRay>& rays, int rounds) {
+Result<std::vector<MesoMarched>> march(MesoMarcher* renderer, const std::vector<Measured>& methods,
+                                       const std::vector<MarchRay>& rays, int rounds) {
     if (renderer == nullptr) return marchHere(methods, rays, rounds);
     std::vector<const meso::Method*> all;
     for (const Measured& m : methods) all.push_back(&m.method);
     return renderer->march(all, rays, rounds);
 }
 
-BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView& view, const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths, const MesoMarched& marched,
+BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView& view,
+                   const std::vector<MarchRay>& rays, const std::vector<TruthHit>& truths, const MesoMarched& marched,
                    const std::vector<double>& peer) {
     BenchMesoRow row;
     row.asset = subject.asset.name, row.view = view.name, row.method = method.name, row.knob = method.knob;
@@ -154,7 +170,8 @@ BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView
     row.nsPerRay = quantile(marched.nsPerRay, 0.5);
     std::vector<double> ratios;
     for (size_t i = 0; i < peer.size(); ++i) ratios.push_back(peer[i] > 0 ? marched.nsPerRay[i] / peer[i] : 0);
-    row.ratioToPeer = quantile(ratios, 0.5), row.ratioLow = quantile(ratios, 0.25), row.ratioHigh = quantile(ratios, 0.75);
+    row.ratioToPeer = quantile(ratios, 0.5), row.ratioLow = quantile(ratios, 0.25),
+    row.ratioHigh = quantile(ratios, 0.75);
     row.shape = judgeMeso(marched.results, truths, subject.texel);
     countWork(marched.results, row);
     if (method.method.field) {
@@ -195,7 +212,8 @@ Result<void> compareCompression(std::vector<MesoPublished>& published) {
         if (!map) return map.error();
         const auto compressed = compressMap(*map, std::array{row.block});
         if (!compressed) return compressed.error();
-        published.push_back({fmt::format("Table 3: texels, blocks of {}", row.block), row.asset, "texels", row.ratio, row.ratio, compressed->texelRatio(), 0});
+        published.push_back({fmt::format("Table 3: texels, blocks of {}", row.block), row.asset, "texels", row.ratio,
+                             row.ratio, compressed->texelRatio(), 0});
     }
     return {};
 }
@@ -203,17 +221,24 @@ Result<void> compareCompression(std::vector<MesoPublished>& published) {
 template <class Names>
 Result<void> knows(const char* what, const std::vector<std::string>& asked, const Names& known) {
     for (const std::string& name : asked)
-        if (std::ranges::find(known, name) == known.end()) return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no {} \"{}\"", what, name)};
+        if (std::ranges::find(known, name) == known.end())
+            return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no {} \"{}\"", what, name)};
     return {};
 }
 
-bool isAsked(const std::vector<std::string>& asked, std::string_view name) { return asked.empty() || std::ranges::find(asked, name) != asked.end(); }
+bool isAsked(const std::vector<std::string>& asked, std::string_view name) {
+    return asked.empty() || std::ranges::find(asked, name) != asked.end();
+}
 
 Error cancelled() { return {.code = ErrorCode::Cancelled, .message = "cancelled"}; }
 
 /// All methods that are asked for over all views; the rows of a method stand together.
-Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer, const std::function<bool(const std::string&)>& told) {
-    const auto isMeasured = [&](const Entry& e) { return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) && methodFits(e.options.name, subject.asset); };
+Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
+                                         const std::function<bool(const std::string&)>& told) {
+    const auto isMeasured = [&](const Entry& e) {
+        return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) &&
+               methodFits(e.options.name, subject.asset);
+    };
     // The peer is measured with them, asked for or not.
     const std::string_view peerName = mesoPeer(subject.asset.heights.has_value());
     std::vector<Measured> methods;
@@ -240,7 +265,8 @@ Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMeso
         if (!marched) return marched.error();
         for (size_t m = 0; m < methods.size(); ++m) {
             if (!isShown[m]) continue;
-            byMethod[m].push_back(rowOf(subject, methods[m], view, rays, truths, (*marched)[m], (*marched)[peer].nsPerRay));
+            byMethod[m].push_back(
+                rowOf(subject, methods[m], view, rays, truths, (*marched)[m], (*marched)[peer].nsPerRay));
             if (renderer != nullptr) byMethod[m].back().device = renderer->device().name;
         }
     }
@@ -270,7 +296,9 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     VCP_TRY(knows("method", options.methods, mesoMethodNames()));
     VCP_TRY(knows("view", options.views, mesoViewNames()));
     std::vector<std::string> assets = options.assets;
-    if (assets.empty()) assets = {"fbm", "hemispheres", "bricks", "maze", "needle", "beads", "chain", "weave", "ball", "scales", "kitten"};
+    if (assets.empty())
+        assets = {"fbm",   "hemispheres", "bricks", "maze",   "needle", "beads",
+                  "chain", "weave",       "ball",   "scales", "kitten"};
     std::unique_ptr<MesoMarcher> renderer;
     if (options.device) {
         auto made = MesoMarcher::create({.device = *options.device});
@@ -279,7 +307,9 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     }
     BenchMesoReport report;
     for (size_t a = 0; a < assets.size(); ++a) {
-        const auto told = [&](const std::string& what) { return !options.progress || options.progress(assets[a] + ": " + what, double(a) / double(assets.size())); };
+        const auto told = [&](const std::string& what) {
+            return !options.progress || options.progress(assets[a] + ": " + what, double(a) / double(assets.size()));
+        };
         const auto subject = subjectOf(assets[a]);
         if (!subject) return subject.error();
         auto rows = rowsOf(**subject, options, renderer.get(), told);
@@ -287,11 +317,13 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         report.rows.insert(report.rows.end(), rows->begin(), rows->end());
         if (options.checkRays == 0) continue;
         if (!told("conservative maps")) return cancelled();
-        const auto checks = checkMesoMaps((*subject)->asset.name, *(*subject)->shape, (*subject)->texel, options.checkRays);
+        const auto checks =
+            checkMesoMaps((*subject)->asset.name, *(*subject)->shape, (*subject)->texel, options.checkRays);
         if (!checks) return checks.error();
         report.checks.insert(report.checks.end(), checks->begin(), checks->end());
     }
-    if (report.rows.empty()) return Error{.code = ErrorCode::Usage, .message = "none of these methods is of these assets"};
+    if (report.rows.empty())
+        return Error{.code = ErrorCode::Usage, .message = "none of these methods is of these assets"};
     if (options.published) {
         report.published = publishedOf(report.rows);
         VCP_TRY(compareCompression(report.published));

@@ -1,11 +1,12 @@
-// vcp bench meso: run time and work against error of the mesostructure marchers, on the CPU or on a device, all with the
-// same rays (docs/mesostructure.md).
+// vcp bench meso: run time and work against error of the mesostructure marchers, on the CPU or on a device, all with
+// the same rays (docs/mesostructure.md).
 //
-// Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes and
-// the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the solving
-// alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times are the processor's (of all threads of a
-// software device; a GPU's are its queue's), taken in rounds over all methods after a warm-up, and each method's is divided by that of one peer
-// in the same round. The median of these ratios is what a machine that does other things as well says reliably.
+// Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes
+// and the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the
+// solving alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times are the processor's
+// (of all threads of a software device; a GPU's are its queue's), taken in rounds over all methods after a warm-up, and
+// each method's is divided by that of one peer in the same round. The median of these ratios is what a machine that
+// does other things as well says reliably.
 #pragma once
 
 #include <array>
@@ -24,20 +25,21 @@ namespace vcp {
 struct BenchMesoOptions {
     /// Names of procedural height fields and solids, or asset files; empty: a set of eleven.
     std::vector<std::string> assets;
-    std::vector<std::string> methods;  ///< empty: all that fit the asset
-    std::vector<std::string> views;    ///< empty: all
-    std::optional<std::string> device; ///< march there, as RendererOptions::device; absent: on the CPU
-    bool sweep = false;                ///< each method at several values of its knob
-    int rays = 2000;                   ///< a view
-    int repetitions = 3;               ///< rounds over the methods
-    bool published = false;            ///< beside the paper's tables; its Table 3 is made anew
-    uint64_t checkRays = 0;            ///< rays of the conservative test an asset; 0: not made
+    std::vector<std::string> methods;   ///< empty: all that fit the asset
+    std::vector<std::string> views;     ///< empty: all
+    std::optional<std::string> device;  ///< march there, as RendererOptions::device; absent: on the CPU
+    bool sweep = false;                 ///< each method at several values of its knob
+    int rays = 2000;                    ///< a view
+    int repetitions = 3;                ///< rounds over the methods
+    bool published = false;             ///< beside the paper's tables; its Table 3 is made anew
+    uint64_t checkRays = 0;             ///< rays of the conservative test an asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
 };
 
 enum class MesoClass { Hit, Miss, Missed, False, WrongFeature, Unresolved };
-inline constexpr std::array<std::string_view, 6> kMesoClassNames = {"hit", "miss", "missed", "false", "wrong_feature", "unresolved"};
+inline constexpr std::array<std::string_view, 6> kMesoClassNames = {"hit",   "miss",          "missed",
+                                                                    "false", "wrong_feature", "unresolved"};
 
 /// What became of rays against one truth; fractions sum to 1. Errors along the ray, of hits that are not of a wrong
 /// feature (off by more than 2 texels), in texels.
@@ -54,16 +56,19 @@ struct MesoJudged {
 struct BenchMesoRow {
     std::string asset, view, method, knob, device = "cpu";
     uint64_t rays = 0;
-    double nsPerRay = 0;        ///< median of the rounds
-    double ratioToPeer = 0, ratioLow = 0, ratioHigh = 0;  ///< time over mesoPeer's in the same round: median and quartiles
-    MesoJudged shape;           ///< against the shape
+    double nsPerRay = 0;  ///< median of the rounds
+    double ratioToPeer = 0, ratioLow = 0,
+           ratioHigh = 0;  ///< time over mesoPeer's in the same round: median and quartiles
+    MesoJudged shape;      ///< against the shape
     bool hasSolver = false;
-    MesoJudged solver;          ///< against the method's own data
+    MesoJudged solver;  ///< against the method's own data
     double fetchesMean = 0, iterationsMean = 0, iterationsP95 = 0, surfaceTestsMean = 0;
-    std::array<double, 4> iterationBins{};  ///< parts of the rays: up to 10, 34, 59 iterations, and more (the bins of the paper's Fig. 7)
-    double divergence8 = 0;     ///< mean over groups of 8 rays of most over mean iterations
+    std::array<double, 4>
+        iterationBins{};  ///< parts of the rays: up to 10, 34, 59 iterations, and more (the bins of the paper's Fig. 7)
+    double divergence8 = 0;  ///< mean over groups of 8 rays of most over mean iterations
     uint64_t bytes = 0;
-    double preprocessSeconds = 0;  ///< of building the method's arrays from the shape, also where an asset file holds them
+    double preprocessSeconds =
+        0;  ///< of building the method's arrays from the shape, also where an asset file holds them
 };
 
 /// The conservative test: rays from anywhere, against what the map of their cell says.
@@ -73,21 +78,21 @@ struct MesoCheck {
     double worstTexels = 0;
 };
 
-/// A ratio that a paper prints (Mehra and Kumar, Tables 1 to 3; Risser et al., refinements of binary over secant search), over its
-/// models from least to most, and ours: the mean over the views of an asset. Figure 7 has no numbers; the rows' iterationBins are
-/// its bins.
+/// A ratio that a paper prints (Mehra and Kumar, Tables 1 to 3; Risser et al., refinements of binary over secant
+/// search), over its models from least to most, and ours: the mean over the views of an asset. Figure 7 has no numbers;
+/// the rows' iterationBins are its bins.
 struct MesoPublished {
     std::string what, asset, of;  ///< `of`: what ours is counted in
     double least = 0, most = 0;
     double ours = 0;
-    double oursTime = 0;          ///< of times; 0: none
+    double oursTime = 0;  ///< of times; 0: none
 
     /// Within 25 % of what the paper's models span.
     [[nodiscard]] bool isNear() const { return ours >= 0.75 * least && ours <= 1.25 * most; }
 };
 
-/// What a method needs for a right picture of an asset: its cheapest knob with at most 0.1 % wrong rays over all views together
-/// and p95 of the error within 0.25 texels in each. By fetches and by time, which may be at different knobs.
+/// What a method needs for a right picture of an asset: its cheapest knob with at most 0.1 % wrong rays over all views
+/// together and p95 of the error within 0.25 texels in each. By fetches and by time, which may be at different knobs.
 struct MesoHeadline {
     std::string asset, method;
     std::string fetchesKnob, timeKnob;
@@ -101,8 +106,8 @@ struct BenchMesoReport {
     std::vector<MesoPublished> published;
 };
 
-/// The method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height fields; the plain distance map
-/// for solids, which relief mapping has no picture of.
+/// The method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height fields; the
+/// plain distance map for solids, which relief mapping has no picture of.
 std::string_view mesoPeer(bool isHeightField);
 std::vector<std::string> mesoMethodNames();
 std::vector<std::string> mesoViewNames();
@@ -110,12 +115,14 @@ std::vector<std::string> mesoViewNames();
 /// Errors: Usage (no such asset, method or view), those of the builders, Cancelled.
 Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options);
 
-/// The conservative test of all kinds of maps over a grid of 32 cells: `rays` rays from outside the surface in cells that are not
-/// occupied, each against the shape. Errors: the builders'.
-Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const meso::Shape& shape, double texel, uint64_t rays);
+/// The conservative test of all kinds of maps over a grid of 32 cells: `rays` rays from outside the surface in cells
+/// that are not occupied, each against the shape. Errors: the builders'.
+Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const meso::Shape& shape, double texel,
+                                             uint64_t rays);
 
 /// Of the rays whose truth is known; `texel` in tile units.
-MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths, double texel);
+MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,
+                     double texel);
 /// The mean work, its bins and divergence into the row.
 void countWork(const std::vector<meso::MarchResult>& results, BenchMesoRow& row);
 

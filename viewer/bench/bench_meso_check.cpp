@@ -25,11 +25,14 @@ struct CheckedMap {
     std::function<double(glm::dvec3 from, glm::dvec3 direction, glm::ivec3 cell)> length;
 };
 
-Result<void> addDistances(std::vector<CheckedMap>& maps, const char* name, const Occupancy& occupancy, const DistanceOptions& options, const Shape& shape) {
+Result<void> addDistances(std::vector<CheckedMap>& maps, const char* name, const Occupancy& occupancy,
+                          const DistanceOptions& options, const Shape& shape) {
     auto made = buildDistanceMap(occupancy, options, &shape);
     if (!made) return made.error();
     const auto map = std::make_shared<const DistanceMap>(*std::move(made));
-    maps.push_back({name, [map, borders = ConeBorders(map->cones)](glm::dvec3, glm::dvec3 direction, glm::ivec3 cell) { return double(map->length(coneOf(borders, glm::vec3(direction)), cell)); }});
+    maps.push_back({name, [map, borders = ConeBorders(map->cones)](glm::dvec3, glm::dvec3 direction, glm::ivec3 cell) {
+                        return double(map->length(coneOf(borders, glm::vec3(direction)), cell));
+                    }});
     return {};
 }
 
@@ -37,12 +40,14 @@ void addBoxes(std::vector<CheckedMap>& maps, const Occupancy& occupancy) {
     const auto boxes = std::make_shared<const OctantBoxes>(buildOctantBoxes(occupancy));
     maps.push_back({"octant boxes", [boxes](glm::dvec3 from, glm::dvec3 direction, glm::ivec3 cell) {
                         const TileGrid& grid = boxes->grid;
-                        const uint16_t box = boxes->boxes[size_t(octantOf(glm::vec3(direction))) * grid.count() + grid.index(cell)];
+                        const uint16_t box =
+                            boxes->boxes[size_t(octantOf(glm::vec3(direction))) * grid.count() + grid.index(cell)];
                         const glm::ivec3 further(box & 31, box >> 5 & 31, box >> 10 & 31);
                         double exit = std::numeric_limits<double>::infinity();
                         for (int axis = 0; axis < 3; ++axis) {
                             if (direction[axis] == 0) continue;
-                            const int wall = direction[axis] > 0 ? cell[axis] + further[axis] + 1 : cell[axis] - further[axis];
+                            const int wall =
+                                direction[axis] > 0 ? cell[axis] + further[axis] + 1 : cell[axis] - further[axis];
                             exit = std::min(exit, (wall * grid.cell[axis] - from[axis]) / direction[axis]);
                         }
                         return exit;
@@ -68,15 +73,18 @@ glm::dvec3 directionFrom(std::mt19937_64& random) {
     std::normal_distribution<double> bell;
     const glm::dvec3 any = glm::normalize(glm::dvec3(bell(random), bell(random), bell(random)));
     if (random() % 4 != 0) return any;
-    const double flat = std::hypot(any.x, any.y), turn = double(random() % 24) * std::numbers::pi / 12 + 1e-6 * std::uniform_real_distribution<double>(-1, 1)(random);
+    const double flat = std::hypot(any.x, any.y), turn = double(random() % 24) * std::numbers::pi / 12 +
+                                                         1e-6 * std::uniform_real_distribution<double>(-1, 1)(random);
     return {flat * std::cos(turn), flat * std::sin(turn), any.z};
 }
 
 }  // namespace
 
-Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Shape& shape, double texel, uint64_t rays) {
+Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Shape& shape, double texel,
+                                             uint64_t rays) {
     const glm::dvec3 extent = shape.extent();
-    const glm::ivec3 cells(kCells, std::max(1, int(std::lround(kCells * extent.y))), std::max(4, int(std::ceil(extent.z * kCells))));
+    const glm::ivec3 cells(kCells, std::max(1, int(std::lround(kCells * extent.y))),
+                           std::max(4, int(std::ceil(extent.z * kCells))));
     const auto occupancy = occupy(shape, cells);
     if (!occupancy) return occupancy.error();
     const auto maps = mapsOf(*occupancy, shape);
@@ -89,7 +97,8 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Sha
     uint64_t asked = 0;
     // A tile that is all surface has hardly a cell to ask.
     for (uint64_t tries = 0; asked < rays && tries < 100 * rays; ++tries) {
-        const glm::dvec3 from(unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z), direction = directionFrom(random);
+        const glm::dvec3 from(unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z),
+            direction = directionFrom(random);
         const glm::ivec3 cell = glm::min(glm::ivec3(glm::floor(from / occupancy->grid.cell)), cells - 1);
         if (occupancy->at(cell) || shape.field(from) <= 0) continue;
         ++asked;
@@ -97,7 +106,9 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Sha
         const TruthHit truth = shape.trace(from, direction, *std::ranges::max_element(lengths));
         for (size_t i = 0; i < maps->size(); ++i) {
             ++checks[i].rays;
-            if (truth.hit && truth.t < lengths[i]) ++checks[i].oversteps, checks[i].worstTexels = std::max(checks[i].worstTexels, (lengths[i] - truth.t) / texel);
+            if (truth.hit && truth.t < lengths[i])
+                ++checks[i].oversteps,
+                    checks[i].worstTexels = std::max(checks[i].worstTexels, (lengths[i] - truth.t) / texel);
         }
     }
     return checks;

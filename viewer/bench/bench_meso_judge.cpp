@@ -29,13 +29,17 @@ MesoJudged judgeMeso(const std::vector<MarchResult>& results, const std::vector<
             c = !truth.hit ? MesoClass::False : error > 2 ? MesoClass::WrongFeature : MesoClass::Hit;
             if (c == MesoClass::Hit) {
                 errors.push_back(error);
-                if (found.normal != glm::vec3(0)) angles.push_back(std::acos(std::clamp(glm::dot(glm::dvec3(found.normal), truth.normal), -1.0, 1.0)) * 180 / std::numbers::pi);
+                if (found.normal != glm::vec3(0))
+                    angles.push_back(
+                        std::acos(std::clamp(glm::dot(glm::dvec3(found.normal), truth.normal), -1.0, 1.0)) * 180 /
+                        std::numbers::pi);
             }
         }
         ++counts[size_t(c)];
     }
     for (size_t i = 0; i < counts.size(); ++i) judged.fractions[i] = counted > 0 ? counts[i] / counted : 0;
-    judged.p50 = quantile(errors, 0.5), judged.p95 = quantile(errors, 0.95), judged.p99 = quantile(errors, 0.99), judged.max = quantile(errors, 1);
+    judged.p50 = quantile(errors, 0.5), judged.p95 = quantile(errors, 0.95), judged.p99 = quantile(errors, 0.99),
+    judged.max = quantile(errors, 1);
     judged.normalP50 = quantile(angles, 0.5), judged.normalP95 = quantile(angles, 0.95);
     return judged;
 }
@@ -48,7 +52,9 @@ void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
         iterations.push_back(r.iterations);
     }
     const double n = std::max<double>(1, double(results.size()));
-    for (double* sum : {&row.fetchesMean, &row.iterationsMean, &row.surfaceTestsMean, &row.iterationBins[0], &row.iterationBins[1], &row.iterationBins[2], &row.iterationBins[3]}) *sum /= n;
+    for (double* sum : {&row.fetchesMean, &row.iterationsMean, &row.surfaceTestsMean, &row.iterationBins[0],
+                        &row.iterationBins[1], &row.iterationBins[2], &row.iterationBins[3]})
+        *sum /= n;
     int groups = 0;
     for (size_t i = 0; i + 8 <= iterations.size(); i += 8, ++groups) {
         double most = 0, sum = 0;

@@ -32,7 +32,8 @@ Json toJson(const BenchMesoRow& row) {
                  {"surface_tests_mean", row.surfaceTestsMean},
                  {"divergence_8", row.divergence8}};
     for (size_t i = 0; i < kMesoClassNames.size(); ++i) json[std::string(kMesoClassNames[i])] = row.shape.fractions[i];
-    json["p50_texels"] = row.shape.p50, json["p95_texels"] = row.shape.p95, json["p99_texels"] = row.shape.p99, json["max_texels"] = row.shape.max;
+    json["p50_texels"] = row.shape.p50, json["p95_texels"] = row.shape.p95, json["p99_texels"] = row.shape.p99,
+    json["max_texels"] = row.shape.max;
     json["normal_p50_degrees"] = row.shape.normalP50, json["normal_p95_degrees"] = row.shape.normalP95;
     // Columns are the same for all rows.
     const auto solver = [&](double value) { return row.hasSolver ? Json(value) : Json(); };
@@ -54,7 +55,8 @@ Json rowsOf(const BenchMesoReport& report) {
 }
 
 template <class Of>
-std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string title, const char* xName, const char* yName, Of of) {
+std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string title, const char* xName,
+                   const char* yName, Of of) {
     Plot plot{.title = std::move(title), .xName = xName, .yName = yName, .logX = true, .logY = true};
     for (const BenchMesoRow* first : rows) {
         auto series = std::ranges::find(plot.series, first->method, &PlotSeries::name);
@@ -79,11 +81,13 @@ struct Cost {
     double ratio = 0, fetches = 0, tests = 0, count = 0;
 };
 
-Cost costOf(const std::vector<BenchMesoRow>& rows, const std::string& asset, std::string_view method, std::string_view knob) {
+Cost costOf(const std::vector<BenchMesoRow>& rows, const std::string& asset, std::string_view method,
+            std::string_view knob) {
     Cost cost;
     for (const BenchMesoRow& row : rows)
         if (row.asset == asset && row.method == method && row.knob == knob)
-            cost.ratio += row.ratioToPeer, cost.fetches += row.fetchesMean, cost.tests += row.surfaceTestsMean, ++cost.count;
+            cost.ratio += row.ratioToPeer, cost.fetches += row.fetchesMean, cost.tests += row.surfaceTestsMean,
+                ++cost.count;
     return cost;
 }
 
@@ -95,26 +99,32 @@ std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
         double least, most;
         bool isOfRefinements = false;
     };
-    constexpr Ratio kRatios[] = {{"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
-                                 {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
-                                 {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
-                                 {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
-                                 {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
-                                 {"Table 2: DDM 4x1 over distance map, 128", "ddm", "4x1 grid 128", "dm", "grid 128", 0.22, 0.50},
-                                 {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary", "steps 32", 0.34, 2.10},
-                                 {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128", 0.89, 2.4},
-                                 {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3, 8.0 / 2, true}};
+    constexpr Ratio kRatios[] = {
+        {"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
+        {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
+        {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
+        {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
+        {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
+        {"Table 2: DDM 4x1 over distance map, 128", "ddm", "4x1 grid 128", "dm", "grid 128", 0.22, 0.50},
+        {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary",
+         "steps 32", 0.34, 2.10},
+        {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128",
+         0.89, 2.4},
+        {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3,
+         8.0 / 2, true}};
     std::vector<std::string> assets;
     for (const BenchMesoRow& row : rows)
         if (std::ranges::find(assets, row.asset) == assets.end()) assets.push_back(row.asset);
     std::vector<MesoPublished> published;
     for (const Ratio& ratio : kRatios)
         for (const std::string& asset : assets) {
-            const Cost of = costOf(rows, asset, ratio.method, ratio.knob), base = costOf(rows, asset, ratio.baseMethod, ratio.baseKnob);
+            const Cost of = costOf(rows, asset, ratio.method, ratio.knob),
+                       base = costOf(rows, asset, ratio.baseMethod, ratio.baseKnob);
             if (of.count == 0 || base.count == 0) continue;
             const double work = ratio.isOfRefinements ? of.tests / base.tests : of.fetches / base.fetches;
             if (!std::isfinite(work)) continue;
-            published.push_back({ratio.what, asset, ratio.isOfRefinements ? "refinements" : "fetches", ratio.least, ratio.most, work, of.ratio / base.ratio});
+            published.push_back({ratio.what, asset, ratio.isOfRefinements ? "refinements" : "fetches", ratio.least,
+                                 ratio.most, work, of.ratio / base.ratio});
         }
     return published;
 }
@@ -126,7 +136,9 @@ std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows) {
     };
     std::vector<Sum> sums;
     for (const BenchMesoRow& row : rows) {
-        const auto isOf = [&](const Sum& s) { return s.asset == row.asset && s.method == row.method && s.knob == row.knob; };
+        const auto isOf = [&](const Sum& s) {
+            return s.asset == row.asset && s.method == row.method && s.knob == row.knob;
+        };
         auto sum = std::ranges::find_if(sums, isOf);
         if (sum == sums.end()) sum = sums.insert(sum, Sum{row.asset, row.method, row.knob});
         sum->wrong += row.shape.wrong(), sum->worstP95 = std::max(sum->worstP95, row.shape.p95);
@@ -151,13 +163,29 @@ std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows) {
 std::string benchMesoJson(const BenchMesoReport& report) {
     Json checks = Json::array();
     for (const MesoCheck& check : report.checks)
-        checks.push_back({{"asset", check.asset}, {"map", check.map}, {"rays", check.rays}, {"oversteps", check.oversteps}, {"worst_texels", check.worstTexels}});
+        checks.push_back({{"asset", check.asset},
+                          {"map", check.map},
+                          {"rays", check.rays},
+                          {"oversteps", check.oversteps},
+                          {"worst_texels", check.worstTexels}});
     Json published = Json::array();
     for (const MesoPublished& row : report.published)
-        published.push_back({{"what", row.what}, {"asset", row.asset}, {"published_least", row.least}, {"published_most", row.most}, {"of", row.of}, {"ours", row.ours}, {"ours_time", row.oursTime}, {"near", row.isNear()}});
+        published.push_back({{"what", row.what},
+                             {"asset", row.asset},
+                             {"published_least", row.least},
+                             {"published_most", row.most},
+                             {"of", row.of},
+                             {"ours", row.ours},
+                             {"ours_time", row.oursTime},
+                             {"near", row.isNear()}});
     Json headlines = Json::array();
     for (const MesoHeadline& h : headlinesOf(report.rows))
-        headlines.push_back({{"asset", h.asset}, {"method", h.method}, {"fetches_mean", h.fetches}, {"fetches_knob", h.fetchesKnob}, {"ratio_to_peer", h.ratioToPeer}, {"ratio_knob", h.timeKnob}});
+        headlines.push_back({{"asset", h.asset},
+                             {"method", h.method},
+                             {"fetches_mean", h.fetches},
+                             {"fetches_knob", h.fetchesKnob},
+                             {"ratio_to_peer", h.ratioToPeer},
+                             {"ratio_knob", h.timeKnob}});
     return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks}, {"published", published}}.dump();
 }
 
@@ -165,29 +193,44 @@ std::string benchMesoCsv(const BenchMesoReport& report) { return csvOf(rowsOf(re
 
 std::string benchMesoMarkdown(const BenchMesoReport& report) {
     std::string text =
-        "| asset | view | method | knob | ns/ray | time over peer | fetches | iterations | hit % | missed % | false % | wrong feature % | unresolved % | p50 | p95 | p99 texels | "
-        "solver wrong % | MB | built s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        "| asset | view | method | knob | ns/ray | time over peer | fetches | iterations | hit % | missed % | false % "
+        "| wrong feature % | unresolved % | p50 | p95 | p99 texels | "
+        "solver wrong % | MB | built s "
+        "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for (const BenchMesoRow& row : report.rows) {
         const auto percent = [&](MesoClass c) { return 100 * row.shape.fraction(c); };
-        text += fmt::format("| {} | {} | {} | {} | {:.0f} | {:.3f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ", row.asset, row.view, row.method, row.knob, row.nsPerRay,
-                            row.ratioToPeer, row.fetchesMean, row.iterationsMean, percent(MesoClass::Hit), percent(MesoClass::Missed), percent(MesoClass::False), percent(MesoClass::WrongFeature),
-                            percent(MesoClass::Unresolved));
-        text += fmt::format("| {:.4f} | {:.4f} | {:.4f} | {} | {:.2f} | {:.2f} |\n", row.shape.p50, row.shape.p95, row.shape.p99,
-                            row.hasSolver ? fmt::format("{:.3f}", 100 * row.solver.wrong()) : std::string(), double(row.bytes) * 1e-6, row.preprocessSeconds);
+        text += fmt::format(
+            "| {} | {} | {} | {} | {:.0f} | {:.3f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ",
+            row.asset, row.view, row.method, row.knob, row.nsPerRay, row.ratioToPeer, row.fetchesMean,
+            row.iterationsMean, percent(MesoClass::Hit), percent(MesoClass::Missed), percent(MesoClass::False),
+            percent(MesoClass::WrongFeature), percent(MesoClass::Unresolved));
+        text +=
+            fmt::format("| {:.4f} | {:.4f} | {:.4f} | {} | {:.2f} | {:.2f} |\n", row.shape.p50, row.shape.p95,
+                        row.shape.p99, row.hasSolver ? fmt::format("{:.3f}", 100 * row.solver.wrong()) : std::string(),
+                        double(row.bytes) * 1e-6, row.preprocessSeconds);
     }
     if (const auto headlines = headlinesOf(report.rows); !headlines.empty()) {
-        text += "\n| least work for <= 0.1 % wrong, p95 <= 0.25 texels | method | fetches | knob | time over peer | knob |\n|---|---|---|---|---|---|\n";
-        for (const MesoHeadline& h : headlines) text += fmt::format("| {} | {} | {:.1f} | {} | {:.3f} | {} |\n", h.asset, h.method, h.fetches, h.fetchesKnob, h.ratioToPeer, h.timeKnob);
+        text +=
+            "\n| least work for <= 0.1 % wrong, p95 <= 0.25 texels | method | fetches | knob | time over peer | knob "
+            "|\n|---|---|---|---|---|---|\n";
+        for (const MesoHeadline& h : headlines)
+            text += fmt::format("| {} | {} | {:.1f} | {} | {:.3f} | {} |\n", h.asset, h.method, h.fetches,
+                                h.fetchesKnob, h.ratioToPeer, h.timeKnob);
     }
     if (!report.published.empty()) {
-        text += "\n| published | asset | ratio there | of | ours | within 25 % | ours, times |\n|---|---|---|---|---|---|---|\n";
+        text +=
+            "\n| published | asset | ratio there | of | ours | within 25 % | ours, times "
+            "|\n|---|---|---|---|---|---|---|\n";
         for (const MesoPublished& row : report.published)
-            text += fmt::format("| {} | {} | {:.3g} to {:.3g} | {} | {:.3g} | {} | {} |\n", row.what, row.asset, row.least, row.most, row.of, row.ours, row.isNear() ? "yes" : "no",
+            text += fmt::format("| {} | {} | {:.3g} to {:.3g} | {} | {:.3g} | {} | {} |\n", row.what, row.asset,
+                                row.least, row.most, row.of, row.ours, row.isNear() ? "yes" : "no",
                                 row.oursTime > 0 ? fmt::format("{:.3g}", row.oursTime) : std::string());
     }
     if (report.checks.empty()) return text;
     text += "\n| asset | map | rays | oversteps | worst, texels |\n|---|---|---|---|---|\n";
-    for (const MesoCheck& check : report.checks) text += fmt::format("| {} | {} | {} | {} | {:.3f} |\n", check.asset, check.map, check.rays, check.oversteps, check.worstTexels);
+    for (const MesoCheck& check : report.checks)
+        text += fmt::format("| {} | {} | {} | {} | {:.3f} |\n", check.asset, check.map, check.rays, check.oversteps,
+                            check.worstTexels);
     return text;
 }
 
@@ -201,14 +244,19 @@ std::vector<std::pair<std::string, std::string>> benchMesoPlots(const BenchMesoR
         for (const BenchMesoRow& row : report.rows)
             if (row.asset == asset) rows.push_back(&row);
         // No wrong ray in a view counts as half a one.
-        const auto wrong = [](const BenchMesoRow& row) { return std::max(row.shape.wrong(), 0.5 / double(std::max<uint64_t>(row.rays, 1))); };
+        const auto wrong = [](const BenchMesoRow& row) {
+            return std::max(row.shape.wrong(), 0.5 / double(std::max<uint64_t>(row.rays, 1)));
+        };
         std::string name = asset.substr(asset.rfind('/') + 1);
         plots.emplace_back("bench_meso_" + name + "_p95_time",
-                           plotOf(rows, name + ": error, p95", "time over the peer's", "texels", [](const BenchMesoRow& r) { return std::pair(r.ratioToPeer, r.shape.p95); }));
+                           plotOf(rows, name + ": error, p95", "time over the peer's", "texels",
+                                  [](const BenchMesoRow& r) { return std::pair(r.ratioToPeer, r.shape.p95); }));
         plots.emplace_back("bench_meso_" + name + "_wrong_fetches",
-                           plotOf(rows, name + ": wrong rays", "fetches a ray", "fraction; none: half a ray", [&](const BenchMesoRow& r) { return std::pair(r.fetchesMean, wrong(r)); }));
+                           plotOf(rows, name + ": wrong rays", "fetches a ray", "fraction; none: half a ray",
+                                  [&](const BenchMesoRow& r) { return std::pair(r.fetchesMean, wrong(r)); }));
         plots.emplace_back("bench_meso_" + name + "_p95_bytes",
-                           plotOf(rows, name + ": error, p95", "bytes", "texels", [](const BenchMesoRow& r) { return std::pair(double(r.bytes), r.shape.p95); }));
+                           plotOf(rows, name + ": error, p95", "bytes", "texels",
+                                  [](const BenchMesoRow& r) { return std::pair(double(r.bytes), r.shape.p95); }));
     }
     return plots;
 }

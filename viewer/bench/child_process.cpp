@@ -166,7 +166,9 @@ void listen(int from, const std::function<void(const char*, size_t)>& hear, cons
     }
 }
 
-double seconds(const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); }
+double seconds(const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
 
 int waitFor(pid_t child, rusage& usage) {
     int status = 0;
@@ -201,7 +203,8 @@ Result<ChildOutcome> runInChild(const ChildWork& work, const ChildProgress& prog
     if (!heard.result) {
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
             return Error{ErrorCode::Limit, "the child process was killed; is there too little memory?"};
-        return Error{ErrorCode::Limit, "the child process ended without a result, with status " + std::to_string(status)};
+        return Error{ErrorCode::Limit,
+                     "the child process ended without a result, with status " + std::to_string(status)};
     }
     if (!*heard.result) return heard.result->error();
     return ChildOutcome{**heard.result, seconds(usage.ru_utime) + seconds(usage.ru_stime),

@@ -70,7 +70,8 @@ double MotionReport::quantileMs(double part) const {
     return sorted[static_cast<size_t>(std::clamp(rank, 1.0, static_cast<double>(sorted.size()))) - 1];
 }
 
-Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds, const MotionOptions& options) {
+Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
+                                   const MotionOptions& options) {
     auto viewer = Viewer::create(options.viewer);
     if (!viewer) return viewer.error();
     OrbitCamera start;
@@ -110,25 +111,38 @@ Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Bo
 
 std::string motionJson(const MotionReport& report) {
     nlohmann::ordered_json sizes = nlohmann::ordered_json::object();
-    for (const auto& [reduction, frames] : report.byReduction) sizes[reduction == 1 ? "1" : fmt::format("1/{}", reduction)] = frames;
+    for (const auto& [reduction, frames] : report.byReduction)
+        sizes[reduction == 1 ? "1" : fmt::format("1/{}", reduction)] = frames;
     nlohmann::ordered_json after;  // null: never
     if (report.fullSizeAfterMs) after = *report.fullSizeAfterMs;
-    const nlohmann::ordered_json json = {{"width", report.size.x}, {"height", report.size.y}, {"device", report.device},
-                                         {"seconds", report.seconds}, {"frames", report.frameMs.size()},
-                                         {"frames_per_second", report.framesPerSecond()}, {"median_ms", report.quantileMs(0.5)},
-                                         {"ms_95", report.quantileMs(0.95)}, {"worst_ms", report.quantileMs(1)},
-                                         {"still_ms", report.stillMs}, {"full_size_after_ms", after}, {"frames_by_size", sizes}};
+    const nlohmann::ordered_json json = {{"width", report.size.x},
+                                         {"height", report.size.y},
+                                         {"device", report.device},
+                                         {"seconds", report.seconds},
+                                         {"frames", report.frameMs.size()},
+                                         {"frames_per_second", report.framesPerSecond()},
+                                         {"median_ms", report.quantileMs(0.5)},
+                                         {"ms_95", report.quantileMs(0.95)},
+                                         {"worst_ms", report.quantileMs(1)},
+                                         {"still_ms", report.stillMs},
+                                         {"full_size_after_ms", after},
+                                         {"frames_by_size", sizes}};
     return json.dump(2);
 }
 
 std::string motionText(const MotionReport& report) {
     std::string sizes;
     for (const auto& [reduction, frames] : report.byReduction)
-        sizes += fmt::format("{}{} at {}", sizes.empty() ? "" : ", ", frames, reduction == 1 ? std::string("full size") : fmt::format("1/{}", reduction));
-    return fmt::format("{} x {} on {}: {} frames in {:.1f} s, {:.1f} a second\n  median {:.1f} ms, 95 % {:.1f} ms, worst {:.1f} ms; at rest {:.1f} ms, {}\n  {}",
-                       report.size.x, report.size.y, report.device, report.frameMs.size(), report.seconds, report.framesPerSecond(),
-                       report.quantileMs(0.5), report.quantileMs(0.95), report.quantileMs(1), report.stillMs,
-                       report.fullSizeAfterMs ? fmt::format("at full size {:.0f} ms after the motion", *report.fullSizeAfterMs) : "never at full size again", sizes);
+        sizes += fmt::format("{}{} at {}", sizes.empty() ? "" : ", ", frames,
+                             reduction == 1 ? std::string("full size") : fmt::format("1/{}", reduction));
+    return fmt::format(
+        "{} x {} on {}: {} frames in {:.1f} s, {:.1f} a second\n  median {:.1f} ms, 95 % {:.1f} ms, worst {:.1f} ms; "
+        "at rest {:.1f} ms, {}\n  {}",
+        report.size.x, report.size.y, report.device, report.frameMs.size(), report.seconds, report.framesPerSecond(),
+        report.quantileMs(0.5), report.quantileMs(0.95), report.quantileMs(1), report.stillMs,
+        report.fullSizeAfterMs ? fmt::format("at full size {:.0f} ms after the motion", *report.fullSizeAfterMs)
+                               : "never at full size again",
+        sizes);
 }
 
 }  // namespace vcp

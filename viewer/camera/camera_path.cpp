@@ -22,7 +22,8 @@ constexpr int kDeepest = 4;  // a camera's coordinates are nested 3 deep
 
 /// Of four keys in a row, for a time from 0 to 1 between the middle two.
 std::array<double, 4> catmullRomWeights(double t) {
-    return {0.5 * t * (-1 + t * (2 - t)), 0.5 * (2 + t * t * (-5 + 3 * t)), 0.5 * t * (1 + t * (4 - 3 * t)), 0.5 * t * t * (t - 1)};
+    return {0.5 * t * (-1 + t * (2 - t)), 0.5 * (2 + t * t * (-5 + 3 * t)), 0.5 * t * (1 + t * (4 - 3 * t)),
+            0.5 * t * t * (t - 1)};
 }
 
 /// One of two quaternions that are the same turn: the one nearer to `to`.
@@ -34,7 +35,9 @@ struct Key {
     double logDistance = 0;
     glm::dquat orientation{1, 0, 0, 0};
 
-    Key operator+(const Key& b) const { return {focus + b.focus, logDistance + b.logDistance, orientation + b.orientation}; }
+    Key operator+(const Key& b) const {
+        return {focus + b.focus, logDistance + b.logDistance, orientation + b.orientation};
+    }
     Key operator*(double s) const { return {focus * s, logDistance * s, orientation * s}; }
 };
 
@@ -84,13 +87,16 @@ std::vector<OrbitCamera> cameraPath(std::span<const OrbitCamera> keys, int count
     std::vector<OrbitCamera> cameras;
     for (int i = 0; i < count; ++i) {
         const double at = count > 1 ? static_cast<double>(i) / (count - 1) * static_cast<double>(keys.size() - 1) : 0;
-        const size_t before = std::min(static_cast<size_t>(at), keys.size() - 1), after = std::min(before + 1, keys.size() - 1);
+        const size_t before = std::min(static_cast<size_t>(at), keys.size() - 1),
+                     after = std::min(before + 1, keys.size() - 1);
         const double t = at - static_cast<double>(before);
         OrbitCamera camera = keys[before];
         if (t > 0) {
             const std::array<double, 4> weights = catmullRomWeights(t);
             Key sum = keyAt(blended, static_cast<std::ptrdiff_t>(before) - 1) * weights[0];
-            for (std::ptrdiff_t k = 1; k < 4; ++k) sum = sum + keyAt(blended, static_cast<std::ptrdiff_t>(before) - 1 + k) * weights[static_cast<size_t>(k)];
+            for (std::ptrdiff_t k = 1; k < 4; ++k)
+                sum =
+                    sum + keyAt(blended, static_cast<std::ptrdiff_t>(before) - 1 + k) * weights[static_cast<size_t>(k)];
             camera.orientation = glm::normalize(sum.orientation);
             camera.focusDistance = std::exp(sum.logDistance);
             camera.position = sum.focus - camera.forwardVector() * camera.focusDistance;
@@ -105,7 +111,8 @@ Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const st
     const auto isShallow = [](int depth, nlohmann::json::parse_event_t, nlohmann::json&) { return depth <= kDeepest; };
     const auto json = nlohmann::json::parse(text, isShallow, false);
     if (!json.is_array() || json.empty() || json.size() > kMostCameras)
-        return Error{ErrorCode::InvalidInput, fmt::format("is not a JSON array of 1 to {} cameras", kMostCameras), name};
+        return Error{ErrorCode::InvalidInput, fmt::format("is not a JSON array of 1 to {} cameras", kMostCameras),
+                     name};
     std::vector<OrbitCamera> cameras;
     for (size_t i = 0; i < json.size(); ++i) {
         auto camera = cameraFromJson(json[i].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), name);
@@ -116,7 +123,8 @@ Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const st
 }
 
 Result<std::vector<OrbitCamera>> readCameras(const std::filesystem::path& path) {
-    const auto text = readText(path, kLargestFile, "a path of cameras", "cannot be opened; a path is a JSON array of cameras");
+    const auto text =
+        readText(path, kLargestFile, "a path of cameras", "cannot be opened; a path is a JSON array of cameras");
     if (!text) return text.error();
     return camerasFromJson(*text, path.string());
 }

@@ -16,8 +16,9 @@ namespace vcp {
 std::vector<OrbitCamera> turntable(const OrbitCamera& from, glm::dvec3 pivot, int count);
 
 /// `count` cameras from the first of `keys` to the last, at equal times between each two: a Catmull-Rom spline of what
-/// they look at, the logarithm of the distance to it, and the orientation, straight at both ends. So two cameras are joined by
-/// a straight line, and cameras about one point by an arc. The projection is that of the key before. Precondition: a key.
+/// they look at, the logarithm of the distance to it, and the orientation, straight at both ends. So two cameras are
+/// joined by a straight line, and cameras about one point by an arc. The projection is that of the key before.
+/// Precondition: a key.
 std::vector<OrbitCamera> cameraPath(std::span<const OrbitCamera> keys, int count);
 
 /// A JSON array of what cameraToJson writes, 1 to 10000. `name` stands for the file in errors. May be hostile. Errors:

@@ -70,7 +70,8 @@ void LinesOf::members(const std::string& pointer, int depth, bool keep) {
             const size_t line = line_;
             key = string();
             keepThis = keepThis && key.size() <= kLongestKey;
-            if (keepThis && !lines_.emplace(pointer + "/" + key, line).second && !twice_) twice_.emplace(pointer + "/" + key, line);
+            if (keepThis && !lines_.emplace(pointer + "/" + key, line).second && !twice_)
+                twice_.emplace(pointer + "/" + key, line);
             skipSpace();
             ++at_;
         }

@@ -9,8 +9,8 @@
 
 namespace vcp {
 
-/// The line of each value of a JSON text, by its JSON pointer; of a member the line of its key. Of texts that nest deeply, have long keys
-/// or many items, not all are kept.
+/// The line of each value of a JSON text, by its JSON pointer; of a member the line of its key. Of texts that nest
+/// deeply, have long keys or many items, not all are kept.
 class LinesOf {
 public:
     /// Precondition: the text is valid JSON.

@@ -73,7 +73,8 @@ glm::dquat facing(glm::dvec3 forward, glm::dvec3 up) {
 Box placedBox(const Box& box, const Similarity& placement) {
     Box placed{placement.toWorld(box.low), placement.toWorld(box.low)};
     for (int corner = 1; corner < 8; ++corner) {
-        const glm::dvec3 at((corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y, (corner & 4) != 0 ? box.high.z : box.low.z);
+        const glm::dvec3 at((corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y,
+                            (corner & 4) != 0 ? box.high.z : box.low.z);
         placed.low = glm::min(placed.low, placement.toWorld(at));
         placed.high = glm::max(placed.high, placement.toWorld(at));
     }
@@ -99,8 +100,7 @@ Camera OrbitCamera::current() const {
 
 CameraRay OrbitCamera::rayThrough(glm::dvec2 pixel, glm::ivec2 size) const {
     const glm::dvec2 at = normalised(pixel, size) * tangents(fovY, size);
-    if (projection == Projection::Perspective)
-        return {position, glm::normalize(orientation * glm::dvec3(at, -1))};
+    if (projection == Projection::Perspective) return {position, glm::normalize(orientation * glm::dvec3(at, -1))};
     return {position + orientation * glm::dvec3(at * focusDistance, 0), forwardVector()};
 }
 
@@ -196,13 +196,27 @@ void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const Picture
     const glm::dvec3 right = glm::cross(upward, front);
     switch (view) {
         case View::Fit:
-        case View::Front: orientation = facing(-front, upward); break;
-        case View::Back: orientation = facing(front, upward); break;
-        case View::Left: orientation = facing(right, upward); break;
-        case View::Right: orientation = facing(-right, upward); break;
-        case View::Top: orientation = facing(-upward, -front); break;
-        case View::Bottom: orientation = facing(upward, front); break;
-        case View::Isometric: orientation = facing(-(front + right + upward), upward); break;
+        case View::Front:
+            orientation = facing(-front, upward);
+            break;
+        case View::Back:
+            orientation = facing(front, upward);
+            break;
+        case View::Left:
+            orientation = facing(right, upward);
+            break;
+        case View::Right:
+            orientation = facing(-right, upward);
+            break;
+        case View::Top:
+            orientation = facing(-upward, -front);
+            break;
+        case View::Bottom:
+            orientation = facing(upward, front);
+            break;
+        case View::Isometric:
+            orientation = facing(-(front + right + upward), upward);
+            break;
     }
     fit(box, size, covered);
 }
@@ -213,8 +227,8 @@ struct NamedView {
     std::string_view name;
     View view;
 };
-constexpr NamedView kViews[] = {{"fit", View::Fit},     {"front", View::Front}, {"back", View::Back},
-                                {"left", View::Left},   {"right", View::Right}, {"top", View::Top},
+constexpr NamedView kViews[] = {{"fit", View::Fit},       {"front", View::Front},  {"back", View::Back},
+                                {"left", View::Left},     {"right", View::Right},  {"top", View::Top},
                                 {"bottom", View::Bottom}, {"iso", View::Isometric}};
 
 }  // namespace
@@ -322,7 +336,7 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
     OrbitCamera camera;
     camera.up = fields.word("up_axis", {"y", "z"}) == 0 ? UpAxis::Y : UpAxis::Z;
     camera.projection = fields.word("projection", {"perspective", "orthographic"}) == 0 ? Projection::Perspective
-                                                                                       : Projection::Orthographic;
+                                                                                        : Projection::Orthographic;
     camera.position = fields.triple("position", std::nullopt);
     const glm::dvec3 target = fields.triple("target", std::nullopt);
     const glm::dvec3 up = fields.triple("up", axisOf(camera.up));
@@ -344,13 +358,16 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
 
 Result<OrbitCamera> readCamera(const std::filesystem::path& path) {
     constexpr size_t kLimit = 1 << 20;
-    const auto text = readText(path, kLimit, "a camera file", "cannot be opened; views are " + viewNames() + " or a JSON file");
+    const auto text =
+        readText(path, kLimit, "a camera file", "cannot be opened; views are " + viewNames() + " or a JSON file");
     if (!text) return text.error();
     auto camera = cameraFromJson(*text, path.string());
     if (camera) return camera;
     Error error = camera.error();
     // A field stands in quotes; what is no camera has no line.
-    if (error.element.starts_with('"')) error.element = fmt::format("line {}: {}", LinesOf(*text)("/" + error.element.substr(1, error.element.size() - 2)), error.element);
+    if (error.element.starts_with('"'))
+        error.element = fmt::format(
+            "line {}: {}", LinesOf(*text)("/" + error.element.substr(1, error.element.size() - 2)), error.element);
     return error;
 }
 

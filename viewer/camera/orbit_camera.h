@@ -37,7 +37,10 @@ struct Box {
     [[nodiscard]] glm::dvec3 centre() const { return 0.5 * (low + high); }
     [[nodiscard]] double diagonal() const;
     /// Turned inside out: what is joined with it is what it then is.
-    static Box nothing() { return {glm::dvec3(std::numeric_limits<double>::infinity()), glm::dvec3(-std::numeric_limits<double>::infinity())}; }
+    static Box nothing() {
+        return {glm::dvec3(std::numeric_limits<double>::infinity()),
+                glm::dvec3(-std::numeric_limits<double>::infinity())};
+    }
     [[nodiscard]] Box joined(const Box& other) const { return {glm::min(low, other.low), glm::max(high, other.high)}; }
 };
 
@@ -49,8 +52,8 @@ enum class UpAxis { Y, Z };
 /// Standard views of a box. `Fit` is the view a dataset opens with: the front.
 enum class View { Fit, Front, Back, Left, Right, Top, Bottom, Isometric };
 
-/// What of a picture is covered along its sides, pixels: the rest is where something fitted into it goes. All of it where less than
-/// half is left either way.
+/// What of a picture is covered along its sides, pixels: the rest is where something fitted into it goes. All of it
+/// where less than half is left either way.
 struct PictureMargins {
     double left = 0, right = 0, top = 0, bottom = 0;
 };
@@ -94,8 +97,8 @@ struct OrbitCamera {
     /// moves with it. Stops where doubles could no longer tell the eye from the point.
     void zoomAbout(glm::dvec3 point, double factor);
 
-    /// Moves along the view axis and sideways so that the box just fits into what of the picture is not covered, its middle in the
-    /// middle of that.
+    /// Moves along the view axis and sideways so that the box just fits into what of the picture is not covered, its
+    /// middle in the middle of that.
     void fit(const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 
     /// Turns to a standard view and fits.

@@ -26,7 +26,8 @@ std::unique_ptr<std::FILE, FileCloser> ownPipe(const std::filesystem::path& path
 
 }  // namespace
 
-Result<std::string> readText(const std::filesystem::path& path, size_t most, const std::string& what, const std::string& unopened) {
+Result<std::string> readText(const std::filesystem::path& path, size_t most, const std::string& what,
+                             const std::string& unopened) {
     auto file = ownPipe(path);
     if (!file) {
         std::error_code failed;

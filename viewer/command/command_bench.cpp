@@ -90,7 +90,8 @@ Result<int> publish(const BenchCommand& command, const std::string& name, const 
         VCP_TRY(writeFile(folder / (name + ".json"), OutputKind::JsonText, texts.json, rules));
         VCP_TRY(writeFile(folder / (name + ".csv"), OutputKind::Text, texts.csv, rules));
         VCP_TRY(writeFile(folder / (name + ".md"), OutputKind::Text, texts.markdown, rules));
-        for (const auto& [plot, svg] : texts.plots) VCP_TRY(writeFile(folder / (plot + ".svg"), OutputKind::Svg, svg, rules));
+        for (const auto& [plot, svg] : texts.plots)
+            VCP_TRY(writeFile(folder / (plot + ".svg"), OutputKind::Svg, svg, rules));
     }
     VCP_TRY(command.report.json ? printJsonText(texts.json) : printLine(texts.markdown));
     return 0;
@@ -109,7 +110,8 @@ Result<std::filesystem::path> findMakeScan() {
     const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
     auto program = self.parent_path() / "make_scan";
     if (!failed && ::access(program.c_str(), X_OK) == 0) return program;
-    return Error{ErrorCode::Usage, "--generated needs the program make_scan beside vcp, and it is not there", program.string()};
+    return Error{ErrorCode::Usage, "--generated needs the program make_scan beside vcp, and it is not there",
+                 program.string()};
 }
 
 Result<int> runBuild(const BuildBenchCommand& command) {
@@ -139,8 +141,9 @@ Result<int> runBuild(const BuildBenchCommand& command) {
     display.finish();
     if (!report) return report.error();
     if (report->rows.empty() && !report->failures.empty()) return report->failures.front();
-    const auto published = publish(command, "bench_build",
-                                   {benchBuildJson(*report), benchBuildCsv(*report), benchBuildMarkdown(*report), benchBuildPlots(*report)});
+    const auto published = publish(
+        command, "bench_build",
+        {benchBuildJson(*report), benchBuildCsv(*report), benchBuildMarkdown(*report), benchBuildPlots(*report)});
     if (!published || report->failures.empty()) return published;
     // What could be measured is there; the first of what could not is the error.
     return report->failures.front();
@@ -170,8 +173,9 @@ Result<int> runRays(const RaysCommand& command) {
     const auto report = benchRays(options);
     display.finish();
     if (!report) return report.error();
-    return publish(command, "bench_rays",
-                   {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
+    return publish(
+        command, "bench_rays",
+        {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
 }
 
 Result<int> runStream(const StreamCommand& command) {
@@ -194,7 +198,9 @@ Result<int> runStream(const StreamCommand& command) {
     const auto rows = benchStream(options);
     display.finish();
     if (!rows) return rows.error();
-    VCP_TRY(publish(command.bench, "bench_stream", {benchStreamJson(*rows), benchStreamCsv(*rows), benchStreamMarkdown(*rows), benchStreamPlots(*rows)}));
+    VCP_TRY(
+        publish(command.bench, "bench_stream",
+                {benchStreamJson(*rows), benchStreamCsv(*rows), benchStreamMarkdown(*rows), benchStreamPlots(*rows)}));
     return std::ranges::all_of(*rows, [](const StressReport& row) { return row.violations.empty(); }) ? 0 : 1;
 }
 
@@ -208,47 +214,62 @@ Result<int> runMeso(const MesoCommand& command) {
     const auto report = benchMeso(options);
     display.finish();
     if (!report) return report.error();
-    return publish(command.bench, "bench_meso", {benchMesoJson(*report), benchMesoCsv(*report), benchMesoMarkdown(*report), benchMesoPlots(*report)});
+    return publish(
+        command.bench, "bench_meso",
+        {benchMesoJson(*report), benchMesoCsv(*report), benchMesoMarkdown(*report), benchMesoPlots(*report)});
 }
 
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
     app.add_option("MODEL", command.models, models)->type_name("");
-    app.add_option("--out", command.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
+    app.add_option("--out", command.out,
+                   "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")
+        ->type_name("DIR");
     addOverwriteOption(app, command.overwrite);
-    app.add_option("--repetitions", command.repetitions, "Runs whose median is reported")->type_name("N")->check(CLI::Range(1, 1000));
+    app.add_option("--repetitions", command.repetitions, "Runs whose median is reported")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1000));
     app.add_option("--cell", command.cell, "Edge of the finest cells, world units [chosen from the mesh]")
         ->type_name("LENGTH")
         ->check([](const std::string& text) {
             const auto length = parseLength(text);
-            return length && !length->isRelative ? std::string() : "must be a length in world units like 0.25, not \"" + text + "\"";
+            return length && !length->isRelative ? std::string()
+                                                 : "must be a length in world units like 0.25, not \"" + text + "\"";
         });
-    app.add_option("--threads", command.threads, "Threads [one a processor]")->type_name("N")->check(CLI::Range(1, 1024));
+    app.add_option("--threads", command.threads, "Threads [one a processor]")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1024));
     addProgressOption(app, command.report);
     addJsonOption(app, command.report);
 }
 
 std::string scanSizeProblem(const std::string& text) {
     const auto count = parseCount(text);
-    return count && *count >= 10'000 && *count <= 1'000'000'000 ? std::string()
-                                                                : "must be like 500k, 10M or 1G, from 10k to 1G, not \"" + text + "\"";
+    return count && *count >= 10'000 && *count <= 1'000'000'000
+               ? std::string()
+               : "must be like 500k, 10M or 1G, from 10k to 1G, not \"" + text + "\"";
 }
 
 RunCommand addBenchBuild(CLI::App& bench) {
     auto command = std::make_shared<BuildBenchCommand>();
     CLI::App* app = bench.add_subcommand("build", "Time the build, beside Embree building its tree");
     addBenchOptions(*app, *command, "Meshes");
-    app->add_option("--generated", command->generated, "Also build scans of so many triangles, made by make_scan: 1M,10M,100M")
+    app->add_option("--generated", command->generated,
+                    "Also build scans of so many triangles, made by make_scan: 1M,10M,100M")
         ->type_name("N,N")
-        ->delimiter(',')->allow_extra_args(false)
+        ->delimiter(',')
+        ->allow_extra_args(false)
         ->check(scanSizeProblem);
     app->add_option("--errors", command->errors, "Also build each mesh with these tolerances, in cells: 0.02,0.05,0.1")
         ->type_name("X,X")
-        ->delimiter(',')->allow_extra_args(false)
+        ->delimiter(',')
+        ->allow_extra_args(false)
         ->check(CLI::Range(1e-6, 1e3));
-    app->add_option("--memory", command->memory, "Cap on the memory that a build allocates: 512M, 4G, 50% [half of the machine's]")
+    app->add_option("--memory", command->memory,
+                    "Cap on the memory that a build allocates: 512M, 4G, 50% [half of the machine's]")
         ->type_name("BYTES")
         ->check([](const std::string& text) {
-            return parseMemory(text, 2 * defaultMemoryBytes()) ? std::string() : "must be like 512M, 4G or 50%, not \"" + text + "\"";
+            return parseMemory(text, 2 * defaultMemoryBytes()) ? std::string()
+                                                               : "must be like 512M, 4G or 50%, not \"" + text + "\"";
         });
     app->add_option("--temp", command->temp, "Folder for temporary files and generated scans [that of what is built]")
         ->type_name("DIR")
@@ -263,23 +284,42 @@ RunCommand addBenchBuild(CLI::App& bench) {
 RunCommand addBenchRays(CLI::App& bench) {
     auto command = std::make_shared<RaysCommand>();
     CLI::App* app = bench.add_subcommand("rays", "Time and judge ray-casters, beside Embree's packets");
-    addBenchOptions(*app, *command, "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
-    app->add_option("--methods", command->methods, fmt::format("{} [all but paper-rules]", fmt::join(rayMethodNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
+    addBenchOptions(
+        *app, *command,
+        "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
+    app->add_option("--methods", command->methods,
+                    fmt::format("{} [all but paper-rules]", fmt::join(rayMethodNames(), ", ")))
+        ->type_name("A,B")
+        ->delimiter(',')
+        ->allow_extra_args(false);
     app->add_flag("--sweep", command->sweep,
-                  "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the other octrees");
+                  "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the "
+                  "other octrees");
     app->add_flag("--stability", command->stability,
-                  "Also what single precision costs, on the processor and on the device, with cells from 1e-6 to 1e6 and origins to 1e7 cells");
-    app->add_option("--cameras", command->cameras, "whole, half, close, cells [these four]; lattice and grazing, which look for holes")->type_name("A,B")->delimiter(',')->allow_extra_args(false);
-    app->add_option("--views", command->views, "Directions that each camera looks from")->type_name("N")->capture_default_str()->check(
-        CLI::Range(1, 1000));
-    app->add_option("--size", command->size, "Rays across and down")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
-        return parseSize(text) ? std::string() : "must be like 1920x1200, not \"" + text + "\"";
-    });
+                  "Also what single precision costs, on the processor and on the device, with cells from 1e-6 to 1e6 "
+                  "and origins to 1e7 cells");
+    app->add_option("--cameras", command->cameras,
+                    "whole, half, close, cells [these four]; lattice and grazing, which look for holes")
+        ->type_name("A,B")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+    app->add_option("--views", command->views, "Directions that each camera looks from")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
+    app->add_option("--size", command->size, "Rays across and down")
+        ->type_name("WxH")
+        ->capture_default_str()
+        ->check([](const std::string& text) {
+            return parseSize(text) ? std::string() : "must be like 1920x1200, not \"" + text + "\"";
+        });
     app->add_option("--judge-every", command->judgeEvery, "Compare every Nth row and column with the mesh")
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 16384));
-    app->add_option("--device", command->device, "Vulkan device of the methods certified and paper-gpu, see `vcp devices` [the best one]")->type_name("DEVICE");
+    app->add_option("--device", command->device,
+                    "Vulkan device of the methods certified and paper-gpu, see `vcp devices` [the best one]")
+        ->type_name("DEVICE");
     addPaperMarchOptions(*app, command->paper.march);
     addPaperStructureOptions(*app, command->paper);
     return [command] { return runRays(*command); };
@@ -287,18 +327,35 @@ RunCommand addBenchRays(CLI::App& bench) {
 
 RunCommand addBenchStream(CLI::App& bench) {
     auto command = std::make_shared<StreamCommand>();
-    CLI::App* app = bench.add_subcommand("stream", "Stream along camera paths under budgets, beside the same frames without loads");
-    app->add_option("MODEL", command->bench.models, ".vcp files, their http(s) addresses, or meshes [a sphere, a torus and a thin plate]")->type_name("");
-    app->add_option("--budgets", command->budgets, "Memory for subvolumes on the device")->type_name("N,N")->delimiter(',')->allow_extra_args(false)->capture_default_str()->check(budgetProblem);
-    app->add_option("--paths", command->paths, fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
+    CLI::App* app =
+        bench.add_subcommand("stream", "Stream along camera paths under budgets, beside the same frames without loads");
+    app->add_option("MODEL", command->bench.models,
+                    ".vcp files, their http(s) addresses, or meshes [a sphere, a torus and a thin plate]")
+        ->type_name("");
+    app->add_option("--budgets", command->budgets, "Memory for subvolumes on the device")
+        ->type_name("N,N")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str()
+        ->check(budgetProblem);
+    app->add_option("--paths", command->paths,
+                    fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("A,B")
-        ->delimiter(',')->allow_extra_args(false)
+        ->delimiter(',')
+        ->allow_extra_args(false)
         ->capture_default_str();
-    app->add_option("--frames", command->frames, "Frames along a path")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1'000'000));
-    app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
-        return parseSize(text) ? std::string() : "must be like 320x200, not \"" + text + "\"";
-    });
-    app->add_option("--ram", command->ram, "Memory for subvolumes on their way to the device, and for stored ones kept to be read again")
+    app->add_option("--frames", command->frames, "Frames along a path")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
+    app->add_option("--size", command->size, "Width and height in pixels")
+        ->type_name("WxH")
+        ->capture_default_str()
+        ->check([](const std::string& text) {
+            return parseSize(text) ? std::string() : "must be like 320x200, not \"" + text + "\"";
+        });
+    app->add_option("--ram", command->ram,
+                    "Memory for subvolumes on their way to the device, and for stored ones kept to be read again")
         ->type_name("BYTES")
         ->capture_default_str()
         ->check(budgetProblem);
@@ -306,8 +363,11 @@ RunCommand addBenchStream(CLI::App& bench) {
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
-    app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
-    app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")->type_name("DIR");
+    app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")
+        ->type_name("DEVICE");
+    app->add_option("--out", command->bench.out,
+                    "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")
+        ->type_name("DIR");
     addOverwriteOption(*app, command->bench.overwrite);
     addSourceSettings(*app, command->source);
     addProgressOption(*app, command->bench.report);
@@ -320,20 +380,39 @@ RunCommand addBenchMeso(CLI::App& bench) {
     auto command = std::make_shared<MesoCommand>();
     BenchMesoOptions& options = command->options;
     CLI::App* app = bench.add_subcommand("meso", "Time and judge the mesostructure marchers");
-    app->add_option("ASSET", options.assets, "Procedural ones by name, or assets (.meso) [eleven procedural ones]")->type_name("");
-    app->add_option("--methods", options.methods, fmt::format("{} [all]", fmt::join(mesoMethodNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
-    app->add_option("--views", options.views, fmt::format("{} [all]", fmt::join(mesoViewNames(), ", ")))->type_name("A,B")->delimiter(',')->allow_extra_args(false);
+    app->add_option("ASSET", options.assets, "Procedural ones by name, or assets (.meso) [eleven procedural ones]")
+        ->type_name("");
+    app->add_option("--methods", options.methods, fmt::format("{} [all]", fmt::join(mesoMethodNames(), ", ")))
+        ->type_name("A,B")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+    app->add_option("--views", options.views, fmt::format("{} [all]", fmt::join(mesoViewNames(), ", ")))
+        ->type_name("A,B")
+        ->delimiter(',')
+        ->allow_extra_args(false);
     app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
-    app->add_flag("--published", options.published, "Beside the ratios of the paper's tables (with --sweep, for those of times)");
-    app->add_option("--device", command->device, "March on a Vulkan device: an index or a part of a name, or without one the best [on the CPU]")
+    app->add_flag("--published", options.published,
+                  "Beside the ratios of the paper's tables (with --sweep, for those of times)");
+    app->add_option("--device", command->device,
+                    "March on a Vulkan device: an index or a part of a name, or without one the best [on the CPU]")
         ->type_name("DEVICE")
         ->expected(0, 1)
         ->default_str(kBestDevice);
-    app->add_option("--rays", options.rays, "Rays a view")->type_name("N")->capture_default_str()->check(CLI::Range(1, 10'000'000));
-    app->add_option("--repetitions", options.repetitions, "Runs whose median is reported")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1000));
-    app->add_option("--check-rays", options.checkRays, "Rays of the test that no distance passes the surface; 0: not made")->type_name("N")->capture_default_str()->check(
-        CLI::Range(0, 1'000'000'000));
-    app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots")->type_name("DIR");
+    app->add_option("--rays", options.rays, "Rays a view")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 10'000'000));
+    app->add_option("--repetitions", options.repetitions, "Runs whose median is reported")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
+    app->add_option("--check-rays", options.checkRays,
+                    "Rays of the test that no distance passes the surface; 0: not made")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 1'000'000'000));
+    app->add_option("--out", command->bench.out, "Folder for the report as JSON, CSV, Markdown and plots")
+        ->type_name("DIR");
     addOverwriteOption(*app, command->bench.overwrite);
     addProgressOption(*app, command->bench.report);
     addJsonOption(*app, command->bench.report);
@@ -345,7 +424,8 @@ RunCommand addBenchMeso(CLI::App& bench) {
 Command addBench(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("bench", "Measure run time against error, beside a peer");
     app->require_subcommand(1);
-    const std::vector<RunCommand> runs{addBenchBuild(*app), addBenchRays(*app), addBenchStream(*app), addBenchMeso(*app)};
+    const std::vector<RunCommand> runs{addBenchBuild(*app), addBenchRays(*app), addBenchStream(*app),
+                                       addBenchMeso(*app)};
     return {app, [=] {
                 const auto all = app->get_subcommands([](CLI::App*) { return true; });
                 const auto at = std::ranges::find_if(all, [](const CLI::App* each) { return each->parsed(); });

@@ -88,14 +88,21 @@ Json toJson(const BuildEstimate& estimate) {
 
 std::string summary(const BuildEstimate& estimate) {
     const SoupMeasures& m = estimate.measures;
-    std::string text = fmt::format("{} triangles ({} without area), {} vertices, {}\n", formatCount(m.triangles), formatCount(m.degenerateTriangles), formatCount(m.vertices),
-                                   m.hasVertexColours ? "with colours" : m.hasMaterials ? "with materials" : "no colour");
-    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", m.boundsMin.x, m.boundsMin.y, m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
-    text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ", formatLength(estimate.frame.cell), estimate.frame.levels);
+    std::string text = fmt::format("{} triangles ({} without area), {} vertices, {}\n", formatCount(m.triangles),
+                                   formatCount(m.degenerateTriangles), formatCount(m.vertices),
+                                   m.hasVertexColours ? "with colours"
+                                   : m.hasMaterials   ? "with materials"
+                                                      : "no colour");
+    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", m.boundsMin.x, m.boundsMin.y,
+                        m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
+    text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ",
+                        formatLength(estimate.frame.cell), estimate.frame.levels);
     text += fmt::format("  memory      at most {}\n", formatBytes(estimate.memoryBytes));
     text += estimate.tempBytes == 0 ? std::string("  temporary   nothing: it fits memory\n")
-                                    : fmt::format("  temporary   about {} of {} free\n", formatBytes(estimate.tempBytes), formatBytes(estimate.freeTempBytes));
-    text += fmt::format("  file        about {} of {} free\n", formatBytes(estimate.fileBytes), formatBytes(estimate.freeOutputBytes));
+                                    : fmt::format("  temporary   about {} of {} free\n",
+                                                  formatBytes(estimate.tempBytes), formatBytes(estimate.freeTempBytes));
+    text += fmt::format("  file        about {} of {} free\n", formatBytes(estimate.fileBytes),
+                        formatBytes(estimate.freeOutputBytes));
     text += fmt::format("  time        about {}", formatSeconds(estimate.seconds));
     return text;
 }
@@ -104,8 +111,10 @@ std::string summary(const BuildEstimate& estimate) {
 Result<int> tell(const BuildOptions& options, bool asJson) {
     const auto estimate = estimateBuild(options);
     if (!estimate) return estimate.error();
-    if (asJson) VCP_TRY(printJson(toJson(*estimate)));
-    else VCP_TRY(printLine(summary(*estimate)));
+    if (asJson)
+        VCP_TRY(printJson(toJson(*estimate)));
+    else
+        VCP_TRY(printLine(summary(*estimate)));
     return 0;
 }
 
@@ -115,7 +124,8 @@ Result<void> checkMethod(const BuildCommand& command) {
     const BuildSettings& s = command.settings;
     if (!command.isPaper() && command.paperOptionsGiven) return usage("the options --paper-... go with --method paper");
     if (!command.isPaper()) return {};
-    if (!s.error.empty() || s.colour == "vertex" || s.colour == "texture") return usage("--method paper has neither a tolerance (--error) nor colour");
+    if (!s.error.empty() || s.colour == "vertex" || s.colour == "texture")
+        return usage("--method paper has neither a tolerance (--error) nor colour");
     if (!s.memory.empty() || !s.temp.empty() || command.resume || command.dryRun)
         return usage("--method paper builds in memory: without --memory, --temp, --resume and --dry-run");
     return {};
@@ -124,7 +134,8 @@ Result<void> checkMethod(const BuildCommand& command) {
 Result<int> run(const BuildCommand& command) {
     VCP_TRY(checkMethod(command));
     BuildOptions options = command.settings.optionsFor(command.inputs);
-    if (command.output.empty() && !command.dryRun) return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
+    if (command.output.empty() && !command.dryRun)
+        return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
     options.output = command.output.empty() ? "." : command.output;
     options.resume = command.resume;
     options.overwrite = command.overwrite;
@@ -151,11 +162,19 @@ Result<int> run(const BuildCommand& command) {
 Command addBuild(CLI::App& vcp) {
     auto command = std::make_shared<BuildCommand>();
     CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
-    app->add_option("IN", command->inputs, "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder stands for those in it, - for standard input")->type_name("")->required();
-    app->add_option("-o,--output", command->output, "The .vcp file to write")->type_name("OUT.vcp")->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
+    app->add_option("IN", command->inputs,
+                    "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder "
+                    "stands for those in it, - for standard input")
+        ->type_name("")
+        ->required();
+    app->add_option("-o,--output", command->output, "The .vcp file to write")
+        ->type_name("OUT.vcp")
+        ->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
     addOverwriteOption(*app, command->overwrite);
     addBuildSettings(*app, command->settings);
-    app->add_option("--method", command->method, "certified, or paper: the octree of Demir and Westermann 2015, for comparison (in memory, no colour, nothing certified)")
+    app->add_option("--method", command->method,
+                    "certified, or paper: the octree of Demir and Westermann 2015, for comparison (in memory, no "
+                    "colour, nothing certified)")
         ->type_name("certified|paper")
         ->capture_default_str()
         ->check(CLI::IsMember({"certified", "paper"}));
@@ -166,12 +185,14 @@ Command addBuild(CLI::App& vcp) {
         ->type_name("SECONDS")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
-    app->add_flag("--dry-run", command->dryRun, "Say what is in the meshes and what the build would need; write nothing");
+    app->add_flag("--dry-run", command->dryRun,
+                  "Say what is in the meshes and what the build would need; write nothing");
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command, app] {
                 for (const CLI::Option* option : app->get_options())
-                    command->paperOptionsGiven = command->paperOptionsGiven || (option->count() > 0 && option->get_name().starts_with("--paper-"));
+                    command->paperOptionsGiven = command->paperOptionsGiven ||
+                                                 (option->count() > 0 && option->get_name().starts_with("--paper-"));
                 return run(*command);
             }};
 }

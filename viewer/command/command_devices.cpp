@@ -29,8 +29,8 @@ Json toJson(const std::vector<DeviceInfo>& devices) {
 std::string table(const std::vector<DeviceInfo>& devices) {
     std::string text;
     for (const DeviceInfo& device : devices) {
-        text += fmt::format("{}{} {}  {}: {}, driver {}", text.empty() ? "" : "\n", device.chosen ? '*' : ' ', device.index,
-                            device.name, device.type, device.driver);
+        text += fmt::format("{}{} {}  {}: {}, driver {}", text.empty() ? "" : "\n", device.chosen ? '*' : ' ',
+                            device.index, device.name, device.type, device.driver);
         if (device.software) text += "; software: runs on the processor, not on a graphics card";
         if (!device.usable) text += "; not usable: needs Vulkan 1.2 and a compute queue";
     }

@@ -74,10 +74,12 @@ Json toJson(const std::string& file, const Dataset& dataset) {
 }
 
 std::string paperLine(const PaperParameters& p) {
-    return fmt::format("  method      paper: band {:g} cells, {}, {}, {} vectors, {} empty nodes\n", p.band,
-                       p.mergeThreshold < 0 ? std::string("not merged") : fmt::format("merged below {:g} cells", p.mergeThreshold),
-                       p.growRounds < 0 ? std::string("exact points") : fmt::format("{} rounds of region growing", p.growRounds),
-                       p.packing == static_cast<uint32_t>(PaperPacking::Spherical) ? "spherical" : "octahedral", p.safeEmpty != 0 ? "safe" : "published");
+    return fmt::format(
+        "  method      paper: band {:g} cells, {}, {}, {} vectors, {} empty nodes\n", p.band,
+        p.mergeThreshold < 0 ? std::string("not merged") : fmt::format("merged below {:g} cells", p.mergeThreshold),
+        p.growRounds < 0 ? std::string("exact points") : fmt::format("{} rounds of region growing", p.growRounds),
+        p.packing == static_cast<uint32_t>(PaperPacking::Spherical) ? "spherical" : "octahedral",
+        p.safeEmpty != 0 ? "safe" : "published");
 }
 
 std::string summary(const std::string& file, const Dataset& dataset) {
@@ -86,15 +88,16 @@ std::string summary(const std::string& file, const Dataset& dataset) {
     text += fmt::format("  mesh        {} triangles ({} without area), {} vertices, {}\n", formatCount(h.triangles),
                         formatCount(h.degenerateTriangles), formatCount(h.vertices),
                         dataset.hasColour() ? "with colour" : "no colour");
-    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", h.boundsMin[0], h.boundsMin[1],
-                        h.boundsMin[2], h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);
+    text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", h.boundsMin[0],
+                        h.boundsMin[1], h.boundsMin[2], h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);
     text += fmt::format("  origin      {:.9g} {:.9g} {:.9g}\n", h.origin[0], h.origin[1], h.origin[2]);
     text += fmt::format("  cell        {}, subvolumes of {}^3 cells\n", formatLength(h.cell), 1u << h.log2Cells);
     if (h.method == Method::Paper)
         text += paperLine(h.paper) + "  error       nothing is certified\n";
     else
-        text += fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
-                            h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
+        text +=
+            fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
+                        h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
     text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>15}\n", "level", "cell", "subvolumes",
                         "stored", "in memory", "leaves", "hard", "certified error");
     for (uint32_t level = 0; level < h.levels; ++level) {

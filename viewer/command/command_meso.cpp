@@ -20,7 +20,8 @@ namespace {
 using namespace meso;
 
 struct BuildMeso {
-    std::string source, out, grid = "auto", cones = "4x2", rule = "any-point", blocks = "4", crossings = "direct", up = "z", period;
+    std::string source, out, grid = "auto", cones = "4x2", rule = "any-point", blocks = "4", crossings = "direct",
+                             up = "z", period;
     double height = 0;  // 0: the generator's own, 0.1 for pictures
     int texels = 256, samples = 2;
     uint32_t seed = 1;
@@ -57,9 +58,12 @@ Result<AssetOptions> optionsOf(const BuildMeso& c) {
     if (cones.size() != 2) return wrong("--cones must be like 4x2, not \"" + c.cones + "\"");
     options.distances.cones = {cones[0], cones[1]};
     options.distances.cap = c.cap;
-    options.distances.rule = c.rule == "paper" ? DistanceRule::Paper : c.rule == "paper-safe" ? DistanceRule::PaperSafe : DistanceRule::AnyPoint;
+    options.distances.rule = c.rule == "paper"        ? DistanceRule::Paper
+                             : c.rule == "paper-safe" ? DistanceRule::PaperSafe
+                                                      : DistanceRule::AnyPoint;
     options.factors = c.blocks == "none" ? std::vector<int>{} : wholeNumbers(c.blocks, ',');
-    if (options.factors.empty() && c.blocks != "none") return wrong("--blocks must be like 4 or 4,2, or none, not \"" + c.blocks + "\"");
+    if (options.factors.empty() && c.blocks != "none")
+        return wrong("--blocks must be like 4 or 4,2, or none, not \"" + c.blocks + "\"");
     options.crossings = c.crossings == "fitted" ? CrossingRule::Fitted : CrossingRule::Direct;
     options.samples = c.samples;
     options.withBoxes = !c.noBoxes, options.withPatches = !c.noPatches;
@@ -71,7 +75,8 @@ Result<glm::ivec3> cellsOf(const std::string& text, glm::dvec3 extent) {
     const std::vector<int> n = wholeNumbers(text, 'x');
     if (n.size() == 3) return glm::ivec3(n[0], n[1], n[2]);
     if (n.size() != 1) return wrong("--grid must be like 64 or 64x64x16, not \"" + text + "\"");
-    return glm::ivec3(n[0], std::max(1, int(std::lround(n[0] * extent.y))), std::max(1, int(std::ceil(extent.z * n[0]))));
+    return glm::ivec3(n[0], std::max(1, int(std::lround(n[0] * extent.y))),
+                      std::max(1, int(std::ceil(extent.z * n[0]))));
 }
 
 Result<void> readSource(const BuildMeso& c, Asset& asset) {
@@ -84,19 +89,23 @@ Result<void> readSource(const BuildMeso& c, Asset& asset) {
     std::string extension = std::filesystem::path(c.source).extension().string();
     std::ranges::transform(extension, extension.begin(), [](unsigned char letter) { return std::tolower(letter); });
     if (isIn(heightFieldNames()) || extension == ".png" || extension == ".exr") {
-        auto map = isIn(heightFieldNames()) ? makeHeightField(c.source, c.texels, c.seed) : readHeightImage(c.source, c.height > 0 ? c.height : 0.1);
+        auto map = isIn(heightFieldNames()) ? makeHeightField(c.source, c.texels, c.seed)
+                                            : readHeightImage(c.source, c.height > 0 ? c.height : 0.1);
         if (!map) return map.error();
         asset.heights = *std::move(map);
         if (c.height > 0) asset.heights->range = c.height;
         return {};
     }
     if (extension.empty())
-        return wrong(fmt::format("\"{}\" is no file with an extension, and no procedural one: {}, {}", c.source, fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")));
+        return wrong(fmt::format("\"{}\" is no file with an extension, and no procedural one: {}, {}", c.source,
+                                 fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")));
     TileMeshOptions options{.up = c.up[0], .period = std::nullopt};
     if (!c.period.empty()) {
         const size_t comma = c.period.find(',');
-        const auto x = parseLength(c.period.substr(0, comma)), y = comma == std::string::npos ? x : parseLength(c.period.substr(comma + 1));
-        if (!x || !y || x->isRelative || y->isRelative) return wrong("--period must be like 4 or 4,2 in the mesh's units, not \"" + c.period + "\"");
+        const auto x = parseLength(c.period.substr(0, comma)),
+                   y = comma == std::string::npos ? x : parseLength(c.period.substr(comma + 1));
+        if (!x || !y || x->isRelative || y->isRelative)
+            return wrong("--period must be like 4 or 4,2 in the mesh's units, not \"" + c.period + "\"");
         options.period = glm::dvec2(x->value, y->value);
     }
     auto mesh = readTileMesh(c.source, options);
@@ -129,20 +138,32 @@ Json toJson(const std::string& file, uint64_t fileBytes, const Asset& a) {
 }
 
 std::string summary(const std::string& file, uint64_t fileBytes, const Asset& a) {
-    std::string text = fmt::format("{}: mesostructure asset version {}, {}\n", file, kAssetVersion, formatBytes(fileBytes));
-    if (a.heights) text += fmt::format("  source      height field of {} x {} texels\n", a.heights->size.x, a.heights->size.y);
-    else if (!a.solid.empty()) text += fmt::format("  source      the solid {}, seed {}\n", a.solid, a.seed);
-    else text += fmt::format("  source      mesh of {} triangles\n", formatCount(a.triangles.size()));
+    std::string text =
+        fmt::format("{}: mesostructure asset version {}, {}\n", file, kAssetVersion, formatBytes(fileBytes));
+    if (a.heights)
+        text += fmt::format("  source      height field of {} x {} texels\n", a.heights->size.x, a.heights->size.y);
+    else if (!a.solid.empty())
+        text += fmt::format("  source      the solid {}, seed {}\n", a.solid, a.seed);
+    else
+        text += fmt::format("  source      mesh of {} triangles\n", formatCount(a.triangles.size()));
     text += fmt::format("  tile        {:.6g} x {:.6g}, {:.6g} high", a.extent.x, a.extent.y, a.extent.z);
     if (a.occupancy) {
         const glm::ivec3 n = a.occupancy->grid.cells;
-        text += fmt::format("\n  grid        {} x {} x {} cells, {} with surface", n.x, n.y, n.z, formatCount(a.occupancy->count()));
+        text += fmt::format("\n  grid        {} x {} x {} cells, {} with surface", n.x, n.y, n.z,
+                            formatCount(a.occupancy->count()));
     }
-    if (a.distances) text += fmt::format("\n  distances   {} x {} cones, {}", a.distances->cones.azimuth, a.distances->cones.elevation, formatBytes(a.distances->bytes()));
-    if (a.compressed) text += fmt::format("\n  compressed  {}: {:.2f} times fewer bytes, {:.2f} times fewer texels", formatBytes(a.compressed->bytes()),
-                                          double(a.distances->bytes()) / double(a.compressed->bytes()), a.compressed->texelRatio());
+    if (a.distances)
+        text += fmt::format("\n  distances   {} x {} cones, {}", a.distances->cones.azimuth,
+                            a.distances->cones.elevation, formatBytes(a.distances->bytes()));
+    if (a.compressed)
+        text += fmt::format("\n  compressed  {}: {:.2f} times fewer bytes, {:.2f} times fewer texels",
+                            formatBytes(a.compressed->bytes()),
+                            double(a.distances->bytes()) / double(a.compressed->bytes()), a.compressed->texelRatio());
     if (a.boxes) text += fmt::format("\n  boxes       {}", formatBytes(a.boxes->bytes()));
-    if (a.patches) text += fmt::format("\n  patches     {}, {}; {} cells with surface have none", formatCount(a.patches->patches.size()), formatBytes(a.patches->bytes()), formatCount(a.patches->cellsWithout));
+    if (a.patches)
+        text += fmt::format("\n  patches     {}, {}; {} cells with surface have none",
+                            formatCount(a.patches->patches.size()), formatBytes(a.patches->bytes()),
+                            formatCount(a.patches->cellsWithout));
     if (a.field) {
         const glm::ivec3 n = a.field->grid.cells;
         text += fmt::format("\n  samples     {} x {} x {}, {}", n.x, n.y, n.z + 1, formatBytes(a.field->bytes()));
@@ -173,8 +194,10 @@ Result<int> runBuild(const BuildMeso& command) {
     if (!bytes) return bytes.error();
     Json json = toJson(command.out, *bytes, asset);
     json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (command.report.json) VCP_TRY(printJson(json));
-    else VCP_TRY(printLine(summary(command.out, *bytes, asset)));
+    if (command.report.json)
+        VCP_TRY(printJson(json));
+    else
+        VCP_TRY(printLine(summary(command.out, *bytes, asset)));
     return 0;
 }
 
@@ -183,8 +206,10 @@ Result<int> runInfo(const InfoMeso& command) {
     if (!asset) return asset.error();
     std::error_code ignored;
     const uint64_t bytes = std::filesystem::file_size(command.file, ignored);
-    if (command.report.json) VCP_TRY(printJson(toJson(command.file, bytes, *asset)));
-    else VCP_TRY(printLine(summary(command.file, bytes, *asset)));
+    if (command.report.json)
+        VCP_TRY(printJson(toJson(command.file, bytes, *asset)));
+    else
+        VCP_TRY(printLine(summary(command.file, bytes, *asset)));
     return 0;
 }
 
@@ -192,29 +217,57 @@ RunCommand addMesoBuild(CLI::App& meso) {
     auto command = std::make_shared<BuildMeso>();
     CLI::App* app = meso.add_subcommand("build", "Make an asset from a height map, a mesh, or a procedural one");
     app->add_option("SOURCE", command->source,
-                    fmt::format("A PNG or EXR of heights, a closed mesh, or one of {}; {}", fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")))
+                    fmt::format("A PNG or EXR of heights, a closed mesh, or one of {}; {}",
+                                fmt::join(heightFieldNames(), ", "), fmt::join(solidNames(), ", ")))
         ->type_name("")
         ->required();
-    app->add_option("-o,--output", command->out, "The asset to write")->type_name("OUT.meso")->required()->check([](const std::string& name) { return extensionProblem(name, ".meso", false); });
+    app->add_option("-o,--output", command->out, "The asset to write")
+        ->type_name("OUT.meso")
+        ->required()
+        ->check([](const std::string& name) { return extensionProblem(name, ".meso", false); });
     addOverwriteOption(*app, command->overwrite);
-    app->add_option("--height", command->height, "Height of a PNG's white, of an EXR's greatest value over its least, in tile edges [0.1, or the procedural one's own]")->type_name("H")->check(CLI::Range(1e-4, 16.0));
-    app->add_option("--texels", command->texels, "Texels an edge of a procedural height field")->type_name("N")->capture_default_str()->check(CLI::Range(8, kMaxGridEdge));
+    app->add_option("--height", command->height,
+                    "Height of a PNG's white, of an EXR's greatest value over its least, in tile edges [0.1, or the "
+                    "procedural one's own]")
+        ->type_name("H")
+        ->check(CLI::Range(1e-4, 16.0));
+    app->add_option("--texels", command->texels, "Texels an edge of a procedural height field")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(8, kMaxGridEdge));
     app->add_option("--seed", command->seed, "Of procedural ones")->type_name("N")->capture_default_str();
     app->add_option("--grid", command->grid, "Cells: 64 along x, or 64x64x16")->type_name("N")->capture_default_str();
-    app->add_option("--samples", command->samples, "Samples of a solid's distance a cell, along each axis")->type_name("N")->capture_default_str()->check(CLI::Range(1, 16));
-    app->add_option("--cones", command->cones, "Directional distance maps: azimuths x elevations")->type_name("MxN")->capture_default_str();
-    app->add_option("--cap", command->cap, "Longest distance that is stored, in tile edges")->type_name("D")->capture_default_str()->check(CLI::Range(1e-3, 16.0));
-    app->add_option("--distances", command->rule, "any-point: conservative; paper: as published, which oversteps; paper-safe: less a diagonal")
+    app->add_option("--samples", command->samples, "Samples of a solid's distance a cell, along each axis")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 16));
+    app->add_option("--cones", command->cones, "Directional distance maps: azimuths x elevations")
+        ->type_name("MxN")
+        ->capture_default_str();
+    app->add_option("--cap", command->cap, "Longest distance that is stored, in tile edges")
+        ->type_name("D")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-3, 16.0));
+    app->add_option("--distances", command->rule,
+                    "any-point: conservative; paper: as published, which oversteps; paper-safe: less a diagonal")
         ->capture_default_str()
         ->check(CLI::IsMember({"any-point", "paper", "paper-safe"}));
-    app->add_option("--blocks", command->blocks, "Edges of the compression's blocks, coarse first: 4 is two levels, 4,2 three; none")->type_name("N,N")->capture_default_str();
-    app->add_option("--crossings", command->crossings, "Points of the quadrics: found on the cells' edges, or of fitted quadrics as published")
+    app->add_option("--blocks", command->blocks,
+                    "Edges of the compression's blocks, coarse first: 4 is two levels, 4,2 three; none")
+        ->type_name("N,N")
+        ->capture_default_str();
+    app->add_option("--crossings", command->crossings,
+                    "Points of the quadrics: found on the cells' edges, or of fitted quadrics as published")
         ->capture_default_str()
         ->check(CLI::IsMember({"direct", "fitted"}));
     app->add_flag("--no-boxes", command->noBoxes, "Without octant boxes");
     app->add_flag("--no-patches", command->noPatches, "Without quadrics");
-    app->add_option("--up", command->up, "The mesh's axis out of the surface")->capture_default_str()->check(CLI::IsMember({"x", "y", "z"}));
-    app->add_option("--period", command->period, "After how much the mesh repeats, in its units [it stands alone in its tile]")->type_name("X,Y");
+    app->add_option("--up", command->up, "The mesh's axis out of the surface")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"x", "y", "z"}));
+    app->add_option("--period", command->period,
+                    "After how much the mesh repeats, in its units [it stands alone in its tile]")
+        ->type_name("X,Y");
     addJsonOption(*app, command->report);
     return [command] { return runBuild(*command); };
 }

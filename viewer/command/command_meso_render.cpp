@@ -61,7 +61,9 @@ template <class T>
 Result<T> valueOf(const std::vector<T>& values, size_t i, size_t count, T otherwise, const char* option) {
     if (values.empty()) return otherwise;
     if (values.size() == 1) return values[0];
-    if (values.size() != count) return wrong(fmt::format("{} is given {} times for {} assets; once, or once for each", option, values.size(), count));
+    if (values.size() != count)
+        return wrong(
+            fmt::format("{} is given {} times for {} assets; once, or once for each", option, values.size(), count));
     return values[i];
 }
 
@@ -79,27 +81,34 @@ Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
     const size_t count = c.assets.size();
     const auto surface = valueOf(c.surfaces, i, count, std::string("quad"), "--surface");
     if (!surface) return surface.error();
-    const auto tiles = valueOf(c.tiles, i, count, 4.0, "--tiles"), height = valueOf(c.heights, i, count, 1.0, "--height"), scale = valueOf(c.scales, i, count, 1.0, "--scale");
+    const auto tiles = valueOf(c.tiles, i, count, 4.0, "--tiles"),
+               height = valueOf(c.heights, i, count, 1.0, "--height"),
+               scale = valueOf(c.scales, i, count, 1.0, "--scale");
     for (const auto* value : {&tiles, &height, &scale})
         if (!*value) return value->error();
     if (!(*scale > 0) || !std::isfinite(*scale)) return wrong("--scale must be above 0");
     if (!(*tiles > 0) || *tiles > 4096) return wrong("--tiles must be above 0 and at most 4096");
     if (!(*height > 0) || !std::isfinite(*height)) return wrong("--height must be above 0");
-    const auto place = valueOf(c.places, i, count, std::string("0,0,0"), "--at"), colour = valueOf(c.colours, i, count, std::string(kColours[i % std::size(kColours)]), "--colour");
+    const auto place = valueOf(c.places, i, count, std::string("0,0,0"), "--at"),
+               colour = valueOf(c.colours, i, count, std::string(kColours[i % std::size(kColours)]), "--colour");
     for (const auto* value : {&place, &colour})
         if (!*value) return value->error();
     const auto at = threeOf(*place, "--at", "0,0.5,0"), rgb = threeOf(*colour, "--colour", "0.8,0.7,0.6");
     for (const auto* value : {&at, &rgb})
         if (!*value) return value->error();
-    if (glm::clamp(*rgb, 0.0, 1.0) != *rgb) return wrong("--colour must be three numbers from 0 to 1, not \"" + *colour + "\"");
+    if (glm::clamp(*rgb, 0.0, 1.0) != *rgb)
+        return wrong("--colour must be three numbers from 0 to 1, not \"" + *colour + "\"");
     const auto cones = parseSize(c.cones);
-    if (!cones || cones->x > 32 || cones->y > 16) return wrong("--cones must be whole numbers from 1x1 to 32x16, like 4x2, not \"" + c.cones + "\"");
-    const auto texture = valueOf(c.textures, i, count, std::string(), "--texture"), normals = valueOf(c.normalTextures, i, count, std::string(), "--normal-texture");
+    if (!cones || cones->x > 32 || cones->y > 16)
+        return wrong("--cones must be whole numbers from 1x1 to 32x16, like 4x2, not \"" + c.cones + "\"");
+    const auto texture = valueOf(c.textures, i, count, std::string(), "--texture"),
+               normals = valueOf(c.normalTextures, i, count, std::string(), "--normal-texture");
     for (const auto* value : {&texture, &normals})
         if (!*value) return value->error();
     d.withFar = c.errorPixels > 0;
     d.colourTexture = *texture, d.normalTexture = *normals;
-    d.asset = c.assets[i], d.base = *surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale, d.place = *at, d.colour = glm::vec3(*rgb), d.up = upOf(c);
+    d.asset = c.assets[i], d.base = *surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale,
+    d.place = *at, d.colour = glm::vec3(*rgb), d.up = upOf(c);
     d.method.cones = {cones->x, cones->y};
     return d;
 }
@@ -132,10 +141,15 @@ Result<Camera> cameraOf(const RenderMeso& c, const Box& bounds, glm::ivec2 size)
     }
     const std::vector<double> view = numbersOf(c.view);
     if (view.size() < 2 || view.size() > 3 || std::abs(view[1]) >= 90 || (view.size() == 3 && !(view[2] > 0)))
-        return wrong("--view must be an azimuth and an elevation below 90 degrees, like 30,35, or with a magnification, like 30,35,2; not \"" + c.view + "\"");
+        return wrong(
+            "--view must be an azimuth and an elevation below 90 degrees, like 30,35, or with a magnification, like "
+            "30,35,2; not \"" +
+            c.view + "\"");
     const double turn = view[0] * std::numbers::pi / 180, rise = view[1] * std::numbers::pi / 180;
-    const glm::dvec3 forward = turnedUp({-std::cos(rise) * std::cos(turn), -std::cos(rise) * std::sin(turn), -std::sin(rise)}, upOf(c));
-    Camera camera = fitCamera(bounds.low, bounds.high, forward, turnedUp({0, 0, 1}, upOf(c)), kFov, double(size.x) / size.y);
+    const glm::dvec3 forward =
+        turnedUp({-std::cos(rise) * std::cos(turn), -std::cos(rise) * std::sin(turn), -std::sin(rise)}, upOf(c));
+    Camera camera =
+        fitCamera(bounds.low, bounds.high, forward, turnedUp({0, 0, 1}, upOf(c)), kFov, double(size.x) / size.y);
     if (view.size() == 3) camera.verticalFov = 2 * std::atan(std::tan(kFov / 2) / view[2]);
     return camera;
 }
@@ -176,7 +190,8 @@ Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, i
     return stats;
 }
 
-Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const RenderMeso& command, const OutputRules& rules, const std::string& method) {
+Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const RenderMeso& command,
+                        const OutputRules& rules, const std::string& method) {
     const auto stats = drawFrames(renderer, request, command.frames);
     if (!stats) return stats.error();
     auto picture = renderer.readPicture();
@@ -192,8 +207,15 @@ Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const R
     if (!problems.empty()) return Error{.code = ErrorCode::Device, .message = problems.front()};
     const double mean = std::accumulate(iterations->begin(), iterations->end(), 0.0) / double(iterations->size());
     return Panel{*std::move(picture),
-                 {{"method", method}, {"ms_per_frame", stats->msFrame}, {"hit_pixels", stats->hitPixels}, {"iterations_mean", mean}, {"unresolved", stats->unresolvedRays}, {"far_hits", stats->farHits}, {"asset_bytes", stats->surfaceBytes}},
-                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame, mean, stats->unresolvedRays, formatBytes(stats->surfaceBytes))};
+                 {{"method", method},
+                  {"ms_per_frame", stats->msFrame},
+                  {"hit_pixels", stats->hitPixels},
+                  {"iterations_mean", mean},
+                  {"unresolved", stats->unresolvedRays},
+                  {"far_hits", stats->farHits},
+                  {"asset_bytes", stats->surfaceBytes}},
+                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame,
+                             mean, stats->unresolvedRays, formatBytes(stats->surfaceBytes))};
 }
 
 Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
@@ -201,7 +223,8 @@ Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
     if (!size) return wrong("--size must be like 960x640, not \"" + command.size + "\"");
     const auto camera = cameraOf(command, bounds, *size);
     if (!camera) return camera.error();
-    const auto light = command.light.empty() ? turnedUp({0.5, -0.4, 0.75}, upOf(command)) : parseDirection(command.light);
+    const auto light =
+        command.light.empty() ? turnedUp({0.5, -0.4, 0.75}, upOf(command)) : parseDirection(command.light);
     if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
     FrameRequest request;
     request.camera = *camera;
@@ -214,7 +237,8 @@ Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
     return request;
 }
 
-Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels, const std::vector<std::string>& warnings, const DeviceInfo& device) {
+Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels,
+                   const std::vector<std::string>& warnings, const DeviceInfo& device) {
     if (command.report.json) {
         Json json = {{"file", command.out}, {"device", device.name}, {"warnings", warnings}, {"panels", Json::array()}};
         for (const Panel& panel : panels) json["panels"].push_back(panel.json);
@@ -229,7 +253,8 @@ Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels, 
 
 /// What the picture may replace: nothing that is read.
 OutputRules rulesOf(const RenderMeso& command, const std::vector<MesoSurfaceDescription>& descriptions) {
-    OutputRules rules{.overwrite = command.overwrite, .inputs = filesOf(SceneFile{.datasets = {{command.scan, {}}}, .surfaces = descriptions})};
+    OutputRules rules{.overwrite = command.overwrite,
+                      .inputs = filesOf(SceneFile{.datasets = {{command.scan, {}}}, .surfaces = descriptions})};
     rules.inputs.emplace_back(command.camera);
     return rules;
 }
@@ -281,37 +306,83 @@ RunCommand addMesoRender(CLI::App& meso) {
     MesoSurfaceDescription& d = command->description;
     CLI::App* app = meso.add_subcommand("render", "A picture of assets on surfaces");
     app->add_option("ASSET", command->assets, "Procedural ones by name, or assets (.meso)")->type_name("")->required();
-    app->add_option("-o,--output", command->out, "The PNG to write")->type_name("FILE")->required()->check([](const std::string& name) { return extensionProblem(name, ".png", false); });
+    app->add_option("-o,--output", command->out, "The PNG to write")
+        ->type_name("FILE")
+        ->required()
+        ->check([](const std::string& name) { return extensionProblem(name, ".png", false); });
     addOverwriteOption(*app, command->overwrite);
-    app->add_option("--surface", command->surfaces, fmt::format("{}, or a mesh with texture coordinates; for all assets, or each [quad]", fmt::join(meso::baseSurfaceNames(), ", ")))
+    app->add_option("--surface", command->surfaces,
+                    fmt::format("{}, or a mesh with texture coordinates; for all assets, or each [quad]",
+                                fmt::join(meso::baseSurfaceNames(), ", ")))
         ->type_name("BASE")
         ->allow_extra_args(false);
-    app->add_option("--at", command->places, "Where the surface's origin is, world units; for all assets, or each [0,0,0]")->type_name("X,Y,Z")->allow_extra_args(false);
-    app->add_option("--scale", command->scales, "Times the surface's own size; for all assets, or each [1]")->type_name("X")->allow_extra_args(false);
-    app->add_option("--scan", command->scan, "In the same picture: an octree (.vcp), a mesh, which is built into the cache first, or a scene of several (.json)")->type_name("FILE");
-    app->add_option("--up", command->up, "Which way is up, for surfaces and view")->capture_default_str()->check(CLI::IsMember({"y", "z"}));
-    app->add_option("--method", command->methods, fmt::format("{}; several are drawn side by side [boxes]", fmt::join(meso::methodNames(), ", ")))
+    app->add_option("--at", command->places,
+                    "Where the surface's origin is, world units; for all assets, or each [0,0,0]")
+        ->type_name("X,Y,Z")
+        ->allow_extra_args(false);
+    app->add_option("--scale", command->scales, "Times the surface's own size; for all assets, or each [1]")
+        ->type_name("X")
+        ->allow_extra_args(false);
+    app->add_option("--scan", command->scan,
+                    "In the same picture: an octree (.vcp), a mesh, which is built into the cache first, or a scene of "
+                    "several (.json)")
+        ->type_name("FILE");
+    app->add_option("--up", command->up, "Which way is up, for surfaces and view")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"y", "z"}));
+    app->add_option("--method", command->methods,
+                    fmt::format("{}; several are drawn side by side [boxes]", fmt::join(meso::methodNames(), ", ")))
         ->type_name("A,B")
         ->delimiter(',')
         ->allow_extra_args(false);
-    app->add_option("--grid", d.method.cells, "Cells along x of the method's grid [the asset's, or 64]")->type_name("N")->check(CLI::Range(1, meso::kMaxGridEdge));
-    app->add_option("--cones", command->cones, "Of ddm methods: azimuths x elevations")->type_name("MxN")->capture_default_str();
-    app->add_option("--steps", d.method.steps, "Of relief methods, from the slab's top to its bottom")->type_name("N")->capture_default_str()->check(CLI::Range(1, 4096));
-    app->add_option("--tiles", command->tiles, "Tile edges along the surface, or a unit of a mesh's coordinates; for all assets, or each [4]")->type_name("N")->allow_extra_args(false);
-    app->add_option("--height", command->heights, "Times the asset's own height; for all assets, or each [1]")->type_name("X")->allow_extra_args(false);
-    app->add_option("--colour", command->colours, "Red, green, blue up to 1, as the screen has them; for all assets, or each")->type_name("R,G,B")->allow_extra_args(false);
-    app->add_option("--texture", command->textures, "A picture (PNG, JPEG) over the tile, in place of --colour; for all assets, or each")->type_name("FILE")->allow_extra_args(false);
-    app->add_option("--normal-texture", command->normalTextures, "A picture of normals over the tile (OpenGL: green is up) that bends those of the asset; for all assets, or each")
+    app->add_option("--grid", d.method.cells, "Cells along x of the method's grid [the asset's, or 64]")
+        ->type_name("N")
+        ->check(CLI::Range(1, meso::kMaxGridEdge));
+    app->add_option("--cones", command->cones, "Of ddm methods: azimuths x elevations")
+        ->type_name("MxN")
+        ->capture_default_str();
+    app->add_option("--steps", d.method.steps, "Of relief methods, from the slab's top to its bottom")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 4096));
+    app->add_option("--tiles", command->tiles,
+                    "Tile edges along the surface, or a unit of a mesh's coordinates; for all assets, or each [4]")
+        ->type_name("N")
+        ->allow_extra_args(false);
+    app->add_option("--height", command->heights, "Times the asset's own height; for all assets, or each [1]")
+        ->type_name("X")
+        ->allow_extra_args(false);
+    app->add_option("--colour", command->colours,
+                    "Red, green, blue up to 1, as the screen has them; for all assets, or each")
+        ->type_name("R,G,B")
+        ->allow_extra_args(false);
+    app->add_option("--texture", command->textures,
+                    "A picture (PNG, JPEG) over the tile, in place of --colour; for all assets, or each")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
+    app->add_option("--normal-texture", command->normalTextures,
+                    "A picture of normals over the tile (OpenGL: green is up) that bends those of the asset; for all "
+                    "assets, or each")
         ->type_name("FILE")
         ->allow_extra_args(false);
     app->add_option("--size", command->size, "Pixels")->type_name("WxH")->capture_default_str();
-    app->add_option("--view", command->view, "Azimuth and elevation of the eye in degrees, magnification")->type_name("A,E,M")->capture_default_str();
-    app->add_option("--camera", command->camera, "fit, front, ..., isometric, or a camera file, in place of --view")->type_name("CAMERA");
-    app->add_option("--light", command->light, "Towards the light, in world space [0.5,-0.4,0.75 where z is up]")->type_name("X,Y,Z");
+    app->add_option("--view", command->view, "Azimuth and elevation of the eye in degrees, magnification")
+        ->type_name("A,E,M")
+        ->capture_default_str();
+    app->add_option("--camera", command->camera, "fit, front, ..., isometric, or a camera file, in place of --view")
+        ->type_name("CAMERA");
+    app->add_option("--light", command->light, "Towards the light, in world space [0.5,-0.4,0.75 where z is up]")
+        ->type_name("X,Y,Z");
     app->add_option("--depth", command->depth, "Distances along the rays, as `vcp render --depth`")->type_name("FILE");
-    app->add_option("--frames", command->frames, "Draw so many more frames and report their median")->type_name("N")->check(CLI::Range(0, 10000));
-    app->add_option("--device", command->device, "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")->type_name("DEVICE");
-    app->add_option("--error-pixels", command->errorPixels, "Mesostructure that strays less than that from its mean height, with tiles of at most eight times that, is not marched; 0: all is")
+    app->add_option("--frames", command->frames, "Draw so many more frames and report their median")
+        ->type_name("N")
+        ->check(CLI::Range(0, 10000));
+    app->add_option("--device", command->device,
+                    "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")
+        ->type_name("DEVICE");
+    app->add_option("--error-pixels", command->errorPixels,
+                    "Mesostructure that strays less than that from its mean height, with tiles of at most eight times "
+                    "that, is not marched; 0: all is")
         ->type_name("X")
         ->capture_default_str()
         ->check(CLI::Range(0.0, 64.0));

@@ -60,10 +60,10 @@ struct Drawing {
     std::vector<double> frameMs;
 
     /// Of the timed frames; of the first when none was timed.
-    [[nodiscard]] double medianMs() const {
-        return frameMs.empty() ? firstFrameMs : quantile(frameMs, 0.5);
+    [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : quantile(frameMs, 0.5); }
+    [[nodiscard]] double raysPerSecond() const {
+        return static_cast<double>(stats.rays) / std::max(1e-3 * medianMs(), 1e-9);
     }
-    [[nodiscard]] double raysPerSecond() const { return static_cast<double>(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
 };
 
 /// Without --settle: what is there as soon as the coarsest page is.
@@ -87,13 +87,16 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
         auto stats = renderer.render(request);
         if (!stats) return stats.error();
         drawing.stats = *stats;
-        if (i == 0) drawing.firstFrameMs = stats->msFrame;
-        else drawing.frameMs.push_back(stats->msFrame);
+        if (i == 0)
+            drawing.firstFrameMs = stats->msFrame;
+        else
+            drawing.frameMs.push_back(stats->msFrame);
     }
     return drawing;
 }
 
-Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command, const OutputRules& rules) {
+Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command,
+                        const OutputRules& rules) {
     if (!command.depth.empty()) {
         const auto depth = renderer.readDepth();
         if (!depth) return depth.error();
@@ -141,7 +144,8 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
 
 std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device) {
     const UpdateResult& update = drawing.update;
-    const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels) : "no certified error";
+    const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
+                                                                : "no certified error";
     return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s) on {}{}\n  {} subvolumes, {} resident, {}, {}",
                        command.output, command.size, drawing.frameMs.empty() ? "first frame" : "a frame",
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), device.name,
@@ -182,7 +186,8 @@ Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& d
 }
 
 /// Pictures in tiles and sequences, with progress; what is finished when it is cancelled stays.
-Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras, const RenderCommand& command, const OutputRules& rules) {
+Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras,
+                       const RenderCommand& command, const OutputRules& rules) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     PictureSequence sequence(renderer, {.request = request,
                                         .cameras = cameras,
@@ -202,17 +207,23 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
     display.finish();
     const TiledPictureStats& total = sequence.stats();
     if (command.report.json) return printJson(toJson(total, cameras.size(), renderer.device(), request));
-    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(), numbered(command.output, cameras.size()).string()) : command.output;
-    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles, formatSeconds(1e-3 * total.ms)));
+    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(),
+                                                                numbered(command.output, cameras.size()).string())
+                                                  : command.output;
+    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles,
+                                                      formatSeconds(1e-3 * total.ms)));
 }
 
 /// Options of the output that do not go together.
 Result<void> checkOptions(const RenderCommand& command) {
     const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
-    if (command.output == kStandardOutput && command.isSequence()) return usage("several pictures cannot go to standard output; give a file name");
-    if (command.output == kStandardOutput && command.report.json) return usage("--json and -o - both want standard output");
+    if (command.output == kStandardOutput && command.isSequence())
+        return usage("several pictures cannot go to standard output; give a file name");
+    if (command.output == kStandardOutput && command.report.json)
+        return usage("--json and -o - both want standard output");
     const std::filesystem::path output = command.output, depth = command.depth, normals = command.normals;
-    if (depth == output || normals == output || (!command.depth.empty() && depth == normals)) return usage("picture, --depth and --normals must be different files");
+    if (depth == output || normals == output || (!command.depth.empty() && depth == normals))
+        return usage("picture, --depth and --normals must be different files");
     return {};
 }
 
@@ -228,7 +239,9 @@ OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesys
 /// Finds what would be refused before anything is built or drawn.
 Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules, size_t pictures) {
     for (const std::string& name : {command.output, command.depth, command.normals})
-        for (size_t i = 1; !name.empty() && i <= pictures; ++i) VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name), *outputKindOf(name == kStandardOutput ? "-.png" : name), rules));
+        for (size_t i = 1; !name.empty() && i <= pictures; ++i)
+            VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name),
+                                *outputKindOf(name == kStandardOutput ? "-.png" : name), rules));
     return {};
 }
 
@@ -236,13 +249,15 @@ Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     const glm::ivec2 size = parseSize(command.size).value();
-    const auto open = openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle());
+    const auto open =
+        openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle());
     if (!open) return open.error();
     if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
     const SceneFile& scene = open->file;
     for (const std::string& warning : open->surfaces.warnings) warnOnTerminal(warning);
     const Box bounds = open->bounds();
-    const auto camera = command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size);
+    const auto camera =
+        command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size);
     if (!camera) return camera.error();
     const auto cameras = camerasOf(command, *camera, bounds);
     if (!cameras) return cameras.error();
@@ -279,7 +294,9 @@ Result<int> run(const RenderCommand& command) {
     if (!drawing) return drawing.error();
     VCP_TRY(writeFiles(**renderer, request, command, rules));
     if (drawing->stats.unresolvedRays > 0)
-        warnOnTerminal(fmt::format("{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them", drawing->stats.unresolvedRays));
+        warnOnTerminal(
+            fmt::format("{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
+                        drawing->stats.unresolvedRays));
     if (command.report.json)
         VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
     else
@@ -299,32 +316,48 @@ std::string checkPlane(const std::string& text) {
 
 Command addRender(CLI::App& vcp) {
     auto command = std::make_shared<RenderCommand>();
-    CLI::App* app = vcp.add_subcommand("render", "Render .vcp files, a scene or meshes into a picture, without a window");
-    app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
+    CLI::App* app =
+        vcp.add_subcommand("render", "Render .vcp files, a scene or meshes into a picture, without a window");
+    app->add_option("IN", command->inputs,
+                    ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the "
+                    "cache first")
         ->type_name("")
         ->required();
-    app->add_option("-o,--output", command->output, "The PNG file to write; - for standard output")->type_name("OUT.png")->required()->check([](const std::string& name) { return extensionProblem(name, ".png", true); });
+    app->add_option("-o,--output", command->output, "The PNG file to write; - for standard output")
+        ->type_name("OUT.png")
+        ->required()
+        ->check([](const std::string& name) { return extensionProblem(name, ".png", true); });
     addOverwriteOption(*app, command->overwrite);
-    app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check(checkSize);
+    app->add_option("--size", command->size, "Width and height in pixels")
+        ->type_name("WxH")
+        ->capture_default_str()
+        ->check(checkSize);
     addRenderSettings(*app, command->render);
     app->add_flag("--transparent", command->transparent, "No background: alpha 0 where nothing is hit");
-    CLI::Option* turntable = app->add_option("--turntable", command->turntable, "So many pictures once around the up axis: OUT-0001.png and so on")
+    CLI::Option* turntable = app->add_option("--turntable", command->turntable,
+                                             "So many pictures once around the up axis: OUT-0001.png and so on")
                                  ->type_name("N")
                                  ->check(CLI::Range(1, 9999));
-    app->add_option("--path", command->path, "Pictures along a smooth path through the cameras of a JSON array, --frames of them [120]: OUT-0001.png and so on")
+    app->add_option("--path", command->path,
+                    "Pictures along a smooth path through the cameras of a JSON array, --frames of them [120]: "
+                    "OUT-0001.png and so on")
         ->type_name("FILE")
         ->excludes(turntable);
-    app->add_option("--tile", command->tile, fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
+    app->add_option(
+           "--tile", command->tile,
+           fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
         ->type_name("PIXELS")
         ->check(CLI::Range(16, 8192));
-    app->add_option("--depth", command->depth, "Write also the distance along each ray: .pfm (float, world units) or .png "
-                                               "(16-bit, 0 no hit, 1 nearest to 65535 farthest)")
+    app->add_option("--depth", command->depth,
+                    "Write also the distance along each ray: .pfm (float, world units) or .png "
+                    "(16-bit, 0 no hit, 1 nearest to 65535 farthest)")
         ->type_name("FILE")
         ->check(checkPlane);
     app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
         ->type_name("FILE")
         ->check(checkPlane);
-    app->add_option("--frames", command->frames, "Draw so many frames after the first and report their median time [0; 5 with --json]")
+    app->add_option("--frames", command->frames,
+                    "Draw so many frames after the first and report their median time [0; 5 with --json]")
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));
     app->add_flag("--settle,!--no-settle", command->settle, "Wait until all that the view wants is loaded [on]");

@@ -45,7 +45,8 @@ Result<void> writeReport(const StressCommand& command, const StressReport& repor
     const OutputRules rules{.overwrite = command.overwrite, .inputs = {command.file, command.path}};
     VCP_TRY(writeFile(folder / "stress.json", OutputKind::JsonText, stressJson(report), rules));
     VCP_TRY(writeFile(folder / "stress.md", OutputKind::Text, stressMarkdown(report), rules));
-    for (const auto& [name, svg] : stressPlots(report)) VCP_TRY(writeFile(folder / (name + ".svg"), OutputKind::Svg, svg, rules));
+    for (const auto& [name, svg] : stressPlots(report))
+        VCP_TRY(writeFile(folder / (name + ".svg"), OutputKind::Svg, svg, rules));
     return {};
 }
 
@@ -110,48 +111,77 @@ Result<int> run(const StressCommand& command) {
 
 Command addStress(CLI::App& vcp) {
     auto command = std::make_shared<StressCommand>();
-    CLI::App* app = vcp.add_subcommand("stress", "Stream under budgets and faults along a camera path, and check every invariant");
+    CLI::App* app =
+        vcp.add_subcommand("stress", "Stream under budgets and faults along a camera path, and check every invariant");
     app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
-    app->add_option("--path", command->path, fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
+    app->add_option("--path", command->path,
+                    fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("PATH")
         ->capture_default_str();
-    app->add_option("--budget", command->budget, "Memory for subvolumes on the device")->type_name("BYTES")->capture_default_str()->check(budgetProblem);
-    app->add_option("--ram", command->ram, "Memory for subvolumes on their way there, and for stored ones kept to be read again")->type_name("BYTES")->capture_default_str()->check(budgetProblem);
+    app->add_option("--budget", command->budget, "Memory for subvolumes on the device")
+        ->type_name("BYTES")
+        ->capture_default_str()
+        ->check(budgetProblem);
+    app->add_option("--ram", command->ram,
+                    "Memory for subvolumes on their way there, and for stored ones kept to be read again")
+        ->type_name("BYTES")
+        ->capture_default_str()
+        ->check(budgetProblem);
     app->add_option("--faults", command->faults,
-                    "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, bandwidth=2.5M (bytes a second)")
+                    "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, "
+                    "bandwidth=2.5M (bytes a second)")
         ->type_name("A=X,B=Y")
-        ->check([](const std::string& text) { return parseFaults(text) ? std::string() : "must be like error=0.1,stall=500ms, not \"" + text + "\""; });
+        ->check([](const std::string& text) {
+            return parseFaults(text) ? std::string() : "must be like error=0.1,stall=500ms, not \"" + text + "\"";
+        });
     app->add_option("--order", command->order,
-                    "Which pages are read first: feedback (what rays ask for), error, nearest, breadth, random; of several, the first is used and all\n"
+                    "Which pages are read first: feedback (what rays ask for), error, nearest, breadth, random; of "
+                    "several, the first is used and all\n"
                     "are compared on the path's last view")
         ->type_name("A,B")
         ->capture_default_str()
-        ->check([](const std::string& text) { return parseOrders(text) ? std::string() : "must be like feedback,nearest, not \"" + text + "\""; });
-    app->add_option("--seed", command->seed, "Of the faults and of the paths teleport and jitter")->type_name("N")->capture_default_str();
-    app->add_option("--frames", command->frames, "Frames along the path")->type_name("N")->capture_default_str()->check(CLI::Range(1, 1'000'000));
-    app->add_option("--views", command->views, "More than one: so many views then fly along the path together, with one pool and one budget")
+        ->check([](const std::string& text) {
+            return parseOrders(text) ? std::string() : "must be like feedback,nearest, not \"" + text + "\"";
+        });
+    app->add_option("--seed", command->seed, "Of the faults and of the paths teleport and jitter")
+        ->type_name("N")
+        ->capture_default_str();
+    app->add_option("--frames", command->frames, "Frames along the path")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
+    app->add_option("--views", command->views,
+                    "More than one: so many views then fly along the path together, with one pool and one budget")
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 100));
-    app->add_option("--size", command->size, "Width and height in pixels")->type_name("WxH")->capture_default_str()->check([](const std::string& text) {
-        return parseSize(text) ? std::string() : "must be like 640x400, not \"" + text + "\"";
-    });
+    app->add_option("--size", command->size, "Width and height in pixels")
+        ->type_name("WxH")
+        ->capture_default_str()
+        ->check([](const std::string& text) {
+            return parseSize(text) ? std::string() : "must be like 640x400, not \"" + text + "\"";
+        });
     app->add_option("--error-pixels", command->errorPixels, "Error that a picture may have, in pixels")
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
     CLI::Option* motion = app->add_option("--motion", command->motionSeconds,
-                    "Instead: turn once about the dataset in so many seconds, as the window draws it (smaller while it is slow), and count frames by size")
-        ->type_name("SECONDS")
-        ->check(CLI::Range(0.1, 3600.0));
-    app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")->type_name("DEVICE");
-    app->add_option("--out", command->out, "Folder for the report as JSON and Markdown, and for its plots")->type_name("DIR")->excludes(motion);
+                                          "Instead: turn once about the dataset in so many seconds, as the window "
+                                          "draws it (smaller while it is slow), and count frames by size")
+                              ->type_name("SECONDS")
+                              ->check(CLI::Range(0.1, 3600.0));
+    app->add_option("--device", command->device, "Vulkan device, see `vcp devices` [the best one]")
+        ->type_name("DEVICE");
+    app->add_option("--out", command->out, "Folder for the report as JSON and Markdown, and for its plots")
+        ->type_name("DIR")
+        ->excludes(motion);
     addOverwriteOption(*app, command->overwrite);
     addSourceSettings(*app, command->source);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
-    app->footer("Exit status 1 when an invariant breaks: a budget exceeded, a view that does not settle or is called settled\n"
-                "and is not, a page loaded twice in a still view, a picture that faults have changed.");
+    app->footer(
+        "Exit status 1 when an invariant breaks: a budget exceeded, a view that does not settle or is called settled\n"
+        "and is not, a page loaded twice in a still view, a picture that faults have changed.");
     return {app, [command] { return run(*command); }};
 }
 

@@ -33,7 +33,8 @@ struct ByteProgress {
 
 bool showBytes(void* user, uint64_t done) {
     const auto* progress = static_cast<const ByteProgress*>(user);
-    progress->display->update("checking", static_cast<double>(done) / static_cast<double>(std::max<uint64_t>(progress->size, 1)));
+    progress->display->update("checking",
+                              static_cast<double>(done) / static_cast<double>(std::max<uint64_t>(progress->size, 1)));
     return !interrupted();
 }
 
@@ -60,7 +61,8 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     if (!cache) return cache.error();
     const uint32_t levels = cache->dataset().header.levels;
     if (command.level != UINT32_MAX && command.level >= levels)
-        return Error{ErrorCode::Usage, fmt::format("has no level {}, only 0 to {}", command.level, levels - 1), command.file};
+        return Error{ErrorCode::Usage, fmt::format("has no level {}, only 0 to {}", command.level, levels - 1),
+                     command.file};
     VCP_TRY(cache->loadLevel(std::min(command.level, levels - 1)));
 
     SurfaceDistanceOptions options;
@@ -97,8 +99,8 @@ void addDistances(Json& json, const SurfaceDistance& distance) {
 std::string row(const char* name, const Quantiles& world, double cell) {
     const Quantiles cells = inCells(world, cell);
     return fmt::format("  {:<16} {:>11} {:>11} {:>11} {:>11}\n  {:<16} {:>11.5f} {:>11.5f} {:>11.5f} {:>11.5f}\n", name,
-                       formatLength(world.p50), formatLength(world.p95), formatLength(world.p99), formatLength(world.max),
-                       "  in cells", cells.p50, cells.p95, cells.p99, cells.max);
+                       formatLength(world.p50), formatLength(world.p95), formatLength(world.p99),
+                       formatLength(world.max), "  in cells", cells.p50, cells.p95, cells.p99, cells.max);
 }
 
 std::string distanceTable(const SurfaceDistance& distance) {
@@ -113,7 +115,8 @@ std::string distanceTable(const SurfaceDistance& distance) {
 
 Error exceeds(const VerifyCommand& command, const SurfaceDistance& distance) {
     return {ErrorCode::InvalidInput,
-            fmt::format("the surface and the mesh are {} apart, more than the certified {}; is it the mesh the file was built from?",
+            fmt::format("the surface and the mesh are {} apart, more than the certified {}; is it the mesh the file "
+                        "was built from?",
                         formatLength(std::max(distance.meshToSurface.max, distance.surfaceToMesh.max)),
                         formatLength(distance.certifiedErrorMax)),
             command.file};
@@ -167,11 +170,14 @@ Command addVerify(CLI::App& vcp) {
     addSourceSettings(*app, command->source);
     app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
         ->type_name("MESH");
-    app->add_option("--samples", command->samples, "Samples, each way")->type_name("N")->capture_default_str()->check(
-        CLI::Range(1, 1'000'000'000));
+    app->add_option("--samples", command->samples, "Samples, each way")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000'000));
     app->add_option("--level", command->level, "Level to measure, 0 the coarsest [the finest]")->type_name("N");
-    app->add_option("--threads", command->threads, "Threads that measure [one a processor]")->type_name("N")->check(
-        CLI::Range(1, 1024));
+    app->add_option("--threads", command->threads, "Threads that measure [one a processor]")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1024));
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

@@ -78,8 +78,10 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     // Settings that cannot be read are those of the first time.
     if (settingsPath) {
         const auto user = readUserSettings(*settingsPath);
-        if (user) options.session.user = *user;
-        else warn(user.error().line());
+        if (user)
+            options.session.user = *user;
+        else
+            warn(user.error().line());
     }
     applyRemembered(command.render, options.session.user, [&](const char* option) { return app.count(option) > 0; });
     options.session.inputs = command.inputs;
@@ -98,7 +100,8 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     }
     if (command.report.json) VCP_TRY(printJson(toJson(*report)));
     if (!report->firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
-    if (!report->firstPictureSeconds && !report->problem.empty()) return Error{ErrorCode::InvalidInput, report->problem};
+    if (!report->firstPictureSeconds && !report->problem.empty())
+        return Error{ErrorCode::InvalidInput, report->problem};
     return 0;
 }
 
@@ -107,7 +110,9 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
 Command addView(CLI::App& vcp) {
     auto command = std::make_shared<ViewCommand>();
     CLI::App* app = vcp.add_subcommand("view", "Open a window, on .vcp files, a scene or meshes");
-    app->add_option("IN", command->inputs, ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the cache first")
+    app->add_option("IN", command->inputs,
+                    ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the "
+                    "cache first")
         ->type_name("");
     app->add_option("--size", command->size, "Width and height of the window [1280x800, then as it was left]")
         ->type_name("WxH")
@@ -118,7 +123,10 @@ Command addView(CLI::App& vcp) {
     addBuildSettings(*app, command->build);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
-    app->footer("Files may also be dropped into the window. Looks, limits, bookmarks and recent files are remembered as they are changed in the window; options hold for one run.\n\n" + keyMapText());
+    app->footer(
+        "Files may also be dropped into the window. Looks, limits, bookmarks and recent files are remembered as they "
+        "are changed in the window; options hold for one run.\n\n" +
+        keyMapText());
     return {app, [command, app] { return run(*command, *app); }};
 }
 

@@ -32,7 +32,8 @@ void addProgressOption(CLI::App& app, ReportOptions& options) {
 }
 
 void addOverwriteOption(CLI::App& app, bool& overwrite) {
-    app.add_flag("--overwrite", overwrite, "Replace also an output that is of another kind or write-protected; never an input");
+    app.add_flag("--overwrite", overwrite,
+                 "Replace also an output that is of another kind or write-protected; never an input");
 }
 
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe) {
@@ -51,7 +52,9 @@ Result<void> printLine(const std::string& text) { return print(terminalLines(tex
 
 Result<void> printJsonText(const std::string& json) { return print(terminalJson(json)); }
 
-void warnOnTerminal(const std::string& warning) { std::fprintf(stderr, "warning: %s\n", terminalText(warning).c_str()); }
+void warnOnTerminal(const std::string& warning) {
+    std::fprintf(stderr, "warning: %s\n", terminalText(warning).c_str());
+}
 
 Result<void> printJson(const Json& json) {
     // File names need not be UTF-8; JSON must.

@@ -58,7 +58,8 @@ void addOverwriteOption(CLI::App& app, bool& overwrite);
 /// Empty where `name` ends in `extension`, or is "-" and `mayBePipe`; else what to write instead.
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe);
 
-/// Writes lines of text to stdout, shown as terminal_text.h says, with a newline behind. Errors: Io (stdout is closed or full).
+/// Writes lines of text to stdout, shown as terminal_text.h says, with a newline behind. Errors: Io (stdout is closed
+/// or full).
 Result<void> printLine(const std::string& text);
 /// The same for what is said of an output: on stderr when the output itself goes to stdout.
 Result<void> printLineAbout(const std::string& output, const std::string& text);

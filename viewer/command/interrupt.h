@@ -1,11 +1,13 @@
-// Ctrl-C during a long task, or the terminal's end: the first one asks it to stop and clean up, the second one ends the process.
+// Ctrl-C during a long task, or the terminal's end: the first one asks it to stop and clean up, the second one ends the
+// process.
 #pragma once
 
 #include <csignal>
 
 namespace vcp {
 
-/// Takes SIGINT, SIGTERM and, unless it is ignored as by nohup, SIGHUP while it lives, then gives them back. One at a time.
+/// Takes SIGINT, SIGTERM and, unless it is ignored as by nohup, SIGHUP while it lives, then gives them back. One at a
+/// time.
 class InterruptScope {
 public:
     InterruptScope();

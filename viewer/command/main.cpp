@@ -71,12 +71,14 @@ int complainOfUsage(const CLI::App& vcp, const std::string& message) {
 }
 
 int runParsed(const CLI::App& vcp, const std::vector<Command>& commands) {
-    const auto parsed = std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
+    const auto parsed =
+        std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
     const Result<int> status = [&]() -> Result<int> {
         try {
             return parsed->run();
         } catch (const std::bad_alloc&) {
-            return Error{ErrorCode::Limit, "needs more memory than there is; close other programs, or give less at once", inputsOf(vcp)};
+            return Error{ErrorCode::Limit,
+                         "needs more memory than there is; close other programs, or give less at once", inputsOf(vcp)};
         }
     }();
     if (status) return *status;
@@ -92,8 +94,8 @@ int runCommandLine(int argc, char** argv) {
     vcp.set_version_flag("--version", "vcp " VCP_VERSION);
     vcp.get_formatter()->column_width(28);
     vcp.footer("`vcp help CMD` says how a command is used.");
-    const std::vector<Command> commands = {addBuild(vcp),  addInfo(vcp),    addVerify(vcp), addRender(vcp),
-                                           addView(vcp),   addStress(vcp),  addBench(vcp),  addMeso(vcp),
+    const std::vector<Command> commands = {addBuild(vcp),   addInfo(vcp),   addVerify(vcp), addRender(vcp),
+                                           addView(vcp),    addStress(vcp), addBench(vcp),  addMeso(vcp),
                                            addDevices(vcp), addHelp(vcp)};
     try {
         vcp.parse(argc, argv);
@@ -112,6 +114,4 @@ int runCommandLine(int argc, char** argv) {
 
 }  // namespace vcp
 
-int main(int argc, char** argv) {
-    return vcp::runCommandLine(argc, argv);
-}
+int main(int argc, char** argv) { return vcp::runCommandLine(argc, argv); }

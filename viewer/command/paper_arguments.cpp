@@ -13,13 +13,16 @@ namespace {
 void addLength(CLI::App& app, const char* name, float& value, const char* what) {
     app.add_option(name, value, what)->type_name("CELLS")->capture_default_str()->check([](const std::string& text) {
         const double length = std::strtod(text.c_str(), nullptr);
-        return std::isfinite(length) && std::abs(length) <= 1e3 ? std::string() : "must be a number of cells up to 1000, not \"" + text + "\"";
+        return std::isfinite(length) && std::abs(length) <= 1e3
+                   ? std::string()
+                   : "must be a number of cells up to 1000, not \"" + text + "\"";
     });
 }
 
 /// Values by name; the first one is the default.
 template <class Value>
-void addChoice(CLI::App& app, const char* name, Value& value, const std::string& what, const std::vector<std::pair<std::string, Value>>& values) {
+void addChoice(CLI::App& app, const char* name, Value& value, const std::string& what,
+               const std::vector<std::pair<std::string, Value>>& values) {
     std::vector<std::string> names;
     for (const auto& [key, ignored] : values) names.push_back(key);
     app.add_option_function<std::string>(
@@ -37,32 +40,44 @@ void addChoice(CLI::App& app, const char* name, Value& value, const std::string&
 
 void addPaperStructureOptions(CLI::App& app, PaperOptions& options) {
     addLength(app, "--paper-band", options.band, "paper: vectors are kept in blocks nearer than this (t)");
-    addLength(app, "--paper-merge", options.mergeThreshold, "paper: cells are merged where their vectors err by less; negative: never");
+    addLength(app, "--paper-merge", options.mergeThreshold,
+              "paper: cells are merged where their vectors err by less; negative: never");
     app.add_option_function<std::string>(
            "--paper-k",
-           [&options](const std::string& text) { options.growRounds = text == "exact" ? CornerOctreeOptions::kExactPoints : std::stoi(text); },
-           fmt::format("paper: rounds of region growing that find the vectors (k); exact: the closest points of the whole mesh [{}]", options.growRounds))
+           [&options](const std::string& text) {
+               options.growRounds = text == "exact" ? CornerOctreeOptions::kExactPoints : std::stoi(text);
+           },
+           fmt::format("paper: rounds of region growing that find the vectors (k); exact: the closest points of the "
+                       "whole mesh [{}]",
+                       options.growRounds))
         ->type_name("ROUNDS|exact")
         ->check([](const std::string& text) {
-            const bool isCount = !text.empty() && text.size() <= 2 && text.find_first_not_of("0123456789") == std::string::npos;
+            const bool isCount =
+                !text.empty() && text.size() <= 2 && text.find_first_not_of("0123456789") == std::string::npos;
             return text == "exact" || isCount ? std::string() : "must be 0 to 99 or exact, not \"" + text + "\"";
         });
-    addChoice<PaperPacking>(app, "--paper-packing", options.packing, "paper: directions of the vectors", {{"spherical", PaperPacking::Spherical}, {"octahedral", PaperPacking::Octahedral}});
-    addChoice<bool>(app, "--paper-empty", options.safeEmpty, "paper: distances of empty nodes, rounded up as published, or so that they are safe to step",
+    addChoice<PaperPacking>(app, "--paper-packing", options.packing, "paper: directions of the vectors",
+                            {{"spherical", PaperPacking::Spherical}, {"octahedral", PaperPacking::Octahedral}});
+    addChoice<bool>(app, "--paper-empty", options.safeEmpty,
+                    "paper: distances of empty nodes, rounded up as published, or so that they are safe to step",
                     {{"published", false}, {"safe", true}});
 }
 
 void addPaperSchemeOption(CLI::App& app, PaperScheme& scheme) {
-    addChoice<PaperScheme>(app, "--paper-scheme", scheme, "paper: interpolation of the vectors",
-                           {{"longer", PaperScheme::Longer}, {"min-plane", PaperScheme::MinPlane}, {"trilinear", PaperScheme::Trilinear}});
+    addChoice<PaperScheme>(
+        app, "--paper-scheme", scheme, "paper: interpolation of the vectors",
+        {{"longer", PaperScheme::Longer}, {"min-plane", PaperScheme::MinPlane}, {"trilinear", PaperScheme::Trilinear}});
 }
 
 void addPaperMarchOptions(CLI::App& app, PaperMarch& march) {
     addLength(app, "--paper-epsilon", march.epsilon, "paper: a ray hits nearer than this");
     addPaperSchemeOption(app, march.scheme);
-    addChoice<PaperStep>(app, "--paper-step", march.step, "paper: steps near the surface", {{"planar", PaperStep::Planar}, {"distance", PaperStep::Distance}});
-    addChoice<bool>(app, "--paper-back", march.back, "paper: a hit is moved back to where the distance is epsilon", {{"on", true}, {"off", false}});
-    addChoice<bool>(app, "--paper-cache", march.cached, "paper: a step reuses the node and vectors of the step before", {{"on", true}, {"off", false}});
+    addChoice<PaperStep>(app, "--paper-step", march.step, "paper: steps near the surface",
+                         {{"planar", PaperStep::Planar}, {"distance", PaperStep::Distance}});
+    addChoice<bool>(app, "--paper-back", march.back, "paper: a hit is moved back to where the distance is epsilon",
+                    {{"on", true}, {"off", false}});
+    addChoice<bool>(app, "--paper-cache", march.cached, "paper: a step reuses the node and vectors of the step before",
+                    {{"on", true}, {"off", false}});
 }
 
 }  // namespace vcp

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <sys/ioctl.h>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include "viewer/command/terminal_text.h"
 #include "viewer/scene/option_values.h"
@@ -89,7 +89,8 @@ void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std
                             std::string(static_cast<size_t>(room - filled), ' ') + "]" + tail;
     lastBar_ = bar.substr(0, static_cast<size_t>(columns));
     // A character of several bytes is cut off whole.
-    while (lastBar_.size() < bar.size() && (static_cast<uint8_t>(bar[lastBar_.size()]) & 0xc0) == 0x80) lastBar_.pop_back();
+    while (lastBar_.size() < bar.size() && (static_cast<uint8_t>(bar[lastBar_.size()]) & 0xc0) == 0x80)
+        lastBar_.pop_back();
     std::fprintf(out_, "\r%s\x1b[K", lastBar_.c_str());
     std::fflush(out_);
 }

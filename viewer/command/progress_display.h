@@ -46,7 +46,9 @@ public:
 
 private:
     void drawBar(std::string_view stage, double fraction, const std::string& facts);
-    [[nodiscard]] double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    [[nodiscard]] double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
     ProgressStyle style_;
     std::FILE* out_;

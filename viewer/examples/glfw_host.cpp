@@ -1,4 +1,5 @@
-// A window of GLFW: glfw_host FILE.vcp [--frames N], N after it is settled. Drag to orbit, wheel to zoom, keys as in `vcp view`.
+// A window of GLFW: glfw_host FILE.vcp [--frames N], N after it is settled. Drag to orbit, wheel to zoom, keys as in
+// `vcp view`.
 #define GLFW_INCLUDE_VULKAN
 #include <GLFW/glfw3.h>
 
@@ -19,7 +20,9 @@ int32_t createSurface(void* window, VkInstance instance, uint64_t* surface) {
     return result;
 }
 
-vcp::widget::View& viewOf(GLFWwindow* window) { return *static_cast<vcp::widget::View*>(glfwGetWindowUserPointer(window)); }
+vcp::widget::View& viewOf(GLFWwindow* window) {
+    return *static_cast<vcp::widget::View*>(glfwGetWindowUserPointer(window));
+}
 
 // The cursor in pixels of the framebuffer, which need not be those of the window.
 void cursor(GLFWwindow* window, double& x, double& y) {
@@ -31,7 +34,9 @@ void cursor(GLFWwindow* window, double& x, double& y) {
     y *= double(fh) / std::max(h, 1);
 }
 
-uint32_t modifiers(int mods) { return ((mods & GLFW_MOD_SHIFT) ? VCP_SHIFT : 0) | ((mods & GLFW_MOD_CONTROL) ? VCP_CONTROL : 0); }
+uint32_t modifiers(int mods) {
+    return ((mods & GLFW_MOD_SHIFT) ? VCP_SHIFT : 0) | ((mods & GLFW_MOD_CONTROL) ? VCP_CONTROL : 0);
+}
 
 // What a callback throws waits here: GLFW is C, nothing may pass through it.
 std::exception_ptr thrown;
@@ -60,14 +65,20 @@ void listen(GLFWwindow* window) {
         guarded(w, [=](vcp::widget::View& view) { view.scroll(x, y, notches); });
     });
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int mods) {
-        const vcp_button which = button == GLFW_MOUSE_BUTTON_LEFT ? VCP_LEFT : button == GLFW_MOUSE_BUTTON_RIGHT ? VCP_RIGHT : VCP_MIDDLE;
+        const vcp_button which = button == GLFW_MOUSE_BUTTON_LEFT    ? VCP_LEFT
+                                 : button == GLFW_MOUSE_BUTTON_RIGHT ? VCP_RIGHT
+                                                                     : VCP_MIDDLE;
         double x, y;
         cursor(w, x, y);
-        guarded(w, [=](vcp::widget::View& view) { action == GLFW_PRESS ? view.press(which, x, y, modifiers(mods)) : view.release(which); });
+        guarded(w, [=](vcp::widget::View& view) {
+            action == GLFW_PRESS ? view.press(which, x, y, modifiers(mods)) : view.release(which);
+        });
     });
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
-        if (key == GLFW_KEY_ESCAPE) glfwSetWindowShouldClose(w, GLFW_TRUE);
-        else if (action != GLFW_REPEAT) guarded(w, [=](vcp::widget::View& view) { view.key(uint32_t(key), action == GLFW_PRESS); });
+        if (key == GLFW_KEY_ESCAPE)
+            glfwSetWindowShouldClose(w, GLFW_TRUE);
+        else if (action != GLFW_REPEAT)
+            guarded(w, [=](vcp::widget::View& view) { view.key(uint32_t(key), action == GLFW_PRESS); });
     });
 }
 
@@ -99,7 +110,8 @@ void run(GLFWwindow* window, const char* file, int frames) {
     }
     if (thrown) std::rethrow_exception(thrown);
     const vcp_stats stats = view.stats();
-    std::printf("%llu frames, %llu pixels show the surface\n", (unsigned long long)stats.frames, (unsigned long long)stats.hit_pixels);
+    std::printf("%llu frames, %llu pixels show the surface\n", (unsigned long long)stats.frames,
+                (unsigned long long)stats.hit_pixels);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// On a Vulkan device of the host's, into an image of the host's: host_device FILE.vcp. Reads the image back, and says how
-// many of its pixels differ from the background in the corner.
+// On a Vulkan device of the host's, into an image of the host's: host_device FILE.vcp. Reads the image back, and says
+// how many of its pixels differ from the background in the corner.
 #include <vulkan/vulkan.h>
 
 #include <cstdio>
@@ -37,7 +37,8 @@ struct Host {
         info.pApplicationInfo = &application;
         VK(vkCreateInstance, &info, nullptr, &instance);
         uint32_t one = 1;
-        if (vkEnumeratePhysicalDevices(instance, &one, &physical) < 0 || one == 0) throw std::runtime_error("no Vulkan device");
+        if (vkEnumeratePhysicalDevices(instance, &one, &physical) < 0 || one == 0)
+            throw std::runtime_error("no Vulkan device");
         chooseFamily();
         makeDevice();
         makeImage();
@@ -83,11 +84,14 @@ struct Host {
         VkPhysicalDeviceMemoryProperties has;
         vkGetImageMemoryRequirements(device, image, &needs);
         vkGetPhysicalDeviceMemoryProperties(physical, &has);
-        constexpr VkMemoryPropertyFlags kMapped = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+        constexpr VkMemoryPropertyFlags kMapped =
+            VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
         VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
         allocation.allocationSize = needs.size;
-        while ((needs.memoryTypeBits >> allocation.memoryTypeIndex & 1) == 0 || (has.memoryTypes[allocation.memoryTypeIndex].propertyFlags & kMapped) != kMapped)
-            if (++allocation.memoryTypeIndex == has.memoryTypeCount) throw std::runtime_error("no memory that can be looked into");
+        while ((needs.memoryTypeBits >> allocation.memoryTypeIndex & 1) == 0 ||
+               (has.memoryTypes[allocation.memoryTypeIndex].propertyFlags & kMapped) != kMapped)
+            if (++allocation.memoryTypeIndex == has.memoryTypeCount)
+                throw std::runtime_error("no memory that can be looked into");
         VK(vkAllocateMemory, device, &allocation, nullptr, &memory);
         VK(vkBindImageMemory, device, image, memory, 0);
     }

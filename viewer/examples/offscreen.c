@@ -1,4 +1,5 @@
-/* Frames into memory, without a window: offscreen FILE.vcp [OUT.ppm]. Writes the picture and says what is in its middle. */
+/* Frames into memory, without a window: offscreen FILE.vcp [OUT.ppm]. Writes the picture and says what is in its
+ * middle. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -31,8 +32,8 @@ static int show(vcp_view* view, const char* out) {
     if (vcp_view_settle(view, 60) || vcp_view_read(view, &frame) || vcp_view_pick(view, WIDTH / 2, HEIGHT / 2, &pick))
         return failed("no frame", vcp_view_last_error(view));
     if (pick.hit)
-        printf("in the middle: %.9g %.9g %.9g, within %.2g; %.6g from the eye\n", pick.position[0], pick.position[1], pick.position[2], pick.error,
-               depth[HEIGHT / 2 * WIDTH + WIDTH / 2]);
+        printf("in the middle: %.9g %.9g %.9g, within %.2g; %.6g from the eye\n", pick.position[0], pick.position[1],
+               pick.position[2], pick.error, depth[HEIGHT / 2 * WIDTH + WIDTH / 2]);
     return out ? write_ppm(out, rgba) : EXIT_SUCCESS;
 }
 

@@ -1,5 +1,5 @@
-// A widget of Qt 6 with a panel of properties beside it: qt_widget FILE.vcp [--frames N]. X11, natively or through XWayland
-// (QT_QPA_PLATFORM=xcb).
+// A widget of Qt 6 with a panel of properties beside it: qt_widget FILE.vcp [--frames N]. X11, natively or through
+// XWayland (QT_QPA_PLATFORM=xcb).
 #include <QtWidgets>
 
 #include <algorithm>
@@ -31,7 +31,10 @@ protected:
     }
     void mousePressEvent(QMouseEvent* e) override {
         const Qt::KeyboardModifiers m = e->modifiers();
-        if (view_) view_->press(buttonOf(e), pixels(e->position().x()), pixels(e->position().y()), (m & Qt::ShiftModifier ? VCP_SHIFT : 0) | (m & Qt::ControlModifier ? VCP_CONTROL : 0)), wake();
+        if (view_)
+            view_->press(buttonOf(e), pixels(e->position().x()), pixels(e->position().y()),
+                         (m & Qt::ShiftModifier ? VCP_SHIFT : 0) | (m & Qt::ControlModifier ? VCP_CONTROL : 0)),
+                wake();
     }
     void mouseMoveEvent(QMouseEvent* e) override {
         if (view_) view_->move(pixels(e->position().x()), pixels(e->position().y())), wake();
@@ -40,19 +43,24 @@ protected:
         if (view_) view_->release(buttonOf(e)), wake();
     }
     void wheelEvent(QWheelEvent* e) override {
-        if (view_) view_->scroll(pixels(e->position().x()), pixels(e->position().y()), e->angleDelta().y() / 120.0), wake();
+        if (view_)
+            view_->scroll(pixels(e->position().x()), pixels(e->position().y()), e->angleDelta().y() / 120.0), wake();
     }
     void keyPressEvent(QKeyEvent* e) override { key(e, true); }
     void keyReleaseEvent(QKeyEvent* e) override { key(e, false); }
     bool event(QEvent* e) override {
         // The surface goes with the native window, and the view before it.
-        if (e->type() == QEvent::PlatformSurface && static_cast<QPlatformSurfaceEvent*>(e)->surfaceEventType() == QPlatformSurfaceEvent::SurfaceAboutToBeDestroyed) timer_.stop(), view_.reset();
+        if (e->type() == QEvent::PlatformSurface && static_cast<QPlatformSurfaceEvent*>(e)->surfaceEventType() ==
+                                                        QPlatformSurfaceEvent::SurfaceAboutToBeDestroyed)
+            timer_.stop(), view_.reset();
         return QWindow::event(e);
     }
 
 private:
     double pixels(double length) const { return length * devicePixelRatio(); }
-    static vcp_button buttonOf(const QMouseEvent* e) { return e->button() == Qt::LeftButton ? VCP_LEFT : e->button() == Qt::RightButton ? VCP_RIGHT : VCP_MIDDLE; }
+    static vcp_button buttonOf(const QMouseEvent* e) {
+        return e->button() == Qt::LeftButton ? VCP_LEFT : e->button() == Qt::RightButton ? VCP_RIGHT : VCP_MIDDLE;
+    }
     void key(QKeyEvent* e, bool pressed) {
         if (view_ && !e->isAutoRepeat()) view_->key(uint32_t(e->key()), pressed), wake();
     }
@@ -133,7 +141,8 @@ int main(int argc, char** argv) {
         scene->drawn = [&](const vcp_stats& stats) {
             status->setText(QString("%1 pages, %2 ms").arg(stats.pages_drawn).arg(stats.frame_ms, 0, 'f', 1));
             if (frames >= 0 && stats.settled && stats.hit_pixels > 0 && stats.frames >= uint64_t(frames)) {
-                std::printf("%llu frames, %llu pixels show the surface\n", (unsigned long long)stats.frames, (unsigned long long)stats.hit_pixels);
+                std::printf("%llu frames, %llu pixels show the surface\n", (unsigned long long)stats.frames,
+                            (unsigned long long)stats.hit_pixels);
                 app.quit();
             } else if (frames >= 0) {
                 shadows->toggle();  // something to draw

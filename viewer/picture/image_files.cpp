@@ -34,7 +34,8 @@ void appendPng(png_structp png, png_bytep data, size_t size) {
 }
 
 /// `rows` in the byte order of PNG (16-bit values big endian). Empty when libpng fails (memory).
-std::vector<uint8_t> encodePng(const std::vector<uint8_t>& rows, int bits, int colourType, uint32_t width, uint32_t height) {
+std::vector<uint8_t> encodePng(const std::vector<uint8_t>& rows, int bits, int colourType, uint32_t width,
+                               uint32_t height) {
     std::vector<uint8_t> bytes;
     png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
     png_infop info = png ? png_create_info_struct(png) : nullptr;
@@ -59,7 +60,8 @@ std::vector<uint8_t> greyRows(std::span<const float> depth) {
     std::vector<uint8_t> rows;
     rows.reserve(2 * depth.size());
     for (const float d : depth) {
-        const auto grey = std::isfinite(d) ? static_cast<uint32_t>(std::lround(1 + scale * (double(d) - range.nearest))) : 0u;
+        const auto grey =
+            std::isfinite(d) ? static_cast<uint32_t>(std::lround(1 + scale * (double(d) - range.nearest))) : 0u;
         rows.push_back(static_cast<uint8_t>(grey >> 8));
         rows.push_back(static_cast<uint8_t>(grey & 255));
     }
@@ -71,18 +73,19 @@ std::vector<uint8_t> normalRows(std::span<const glm::vec3> normals) {
     rows.reserve(3 * normals.size());
     for (const glm::vec3& n : normals)
         for (int axis = 0; axis < 3; ++axis)
-            rows.push_back(n == glm::vec3(0) ? uint8_t(0) : static_cast<uint8_t>(std::lround(128 + 127 * std::clamp(n[axis], -1.0f, 1.0f))));
+            rows.push_back(n == glm::vec3(0)
+                               ? uint8_t(0)
+                               : static_cast<uint8_t>(std::lround(128 + 127 * std::clamp(n[axis], -1.0f, 1.0f))));
     return rows;
 }
 
-Result<void> writePlane(const std::vector<uint8_t>& bytes, OutputKind kind, const fs::path& path, const OutputRules& rules) {
+Result<void> writePlane(const std::vector<uint8_t>& bytes, OutputKind kind, const fs::path& path,
+                        const OutputRules& rules) {
     if (bytes.empty()) return Error{ErrorCode::Limit, "not enough memory to compress the picture", path.string()};
     return writeFile(path, kind, std::as_bytes(std::span(bytes)), rules);
 }
 
-Error unknownKind(const fs::path& path) {
-    return {ErrorCode::Unsupported, "is neither .pfm nor .png", path.string()};
-}
+Error unknownKind(const fs::path& path) { return {ErrorCode::Unsupported, "is neither .pfm nor .png", path.string()}; }
 
 }  // namespace
 
@@ -101,17 +104,23 @@ DepthRange depthRange(std::span<const float> depth) {
     return std::isfinite(range.nearest) ? range : DepthRange{};
 }
 
-Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height, const fs::path& path, const OutputRules& rules) {
+Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height, const fs::path& path,
+                        const OutputRules& rules) {
     if (!isImagePlanePath(path)) return unknownKind(path);
     const OutputKind kind = *outputKindOf(path);
-    return writePlane(kind == OutputKind::Pfm ? encodePfm(depth.data(), 1, width, height) : encodePng(greyRows(depth), 16, PNG_COLOR_TYPE_GRAY, width, height), kind, path, rules);
+    return writePlane(kind == OutputKind::Pfm ? encodePfm(depth.data(), 1, width, height)
+                                              : encodePng(greyRows(depth), 16, PNG_COLOR_TYPE_GRAY, width, height),
+                      kind, path, rules);
 }
 
-Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height, const fs::path& path, const OutputRules& rules) {
+Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height, const fs::path& path,
+                          const OutputRules& rules) {
     static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
     if (!isImagePlanePath(path)) return unknownKind(path);
     const OutputKind kind = *outputKindOf(path);
-    return writePlane(kind == OutputKind::Pfm ? encodePfm(&normals.data()->x, 3, width, height) : encodePng(normalRows(normals), 8, PNG_COLOR_TYPE_RGB, width, height), kind, path, rules);
+    return writePlane(kind == OutputKind::Pfm ? encodePfm(&normals.data()->x, 3, width, height)
+                                              : encodePng(normalRows(normals), 8, PNG_COLOR_TYPE_RGB, width, height),
+                      kind, path, rules);
 }
 
 }  // namespace vcp

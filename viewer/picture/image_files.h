@@ -25,7 +25,8 @@ struct DepthRange {
 DepthRange depthRange(std::span<const float> depth);
 
 /// `depth` has width * height values, upper row first. Errors: Unsupported (neither .pfm nor .png), Io.
-Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height, const std::filesystem::path& path, const OutputRules& rules = {});
+Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height,
+                        const std::filesystem::path& path, const OutputRules& rules = {});
 
 /// Likewise for unit normals.
 Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height,

@@ -32,8 +32,10 @@ Result<void> PictureSequence::begin() {
     auto png = PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules);
     if (!png) return png.error();
     png_ = *std::move(png);
-    const TiledPictureOptions options{.tile = o_.tile, .depth = !o_.files.depth.empty(), .normals = !o_.files.normals.empty(), .problem = o_.problem};
-    picture_ = std::make_unique<TiledPicture>(*renderer_, request, options, [this](const PictureBand& band) { return take(band); });
+    const TiledPictureOptions options{
+        .tile = o_.tile, .depth = !o_.files.depth.empty(), .normals = !o_.files.normals.empty(), .problem = o_.problem};
+    picture_ = std::make_unique<TiledPicture>(*renderer_, request, options,
+                                              [this](const PictureBand& band) { return take(band); });
     return {};
 }
 

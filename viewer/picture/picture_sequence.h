@@ -25,9 +25,9 @@ struct PictureSequenceOptions {
     FrameRequest request;         ///< of each picture, but for the camera
     std::vector<Camera> cameras;  ///< a picture each; at least one
     PictureFiles files;
-    bool isNumbered = false;      ///< turn.png stands for turn-0001.png and so on
-    uint32_t tile = 2048;         ///< edge in pixels, at least 16
-    OutputRules rules = {};       ///< what the files may replace
+    bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on
+    uint32_t tile = 2048;     ///< edge in pixels, at least 16
+    OutputRules rules = {};   ///< what the files may replace
     /// As TiledPicture's.
     std::function<void(const Error& problem)> problem;
 };
@@ -35,16 +35,18 @@ struct PictureSequenceOptions {
 /// "turn.png" and 7: "turn-0007.png".
 std::filesystem::path numbered(const std::filesystem::path& path, size_t number);
 
-/// Pictures in the making; without the last step the one that was begun leaves nothing. Rows are written as they are drawn; depth
-/// and normals are kept until their picture is whole, 4 and 12 bytes a pixel. One thread.
+/// Pictures in the making; without the last step the one that was begun leaves nothing. Rows are written as they are
+/// drawn; depth and normals are kept until their picture is whole, 4 and 12 bytes a pixel. One thread.
 class PictureSequence {
 public:
-    PictureSequence(Renderer& renderer, PictureSequenceOptions options) : renderer_(&renderer), o_(std::move(options)) {}
+    PictureSequence(Renderer& renderer, PictureSequenceOptions options)
+        : renderer_(&renderer), o_(std::move(options)) {}
     PictureSequence(const PictureSequence&) = delete;
     PictureSequence& operator=(const PictureSequence&) = delete;
 
     /// Draws the next tile where all that it wants is there; never waits for reads. True when the last file is
-    /// written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; nothing more is to be asked of it then.
+    /// written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; nothing more is to be asked of it
+    /// then.
     Result<bool> step();
     /// Whether the last step() missed pages.
     [[nodiscard]] bool isWaiting() const { return picture_ && picture_->isWaiting(); }
@@ -57,7 +59,9 @@ public:
     [[nodiscard]] const TiledPictureStats& stats() const { return stats_; }
 
 private:
-    [[nodiscard]] std::filesystem::path fileOf(const std::filesystem::path& path) const { return o_.isNumbered ? numbered(path, finished_ + 1) : path; }
+    [[nodiscard]] std::filesystem::path fileOf(const std::filesystem::path& path) const {
+        return o_.isNumbered ? numbered(path, finished_ + 1) : path;
+    }
     Result<void> begin();
     Result<void> take(const PictureBand& band);
     Result<void> finish();

@@ -25,16 +25,20 @@ struct PngRows::Encoder {
     png_infop info = nullptr;
     std::string complaint;
 
-    [[nodiscard]] Error error(ErrorCode code, const std::string& what) const { return {.code = code, .message = what, .file = output.path().string()}; }
+    [[nodiscard]] Error error(ErrorCode code, const std::string& what) const {
+        return {.code = code, .message = what, .file = output.path().string()};
+    }
     [[nodiscard]] Error ioError() const {
-        return error(ErrorCode::Io, complaint.empty() ? std::string("cannot write: ") + std::strerror(errno) : "PNG: " + complaint);
+        return error(ErrorCode::Io,
+                     complaint.empty() ? std::string("cannot write: ") + std::strerror(errno) : "PNG: " + complaint);
     }
 
     // libpng leaves by longjmp: nothing with a destructor may live in these three.
     bool begin() {
         if (setjmp(png_jmpbuf(png)) != 0) return false;
         png_init_io(png, file);
-        png_set_IHDR(png, info, width, height, 8, PNG_COLOR_TYPE_RGBA, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+        png_set_IHDR(png, info, width, height, 8, PNG_COLOR_TYPE_RGBA, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                     PNG_FILTER_TYPE_DEFAULT);
         png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
         // Speed over the last few percent of size.
         png_set_compression_level(png, 3);
@@ -62,9 +66,11 @@ PngRows::~PngRows() {
     if (e.file) std::fclose(e.file);
 }
 
-Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& path, uint32_t width, uint32_t height, const OutputRules& rules) {
+Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& path, uint32_t width, uint32_t height,
+                                                 const OutputRules& rules) {
     if (width < 1 || height < 1 || width > kLargest || height > kLargest)
-        return Error{.code = ErrorCode::Usage, .message = "a picture has 1 to 2^20 pixels a side", .file = path.string()};
+        return Error{
+            .code = ErrorCode::Usage, .message = "a picture has 1 to 2^20 pixels a side", .file = path.string()};
     auto output = OutputFile::create(path, OutputKind::Png, rules);
     if (!output) return output.error();
     std::unique_ptr<PngRows> rows(new PngRows(std::make_unique<Encoder>(*std::move(output))));
@@ -89,7 +95,8 @@ Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& pa
 Result<void> PngRows::add(std::span<const uint8_t> rgba) {
     Encoder& e = *encoder_;
     const uint64_t rowBytes = uint64_t{4} * e.width, count = rgba.size() / rowBytes;
-    if (rgba.size() % rowBytes != 0 || count > e.height - e.rows) return e.error(ErrorCode::Usage, "rows that the picture does not have");
+    if (rgba.size() % rowBytes != 0 || count > e.height - e.rows)
+        return e.error(ErrorCode::Usage, "rows that the picture does not have");
     if (!e.write(rgba.data(), static_cast<uint32_t>(count))) return e.ioError();
     e.rows += static_cast<uint32_t>(count);
     return {};

@@ -16,7 +16,8 @@ namespace vcp {
 class PngRows {
 public:
     /// 8-bit RGBA, `width` and `height` from 1 to 2^20. Errors: Io, Usage.
-    static Result<std::unique_ptr<PngRows>> create(const std::filesystem::path& path, uint32_t width, uint32_t height, const OutputRules& rules = {});
+    static Result<std::unique_ptr<PngRows>> create(const std::filesystem::path& path, uint32_t width, uint32_t height,
+                                                   const OutputRules& rules = {});
     ~PngRows();
     PngRows(const PngRows&) = delete;
     PngRows& operator=(const PngRows&) = delete;

@@ -12,11 +12,13 @@ constexpr uint32_t kOverlap = 8;
 
 /// Copies what `inner` covers of a tile's pixels, `words` values each, into a band.
 template <class Value, class Rect>
-void copyInto(std::vector<Value>& band, uint32_t bandWidth, const std::vector<Value>& pixels, const Rect& outer, const Rect& inner, uint32_t words) {
+void copyInto(std::vector<Value>& band, uint32_t bandWidth, const std::vector<Value>& pixels, const Rect& outer,
+              const Rect& inner, uint32_t words) {
     for (uint32_t row = 0; row < inner.height; ++row) {
         const uint64_t from = uint64_t{inner.y - outer.y + row} * outer.width + (inner.x - outer.x);
         const auto* begin = pixels.data() + from * words;
-        std::copy(begin, begin + uint64_t{inner.width} * words, band.data() + (uint64_t{row} * bandWidth + inner.x) * words);
+        std::copy(begin, begin + uint64_t{inner.width} * words,
+                  band.data() + (uint64_t{row} * bandWidth + inner.x) * words);
     }
 }
 
@@ -46,7 +48,8 @@ Result<bool> TiledPicture::step() {
     FrameRequest request = whole_;
     request.width = with.width;
     request.height = with.height;
-    if (with.width != whole_.width || with.height != whole_.height) request.tile = {with.x, with.y, whole_.width, whole_.height};
+    if (with.width != whole_.width || with.height != whole_.height)
+        request.tile = {with.x, with.y, whole_.width, whole_.height};
     auto update = renderer_->update(request);
     if (!update) return update.error();
     if (!update->problems.empty() && !options_.problem) return update->problems.front();

@@ -26,15 +26,15 @@ struct TiledPictureOptions {
 /// Rows of the picture, over its whole width, from the upper one on.
 struct PictureBand {
     Picture picture;
-    std::vector<float> depth;          ///< where asked for
-    std::vector<glm::vec3> normals;    ///< where asked for
+    std::vector<float> depth;        ///< where asked for
+    std::vector<glm::vec3> normals;  ///< where asked for
 };
 
 struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
-    double ms = 0;  ///< of drawing alone
-    double errorPixels = 0;      ///< largest of the tiles'
-    UpdateResult update;         ///< of the last tile
+    double ms = 0;           ///< of drawing alone
+    double errorPixels = 0;  ///< largest of the tiles'
+    UpdateResult update;     ///< of the last tile
 };
 
 /// A picture in the making, tile by tile. What it is given stays until it is done.
@@ -46,8 +46,8 @@ public:
     TiledPicture(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 
-    /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. True when the last
-    /// band was taken. Errors: those of Renderer; those of `take`; the first page that cannot be read.
+    /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. True when the
+    /// last band was taken. Errors: those of Renderer; those of `take`; the first page that cannot be read.
     Result<bool> step();
     /// Whether the last step() missed pages.
     [[nodiscard]] bool isWaiting() const { return isWaiting_; }

@@ -38,16 +38,22 @@ public:
         while (true) {
             ++line_;
             const auto line = source_.line(kLongestLine);
-            if (!line) return line.error().code == ErrorCode::Limit ? wrong("the line is longer than 1 MiB") : line.error();
+            if (!line)
+                return line.error().code == ErrorCode::Limit ? wrong("the line is longer than 1 MiB") : line.error();
             if (!*line) break;
             text_ = (*line)->substr(0, (*line)->find('#'));
             const std::string_view word = nextWord();
-            if (word == "v") VCP_TRY(readPosition());
-            else if (word == "vt") VCP_TRY(readCoordinate());
-            else if (word == "f") VCP_TRY(readFace());
+            if (word == "v")
+                VCP_TRY(readPosition());
+            else if (word == "vt")
+                VCP_TRY(readCoordinate());
+            else if (word == "f")
+                VCP_TRY(readFace());
             if (made_.positions.size() > 3 * kMostTriangles || coordinates_.size() > 3 * kMostTriangles)
-                return wrong("a base surface has at most 15 million vertices and texture coordinates", ErrorCode::Limit);
-            if (made_.triangles.size() > kMostTriangles) return wrong("a base surface has at most 5 million triangles", ErrorCode::Limit);
+                return wrong("a base surface has at most 15 million vertices and texture coordinates",
+                             ErrorCode::Limit);
+            if (made_.triangles.size() > kMostTriangles)
+                return wrong("a base surface has at most 5 million triangles", ErrorCode::Limit);
         }
         if (made_.triangles.empty()) return source_.error(ErrorCode::InvalidInput, "", std::nullopt, "has no faces");
         return finished(std::move(made_), source_.name());
@@ -87,7 +93,9 @@ private:
         int64_t number = 0;
         const auto [stop, failure] = std::from_chars(word.data(), word.data() + word.size(), number);
         const auto count = int64_t(of.size());
-        if (failure != std::errc() || stop != word.data() + word.size() || number == 0 || number > count || number < -count) return false;
+        if (failure != std::errc() || stop != word.data() + word.size() || number == 0 || number > count ||
+            number < -count)
+            return false;
         index = uint32_t(number > 0 ? number - 1 : count + number);
         return true;
     }
@@ -96,16 +104,20 @@ private:
         for (std::string_view word = nextWord(); !word.empty(); word = nextWord()) {
             const size_t slash = word.find('/');
             std::pair<uint32_t, uint32_t> corner;
-            if (!at(word.substr(0, slash), made_.positions, corner.first)) return wrong(fmt::format("\"{}\" names no vertex before it", word.substr(0, 40)));
-            if (slash == std::string_view::npos || slash + 1 == word.size() || word[slash + 1] == '/') return noMap(source_.name(), fmt::format("line {}", line_));
+            if (!at(word.substr(0, slash), made_.positions, corner.first))
+                return wrong(fmt::format("\"{}\" names no vertex before it", word.substr(0, 40)));
+            if (slash == std::string_view::npos || slash + 1 == word.size() || word[slash + 1] == '/')
+                return noMap(source_.name(), fmt::format("line {}", line_));
             const std::string_view rest = word.substr(slash + 1);
-            if (!at(rest.substr(0, rest.find('/')), coordinates_, corner.second)) return wrong(fmt::format("\"{}\" names no texture coordinates before it", word.substr(0, 40)));
+            if (!at(rest.substr(0, rest.find('/')), coordinates_, corner.second))
+                return wrong(fmt::format("\"{}\" names no texture coordinates before it", word.substr(0, 40)));
             corners.push_back(corner);
         }
         if (corners.size() < 3) return wrong("a face has three corners at least");
         for (size_t i = 2; i < corners.size(); ++i) {
             made_.triangles.push_back({corners[0].first, corners[i - 1].first, corners[i].first});
-            made_.uvs.push_back({coordinates_[corners[0].second], coordinates_[corners[i - 1].second], coordinates_[corners[i].second]});
+            made_.uvs.push_back({coordinates_[corners[0].second], coordinates_[corners[i - 1].second],
+                                 coordinates_[corners[i].second]});
         }
         return {};
     }
@@ -136,14 +148,18 @@ Result<meso::BaseSurface> readStream(const std::filesystem::path& path, double t
             for (int k = 0; k < 3; ++k) map[k] = glm::dvec2(chunk.uvs[i][k].x, 1 - chunk.uvs[i][k].y) * tiles;
         }
         if (made.triangles.size() > kMostTriangles || made.positions.size() > 3 * kMostTriangles)
-            return Error{.code = ErrorCode::Limit, .message = "a base surface has at most 5 million triangles", .file = path.string()};
+            return Error{.code = ErrorCode::Limit,
+                         .message = "a base surface has at most 5 million triangles",
+                         .file = path.string()};
     }
     return finished(std::move(made), path.string());
 }
 
 }  // namespace
 
-Result<meso::BaseSurface> readBaseObj(ByteSource source, double tiles) { return ObjBase(std::move(source), tiles).read(); }
+Result<meso::BaseSurface> readBaseObj(ByteSource source, double tiles) {
+    return ObjBase(std::move(source), tiles).read();
+}
 
 Result<meso::BaseSurface> readBaseMesh(const std::filesystem::path& path, double tiles) {
     std::string extension = path.extension().string();

@@ -13,7 +13,10 @@ namespace vcp {
 namespace {
 
 ColourChoice colourNamed(const std::string& name) {
-    return name == "vertex" ? ColourChoice::Vertex : name == "texture" ? ColourChoice::Texture : name == "none" ? ColourChoice::None : ColourChoice::Auto;
+    return name == "vertex"    ? ColourChoice::Vertex
+           : name == "texture" ? ColourChoice::Texture
+           : name == "none"    ? ColourChoice::None
+                               : ColourChoice::Auto;
 }
 
 }  // namespace
@@ -41,13 +44,15 @@ Result<InputKind> kindOf(const std::vector<std::string>& inputs) {
     if (scenes > 0 && inputs.size() > 1) return Error{ErrorCode::Usage, "a scene file (.json) is opened alone"};
     if (scenes > 0) return InputKind::Scene;
     if (datasets > 0 && datasets < inputs.size())
-        return Error{ErrorCode::Usage, "several inputs must all be meshes or all .vcp files; a scene file (.json) takes both"};
+        return Error{ErrorCode::Usage,
+                     "several inputs must all be meshes or all .vcp files; a scene file (.json) takes both"};
     return datasets > 0 ? InputKind::Datasets : InputKind::Meshes;
 }
 
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          const std::function<bool(const BuildProgress&)>& progress) {
-    if (inputs.size() == 1 && (isHttpUrl(inputs.front()) || looksLikeDataset(inputs.front()))) return std::filesystem::path(inputs.front());
+    if (inputs.size() == 1 && (isHttpUrl(inputs.front()) || looksLikeDataset(inputs.front())))
+        return std::filesystem::path(inputs.front());
 
     auto folder = defaultCacheFolder();
     if (!folder) return folder;

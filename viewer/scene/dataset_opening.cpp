@@ -14,8 +14,8 @@ std::string nameOf(const std::vector<std::string>& inputs) {
     return inputs.size() == 1 ? first : fmt::format("{} and {} more", first, inputs.size() - 1);
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source,
-                              const std::function<bool(const BuildProgress&)>& progress) {
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
+                              const SourceAccess& source, const std::function<bool(const BuildProgress&)>& progress) {
     const auto kind = kindOf(inputs);
     if (!kind) return kind.error();
     SceneFile file;
@@ -40,7 +40,8 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     };
     if (*kind == InputKind::Meshes) addSideFiles(inputs);
     auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
-        if (progress && !progress({.stage = "opening", .fraction = opened++ / count})) return Error{ErrorCode::Cancelled, "cancelled"};
+        if (progress && !progress({.stage = "opening", .fraction = opened++ / count}))
+            return Error{ErrorCode::Cancelled, "cancelled"};
         const auto path = datasetFor({each}, build, progress);
         if (!path) return path.error();
         addSideFiles({each});
@@ -50,7 +51,8 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     return scene;
 }
 
-DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, std::function<bool(const BuildProgress&)> told)
+DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source,
+                               std::function<bool(const BuildProgress&)> told)
     : inputs_(std::move(inputs)), build_(std::move(build)), source_(source), told_(std::move(told)) {
     source_.cancelled = [token = cancelled_, others = source.cancelled] { return *token || (others && others()); };
     thread_ = std::thread([this] {

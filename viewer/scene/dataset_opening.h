@@ -19,12 +19,13 @@ namespace vcp {
 std::string nameOf(const std::vector<std::string>& inputs);
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
-/// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. Any thread. Errors:
-/// Usage (.vcp files among meshes); those of readScene, MeshCache and openDataset.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build, const SourceAccess& source,
-                              const std::function<bool(const BuildProgress&)>& progress);
+/// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. Any thread.
+/// Errors: Usage (.vcp files among meshes); those of readScene, MeshCache and openDataset.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
+                              const SourceAccess& source, const std::function<bool(const BuildProgress&)>& progress);
 
-/// One thread may call; destroying it before it is done cancels and waits for the build, or the exchange with a server, to notice.
+/// One thread may call; destroying it before it is done cancels and waits for the build, or the exchange with a server,
+/// to notice.
 class DatasetOpening {
 public:
     struct Progress {
@@ -33,8 +34,10 @@ public:
         uint64_t triangles = 0;
     };
 
-    /// `inputs`: as openScene takes them. `told`: called in the thread, false cancels; gone when it is done; may be empty.
-    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source, std::function<bool(const BuildProgress&)> told);
+    /// `inputs`: as openScene takes them. `told`: called in the thread, false cancels; gone when it is done; may be
+    /// empty.
+    DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source,
+                   std::function<bool(const BuildProgress&)> told);
     ~DatasetOpening();
     DatasetOpening(const DatasetOpening&) = delete;
     DatasetOpening& operator=(const DatasetOpening&) = delete;
@@ -53,10 +56,11 @@ private:
     BuildSettings build_;
     SourceAccess source_;
     std::function<bool(const BuildProgress&)> told_;  // of the thread
-    const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);  // readers ask it, which live longer
+    const std::shared_ptr<std::atomic<bool>> cancelled_ =
+        std::make_shared<std::atomic<bool>>(false);  // readers ask it, which live longer
     std::atomic<bool> done_ = false;
     mutable std::mutex mutex_;
-    Progress progress_;                         // guarded by mutex_
+    Progress progress_;                          // guarded by mutex_
     std::optional<Result<OpenedScene>> opened_;  // of the thread until done_
     std::thread thread_;
 };

@@ -33,7 +33,9 @@ Error ioError(const fs::path& path, const std::string& what, std::error_code cod
     return {ErrorCode::Io, what + ": " + code.message(), path.string()};
 }
 
-std::string hashOf(const std::string& text) { return fmt::format("{:016x}", hashBytes(std::as_bytes(std::span(text)))); }
+std::string hashOf(const std::string& text) {
+    return fmt::format("{:016x}", hashBytes(std::as_bytes(std::span(text))));
+}
 
 /// What a mesh is known by: path, size, times of last change.
 Result<std::string> identity(const fs::path& mesh) {
@@ -46,8 +48,9 @@ Result<std::string> identity(const fs::path& mesh) {
 
 /// Hash of what is known of a dataset before it is built.
 Result<std::string> keyOf(const BuildOptions& options) {
-    std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell, options.error, options.errorIsRelative,
-                                   static_cast<int>(options.colour), options.format);
+    std::string text =
+        fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell, options.error,
+                    options.errorIsRelative, static_cast<int>(options.colour), options.format);
     for (const fs::path& mesh : options.inputs) {
         auto id = identity(mesh);
         if (!id) return id.error();
@@ -64,7 +67,9 @@ std::string nameOf(const std::string& key, const std::vector<fs::path>& sideFile
     return hashOf(text);
 }
 
-fs::path listOf(const fs::path& folder, const std::string& key) { return folder / fmt::format("{}{}", key, kListExtension); }
+fs::path listOf(const fs::path& folder, const std::string& key) {
+    return folder / fmt::format("{}{}", key, kListExtension);
+}
 
 /// Paths, each with a zero behind. Empty where there is none.
 std::vector<fs::path> readList(const fs::path& path) {
@@ -86,13 +91,18 @@ void writeList(const fs::path& path, const std::vector<fs::path>& files) {
     std::ofstream file(partial, std::ios::binary);
     for (const fs::path& each : files) file << each.string() << '\0';
     file.close();
-    if (file) fs::rename(partial, path, ignored);
-    else fs::remove(partial, ignored);
+    if (file)
+        fs::rename(partial, path, ignored);
+    else
+        fs::remove(partial, ignored);
 }
 
 /// Errors: InvalidInput, where what was read is not what is there.
 Result<void> checkUnchanged(const BuildOptions& options, const std::string& keyBefore, const BuildReport& report) {
-    const auto changed = [](const fs::path& file) { return Error{ErrorCode::InvalidInput, "was changed while it was read; open it again once it is whole", file.string()}; };
+    const auto changed = [](const fs::path& file) {
+        return Error{ErrorCode::InvalidInput, "was changed while it was read; open it again once it is whole",
+                     file.string()};
+    };
     const auto key = keyOf(options);
     if (!key) return key.error();
     if (*key != keyBefore) return changed(options.inputs.front());
@@ -129,7 +139,8 @@ std::vector<CachedFile> filesIn(const fs::path& folder) {
 /// 16 hexadecimal digits and an extension of ours. Other files in the folder are not ours to remove.
 bool isOurName(const fs::path& path, std::string_view extension) {
     const std::string stem = path.stem().string();
-    return path.extension() == extension && stem.size() == 16 && stem.find_first_not_of("0123456789abcdef") == std::string::npos;
+    return path.extension() == extension && stem.size() == 16 &&
+           stem.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
 bool isLeftoverName(const fs::path& path) { return path.filename().string().find(".building.") != std::string::npos; }
@@ -149,7 +160,9 @@ bool looksLikeDataset(const fs::path& path) {
     const FileHeader header;
     // A pipe may be a mesh: what is read of it is gone.
     const auto file = openRegularStream(path);
-    if (file && std::fread(start.data(), 1, start.size(), file->get()) == start.size() && std::equal(start.begin(), start.end(), header.magic)) return true;
+    if (file && std::fread(start.data(), 1, start.size(), file->get()) == start.size() &&
+        std::equal(start.begin(), start.end(), header.magic))
+        return true;
     return path.extension() == kExtension;
 }
 
@@ -186,7 +199,8 @@ Result<fs::path> MeshCache::dataset(BuildOptions options, const Builder& build) 
         return unchanged.error();
     }
     std::vector<fs::path> sideFiles;
-    for (const SideFile& each : report->sideFiles) sideFiles.push_back(fs::absolute(each.path, failed).lexically_normal());
+    for (const SideFile& each : report->sideFiles)
+        sideFiles.push_back(fs::absolute(each.path, failed).lexically_normal());
     path = folder_ / fmt::format("{}{}", nameOf(*key, sideFiles), kExtension);
     fs::rename(options.output, path, failed);
     if (failed) return ioError(path, "cannot be put into the cache", failed);
@@ -210,8 +224,10 @@ void MeshCache::trim(const fs::path& keep) const {
     for (const CachedFile& file : files) total += file.bytes;
     auto oldest = fs::file_time_type::max();
     for (const CachedFile& file : files) {
-        if (total > limitBytes_ && file.path != keep && fs::remove(file.path, ignored)) total -= file.bytes;
-        else oldest = std::min(oldest, file.used);
+        if (total > limitBytes_ && file.path != keep && fs::remove(file.path, ignored))
+            total -= file.bytes;
+        else
+            oldest = std::min(oldest, file.used);
     }
     for (const CachedFile& list : lists)
         if (list.used < oldest) fs::remove(list.path, ignored);

@@ -3,8 +3,9 @@
 // A dataset is named by a hash of what it was built from: each mesh's absolute path, size and times of last
 // change, the same of the files that it names (materials, images, buffers), and the options that shape the output.
 // Which files those are is known once it was built: a list beside the datasets says it (KEY.files, KEY the hash of
-// meshes and options alone). A mesh that changes gets a new name; the old one ages and goes. The folder is held under a size by removing what was used least recently. Several processes may
-// use it at once: a dataset appears by a rename, whole or not at all.
+// meshes and options alone). A mesh that changes gets a new name; the old one ages and goes. The folder is held under a
+// size by removing what was used least recently. Several processes may use it at once: a dataset appears by a rename,
+// whole or not at all.
 #pragma once
 
 #include <cstdint>

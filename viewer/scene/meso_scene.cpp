@@ -75,7 +75,8 @@ void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::
     say(shell.withoutArea, "triangles without area are left out");
     say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
     say(shell.flat, "pieces of the shell have no volume and are left out: faces on their own backs have no outside");
-    say(shell.inverted, "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
+    say(shell.inverted,
+        "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
 }
 
 }  // namespace
@@ -83,7 +84,10 @@ void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::
 Error ScenePlace::blamed(Error error) const {
     if (file.empty() || error.code != ErrorCode::Usage) return error;
     const std::string about = error.file.empty() ? std::string() : error.file + ": ";
-    return {.code = ErrorCode::InvalidInput, .message = (key.empty() ? "" : fmt::format("\"{}\": ", key)) + about + error.message, .file = file, .element = fmt::format("line {}", line)};
+    return {.code = ErrorCode::InvalidInput,
+            .message = (key.empty() ? "" : fmt::format("\"{}\": ", key)) + about + error.message,
+            .file = file,
+            .element = fmt::format("line {}", line)};
 }
 
 Result<Asset> openMesoAsset(const std::string& name) {
@@ -98,7 +102,9 @@ Result<Asset> openMesoAsset(const std::string& name) {
         asset.solid = name, asset.seed = 1;
     } else {
         if (!name.ends_with(".meso"))
-            return Error{.code = ErrorCode::Usage, .message = fmt::format("\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format(
+                             "\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
         return readAsset(name);
     }
     const auto shape = shapeOf(asset);
@@ -146,7 +152,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             }
             surface.far = far;
         }
-        surface.arrays = *std::move(arrays), surface.shell = *std::move(shell), surface.colour = d.colour, surface.withBase = d.withBase;
+        surface.arrays = *std::move(arrays), surface.shell = *std::move(shell), surface.colour = d.colour,
+        surface.withBase = d.withBase;
         scene.surfaces.push_back(std::move(surface));
     }
     return scene;

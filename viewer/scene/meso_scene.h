@@ -1,5 +1,5 @@
-// Mesostructure surfaces from what a person says of them: asset, method, base. What scenes and `vcp meso render` hand to the
-// renderer (Renderer::setSurfaces).
+// Mesostructure surfaces from what a person says of them: asset, method, base. What scenes and `vcp meso render` hand
+// to the renderer (Renderer::setSurfaces).
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,8 @@
 
 namespace vcp {
 
-/// A procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those of readAsset.
+/// A procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those of
+/// readAsset.
 Result<meso::Asset> openMesoAsset(const std::string& name);
 
 /// Where a scene file says something; no file: somebody else said it.
@@ -27,18 +28,18 @@ struct ScenePlace {
 };
 
 struct MesoSurfaceDescription {
-    std::string asset;           ///< as openMesoAsset
+    std::string asset;  ///< as openMesoAsset
     meso::MethodOptions method;
-    std::string base = "quad";   ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
-    double tiles = 4;            ///< along the base (makeBaseSurface, readBaseMesh)
-    double heightScale = 1;      ///< of the slab; 1: as high as the asset is to its tile's edge
-    glm::dvec3 place{0};         ///< the base's origin, world
-    double scale = 1;            ///< of the base, mesh files too
-    UpAxis up = UpAxis::Z;       ///< which way the base's z points; mesh files stay as they are
-    glm::vec3 colour{0.8f};      ///< encoded
+    std::string base = "quad";  ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
+    double tiles = 4;           ///< along the base (makeBaseSurface, readBaseMesh)
+    double heightScale = 1;     ///< of the slab; 1: as high as the asset is to its tile's edge
+    glm::dvec3 place{0};        ///< the base's origin, world
+    double scale = 1;           ///< of the base, mesh files too
+    UpAxis up = UpAxis::Z;      ///< which way the base's z points; mesh files stay as they are
+    glm::vec3 colour{0.8f};     ///< encoded
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/scene/tile_texture.h); empty: none
     bool withBase = true;
-    bool withFar = true;         ///< far away it is not marched (MesoLook::errorPixels)
+    bool withFar = true;  ///< far away it is not marched (MesoLook::errorPixels)
     ScenePlace from = {};
 };
 

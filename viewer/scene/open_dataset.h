@@ -15,11 +15,11 @@ namespace vcp {
 
 /// How servers are asked.
 struct SourceAccess {
-    std::string caFile;  ///< PEM; empty: the system's
-    std::string cache;   ///< folder that keeps what a server sends; empty: nothing is kept
+    std::string caFile;                ///< PEM; empty: the system's
+    std::string cache;                 ///< folder that keeps what a server sends; empty: nothing is kept
     uint64_t cacheBytes = 4ull << 30;  ///< limit of that folder
-    /// Ends what a server is asked for, within some 50 ms, once it says so: while a dataset is opened, and in its later reads. Any
-    /// thread asks.
+    /// Ends what a server is asked for, within some 50 ms, once it says so: while a dataset is opened, and in its later
+    /// reads. Any thread asks.
     std::function<bool()> cancelled = {};
 };
 

@@ -17,11 +17,13 @@ Box OpenedScene::bounds() const {
 
 std::vector<PlacedDataset> OpenedScene::placed() const {
     std::vector<PlacedDataset> datasets;
-    for (const Part& part : parts) datasets.push_back({part.open.dataset, part.open.source, part.placement, part.open.loaderThreads()});
+    for (const Part& part : parts)
+        datasets.push_back({part.open.dataset, part.open.source, part.placement, part.open.loaderThreads()});
     return datasets;
 }
 
-Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std::function<Result<OpenDataset>(const std::string& file)>& open) {
+Result<OpenedScene> openScene(SceneFile file, const std::string& name,
+                              const std::function<Result<OpenDataset>(const std::string& file)>& open) {
     OpenedScene scene;
     scene.file = std::move(file);
     for (const SceneDataset& each : scene.file.datasets) {
@@ -33,7 +35,9 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std
     if (!surfaces) return surfaces.error();
     scene.surfaces = *std::move(surfaces);
     const Box all = scene.bounds();
-    if (!std::isfinite(glm::length(all.high - all.low))) return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together", shownAddress(name)};
+    if (!std::isfinite(glm::length(all.high - all.low)))
+        return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together",
+                     shownAddress(name)};
     return scene;
 }
 

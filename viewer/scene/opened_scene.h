@@ -16,9 +16,9 @@ struct OpenedScene {
         OpenDataset open;
         Similarity placement;
     };
-    std::vector<Part> parts;  ///< at least one, or a surface
-    MesoScene surfaces;       ///< made of those of the file
-    SceneFile file;           ///< light, camera and sections of a scene file; empty without one
+    std::vector<Part> parts;                       ///< at least one, or a surface
+    MesoScene surfaces;                            ///< made of those of the file
+    SceneFile file;                                ///< light, camera and sections of a scene file; empty without one
     std::vector<std::filesystem::path> filesRead;  ///< which no output may replace; addresses stand among them
 
     /// Of all datasets where they are placed, and of the surfaces.
@@ -26,8 +26,9 @@ struct OpenedScene {
     [[nodiscard]] std::vector<PlacedDataset> placed() const;
 };
 
-/// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for the scene in
-/// errors. Errors: those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
-Result<OpenedScene> openScene(SceneFile file, const std::string& name, const std::function<Result<OpenDataset>(const std::string& file)>& open);
+/// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for
+/// the scene in errors. Errors: those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
+Result<OpenedScene> openScene(SceneFile file, const std::string& name,
+                              const std::function<Result<OpenDataset>(const std::string& file)>& open);
 
 }  // namespace vcp

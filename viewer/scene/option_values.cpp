@@ -98,7 +98,8 @@ std::optional<uint64_t> parseBytes(std::string_view text) {
 
 std::string budgetProblem(const std::string& text) {
     const auto bytes = parseBytes(text);
-    return bytes && *bytes >= 1 << 20 ? std::string() : fmt::format("must be at least 1M, like 64M or 1G, not \"{}\"", text);
+    return bytes && *bytes >= 1 << 20 ? std::string()
+                                      : fmt::format("must be at least 1M, like 64M or 1G, not \"{}\"", text);
 }
 
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {

@@ -18,8 +18,7 @@ struct NamedShading {
 constexpr NamedShading kShadings[] = {
     {"lit", ShadingMode::Lit},         {"unlit", ShadingMode::Unlit}, {"clay", ShadingMode::Clay},
     {"normals", ShadingMode::Normals}, {"steps", ShadingMode::Steps}, {"cells", ShadingMode::Cells},
-    {"fetches", ShadingMode::Fetches},
-    {"level", ShadingMode::Level},     {"error", ShadingMode::Error},
+    {"fetches", ShadingMode::Fetches}, {"level", ShadingMode::Level}, {"error", ShadingMode::Error},
 };
 
 // From the left, almost along a surface that faces the camera: relief of a millimetre casts its shade.
@@ -46,14 +45,18 @@ RendererOptions RenderSettings::rendererOptions() const {
 Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
     const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
     const bool isPaper = dataset.header.method == Method::Paper;
-    if (!isPaper && march != PaperMarch{}) return usage("the options --paper-... are for files built with --method paper");
-    if (isPaper && (shadows || occlusionRays > 0 || caps)) return usage("files built with --method paper have no --shadows, --occlusion or --caps");
+    if (!isPaper && march != PaperMarch{})
+        return usage("the options --paper-... are for files built with --method paper");
+    if (isPaper && (shadows || occlusionRays > 0 || caps))
+        return usage("files built with --method paper have no --shadows, --occlusion or --caps");
     return {};
 }
 
 Shading RenderSettings::shadingChosen() const {
     Shading chosen;
-    chosen.mode = std::find_if(std::begin(kShadings), std::end(kShadings), [&](const auto& each) { return shading == each.name; })->mode;
+    chosen.mode = std::find_if(std::begin(kShadings), std::end(kShadings), [&](const auto& each) {
+                      return shading == each.name;
+                  })->mode;
     chosen.lightFollowsCamera = light != "fixed";
     if (light == "raking") chosen.lightDirection = kRakingLight;
     if (!lightDirection.empty()) chosen.lightDirection = parseDirection(lightDirection).value();
@@ -68,7 +71,9 @@ std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const
         const PlaneText plane = parsePlane(text).value();
         // An axis' own offset: from the box's lower side on, whichever side is kept.
         const glm::dvec3 axis = glm::abs(plane.normal);
-        const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) + plane.offset * glm::dot(axis, bounds.high - bounds.low) : plane.offset;
+        const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) +
+                                                     plane.offset * glm::dot(axis, bounds.high - bounds.low)
+                                               : plane.offset;
         planes.push_back({plane.normal, offset});
     }
     return planes;

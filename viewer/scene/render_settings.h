@@ -39,7 +39,8 @@ struct RenderSettings {
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
     /// The view, or the camera file. Errors: those of readCamera.
-    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered = {}) const;
+    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size,
+                                                const PictureMargins& covered = {}) const;
 };
 
 /// What RenderSettings::shading may say.

@@ -36,7 +36,8 @@ bool isDeeperThan(const Json& json, int depth) {
 /// Takes a scene apart and remembers the first thing that is wrong.
 class SceneReader {
 public:
-    SceneReader(const LinesOf& lines, const std::string& name, std::filesystem::path folder) : lines_(lines), name_(name), folder_(std::move(folder)) {}
+    SceneReader(const LinesOf& lines, const std::string& name, std::filesystem::path folder)
+        : lines_(lines), name_(name), folder_(std::move(folder)) {}
 
     SceneFile scene(const Json& json) {
         SceneFile scene;
@@ -45,9 +46,11 @@ public:
         if (json.contains("mesostructure")) scene.surfaces = surfaces(json["mesostructure"]);
         if (!json.contains("datasets") && scene.surfaces.empty()) wrong("", "\"datasets\" is missing");
         const Json& datasets = json.value("datasets", Json::array());
-        if (!datasets.is_array() || (datasets.empty() && scene.surfaces.empty()) || datasets.size() > kMostSceneDatasets)
+        if (!datasets.is_array() || (datasets.empty() && scene.surfaces.empty()) ||
+            datasets.size() > kMostSceneDatasets)
             wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostSceneDatasets));
-        for (size_t i = 0; i < datasets.size() && !error_; ++i) scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
+        for (size_t i = 0; i < datasets.size() && !error_; ++i)
+            scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
         if (json.contains("lights")) scene.light = light(json["lights"]);
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
         if (json.contains("sections")) scene.sections = sections(json["sections"]);
@@ -61,18 +64,22 @@ private:
     void wrong(const std::string& at, const std::string& what) {
         if (error_) return;
         const std::string key = at.substr(at.rfind('/') + 1);
-        const bool isKey = !key.empty() && !std::all_of(key.begin(), key.end(), [](char c) { return c >= '0' && c <= '9'; });
-        error_ = Error{ErrorCode::InvalidInput, isKey ? fmt::format("\"{}\" {}", key, what) : what, name_, fmt::format("line {}", lines_(at))};
+        const bool isKey =
+            !key.empty() && !std::all_of(key.begin(), key.end(), [](char c) { return c >= '0' && c <= '9'; });
+        error_ = Error{ErrorCode::InvalidInput, isKey ? fmt::format("\"{}\" {}", key, what) : what, name_,
+                       fmt::format("line {}", lines_(at))};
     }
 
     void onlyKeys(const Json& object, const std::string& at, std::initializer_list<std::string_view> keys) {
         for (const auto& [key, value] : object.items())
-            if (std::find(keys.begin(), keys.end(), key) == keys.end()) wrong(at + "/" + key, fmt::format("is no key here; there are {}", fmt::join(keys, ", ")));
+            if (std::find(keys.begin(), keys.end(), key) == keys.end())
+                wrong(at + "/" + key, fmt::format("is no key here; there are {}", fmt::join(keys, ", ")));
     }
 
     double number(const Json& value, const std::string& at) {
         if (!value.is_number()) return wrong(at, "must be a number"), 0;
-        if (!(std::abs(value.get<double>()) <= kLargestNumber)) return wrong(at, fmt::format("must be between -{0:g} and {0:g}", kLargestNumber)), 0;
+        if (!(std::abs(value.get<double>()) <= kLargestNumber))
+            return wrong(at, fmt::format("must be between -{0:g} and {0:g}", kLargestNumber)), 0;
         return value.get<double>();
     }
 
@@ -101,7 +108,9 @@ private:
     }
 
     /// Of any length above zero.
-    static glm::dvec3 unit(glm::dvec3 v) { return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)})); }
+    static glm::dvec3 unit(glm::dvec3 v) {
+        return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
+    }
 
     bool isObject(const Json& value, const std::string& at) {
         if (!value.is_object()) wrong(at, "must be an object");
@@ -113,9 +122,12 @@ private:
         if (!isObject(json, at)) return made;
         onlyKeys(json, at, {"file", "transform", "translate", "rotate", "scale"});
         made.from = {name_, lines_(at + "/file"), "file"};
-        if (!json.contains("file")) wrong(at, "\"file\" is missing");
-        else if (!json["file"].is_string() || json["file"].get<std::string>().empty()) wrong(at + "/file", "must be a file's name");
-        else made.file = fileNamed(json["file"].get<std::string>());
+        if (!json.contains("file"))
+            wrong(at, "\"file\" is missing");
+        else if (!json["file"].is_string() || json["file"].get<std::string>().empty())
+            wrong(at + "/file", "must be a file's name");
+        else
+            made.file = fileNamed(json["file"].get<std::string>());
         if (json.contains("transform")) {
             for (const char* other : {"translate", "rotate", "scale"})
                 if (json.contains(other)) wrong(at + "/" + other, "does not go with \"transform\"");
@@ -130,8 +142,10 @@ private:
 
     std::vector<MesoSurfaceDescription> surfaces(const Json& json) {
         std::vector<MesoSurfaceDescription> all;
-        if (!json.is_array() || json.empty() || json.size() > kMostSurfaces) return wrong("/mesostructure", fmt::format("must be a list of 1 to {} surfaces", kMostSurfaces)), all;
-        for (size_t i = 0; i < json.size() && !error_; ++i) all.push_back(surface(json[i], fmt::format("/mesostructure/{}", i)));
+        if (!json.is_array() || json.empty() || json.size() > kMostSurfaces)
+            return wrong("/mesostructure", fmt::format("must be a list of 1 to {} surfaces", kMostSurfaces)), all;
+        for (size_t i = 0; i < json.size() && !error_; ++i)
+            all.push_back(surface(json[i], fmt::format("/mesostructure/{}", i)));
         return all;
     }
 
@@ -139,9 +153,13 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "texture", "normal_texture", "method", "base"});
-        if (!json.contains("asset")) wrong(at, "\"asset\" is missing");
-        else made.asset = assetNamed(json["asset"], at + "/asset");
+        onlyKeys(json, at,
+                 {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "texture",
+                  "normal_texture", "method", "base"});
+        if (!json.contains("asset"))
+            wrong(at, "\"asset\" is missing");
+        else
+            made.asset = assetNamed(json["asset"], at + "/asset");
         made.from = {name_, lines_(at), {}};
         // A base that is none by name is a mesh.
         const auto bases = meso::baseSurfaceNames();
@@ -155,7 +173,8 @@ private:
         if (json.contains("colour")) made.colour = colour(json["colour"], at + "/colour");
         const auto isPicture = [](const std::string&) { return true; };
         if (json.contains("texture")) made.colourTexture = named(json["texture"], at + "/texture", isPicture);
-        if (json.contains("normal_texture")) made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
+        if (json.contains("normal_texture"))
+            made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
         if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
         return made;
@@ -164,7 +183,8 @@ private:
     /// A name, or a file, which is taken from the scene's folder.
     template <class IsFile>
     std::string named(const Json& json, const std::string& at, IsFile isFile) {
-        if (!json.is_string() || json.get<std::string>().empty()) return wrong(at, "must be a name or a file's name"), std::string();
+        if (!json.is_string() || json.get<std::string>().empty())
+            return wrong(at, "must be a name or a file's name"), std::string();
         const std::string name = json.get<std::string>();
         return isFile(name) ? fileNamed(name) : name;
     }
@@ -173,7 +193,8 @@ private:
         const std::string name = named(json, at, [](const std::string& file) { return file.ends_with(".meso"); });
         const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
         if (!error_ && !name.ends_with(".meso") && !isIn(meso::heightFieldNames()) && !isIn(meso::solidNames()))
-            wrong(at, fmt::format("must be an asset (.meso), a height field ({}) or a solid ({})", fmt::join(meso::heightFieldNames(), ", "), fmt::join(meso::solidNames(), ", ")));
+            wrong(at, fmt::format("must be an asset (.meso), a height field ({}) or a solid ({})",
+                                  fmt::join(meso::heightFieldNames(), ", "), fmt::join(meso::solidNames(), ", ")));
         return name;
     }
 
@@ -191,18 +212,23 @@ private:
     std::string methodNamed(const Json& json, const std::string& at) {
         const auto names = meso::methodNames();
         const std::string name = json.is_string() ? json.get<std::string>() : std::string();
-        if (std::ranges::find(names, name) == names.end()) wrong(at, fmt::format("must be one of {}", fmt::join(names, ", ")));
+        if (std::ranges::find(names, name) == names.end())
+            wrong(at, fmt::format("must be one of {}", fmt::join(names, ", ")));
         return name;
     }
 
     [[nodiscard]] std::string fileNamed(const std::string& file) const {
-        return isHttpUrl(file) || std::filesystem::path(file).is_absolute() ? file : (folder_ / file).lexically_normal().string();
+        return isHttpUrl(file) || std::filesystem::path(file).is_absolute()
+                   ? file
+                   : (folder_ / file).lexically_normal().string();
     }
 
     double scale(const Json& value, const std::string& at) {
-        if (value.is_array()) return wrong(at, "must be one number: other scales along other axes are not supported"), 1;
+        if (value.is_array())
+            return wrong(at, "must be one number: other scales along other axes are not supported"), 1;
         const double s = number(value, at);
-        if (!error_ && !(s >= 1 / kLargestScale && s <= kLargestScale)) return wrong(at, fmt::format("must be above 0, from {:g} to {:g}", 1 / kLargestScale, kLargestScale)), 1;
+        if (!error_ && !(s >= 1 / kLargestScale && s <= kLargestScale))
+            return wrong(at, fmt::format("must be above 0, from {:g} to {:g}", 1 / kLargestScale, kLargestScale)), 1;
         return s;
     }
 
@@ -229,12 +255,14 @@ private:
     }
 
     std::optional<SceneLight> light(const Json& json) {
-        if (!json.is_array() || json.size() > 1) return wrong("/lights", "must be a list of at most one light; more are not supported"), std::nullopt;
+        if (!json.is_array() || json.size() > 1)
+            return wrong("/lights", "must be a list of at most one light; more are not supported"), std::nullopt;
         if (json.empty() || !isObject(json[0], "/lights/0")) return std::nullopt;
         onlyKeys(json[0], "/lights/0", {"direction", "follows_camera"});
         SceneLight made;
         made.direction = glm::vec3(unit(direction(json[0], "direction", "/lights/0")));
-        made.followsCamera = json[0].contains("follows_camera") && flag(json[0]["follows_camera"], "/lights/0/follows_camera");
+        made.followsCamera =
+            json[0].contains("follows_camera") && flag(json[0]["follows_camera"], "/lights/0/follows_camera");
         return made;
     }
 
@@ -245,13 +273,15 @@ private:
         // The field is named by the error: "\"target\"".
         std::string field = made.error().element;
         std::erase(field, '"');
-        wrong(json.contains(field) ? "/camera/" + field : "/camera", json.contains(field) ? made.error().message : fmt::format("\"{}\" {}", field, made.error().message));
+        wrong(json.contains(field) ? "/camera/" + field : "/camera",
+              json.contains(field) ? made.error().message : fmt::format("\"{}\" {}", field, made.error().message));
         return std::nullopt;
     }
 
     std::vector<SectionPlane> sections(const Json& json) {
         std::vector<SectionPlane> planes;
-        if (!json.is_array() || json.size() > kMostSections) return wrong("/sections", fmt::format("must be a list of at most {} planes", kMostSections)), planes;
+        if (!json.is_array() || json.size() > kMostSections)
+            return wrong("/sections", fmt::format("must be a list of at most {} planes", kMostSections)), planes;
         for (size_t i = 0; i < json.size() && !error_; ++i) {
             const std::string at = fmt::format("/sections/{}", i);
             if (!isObject(json[i], at)) return planes;
@@ -298,8 +328,11 @@ Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
     auto placement = similarityFromMatrix(rows);
     if (!placement) return placement;
     const glm::dvec3 far = glm::abs(placement->translation);
-    if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale || placement->scale < 1 / kLargestScale)
-        return Error{ErrorCode::Usage, fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}", kLargestNumber, kLargestScale, 1 / kLargestScale)};
+    if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale ||
+        placement->scale < 1 / kLargestScale)
+        return Error{ErrorCode::Usage,
+                     fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}",
+                                 kLargestNumber, kLargestScale, 1 / kLargestScale)};
     return placement;
 }
 
@@ -312,7 +345,9 @@ std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {
     return files;
 }
 
-bool isSceneName(const std::string& name) { return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json"; }
+bool isSceneName(const std::string& name) {
+    return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json";
+}
 
 Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
     if (auto error = notJson(text, name)) return *std::move(error);
@@ -321,7 +356,8 @@ Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, 
     const LinesOf lines(text);
     if (lines.twice()) {
         const std::string& at = lines.twice()->first;
-        return Error{ErrorCode::InvalidInput, fmt::format("\"{}\" is there twice", at.substr(at.rfind('/') + 1)), name, fmt::format("line {}", lines.twice()->second)};
+        return Error{ErrorCode::InvalidInput, fmt::format("\"{}\" is there twice", at.substr(at.rfind('/') + 1)), name,
+                     fmt::format("line {}", lines.twice()->second)};
     }
     SceneReader reader(lines, name, folder);
     SceneFile scene = reader.scene(json);

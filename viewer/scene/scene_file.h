@@ -1,5 +1,5 @@
-// Scene files: several datasets and surfaces with mesostructure, each in its place, light, camera and section planes, in JSON. docs/scenes.md has the
-// schema and an example.
+// Scene files: several datasets and surfaces with mesostructure, each in its place, light, camera and section planes,
+// in JSON. docs/scenes.md has the schema and an example.
 //
 // Unknown keys are errors, so that a misspelt one is not passed over. Errors name the file, the line and the key.
 #pragma once
@@ -44,7 +44,8 @@ constexpr size_t kMostSceneDatasets = 256;
 /// The files that a scene names: datasets and meshes but for addresses, assets, bases and textures.
 std::vector<std::filesystem::path> filesOf(const SceneFile& scene);
 
-/// similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9. Errors: Usage.
+/// similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9. Errors:
+/// Usage.
 Result<Similarity> scenePlacement(std::span<const double, 16> rows);
 
 /// Whether a name stands for a scene file: it ends in .json.

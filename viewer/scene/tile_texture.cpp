@@ -22,7 +22,8 @@ Result<MesoTexture> readTexture(const std::filesystem::path& path, ToVector toVe
     std::vector<glm::vec4> texels;
     texels.reserve(image->texels.size());
     for (uint32_t y = image->height; y-- > 0;)
-        for (uint32_t x = 0; x < image->width; ++x) texels.push_back(toVector(image->texels[size_t{y} * image->width + x]));
+        for (uint32_t x = 0; x < image->width; ++x)
+            texels.push_back(toVector(image->texels[size_t{y} * image->width + x]));
     return makeMesoTexture({image->width, image->height}, std::move(texels));
 }
 

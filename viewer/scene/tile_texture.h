@@ -8,8 +8,9 @@
 
 namespace vcp {
 
-/// Reads PNG or JPEG; the picture's upper row is the tile's highest y. Colours are sRGB and become light; alpha is left out.
-/// The file may be hostile. Errors: those of loadImage, with the file's name; Limit (more than 4096 texels along an edge).
+/// Reads PNG or JPEG; the picture's upper row is the tile's highest y. Colours are sRGB and become light; alpha is left
+/// out. The file may be hostile. Errors: those of loadImage, with the file's name; Limit (more than 4096 texels along
+/// an edge).
 Result<MesoTexture> readColourTexture(const std::filesystem::path& path);
 
 /// The same of normals in the OpenGL convention: red, green and blue from 0 to 255 are x (to the right), y (up in the

@@ -81,7 +81,8 @@ void cancelOpening(vcp_context& context) {
     if (context.openingIsCancelled) *context.openingIsCancelled = true;
 }
 
-Result<OpenedScene> openCancellably(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
+Result<OpenedScene> openCancellably(vcp_context& context, SceneFile file, const std::string& name,
+                                    const vcp_open_options* options) {
     auto access = accessFor(options);
     if (!access) return access.error();
     const Opening opening(context);
@@ -101,7 +102,8 @@ Result<void> openFor(vcp_context& context, SceneFile file, const std::string& na
     for (const OpenedScene::Part& part : context.open->parts) {
         context.finest->add(part.open.reader, *part.open.dataset, part.placement);
         const FileHeader& header = part.open.dataset->header;
-        context.log(VCP_LOG_INFO, fmt::format("{}: {} triangles in {} levels", part.open.reader->name(), header.triangles, header.levels));
+        context.log(VCP_LOG_INFO, fmt::format("{}: {} triangles in {} levels", part.open.reader->name(),
+                                              header.triangles, header.levels));
     }
     for (const std::string& warning : context.open->surfaces.warnings) context.log(VCP_LOG_WARNING, warning);
     for (vcp_view* view : context.views) {
@@ -125,25 +127,33 @@ Result<void> openPath(vcp_context& context, const char* path, const vcp_open_opt
 
 Result<SceneDataset> placedFrom(const vcp_placed& given, uint32_t number) {
     const std::string who = fmt::format("dataset {}", number);
-    if (!given.path || *given.path == '\0') return Error{.code = ErrorCode::Usage, .message = "has no path", .element = who};
+    if (!given.path || *given.path == '\0')
+        return Error{.code = ErrorCode::Usage, .message = "has no path", .element = who};
     SceneDataset dataset{given.path, {}};
     const std::span<const double, 16> rows(given.world_from_dataset);
     if (std::all_of(rows.begin(), rows.end(), [](double x) { return x == 0; })) return dataset;
     const auto placement = scenePlacement(rows);
-    if (!placement) return Error{.code = ErrorCode::Usage, .message = "its matrix " + placement.error().message, .file = shownAddress(given.path), .element = who};
+    if (!placement)
+        return Error{.code = ErrorCode::Usage,
+                     .message = "its matrix " + placement.error().message,
+                     .file = shownAddress(given.path),
+                     .element = who};
     dataset.placement = *placement;
     return dataset;
 }
 
-Result<void> openPlaced(vcp_context& context, const vcp_placed* datasets, uint32_t count, const vcp_open_options* options) {
-    if (count < 1 || count > kMostSceneDatasets) return wrong(fmt::format("a scene has 1 to {} datasets", kMostSceneDatasets));
+Result<void> openPlaced(vcp_context& context, const vcp_placed* datasets, uint32_t count,
+                        const vcp_open_options* options) {
+    if (count < 1 || count > kMostSceneDatasets)
+        return wrong(fmt::format("a scene has 1 to {} datasets", kMostSceneDatasets));
     const auto stride = structSize(datasets);
     if (!stride) return stride.error();
     SceneFile file;
     for (uint32_t i = 0; i < count; ++i) {
         // The host's structs may be longer than ours.
         const void* at = reinterpret_cast<const char*>(datasets) + size_t{*stride} * i;
-        if (const auto size = structSize(at); !size || *size != *stride) return wrong("struct_size is not the same in all of an array");
+        if (const auto size = structSize(at); !size || *size != *stride)
+            return wrong("struct_size is not the same in all of an array");
         vcp_placed each{};
         VCP_TRY(takeStruct(at, &each, sizeof(each)));
         auto dataset = placedFrom(each, i);
@@ -208,13 +218,16 @@ vcp_status vcp_context_destroy(vcp_context* context) {
     return VCP_OK;
 }
 
-const char* vcp_context_last_error(const vcp_context* context) { return context ? context->lastError.c_str() : "there is no context"; }
+const char* vcp_context_last_error(const vcp_context* context) {
+    return context ? context->lastError.c_str() : "there is no context";
+}
 
 vcp_status vcp_context_open(vcp_context* context, const char* path, const vcp_open_options* options) {
     return inTurn(context, [&] { return openPath(*context, path, options); });
 }
 
-vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count, const vcp_open_options* options) {
+vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count,
+                                   const vcp_open_options* options) {
     return inTurn(context, [&] { return openPlaced(*context, datasets, count, options); });
 }
 
@@ -236,7 +249,8 @@ vcp_status vcp_context_device(vcp_context* context, vcp_device_info* info) {
 
 vcp_status vcp_context_set_budgets(vcp_context* context, uint64_t gpuBytes, uint64_t ramBytes) {
     return inTurn(context, [&]() -> vcp::Result<void> {
-        const uint64_t gpu = gpuBytes > 0 ? gpuBytes : context->gpuBytes, ram = ramBytes > 0 ? ramBytes : context->ramBytes;
+        const uint64_t gpu = gpuBytes > 0 ? gpuBytes : context->gpuBytes,
+                       ram = ramBytes > 0 ? ramBytes : context->ramBytes;
         VCP_TRY(context->renderer->setBudgets(gpu, ram));
         context->gpuBytes = gpu;
         context->ramBytes = ram;

@@ -12,12 +12,16 @@ size_t characterAt(const std::string& text, size_t at) {
     const auto byte = [&](size_t i) { return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u; };
     const unsigned first = byte(0);
     if (first < 0x80) return 1;
-    const size_t length = first >= 0xC2 && first < 0xE0 ? 2 : (first & 0xF0) == 0xE0 ? 3 : first >= 0xF0 && first < 0xF5 ? 4 : 0;
+    const size_t length = first >= 0xC2 && first < 0xE0   ? 2
+                          : (first & 0xF0) == 0xE0        ? 3
+                          : first >= 0xF0 && first < 0xF5 ? 4
+                                                          : 0;
     for (size_t i = 1; i < length; ++i)
         if ((byte(i) & 0xC0) != 0x80) return 0;
     // Longer than it need be, half of a pair of UTF-16, or beyond the last.
     const unsigned second = byte(1);
-    const bool isWrong = (first == 0xE0 && second < 0xA0) || (first == 0xED && second >= 0xA0) || (first == 0xF0 && second < 0x90) || (first == 0xF4 && second >= 0x90);
+    const bool isWrong = (first == 0xE0 && second < 0xA0) || (first == 0xED && second >= 0xA0) ||
+                         (first == 0xF0 && second < 0x90) || (first == 0xF4 && second >= 0x90);
     return isWrong ? 0 : length;
 }
 
@@ -35,13 +39,27 @@ std::string utf8Of(const std::string& text) {
 
 Outcome::Outcome(const Error& error) : text(utf8Of(error.line())) {
     switch (error.code) {
-        case ErrorCode::InvalidInput: status = VCP_INVALID_INPUT; break;
-        case ErrorCode::Io: status = VCP_IO; break;
-        case ErrorCode::Unsupported: status = VCP_UNSUPPORTED; break;
-        case ErrorCode::Limit: status = VCP_LIMIT; break;
-        case ErrorCode::Device: status = VCP_DEVICE; break;
-        case ErrorCode::Usage: status = VCP_USAGE; break;
-        case ErrorCode::Cancelled: status = VCP_CANCELLED; break;
+        case ErrorCode::InvalidInput:
+            status = VCP_INVALID_INPUT;
+            break;
+        case ErrorCode::Io:
+            status = VCP_IO;
+            break;
+        case ErrorCode::Unsupported:
+            status = VCP_UNSUPPORTED;
+            break;
+        case ErrorCode::Limit:
+            status = VCP_LIMIT;
+            break;
+        case ErrorCode::Device:
+            status = VCP_DEVICE;
+            break;
+        case ErrorCode::Usage:
+            status = VCP_USAGE;
+            break;
+        case ErrorCode::Cancelled:
+            status = VCP_CANCELLED;
+            break;
     }
 }
 
@@ -57,7 +75,8 @@ Result<uint32_t> structSize(const void* given) {
     if (!given) return wrong("a struct is needed, and NULL was given");
     uint32_t size = 0;
     std::memcpy(&size, given, sizeof(size));
-    if (size < sizeof(size) || size > kLargestStruct) return wrong("struct_size of a struct is not set: VCP_INIT sets it");
+    if (size < sizeof(size) || size > kLargestStruct)
+        return wrong("struct_size of a struct is not set: VCP_INIT sets it");
     return size;
 }
 
@@ -75,7 +94,8 @@ Result<void> giveStruct(void* out, const void* value, size_t size) {
     const auto theirs = structSize(out);
     if (!theirs) return theirs.error();
     constexpr size_t kBehind = sizeof(uint32_t);
-    std::memcpy(static_cast<char*>(out) + kBehind, static_cast<const char*>(value) + kBehind, std::min<size_t>(size, *theirs) - kBehind);
+    std::memcpy(static_cast<char*>(out) + kBehind, static_cast<const char*>(value) + kBehind,
+                std::min<size_t>(size, *theirs) - kBehind);
     return {};
 }
 
@@ -96,18 +116,30 @@ const char* vcp_version(void) { return VCP_VERSION; }
 
 const char* vcp_status_text(vcp_status status) {
     switch (status) {
-        case VCP_OK: return "done";
-        case VCP_INVALID_INPUT: return "invalid input";
-        case VCP_IO: return "input or output failed";
-        case VCP_UNSUPPORTED: return "not supported";
-        case VCP_LIMIT: return "limit exceeded";
-        case VCP_DEVICE: return "device failed";
-        case VCP_USAGE: return "wrong call";
-        case VCP_CANCELLED: return "cancelled";
-        case VCP_BUSY: return "another call is under way";
-        case VCP_OUT_OF_MEMORY: return "out of memory";
-        case VCP_INTERNAL: return "defect of the library";
-        default: return "unknown status";
+        case VCP_OK:
+            return "done";
+        case VCP_INVALID_INPUT:
+            return "invalid input";
+        case VCP_IO:
+            return "input or output failed";
+        case VCP_UNSUPPORTED:
+            return "not supported";
+        case VCP_LIMIT:
+            return "limit exceeded";
+        case VCP_DEVICE:
+            return "device failed";
+        case VCP_USAGE:
+            return "wrong call";
+        case VCP_CANCELLED:
+            return "cancelled";
+        case VCP_BUSY:
+            return "another call is under way";
+        case VCP_OUT_OF_MEMORY:
+            return "out of memory";
+        case VCP_INTERNAL:
+            return "defect of the library";
+        default:
+            return "unknown status";
     }
 }
 }

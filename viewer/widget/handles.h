@@ -22,7 +22,8 @@
 #include "viewer/widget/vcp.h"
 
 namespace vcp::widget {
-/// For hosts, which take texts for UTF-8: names of files and what stands in them may be anything. What is none becomes U+FFFD.
+/// For hosts, which take texts for UTF-8: names of files and what stands in them may be anything. What is none becomes
+/// U+FFFD.
 std::string utf8Of(const std::string& text);
 }  // namespace vcp::widget
 
@@ -41,7 +42,9 @@ struct vcp_context {
     std::string name;
     std::unique_ptr<vcp::ScenePick> finest;
 
-    [[nodiscard]] double now() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
+    [[nodiscard]] double now() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    }
     void log(vcp_log_level level, const std::string& text) const {
         if (callbacks.log) callbacks.log(callbacks.user, level, vcp::widget::utf8Of(text).c_str());
     }
@@ -53,11 +56,11 @@ struct vcp_view {
     std::string lastError;
     bool hasWindow = false;
     vcp::UpAxis up = vcp::UpAxis::Y;
-    bool isUpdated = false;   // since it was made
+    bool isUpdated = false;  // since it was made
     bool wasSettled = false;
     bool hasSceneLight = false, hasSceneSections = false;  // of the scene file that is open
     uint32_t losses = 0;
-    vcp::NextStep next;       // of the last update, less what was drawn since
+    vcp::NextStep next;  // of the last update, less what was drawn since
     glm::dvec2 cursor{0};
     glm::dvec3 fly{0};
 
@@ -102,7 +105,8 @@ Outcome outcomeOf(Call call) noexcept {
 /// The context's turn: one call at a time.
 class Turn {
 public:
-    explicit Turn(vcp_context& context) : context_(&context), taken_(!context.busy.test_and_set(std::memory_order_acquire)) {}
+    explicit Turn(vcp_context& context)
+        : context_(&context), taken_(!context.busy.test_and_set(std::memory_order_acquire)) {}
     ~Turn() {
         if (taken_) context_->busy.clear(std::memory_order_release);
     }
@@ -146,7 +150,8 @@ Result<uint32_t> structSize(const void* given);
 Result<void> takeStruct(const void* given, void* value, size_t size);
 Result<void> giveStruct(void* out, const void* value, size_t size);
 
-/// The host's struct over `value`, which stays what it is beyond the host's size; nothing where it is null. Errors: Usage.
+/// The host's struct over `value`, which stays what it is beyond the host's size; nothing where it is null. Errors:
+/// Usage.
 template <class T>
 Result<T> taken(const T* given, T value = {}) {
     if (given) VCP_TRY(takeStruct(given, &value, sizeof(T)));

@@ -1,8 +1,8 @@
 /* vcp.h: the viewer of .vcp files as a part of your own program, in C.
  *
- *   vcp_context   a device, its budgets and a dataset, or several in their places; as many as you like, independent of each other
- *   vcp_view      a picture of what the context has open: in a window of yours, in your memory or in your Vulkan image;
- *                 the views of a context share its device, its budgets and what is read
+ *   vcp_context   a device, its budgets and a dataset, or several in their places; as many as you like, independent of
+ * each other vcp_view      a picture of what the context has open: in a window of yours, in your memory or in your
+ * Vulkan image; the views of a context share its device, its budgets and what is read
  *
  *   vcp_context_create(&options, &context);          vcp_context_open(context, "statue.vcp", NULL);
  *   vcp_view_create(context, &viewOptions, &view);
@@ -16,18 +16,18 @@
  * Structs begin with struct_size, which you set to sizeof the struct: VCP_INIT(vcp_step) does. All else may be zero,
  * and is then what the comment says. A pointer to an options struct may be NULL: all of it is zero.
  *
- * Errors: every function returns a vcp_status; no call aborts, prints, exits, or writes outside the paths it was given, and
- * no exception leaves one. What went wrong is a line of text: vcp_context_last_error, vcp_view_last_error, or the
- * error_text of the options where there is no handle yet. A handle or a pointer that is needed and NULL gives VCP_USAGE;
- * a handle that was destroyed must not be used.
+ * Errors: every function returns a vcp_status; no call aborts, prints, exits, or writes outside the paths it was given,
+ * and no exception leaves one. What went wrong is a line of text: vcp_context_last_error, vcp_view_last_error, or the
+ * error_text of the options where there is no handle yet. A handle or a pointer that is needed and NULL gives
+ * VCP_USAGE; a handle that was destroyed must not be used.
  *
  * Threads: calls for a context and its views come one at a time, from any threads; a call that comes while another is
  * under way does nothing but give VCP_BUSY. So do calls from within a callback. Different contexts may be used in
- * different threads at once. vcp_build and vcp_version need no context and may be called from any thread. Callbacks come from
- * within a call of yours, in its thread, and must not throw. There is no global state.
+ * different threads at once. vcp_build and vcp_version need no context and may be called from any thread. Callbacks
+ * come from within a call of yours, in its thread, and must not throw. There is no global state.
  *
- * Texts are UTF-8. Pixels have their origin at the upper left, y down. Lengths are in the dataset's own unit; of several
- * datasets, in that of the world that they are placed in. */
+ * Texts are UTF-8. Pixels have their origin at the upper left, y down. Lengths are in the dataset's own unit; of
+ * several datasets, in that of the world that they are placed in. */
 #ifndef VCP_H
 #define VCP_H
 
@@ -45,7 +45,8 @@ extern "C" {
 #endif
 
 /* vcp_step step = VCP_INIT(vcp_step); */
-#define VCP_INIT(type) {.struct_size = sizeof(type)}
+#define VCP_INIT(type) \
+    { .struct_size = sizeof(type) }
 
 typedef struct vcp_context vcp_context;
 typedef struct vcp_view vcp_view;
@@ -62,7 +63,7 @@ enum {
     VCP_CANCELLED = 7,     /* you asked to stop, or the time was over */
     VCP_BUSY = 8,          /* another call for this context is under way */
     VCP_OUT_OF_MEMORY = 9,
-    VCP_INTERNAL = 10      /* a defect of the library */
+    VCP_INTERNAL = 10 /* a defect of the library */
 };
 
 /* The status in a word or two; never NULL. */
@@ -89,8 +90,9 @@ typedef struct vcp_callbacks {
     void (*settled)(void* user, vcp_view* view);
 } vcp_callbacks;
 
-/* A Vulkan device of yours. It outlives the context, has Vulkan 1.2, and the instance was made for that version; no feature
- * is needed. For views in windows it has VK_KHR_swapchain. A device that is lost is not made anew: VCP_DEVICE from then on. */
+/* A Vulkan device of yours. It outlives the context, has Vulkan 1.2, and the instance was made for that version; no
+ * feature is needed. For views in windows it has VK_KHR_swapchain. A device that is lost is not made anew: VCP_DEVICE
+ * from then on. */
 typedef struct vcp_host_device {
     uint32_t struct_size;
     uint32_t queue_family; /* computes; for windows and images it has graphics as well */
@@ -102,24 +104,24 @@ typedef struct vcp_host_device {
 
 typedef struct vcp_context_options {
     uint32_t struct_size;
-    uint32_t windows;          /* 1: views may have windows */
-    const char* device;        /* index, or a part of the name; NULL: the best one */
+    uint32_t windows;                   /* 1: views may have windows */
+    const char* device;                 /* index, or a part of the name; NULL: the best one */
     const vcp_host_device* host_device; /* NULL: the context makes a device of its own */
-    uint64_t gpu_bytes;        /* budget of the pages on the device, never exceeded; 0: 512 MiB */
-    uint64_t ram_bytes;        /* budget of pages being read or kept to be read again, never exceeded; 0: 256 MiB */
-    uint32_t loader_threads;   /* 0: 2, for what is on a server 8 */
-    uint32_t without_colour;   /* 1: colours are neither read nor kept */
+    uint64_t gpu_bytes;                 /* budget of the pages on the device, never exceeded; 0: 512 MiB */
+    uint64_t ram_bytes;      /* budget of pages being read or kept to be read again, never exceeded; 0: 256 MiB */
+    uint32_t loader_threads; /* 0: 2, for what is on a server 8 */
+    uint32_t without_colour; /* 1: colours are neither read nor kept */
     const vcp_callbacks* callbacks; /* NULL: none; copied */
-    char* error_text;          /* NULL, or where it is written why there is no context */
+    char* error_text;               /* NULL, or where it is written why there is no context */
     size_t error_text_size;
 } vcp_context_options;
 
 VCP_API vcp_status vcp_context_create(const vcp_context_options* options, vcp_context** context);
-/* VCP_USAGE while it has views. While another thread opens something: VCP_BUSY, and that call ends soon, with VCP_CANCELLED; then call
- * again. NULL: nothing is done. */
+/* VCP_USAGE while it has views. While another thread opens something: VCP_BUSY, and that call ends soon, with
+ * VCP_CANCELLED; then call again. NULL: nothing is done. */
 VCP_API vcp_status vcp_context_destroy(vcp_context* context);
-/* The last line of what went wrong for the context; "" when nothing has. Lives until the next call. VCP_BUSY leaves it as it is;
- * do not read it while another thread's call is under way. */
+/* The last line of what went wrong for the context; "" when nothing has. Lives until the next call. VCP_BUSY leaves it
+ * as it is; do not read it while another thread's call is under way. */
 VCP_API const char* vcp_context_last_error(const vcp_context* context);
 
 typedef struct vcp_open_options {
@@ -132,24 +134,25 @@ typedef struct vcp_open_options {
 /* Opens a .vcp file, or its http:// or https:// address, and shows all of it in all views, in place of what was open. A
  * mesh is built first: vcp_build. When it fails nothing is open, or what was open before.
  *
- * A path that ends in .json is a scene file (docs/scenes.md): all its datasets and surfaces are shown where it places them, and its camera,
- * light, section planes and caps, where it has any, go to all views, those that are made later too. What is opened next takes a scene's
- * light and planes away again. */
+ * A path that ends in .json is a scene file (docs/scenes.md): all its datasets and surfaces are shown where it places
+ * them, and its camera, light, section planes and caps, where it has any, go to all views, those that are made later
+ * too. What is opened next takes a scene's light and planes away again. */
 VCP_API vcp_status vcp_context_open(vcp_context* context, const char* path, const vcp_open_options* options);
 
 /* A dataset in its place. */
 typedef struct vcp_placed {
-    uint32_t struct_size;      /* the same in all of an array */
+    uint32_t struct_size; /* the same in all of an array */
     uint32_t reserved;
-    const char* path;          /* a .vcp file, or its address */
-    double world_from_dataset[16]; /* a matrix, row by row, for columns (x, y, z, 1): turns, moves, and scales all axes by one number; all zero: where
-                                * it lies by itself */
+    const char* path;              /* a .vcp file, or its address */
+    double world_from_dataset[16]; /* a matrix, row by row, for columns (x, y, z, 1): turns, moves, and scales all axes
+                                    * by one number; all zero: where it lies by itself */
 } vcp_placed;
 
-/* Opens `count` datasets, 1 to 256, and shows them together, as vcp_context_open does one. Each gets a share of the budgets and at
- * least one loader thread. VCP_USAGE where a matrix mirrors, shears, stretches one axis more than another, moves by more than 1e12 or
- * scales by more than 1e9 or less than 1e-9. */
-VCP_API vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count, const vcp_open_options* options);
+/* Opens `count` datasets, 1 to 256, and shows them together, as vcp_context_open does one. Each gets a share of the
+ * budgets and at least one loader thread. VCP_USAGE where a matrix mirrors, shears, stretches one axis more than
+ * another, moves by more than 1e12 or scales by more than 1e9 or less than 1e-9. */
+VCP_API vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count,
+                                           const vcp_open_options* options);
 
 typedef struct vcp_dataset_info {
     uint32_t struct_size;
@@ -162,8 +165,8 @@ typedef struct vcp_dataset_info {
     uint32_t reserved;
 } vcp_dataset_info;
 
-/* Of all that is open together, in the world: most levels, all triangles, the box about all, the smallest cell, the largest
- * error. VCP_USAGE where nothing is open. */
+/* Of all that is open together, in the world: most levels, all triangles, the box about all, the smallest cell, the
+ * largest error. VCP_USAGE where nothing is open. */
 VCP_API vcp_status vcp_context_dataset(vcp_context* context, vcp_dataset_info* info);
 
 typedef struct vcp_device_info {
@@ -198,11 +201,11 @@ typedef struct vcp_view_options {
      * vcp_view_create, and again when a lost device is made anew. */
     int32_t (*create_surface)(void* user, struct VkInstance_T* instance, uint64_t* surface);
     void* create_surface_user;
-    uint32_t width, height;   /* pixels of the framebuffer; 0: minimized */
-    double moving_frame_ms;   /* while the camera moves, frames that would take longer are drawn smaller; 0: never */
-    double move_seconds;      /* that a smooth move takes; 0: at once */
-    uint32_t z_is_up;         /* 0: y is up */
-    char* error_text;         /* NULL, or where it is written why there is no view */
+    uint32_t width, height; /* pixels of the framebuffer; 0: minimized */
+    double moving_frame_ms; /* while the camera moves, frames that would take longer are drawn smaller; 0: never */
+    double move_seconds;    /* that a smooth move takes; 0: at once */
+    uint32_t z_is_up;       /* 0: y is up */
+    char* error_text;       /* NULL, or where it is written why there is no view */
     size_t error_text_size;
 } vcp_view_options;
 
@@ -228,12 +231,12 @@ VCP_API vcp_status vcp_view_mouse_scroll(vcp_view* view, double x, double y, dou
 
 typedef int32_t vcp_action;
 enum {
-    VCP_FIT = 0,                /* all of the dataset into the picture */
-    VCP_RESET = 1,              /* the view it opened with */
-    VCP_TOGGLE_LIGHT = 2,       /* follows the camera, or stays */
+    VCP_FIT = 0,          /* all of the dataset into the picture */
+    VCP_RESET = 1,        /* the view it opened with */
+    VCP_TOGGLE_LIGHT = 2, /* follows the camera, or stays */
     VCP_TOGGLE_SHADOWS = 3,
     VCP_TOGGLE_OCCLUSION = 4,
-    VCP_TOGGLE_SECTION = 5,     /* cuts through the middle */
+    VCP_TOGGLE_SECTION = 5, /* cuts through the middle */
     VCP_NEXT_SHADING = 6,
     VCP_TOGGLE_PROJECTION = 7,
     VCP_TOGGLE_COLOUR = 8,
@@ -243,7 +246,7 @@ enum {
     VCP_VIEW_RIGHT = 12,
     VCP_VIEW_TOP = 13,
     VCP_VIEW_ISOMETRIC = 14,
-    VCP_CENTRE = 15             /* what was last under the cursor comes to the middle */
+    VCP_CENTRE = 15 /* what was last under the cursor comes to the middle */
 };
 VCP_API vcp_status vcp_view_act(vcp_view* view, vcp_action action);
 /* A key of a keyboard, as the character on it in capitals: what it does in the window of `vcp view` (F fit, R reset, M
@@ -255,9 +258,9 @@ typedef struct vcp_camera {
     uint32_t struct_size;
     uint32_t orthographic; /* 1: parallel rays; the height shown is that at the target */
     double position[3];
-    double target[3];      /* what orbiting turns about where nothing is under the cursor */
-    double up[3];          /* zero: the up axis */
-    double fov_y;          /* full vertical angle in radians; 0: 45 degrees */
+    double target[3]; /* what orbiting turns about where nothing is under the cursor */
+    double up[3];     /* zero: the up axis */
+    double fov_y;     /* full vertical angle in radians; 0: 45 degrees */
 } vcp_camera;
 
 VCP_API vcp_status vcp_view_get_camera(vcp_view* view, vcp_camera* camera);
@@ -284,16 +287,16 @@ enum {
 typedef struct vcp_look {
     uint32_t struct_size;
     vcp_shading shading;
-    double error_pixels;       /* refined until the certified error is below, in pixels; above 0 */
-    uint32_t shadows;          /* 1: hard shadows */
-    uint32_t occlusion_rays;   /* a pixel, at most 64; 0: no ambient occlusion */
-    double occlusion_radius;   /* 0: a tenth of the diagonal */
-    uint32_t light_in_world;   /* 0: the light follows the camera */
-    uint32_t transparent;      /* 1: the background is black with alpha 0 */
-    float light[3];            /* towards it; camera axes (right, up, back), or the world's */
+    double error_pixels;                           /* refined until the certified error is below, in pixels; above 0 */
+    uint32_t shadows;                              /* 1: hard shadows */
+    uint32_t occlusion_rays;                       /* a pixel, at most 64; 0: no ambient occlusion */
+    double occlusion_radius;                       /* 0: a tenth of the diagonal */
+    uint32_t light_in_world;                       /* 0: the light follows the camera */
+    uint32_t transparent;                          /* 1: the background is black with alpha 0 */
+    float light[3];                                /* towards it; camera axes (right, up, back), or the world's */
     float background_top[3], background_bottom[3]; /* linear, 0 to 1 */
-    uint32_t section_count;    /* at most 6 planes; what lies beyond them is cut away */
-    double sections[6][4];     /* n, d: kept is where dot(n, x) >= d */
+    uint32_t section_count;                        /* at most 6 planes; what lies beyond them is cut away */
+    double sections[6][4];                         /* n, d: kept is where dot(n, x) >= d */
 } vcp_look;
 
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
@@ -301,8 +304,8 @@ VCP_API vcp_status vcp_view_set_look(vcp_view* view, const vcp_look* look);
 
 typedef struct vcp_step {
     uint32_t struct_size;
-    uint32_t draw;       /* 1: vcp_view_render is due */
-    uint32_t settled;    /* 1: nothing that the view wants is missing, loading or queued */
+    uint32_t draw;    /* 1: vcp_view_render is due */
+    uint32_t settled; /* 1: nothing that the view wants is missing, loading or queued */
     uint32_t reserved;
     double wait_seconds; /* come back after this time even if nothing happens; infinity: nothing is going on */
 } vcp_step;
@@ -320,10 +323,10 @@ typedef struct vcp_frame {
     uint32_t struct_size;
     uint32_t width, height; /* written */
     uint32_t reserved;
-    uint8_t* rgba;          /* NULL, or room for the picture: upper row first, no padding, sRGB-encoded */
-    size_t rgba_size;       /* bytes */
-    float* depth;           /* NULL, or room: distance from the eye along each pixel's ray; infinity: nothing is hit */
-    size_t depth_size;      /* floats */
+    uint8_t* rgba;     /* NULL, or room for the picture: upper row first, no padding, sRGB-encoded */
+    size_t rgba_size;  /* bytes */
+    float* depth;      /* NULL, or room: distance from the eye along each pixel's ray; infinity: nothing is hit */
+    size_t depth_size; /* floats */
 } vcp_frame;
 
 /* VCP_USAGE where nothing was rendered yet; VCP_LIMIT, with width and height written, where the room is too small. */
@@ -335,8 +338,8 @@ typedef struct vcp_host_image {
     int32_t layout_after; /* VkImageLayout; 0: SHADER_READ_ONLY_OPTIMAL */
     uint64_t image;       /* VkImage */
     uint32_t width, height;
-    uint64_t wait;        /* VkSemaphore that is signalled before the image is written, or 0 */
-    uint64_t signal;      /* VkSemaphore to signal when it is written, or 0 */
+    uint64_t wait;   /* VkSemaphore that is signalled before the image is written, or 0 */
+    uint64_t signal; /* VkSemaphore to signal when it is written, or 0 */
 } vcp_host_image;
 
 /* Copies the last picture into it, scaled to it; what was in the image is lost. */
@@ -344,7 +347,7 @@ VCP_API vcp_status vcp_view_copy_to_image(vcp_view* view, const vcp_host_image* 
 
 typedef struct vcp_pick {
     uint32_t struct_size;
-    uint32_t hit;     /* 0: nothing is there, and the rest is zero */
+    uint32_t hit; /* 0: nothing is there, and the rest is zero */
     double position[3];
     double normal[3]; /* unit, towards the eye */
     double distance;  /* from the eye's ray's origin */
@@ -353,8 +356,8 @@ typedef struct vcp_pick {
     uint32_t dataset; /* number of the dataset that was hit, in the order in which they were placed */
 } vcp_pick;
 
-/* What is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads from the file
- * or the server what it needs: may wait. */
+/* What is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads from the
+ * file or the server what it needs: may wait. */
 VCP_API vcp_status vcp_view_pick(vcp_view* view, double x, double y, vcp_pick* pick);
 
 /* Of the last update and the last picture. */
@@ -366,7 +369,7 @@ typedef struct vcp_stats {
     uint32_t device_losses; /* that were made good */
     uint64_t frames;        /* rendered */
     double frame_ms;
-    double error_pixels;    /* largest projected certified error in the picture */
+    double error_pixels; /* largest projected certified error in the picture */
     uint64_t rays, hit_pixels;
     uint64_t resident_bytes, pool_bytes, bytes_read;
     uint64_t read_failures; /* tried again */
@@ -397,7 +400,8 @@ typedef struct vcp_build_options {
     uint64_t memory_bytes;     /* cap; 0: a part of what the machine has */
     uint32_t threads;          /* 0: one a processor */
     uint32_t resume;           /* 1: goes on where an interrupted build of the same output was */
-    /* About ten times a second, and of every stage, in the calling thread; 0 cancels, and then it is not called again. */
+    /* About ten times a second, and of every stage, in the calling thread; 0 cancels, and then it is not called again.
+     */
     int (*progress)(void* user, const vcp_progress* progress);
     void* user;
     char* error_text;

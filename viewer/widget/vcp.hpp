@@ -1,5 +1,6 @@
-// vcp.hpp: vcp.h for C++17, header only. Handles that clean up after themselves, functions as members, errors as exceptions
-// of type vcp::widget::Error; callbacks are std::function. What calls mean, and in which threads, says vcp.h.
+// vcp.hpp: vcp.h for C++17, header only. Handles that clean up after themselves, functions as members, errors as
+// exceptions of type vcp::widget::Error; callbacks are std::function. What calls mean, and in which threads, says
+// vcp.h.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,8 @@ namespace vcp::widget {
 
 class Error : public std::runtime_error {
 public:
-    Error(vcp_status status, const std::string& what) : std::runtime_error(what.empty() ? vcp_status_text(status) : what), status_(status) {}
+    Error(vcp_status status, const std::string& what)
+        : std::runtime_error(what.empty() ? vcp_status_text(status) : what), status_(status) {}
     [[nodiscard]] vcp_status status() const { return status_; }
 
 private:
@@ -47,7 +49,8 @@ struct Callbacks {
     std::function<void(vcp_view*)> needsRedraw, settled;
 };
 
-/// A dataset in its place: a .vcp file or its address, and a matrix row by row (vcp_placed); all zero: where it lies by itself.
+/// A dataset in its place: a .vcp file or its address, and a matrix row by row (vcp_placed); all zero: where it lies by
+/// itself.
 struct Placed {
     std::string path;
     std::array<double, 16> worldFromDataset{};
@@ -64,36 +67,47 @@ struct Frame {
 class Context {
 public:
     /// `options.callbacks` is not looked at.
-    explicit Context(vcp_context_options options = sized<vcp_context_options>(), Callbacks callbacks = {}) : shared_(std::make_shared<Shared>()) {
+    explicit Context(vcp_context_options options = sized<vcp_context_options>(), Callbacks callbacks = {})
+        : shared_(std::make_shared<Shared>()) {
         shared_->callbacks = std::move(callbacks);
         vcp_callbacks calls = sized<vcp_callbacks>();
         calls.user = &shared_->callbacks;
-        calls.log = [](void* user, vcp_log_level level, const char* text) { call(static_cast<Callbacks*>(user)->log, level, text); };
-        calls.error = [](void* user, vcp_status status, const char* text) { call(static_cast<Callbacks*>(user)->error, status, text); };
+        calls.log = [](void* user, vcp_log_level level, const char* text) {
+            call(static_cast<Callbacks*>(user)->log, level, text);
+        };
+        calls.error = [](void* user, vcp_status status, const char* text) {
+            call(static_cast<Callbacks*>(user)->error, status, text);
+        };
         calls.needs_redraw = [](void* user, vcp_view* view) { call(static_cast<Callbacks*>(user)->needsRedraw, view); };
         calls.settled = [](void* user, vcp_view* view) { call(static_cast<Callbacks*>(user)->settled, view); };
         std::array<char, 512> text{};
         options.callbacks = &calls;
         options.error_text = text.data();
         options.error_text_size = text.size();
-        if (const vcp_status status = vcp_context_create(&options, &shared_->handle); status != VCP_OK) throw Error(status, text.data());
+        if (const vcp_status status = vcp_context_create(&options, &shared_->handle); status != VCP_OK)
+            throw Error(status, text.data());
     }
 
-    void open(const std::string& path, const vcp_open_options* options = nullptr) { check(vcp_context_open(handle(), path.c_str(), options)); }
+    void open(const std::string& path, const vcp_open_options* options = nullptr) {
+        check(vcp_context_open(handle(), path.c_str(), options));
+    }
     /// Several together, each in its place.
     void open(const std::vector<Placed>& datasets, const vcp_open_options* options = nullptr) {
         std::vector<vcp_placed> placed;
         for (const Placed& dataset : datasets) {
             placed.push_back(sized<vcp_placed>());
             placed.back().path = dataset.path.c_str();
-            std::copy(dataset.worldFromDataset.begin(), dataset.worldFromDataset.end(), placed.back().world_from_dataset);
+            std::copy(dataset.worldFromDataset.begin(), dataset.worldFromDataset.end(),
+                      placed.back().world_from_dataset);
         }
         check(vcp_context_open_placed(handle(), placed.data(), static_cast<uint32_t>(placed.size()), options));
     }
     [[nodiscard]] vcp_dataset_info dataset() const { return got(vcp_context_dataset); }
     [[nodiscard]] vcp_device_info device() const { return got(vcp_context_device); }
     /// 0: as it is.
-    void setBudgets(uint64_t gpuBytes, uint64_t ramBytes = 0) { check(vcp_context_set_budgets(handle(), gpuBytes, ramBytes)); }
+    void setBudgets(uint64_t gpuBytes, uint64_t ramBytes = 0) {
+        check(vcp_context_set_budgets(handle(), gpuBytes, ramBytes));
+    }
     void wait(double seconds) { check(vcp_context_wait(handle(), seconds)); }
     [[nodiscard]] vcp_context* handle() const { return shared_->handle; }
 
@@ -144,10 +158,14 @@ public:
     View(Context context, uint32_t width, uint32_t height) : View(std::move(context), offscreen(width, height)) {}
 
     void resize(uint32_t width, uint32_t height) { check(vcp_view_resize(handle(), width, height)); }
-    void press(vcp_button button, double x, double y, uint32_t modifiers = 0) { check(vcp_view_mouse_press(handle(), button, x, y, modifiers)); }
+    void press(vcp_button button, double x, double y, uint32_t modifiers = 0) {
+        check(vcp_view_mouse_press(handle(), button, x, y, modifiers));
+    }
     void move(double x, double y) { check(vcp_view_mouse_move(handle(), x, y)); }
     void release(vcp_button button) { check(vcp_view_mouse_release(handle(), button)); }
-    void scroll(double x, double y, double notches, uint32_t modifiers = 0) { check(vcp_view_mouse_scroll(handle(), x, y, notches, modifiers)); }
+    void scroll(double x, double y, double notches, uint32_t modifiers = 0) {
+        check(vcp_view_mouse_scroll(handle(), x, y, notches, modifiers));
+    }
     void key(uint32_t character, bool pressed) { check(vcp_view_key(handle(), character, pressed ? 1 : 0)); }
     void act(vcp_action action) { check(vcp_view_act(handle(), action)); }
 
@@ -169,7 +187,8 @@ public:
         vcp_frame frame = sized<vcp_frame>();
         check(vcp_view_read(handle(), &frame));
         const size_t pixels = size_t{frame.width} * frame.height;
-        Frame read{frame.width, frame.height, std::vector<uint8_t>(4 * pixels), std::vector<float>(withDepth ? pixels : 0)};
+        Frame read{frame.width, frame.height, std::vector<uint8_t>(4 * pixels),
+                   std::vector<float>(withDepth ? pixels : 0)};
         frame.rgba = read.rgba.data();
         frame.rgba_size = read.rgba.size();
         frame.depth = withDepth ? read.depth.data() : nullptr;
@@ -211,7 +230,8 @@ private:
 };
 
 /// Meshes to one .vcp file. `options.inputs` and `output` come from the arguments; `progress` returns false to cancel.
-inline vcp_build_report build(const std::vector<std::string>& inputs, const std::string& output, const std::function<bool(const vcp_progress&)>& progress = {},
+inline vcp_build_report build(const std::vector<std::string>& inputs, const std::string& output,
+                              const std::function<bool(const vcp_progress&)>& progress = {},
                               vcp_build_options options = sized<vcp_build_options>()) {
     std::vector<const char*> paths;
     for (const std::string& input : inputs) paths.push_back(input.c_str());
@@ -220,7 +240,10 @@ inline vcp_build_report build(const std::vector<std::string>& inputs, const std:
     options.input_count = static_cast<uint32_t>(paths.size());
     options.output = output.c_str();
     options.user = const_cast<void*>(static_cast<const void*>(&progress));
-    if (progress) options.progress = [](void* user, const vcp_progress* at) { return (*static_cast<const std::function<bool(const vcp_progress&)>*>(user))(*at) ? 1 : 0; };
+    if (progress)
+        options.progress = [](void* user, const vcp_progress* at) {
+            return (*static_cast<const std::function<bool(const vcp_progress&)>*>(user))(*at) ? 1 : 0;
+        };
     options.error_text = text.data();
     options.error_text_size = text.size();
     vcp_build_report report = sized<vcp_build_report>();

@@ -24,7 +24,8 @@ Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_vie
     auto surface = surfaceSource(given);
     if (!surface) return surface.error();
     if (*surface && !context.hasWindows) return wrong("the context was made without windows");
-    if (given.width > kLargestSide || given.height > kLargestSide) return wrong("a view has at most 16384 pixels a side");
+    if (given.width > kLargestSide || given.height > kLargestSide)
+        return wrong("a view has at most 16384 pixels a side");
     if (!(given.moving_frame_ms >= 0) || !(given.move_seconds >= 0)) return wrong("a time is below 0 or not a number");
     auto renderer = context.renderer->addView(*surface);
     if (!renderer) return renderer.error();
@@ -88,11 +89,15 @@ Result<void> settle(vcp_view& view, double seconds) {
         const double left = begin + seconds - view.context->now();
         isLate = left <= 0;
         const std::chrono::milliseconds wait(static_cast<int>(1000 * std::clamp(left, 0.0, kPollSeconds)));
-        if (!view.viewer->status().update.settled) view.viewer->renderer().waitForPage(wait);
-        else std::this_thread::sleep_for(std::min(wait, std::chrono::milliseconds(static_cast<int>(1000 * std::min(view.next.waitSeconds, kPollSeconds)))));
+        if (!view.viewer->status().update.settled)
+            view.viewer->renderer().waitForPage(wait);
+        else
+            std::this_thread::sleep_for(std::min(wait, std::chrono::milliseconds(static_cast<int>(
+                                                           1000 * std::min(view.next.waitSeconds, kPollSeconds)))));
     }
     VCP_TRY(render(view));
-    if (isLate) return Error{.code = ErrorCode::Cancelled, .message = fmt::format("not settled within {} seconds", seconds)};
+    if (isLate)
+        return Error{.code = ErrorCode::Cancelled, .message = fmt::format("not settled within {} seconds", seconds)};
     return {};
 }
 
@@ -107,7 +112,8 @@ Result<void> readFrame(vcp_view& view, vcp_frame* out) {
     VCP_TRY(give(out, *frame));
     const size_t pixels = size_t{picture->width} * picture->height;
     if ((frame->rgba && frame->rgba_size < 4 * pixels) || (frame->depth && frame->depth_size < pixels))
-        return Error{.code = ErrorCode::Limit, .message = fmt::format("too little room for {} x {} pixels", picture->width, picture->height)};
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("too little room for {} x {} pixels", picture->width, picture->height)};
     if (frame->rgba) std::memcpy(frame->rgba, picture->rgba.data(), picture->rgba.size());
     if (!frame->depth) return {};
     const auto depth = view.viewer->renderer().readDepth();
@@ -178,15 +184,18 @@ Result<OrbitCamera> cameraFrom(const vcp_camera* given, const OrbitCamera& befor
     if (!given) return wrong("there is no camera");
     const auto wanted = taken(given);
     if (!wanted) return wanted.error();
-    if (!isFinite(wanted->position, 3) || !isFinite(wanted->target, 3) || !isFinite(wanted->up, 3)) return wrong("a number of the camera is not finite");
+    if (!isFinite(wanted->position, 3) || !isFinite(wanted->target, 3) || !isFinite(wanted->up, 3))
+        return wrong("a number of the camera is not finite");
     OrbitCamera camera = before;
     camera.position = vectorFrom(wanted->position);
     const glm::dvec3 ahead = vectorFrom(wanted->target) - camera.position;
     glm::dvec3 up = vectorFrom(wanted->up);
     if (up == glm::dvec3(0)) up = before.up == UpAxis::Z ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
     camera.focusDistance = glm::length(ahead);
-    if (!(camera.focusDistance > 0) || !std::isfinite(camera.focusDistance)) return wrong("the camera's target is not away from its position");
-    if (!(glm::length(glm::cross(up, ahead)) > 1e-9 * glm::length(up) * camera.focusDistance)) return wrong("the camera's up is along its view");
+    if (!(camera.focusDistance > 0) || !std::isfinite(camera.focusDistance))
+        return wrong("the camera's target is not away from its position");
+    if (!(glm::length(glm::cross(up, ahead)) > 1e-9 * glm::length(up) * camera.focusDistance))
+        return wrong("the camera's up is along its view");
     camera.orientation = facing(ahead, up);
     camera.projection = wanted->orthographic != 0 ? Projection::Orthographic : Projection::Perspective;
     camera.fovY = wanted->fov_y == 0 ? std::numbers::pi / 4 : wanted->fov_y;
@@ -222,12 +231,15 @@ Result<void> checkLook(const vcp_look& look) {
     if (look.shading < VCP_SHADING_LIT || look.shading > VCP_SHADING_ERROR) return wrong("there is no such shading");
     if (!(look.error_pixels > 0) || !std::isfinite(look.error_pixels)) return wrong("error_pixels is not above 0");
     if (look.occlusion_rays > kMostOcclusionRays) return wrong("more than 64 occlusion rays");
-    if (!(look.occlusion_radius >= 0) || !std::isfinite(look.occlusion_radius)) return wrong("occlusion_radius is below 0 or not finite");
+    if (!(look.occlusion_radius >= 0) || !std::isfinite(look.occlusion_radius))
+        return wrong("occlusion_radius is below 0 or not finite");
     if (!isFinite(look.light, 3) || vectorFrom(look.light) == glm::vec3(0)) return wrong("the light has no direction");
-    if (!isFinite(look.background_top, 3) || !isFinite(look.background_bottom, 3)) return wrong("the background is not finite");
+    if (!isFinite(look.background_top, 3) || !isFinite(look.background_bottom, 3))
+        return wrong("the background is not finite");
     if (look.section_count > kMostSections) return wrong("more than 6 section planes");
     for (uint32_t i = 0; i < look.section_count; ++i)
-        if (!isFinite(look.sections[i], 4) || vectorFrom(look.sections[i]) == glm::dvec3(0)) return wrong("a section plane has no normal, or is not finite");
+        if (!isFinite(look.sections[i], 4) || vectorFrom(look.sections[i]) == glm::dvec3(0))
+            return wrong("a section plane has no normal, or is not finite");
     return {};
 }
 
@@ -247,7 +259,8 @@ Result<void> setLook(Viewer& viewer, const vcp_look* given) {
     shading.backgroundTop = vectorFrom(look->background_top);
     shading.backgroundBottom = vectorFrom(look->background_bottom);
     std::vector<SectionPlane> sections;
-    for (uint32_t i = 0; i < look->section_count; ++i) sections.push_back({vectorFrom(look->sections[i]), look->sections[i][3]});
+    for (uint32_t i = 0; i < look->section_count; ++i)
+        sections.push_back({vectorFrom(look->sections[i]), look->sections[i][3]});
     viewer.setShading(shading);
     viewer.setErrorPixels(look->error_pixels);
     viewer.setSections(std::move(sections));
@@ -327,9 +340,12 @@ void pressKey(vcp_view& view, uint32_t key, bool isPressed) {
 
 }  // namespace
 
-static_assert(VCP_VIEW_ISOMETRIC == static_cast<int>(ViewerAction::ViewIsometric) && VCP_TOGGLE_FLY == static_cast<int>(ViewerAction::ToggleFly) &&
-              VCP_TOGGLE_SECTION == static_cast<int>(ViewerAction::ToggleSection) && VCP_NEXT_SHADING == static_cast<int>(ViewerAction::NextShading));
-static_assert(VCP_SHADING_ERROR == static_cast<int>(ShadingMode::Error) && VCP_SHADING_STEPS == static_cast<int>(ShadingMode::Steps));
+static_assert(VCP_VIEW_ISOMETRIC == static_cast<int>(ViewerAction::ViewIsometric) &&
+              VCP_TOGGLE_FLY == static_cast<int>(ViewerAction::ToggleFly) &&
+              VCP_TOGGLE_SECTION == static_cast<int>(ViewerAction::ToggleSection) &&
+              VCP_NEXT_SHADING == static_cast<int>(ViewerAction::NextShading));
+static_assert(VCP_SHADING_ERROR == static_cast<int>(ShadingMode::Error) &&
+              VCP_SHADING_STEPS == static_cast<int>(ShadingMode::Steps));
 static_assert(VCP_RIGHT == static_cast<int>(MouseButton::Right) && VCP_MIDDLE == static_cast<int>(MouseButton::Middle));
 
 }  // namespace vcp::widget
@@ -400,7 +416,8 @@ vcp_status vcp_view_mouse_press(vcp_view* view, vcp_button button, double x, dou
         const auto at = cursorAt(v, x, y);
         if (!at) return at.error();
         if (button < VCP_LEFT || button > VCP_RIGHT) return wrong("there is no such button");
-        v.viewer->press(static_cast<vcp::MouseButton>(button), *at, {(modifiers & VCP_SHIFT) != 0, (modifiers & VCP_CONTROL) != 0});
+        v.viewer->press(static_cast<vcp::MouseButton>(button), *at,
+                        {(modifiers & VCP_SHIFT) != 0, (modifiers & VCP_CONTROL) != 0});
         return {};
     });
 }
@@ -450,9 +467,13 @@ vcp_status vcp_view_get_camera(vcp_view* view, vcp_camera* camera) {
     return inTurn(view, [&](vcp_view& v) { return give(camera, cameraOf(v.viewer->camera())); });
 }
 
-vcp_status vcp_view_set_camera(vcp_view* view, const vcp_camera* camera) { return toCamera(view, camera, &vcp::Viewer::setCamera); }
+vcp_status vcp_view_set_camera(vcp_view* view, const vcp_camera* camera) {
+    return toCamera(view, camera, &vcp::Viewer::setCamera);
+}
 
-vcp_status vcp_view_move_camera(vcp_view* view, const vcp_camera* camera) { return toCamera(view, camera, &vcp::Viewer::moveTo); }
+vcp_status vcp_view_move_camera(vcp_view* view, const vcp_camera* camera) {
+    return toCamera(view, camera, &vcp::Viewer::moveTo);
+}
 
 vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look) {
     return inTurn(view, [&](vcp_view& v) { return give(look, lookOf(*v.viewer)); });

@@ -71,8 +71,10 @@ Result<std::vector<std::string>> windowExtensions() {
     std::vector<VkExtensionProperties> there(count);
     VCP_VK(vkEnumerateInstanceExtensionProperties, nullptr, &count, there.data());
     std::vector<std::string> names;
-    for (const char* name : {VK_KHR_SURFACE_EXTENSION_NAME, VK_KHR_XCB_SURFACE_EXTENSION_NAME, VK_KHR_XLIB_SURFACE_EXTENSION_NAME, VK_KHR_WAYLAND_SURFACE_EXTENSION_NAME})
-        if (std::any_of(there.begin(), there.end(), [&](const VkExtensionProperties& each) { return std::strcmp(each.extensionName, name) == 0; }))
+    for (const char* name : {VK_KHR_SURFACE_EXTENSION_NAME, VK_KHR_XCB_SURFACE_EXTENSION_NAME,
+                             VK_KHR_XLIB_SURFACE_EXTENSION_NAME, VK_KHR_WAYLAND_SURFACE_EXTENSION_NAME})
+        if (std::any_of(there.begin(), there.end(),
+                        [&](const VkExtensionProperties& each) { return std::strcmp(each.extensionName, name) == 0; }))
             names.emplace_back(name);
     if (names.size() < 2) return Error{.code = ErrorCode::Device, .message = "Vulkan cannot draw into windows here"};
     return names;
@@ -82,19 +84,27 @@ Result<std::optional<SurfaceSource>> surfaceSource(const vcp_view_options& optio
     const auto wrong = [](const char* what) { return Error{.code = ErrorCode::Usage, .message = what}; };
     SurfaceSource source;
     switch (options.window_system) {
-        case VCP_WINDOW_NONE: return std::optional<SurfaceSource>{};
+        case VCP_WINDOW_NONE:
+            return std::optional<SurfaceSource>{};
         case VCP_WINDOW_CALLBACK:
             if (!options.create_surface) return wrong("the view has no create_surface");
-            source.createSurface = [options](VkInstance instance, VkSurfaceKHR* surface) { return createByHost(options, instance, surface); };
+            source.createSurface = [options](VkInstance instance, VkSurfaceKHR* surface) {
+                return createByHost(options, instance, surface);
+            };
             return std::optional(std::move(source));
         case VCP_WINDOW_XCB:
         case VCP_WINDOW_XLIB:
-        case VCP_WINDOW_WAYLAND: break;
-        default: return wrong("there is no such window_system");
+        case VCP_WINDOW_WAYLAND:
+            break;
+        default:
+            return wrong("there is no such window_system");
     }
     if (!options.display || options.window == 0) return wrong("the view has no display, or no window");
-    const auto system = options.window_system == VCP_WINDOW_XCB ? createXcb : options.window_system == VCP_WINDOW_XLIB ? createXlib : createWayland;
-    source.createSurface = [system, display = options.display, window = options.window](VkInstance instance, VkSurfaceKHR* surface) {
+    const auto system = options.window_system == VCP_WINDOW_XCB    ? createXcb
+                        : options.window_system == VCP_WINDOW_XLIB ? createXlib
+                                                                   : createWayland;
+    source.createSurface = [system, display = options.display, window = options.window](VkInstance instance,
+                                                                                        VkSurfaceKHR* surface) {
         return system(instance, display, window, surface);
     };
     return std::optional(std::move(source));

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <imgui.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <imgui.h>
 
 #include "viewer/key_map.h"
 #include "viewer/scene/option_values.h"
@@ -15,17 +15,20 @@ namespace vcp {
 
 namespace {
 
-constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings;
+constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
+                                    ImGuiWindowFlags_NoSavedSettings;
 constexpr ImGuiWindowFlags kBare = kFixed | ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar;
 // Values are dragged, not typed: keys are the window's.
 constexpr ImGuiSliderFlags kNoTyping = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
-constexpr ImGuiColorEditFlags kColour = ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions | ImGuiColorEditFlags_Float;
+constexpr ImGuiColorEditFlags kColour =
+    ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions | ImGuiColorEditFlags_Float;
 
 constexpr float kPanelWidth = 250, kMargin = 8;
 constexpr float kScaleBarLargest = 160;
 constexpr size_t kMostBoxes = 2000;
 constexpr double kUrgentDoublings = 5;  // of the tolerated error, until a ray that asks is red
-constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160), kMeasured = IM_COL32(255, 210, 60, 255);
+constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160),
+                kMeasured = IM_COL32(255, 210, 60, 255);
 constexpr ImU32 kHandle = IM_COL32(90, 190, 255, 255), kGripped = IM_COL32(255, 210, 60, 255);
 constexpr uint32_t kOcclusionRays = 8;
 
@@ -34,8 +37,10 @@ constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "c
 constexpr int kMostPictures = 3600;
 constexpr double kPicturesPerSecond = 30;
 
-constexpr const char* kPictureSizeNames[] = {"as shown", "1920 x 1080", "3840 x 2160", "7680 x 4320", "16384 x 9216", "16384 x 16384"};
-constexpr glm::ivec2 kPictureSizes[] = {{0, 0}, {1920, 1080}, {3840, 2160}, {7680, 4320}, {16384, 9216}, {16384, 16384}};
+constexpr const char* kPictureSizeNames[] = {"as shown",    "1920 x 1080",  "3840 x 2160",
+                                             "7680 x 4320", "16384 x 9216", "16384 x 16384"};
+constexpr glm::ivec2 kPictureSizes[] = {{0, 0},       {1920, 1080},  {3840, 2160},
+                                        {7680, 4320}, {16384, 9216}, {16384, 16384}};
 
 ImVec2 vec(glm::vec2 v) { return {v.x, v.y}; }
 
@@ -56,7 +61,8 @@ void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
 
 /// Blue through green to red, as the false colours (shaders/shade.comp).
 ImU32 heatColour(float x, int alpha) {
-    const glm::vec3 c = 255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
+    const glm::vec3 c =
+        255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
     return IM_COL32(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z), alpha);
 }
 
@@ -113,8 +119,10 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
     }
     layOutStatus();
     layOutMessages();
-    if (session_->opening()) layOutOpening();
-    else if (const auto saving = session_->saving()) layOutSaving(*saving);
+    if (session_->opening())
+        layOutOpening();
+    else if (const auto saving = session_->saving())
+        layOutSaving(*saving);
     if (showsHelp) layOutHelp();
 }
 
@@ -148,8 +156,12 @@ void Interface::layOutMessages() {
     const std::string& said = problem.empty() ? session_->note() : problem;
     if (said.empty()) return;
     ImGui::SetNextWindowPos({kMargin * scale_, kMargin * scale_});
-    ImGui::SetNextWindowSize({size_.x - (2 * kMargin + (session_->user().panel && session_->viewer().isOpen() ? kPanelWidth + kMargin : 0)) * scale_, 0});
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, problem.empty() ? ImVec4(0.1f, 0.2f, 0.3f, 0.9f) : ImVec4(0.45f, 0.08f, 0.05f, 0.95f));
+    ImGui::SetNextWindowSize(
+        {size_.x - (2 * kMargin + (session_->user().panel && session_->viewer().isOpen() ? kPanelWidth + kMargin : 0)) *
+                       scale_,
+         0});
+    ImGui::PushStyleColor(ImGuiCol_WindowBg,
+                          problem.empty() ? ImVec4(0.1f, 0.2f, 0.3f, 0.9f) : ImVec4(0.45f, 0.08f, 0.05f, 0.95f));
     ImGui::Begin("message", nullptr, kBare);
     if (!problem.empty()) {
         if (ImGui::SmallButton("x")) session_->dismissProblem();
@@ -186,7 +198,8 @@ void Interface::layOutViews() {
     ImGui::SameLine();
     actionButton("Reset", ViewerAction::Reset);
     ImGui::SameLine();
-    actionButton(viewer.camera().projection == Projection::Perspective ? "Orthographic" : "Perspective", ViewerAction::ToggleProjection);
+    actionButton(viewer.camera().projection == Projection::Perspective ? "Orthographic" : "Perspective",
+                 ViewerAction::ToggleProjection);
     actionButton("Front", ViewerAction::ViewFront);
     ImGui::SameLine();
     actionButton("Right", ViewerAction::ViewRight);
@@ -219,7 +232,8 @@ void Interface::layOutLooks() {
     Viewer& viewer = session_->viewer();
     Shading shading = viewer.shading();
     int mode = static_cast<int>(shading.mode);
-    if (ImGui::Combo("shading", &mode, kModes, static_cast<int>(std::size(kModes)))) shading.mode = static_cast<ShadingMode>(mode);
+    if (ImGui::Combo("shading", &mode, kModes, static_cast<int>(std::size(kModes))))
+        shading.mode = static_cast<ShadingMode>(mode);
     // On files that are drawn without, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
     ImGui::Checkbox("shadows", &shading.shadows);
@@ -244,11 +258,15 @@ void Interface::layOutLimits() {
     Viewer& viewer = session_->viewer();
     const ViewerStatus& status = viewer.status();
     auto error = static_cast<float>(viewer.errorPixels());
-    if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic)) viewer.setErrorPixels(static_cast<double>(error));
+    if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic))
+        viewer.setErrorPixels(static_cast<double>(error));
     const UpdateResult& update = status.update;
-    wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels), update.relaxed ? ": the budget is too small for less" : ""));
-    const float part = static_cast<float>(update.residentBytes) / static_cast<float>(std::max<uint64_t>(status.budgetBytes, 1));
-    const std::string filled = fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
+    wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels),
+                        update.relaxed ? ": the budget is too small for less" : ""));
+    const float part =
+        static_cast<float>(update.residentBytes) / static_cast<float>(std::max<uint64_t>(status.budgetBytes, 1));
+    const std::string filled =
+        fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
     ImGui::ProgressBar(part, ImVec2(-1, 0), filled.c_str());
     uint64_t budget = status.budgetBytes;
     if (ImGui::SmallButton("half the budget")) budget /= 2;
@@ -292,10 +310,12 @@ void Interface::layOutPicture() {
 }
 
 void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
-    ImGui::SetNextWindowPos({0.5f * size_.x, size_.y - statusHeight_ - 2 * kMargin * scale_}, ImGuiCond_Always, {0.5f, 1});
+    ImGui::SetNextWindowPos({0.5f * size_.x, size_.y - statusHeight_ - 2 * kMargin * scale_}, ImGuiCond_Always,
+                            {0.5f, 1});
     ImGui::SetNextWindowSize({std::min(300 * scale_, size_.x), 0});
     ImGui::Begin("saving", nullptr, kBare);
-    wrapped(saving.pictures > 1 ? fmt::format("{}: {} of {} pictures", saving.name, saving.finished, saving.pictures) : saving.name);
+    wrapped(saving.pictures > 1 ? fmt::format("{}: {} of {} pictures", saving.name, saving.finished, saving.pictures)
+                                : saving.name);
     const std::string percent = fmt::format("{:.0f} %", 100 * saving.fraction);
     ImGui::ProgressBar(static_cast<float>(saving.fraction), ImVec2(-1, 0), percent.c_str());
     if (ImGui::Button("Cancel (Esc)")) session_->cancelSaving();
@@ -358,7 +378,8 @@ void Interface::drawScaleBar() const {
     const glm::vec2 from(2 * kMargin * scale_, size_.y - statusHeight_ - 2 * kMargin * scale_);
     for (const auto& [colour, width] : {std::pair(kShade, 4 * scale_), std::pair(kInk, 2 * scale_)}) {
         list.AddLine(vec(from), {from.x + pixels, from.y}, colour, width);
-        for (const float x : {from.x, from.x + pixels}) list.AddLine({x, from.y - 4 * scale_}, {x, from.y + 4 * scale_}, colour, width);
+        for (const float x : {from.x, from.x + pixels})
+            list.AddLine({x, from.y - 4 * scale_}, {x, from.y + 4 * scale_}, colour, width);
     }
     const bool everywhere = viewer.camera().projection == Projection::Orthographic;
     textAt(list, from + glm::vec2(0, -20 * scale_), formatLength(length) + (everywhere ? "" : " in the middle"));
@@ -388,11 +409,14 @@ void Interface::drawSectionHandles() const {
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
     const SectionGrab grab = session_->viewer().sectionGrab();
     for (const SectionHandle& handle : session_->viewer().sectionHandles()) {
-        const auto colourOf = [&](SectionGrip part) { return grab == SectionGrab{part, handle.plane} ? kGripped : kHandle; };
+        const auto colourOf = [&](SectionGrip part) {
+            return grab == SectionGrab{part, handle.plane} ? kGripped : kHandle;
+        };
         std::vector<ImVec2> ring;
         for (const glm::dvec2 at : handle.ring) ring.push_back(vec(glm::vec2(at)));
         list.AddPolyline(ring.data(), static_cast<int>(ring.size()), kShade, ImDrawFlags_Closed, 5 * scale_);
-        list.AddPolyline(ring.data(), static_cast<int>(ring.size()), colourOf(SectionGrip::Turn), ImDrawFlags_Closed, 2.5f * scale_);
+        list.AddPolyline(ring.data(), static_cast<int>(ring.size()), colourOf(SectionGrip::Turn), ImDrawFlags_Closed,
+                         2.5f * scale_);
         const glm::vec2 foot(handle.foot), tip(handle.tip);
         const ImU32 colour = colourOf(SectionGrip::Move);
         list.AddCircleFilled(vec(foot), 8 * scale_, kShade);
@@ -417,12 +441,15 @@ void Interface::drawPages() const {
         const ImU32 colour = heatColour(static_cast<float>(page.level) / finest, 150);
         for (int axis = 0; axis < 3; ++axis)
             for (int side = 0; side < 4; ++side) {
-                const glm::dvec3 from = page.corner + page.edges[size_t(axis + 1) % 3] * double(side & 1) + page.edges[size_t(axis + 2) % 3] * double(side >> 1);
+                const glm::dvec3 from = page.corner + page.edges[size_t(axis + 1) % 3] * double(side & 1) +
+                                        page.edges[size_t(axis + 2) % 3] * double(side >> 1);
                 drawSegment(list, viewer, from, from + page.edges[size_t(axis)], colour, scale_);
             }
     }
-    const std::string said = fmt::format("{} of {} subvolumes in memory are drawn{}", std::count_if(pages.begin(), pages.end(), [](const PageBox& p) { return p.isDrawn; }),
-                                         pages.size(), drawn > kMostBoxes ? fmt::format("; the first {} as boxes", kMostBoxes) : "");
+    const std::string said =
+        fmt::format("{} of {} subvolumes in memory are drawn{}",
+                    std::count_if(pages.begin(), pages.end(), [](const PageBox& p) { return p.isDrawn; }), pages.size(),
+                    drawn > kMostBoxes ? fmt::format("; the first {} as boxes", kMostBoxes) : "");
     textAt(list, {2 * kMargin * scale_, size_.y - statusHeight_ - 52 * scale_}, said);
 }
 
@@ -443,11 +470,14 @@ void Interface::drawFeedback() const {
         asking += asks ? 1 : 0;
         const glm::vec2 at = corner + cell * glm::vec2(i % FeedbackPicture::kWidth, i / FeedbackPicture::kWidth);
         // Green where the page is fine enough, yellow to red where a finer one is asked for.
-        const auto urgency = static_cast<float>(asks ? std::min(std::log2(error / tolerated) / kUrgentDoublings, 1.0) : 0);
-        const ImU32 colour = asks ? IM_COL32(255, static_cast<int>(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
+        const auto urgency =
+            static_cast<float>(asks ? std::min(std::log2(error / tolerated) / kUrgentDoublings, 1.0) : 0);
+        const ImU32 colour =
+            asks ? IM_COL32(255, static_cast<int>(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
         list.AddRectFilled(vec(at), vec(at + cell - scale_), colour);
     }
-    const std::string said = kept ? fmt::format("{} of {} rays asked", asking, kept->errorPixels.size()) : "nothing is missing";
+    const std::string said =
+        kept ? fmt::format("{} of {} rays asked", asking, kept->errorPixels.size()) : "nothing is missing";
     textAt(list, corner + glm::vec2(0, size.y + 3 * scale_), said);
 }
 

@@ -19,7 +19,9 @@ constexpr float kFontPixels = 13;
 constexpr uint32_t kBuffers = 2;
 constexpr uint32_t kMostDescriptors = 8;
 
-uint64_t hashOf(const void* bytes, size_t size) { return hashBytes(std::span(static_cast<const std::byte*>(bytes), size)); }
+uint64_t hashOf(const void* bytes, size_t size) {
+    return hashBytes(std::span(static_cast<const std::byte*>(bytes), size));
+}
 
 uint64_t hashOf(const ImDrawData& drawing) {
     uint64_t hash = 0;
@@ -113,7 +115,8 @@ Result<void> InterfacePainter::uploadFont() {
         VCP_VK(vkAllocateCommandBuffers, window_.device, &allocation, &commands);
         VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
         VCP_VK(vkBeginCommandBuffer, commands, &begin);
-        if (!ImGui_ImplVulkan_CreateFontsTexture(commands)) return Error{.code = ErrorCode::Device, .message = "no memory for the window's font"};
+        if (!ImGui_ImplVulkan_CreateFontsTexture(commands))
+            return Error{.code = ErrorCode::Device, .message = "no memory for the window's font"};
         VCP_VK(vkEndCommandBuffer, commands);
         VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
         submit.commandBufferCount = 1;
@@ -148,7 +151,8 @@ DrawOver InterfacePainter::drawOver() {
     return [](VkCommandBuffer commands, VkExtent2D size) {
         ImDrawData* drawing = ImGui::GetDrawData();
         // A window that has just changed its size is laid out anew at once.
-        const bool fits = drawing && drawing->DisplaySize.x <= static_cast<float>(size.width) && drawing->DisplaySize.y <= static_cast<float>(size.height);
+        const bool fits = drawing && drawing->DisplaySize.x <= static_cast<float>(size.width) &&
+                          drawing->DisplaySize.y <= static_cast<float>(size.height);
         if (fits) ImGui_ImplVulkan_RenderDrawData(drawing, commands);
     };
 }

@@ -23,20 +23,26 @@ int digitsFor(double error) {
 std::string rounded(double value, double error) { return fmt::format("{:.{}f}", value, digitsFor(error)); }
 
 bool hasAngle(const MeasuredLine& line, size_t i) {
-    return i > 0 && i + 1 < line.size() && line[i].position != line[i - 1].position && line[i].position != line[i + 1].position;
+    return i > 0 && i + 1 < line.size() && line[i].position != line[i - 1].position &&
+           line[i].position != line[i + 1].position;
 }
 
 std::string textOf(const MeasuredLine& line, size_t number) {
     std::string text;
     for (size_t i = 0; i < line.size(); ++i) {
         const MeasuredPoint& p = line[i];
-        text += fmt::format("{}.{}  {}  {}  {}  +-{:.2g} (level {})", number, i + 1, rounded(p.position.x, p.error), rounded(p.position.y, p.error),
-                            rounded(p.position.z, p.error), p.error, p.level);
-        if (i > 0) text += fmt::format("\n     distance {} +-{:.2g}", rounded(segmentLength(line, i - 1), segmentError(line, i - 1)), segmentError(line, i - 1));
+        text += fmt::format("{}.{}  {}  {}  {}  +-{:.2g} (level {})", number, i + 1, rounded(p.position.x, p.error),
+                            rounded(p.position.y, p.error), rounded(p.position.z, p.error), p.error, p.level);
+        if (i > 0)
+            text +=
+                fmt::format("\n     distance {} +-{:.2g}",
+                            rounded(segmentLength(line, i - 1), segmentError(line, i - 1)), segmentError(line, i - 1));
         if (hasAngle(line, i)) text += fmt::format("\n     angle {:.2f} degrees", angleAt(line, i));
         text += '\n';
     }
-    if (line.size() > 2) text += fmt::format("{}  length {} +-{:.2g}\n", number, rounded(lineLength(line), lineError(line)), lineError(line));
+    if (line.size() > 2)
+        text += fmt::format("{}  length {} +-{:.2g}\n", number, rounded(lineLength(line), lineError(line)),
+                            lineError(line));
     return text;
 }
 
@@ -46,7 +52,8 @@ Json toJson(const MeasuredLine& line) {
     Json segments = Json::array(), angles = Json::array();
     for (size_t i = 0; i < line.size(); ++i) {
         const MeasuredPoint& p = line[i];
-        json["points"].push_back({{"position", {p.position.x, p.position.y, p.position.z}}, {"error", p.error}, {"level", p.level}});
+        json["points"].push_back(
+            {{"position", {p.position.x, p.position.y, p.position.z}}, {"error", p.error}, {"level", p.level}});
         if (i + 1 < line.size()) segments.push_back(segmentLength(line, i));
         if (i > 0 && i + 1 < line.size()) angles.push_back(hasAngle(line, i) ? Json(angleAt(line, i)) : Json(nullptr));
     }
@@ -59,7 +66,9 @@ Json toJson(const MeasuredLine& line) {
 
 }  // namespace
 
-double segmentLength(const MeasuredLine& line, size_t i) { return glm::distance(line[i].position, line[i + 1].position); }
+double segmentLength(const MeasuredLine& line, size_t i) {
+    return glm::distance(line[i].position, line[i + 1].position);
+}
 double segmentError(const MeasuredLine& line, size_t i) { return line[i].error + line[i + 1].error; }
 
 double lineLength(const MeasuredLine& line) {
@@ -106,10 +115,12 @@ std::string measurementCsv(const Measurement& measurement) {
         double total = 0;
         for (size_t i = 0; i < line.size(); ++i) {
             const MeasuredPoint& p = line[i];
-            csv += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.9g},{},", n + 1, i + 1, p.position.x, p.position.y, p.position.z, p.error, p.level);
+            csv += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.9g},{},", n + 1, i + 1, p.position.x, p.position.y,
+                               p.position.z, p.error, p.level);
             if (i > 0) {
                 total += segmentLength(line, i - 1);
-                csv += fmt::format("{:.17g},{:.9g},{:.17g},", segmentLength(line, i - 1), segmentError(line, i - 1), total);
+                csv += fmt::format("{:.17g},{:.9g},{:.17g},", segmentLength(line, i - 1), segmentError(line, i - 1),
+                                   total);
             } else {
                 csv += ",,,";
             }

@@ -23,7 +23,7 @@ struct UserSettings {
     static constexpr size_t kMostBookmarks = 9;
     static constexpr size_t kMostBookmarkedFiles = 50;
 
-    std::vector<std::string> recent;                              ///< absolute paths and addresses without passwords, the last one first
+    std::vector<std::string> recent;  ///< absolute paths and addresses without passwords, the last one first
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< of a path or address; numbers 1 to 9
     glm::ivec2 windowSize{1280, 800};
     bool panel = false;

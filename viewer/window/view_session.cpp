@@ -47,7 +47,8 @@ bool writeText(const std::filesystem::path& path, const std::string& text) {
 
 }  // namespace
 
-void applyRemembered(RenderSettings& render, const UserSettings& user, const std::function<bool(const char* option)>& isGiven) {
+void applyRemembered(RenderSettings& render, const UserSettings& user,
+                     const std::function<bool(const char* option)>& isGiven) {
     if (!isGiven("--error-pixels")) render.errorPixels = user.errorPixels;
     if (!isGiven("--budget")) render.budget = std::to_string(user.budgetBytes);
     if (!isGiven("--shadows")) render.shadows = user.shadows;
@@ -55,7 +56,8 @@ void applyRemembered(RenderSettings& render, const UserSettings& user, const std
     if (!isGiven("--up")) render.up = user.up == UpAxis::Z ? "z" : "y";
 }
 
-Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options, std::optional<SurfaceSource> surface) {
+Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options,
+                                                         std::optional<SurfaceSource> surface) {
     ViewerOptions viewerOptions;
     viewerOptions.renderer = options.render.rendererOptions();
     // Any shading may be chosen later.
@@ -73,7 +75,11 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.upAxis()) {}
+    : options_(options),
+      user_(options.user),
+      viewer_(std::move(viewer)),
+      seenLooks_(looks()),
+      up_(options.render.upAxis()) {}
 
 ViewSession::~ViewSession() {
     cancelSaving();
@@ -82,7 +88,8 @@ ViewSession::~ViewSession() {
 
 /// A server may take long; a cast may be about to read again.
 void ViewSession::endPick() {
-    while (pick_.valid() && pick_.wait_for(std::chrono::milliseconds(10)) != std::future_status::ready) finest_->interrupt();
+    while (pick_.valid() && pick_.wait_for(std::chrono::milliseconds(10)) != std::future_status::ready)
+        finest_->interrupt();
     pick_ = {};
 }
 
@@ -167,7 +174,8 @@ Result<NextStep> ViewSession::update(double now) {
 
 void ViewSession::act(ViewerAction action) {
     // A camera of a scene or a bookmark brings its own axis: this alone is by hand.
-    if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen()) changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
+    if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen())
+        changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
     viewer_->act(action);
     if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
 }
@@ -193,7 +201,8 @@ void ViewSession::keepBookmark(int number) {
 void ViewSession::goToBookmark(int number) {
     const auto* kept = bookmarks();
     const auto bookmark = kept ? kept->find(number) : std::map<int, OrbitCamera>::const_iterator{};
-    if (!kept || bookmark == kept->end()) return note(fmt::format("there is no bookmark {}; Ctrl+{} makes one", number, number));
+    if (!kept || bookmark == kept->end())
+        return note(fmt::format("there is no bookmark {}; Ctrl+{} makes one", number, number));
     viewer_->moveTo(bookmark->second);
 }
 
@@ -210,7 +219,8 @@ void ViewSession::pasteCamera(const std::string& json) {
 
 void ViewSession::measureAt(glm::dvec2 pixel) {
     if (!finest_ || pick_.valid()) return;
-    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface) return note("mesostructure is not measured: it has no certified error");
+    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface)
+        return note("mesostructure is not measured: it has no certified error");
     // A cap is the section plane itself: its points are exact.
     if (const auto cap = viewer_->capAt(pixel)) {
         measurement_.add({*cap, 0, viewer_->status().levels - 1});
@@ -218,7 +228,8 @@ void ViewSession::measureAt(glm::dvec2 pixel) {
     }
     const CameraRay through = viewer_->camera().rayThrough(pixel, viewer_->size());
     const Ray ray{through.origin, through.direction};
-    pick_ = std::async(std::launch::async, [finest = finest_, ray, sections = viewer_->sections()] { return finest->cast(ray, sections); });
+    pick_ = std::async(std::launch::async,
+                       [finest = finest_, ray, sections = viewer_->sections()] { return finest->cast(ray, sections); });
 }
 
 void ViewSession::takePicked() {
@@ -232,9 +243,11 @@ void ViewSession::takePicked() {
 void ViewSession::exportMeasurement() {
     if (measurement_.empty()) return note("nothing is measured yet: D, then click");
     const auto nameOf = [](int number) { return fmt::format("measurement-{}", number); };
-    const std::string name = nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
+    const std::string name =
+        nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
     std::error_code failed;
-    if (!writeText(name + ".csv", measurementCsv(measurement_)) || !writeText(name + ".json", measurementJson(measurement_)))
+    if (!writeText(name + ".csv", measurementCsv(measurement_)) ||
+        !writeText(name + ".json", measurementJson(measurement_)))
         return say(std::filesystem::absolute(name + ".csv", failed).string() + ": cannot be written");
     note(fmt::format("written: {}.csv and .json in {}", name, workingFolder()));
 }
@@ -246,7 +259,8 @@ void ViewSession::savePicture(const PictureChoice& choice) {
         if (choice.depth) files.depth = fmt::format("picture-{}-depth.pfm", number);
         return files;
     };
-    const PictureFiles files = filesOf(freeNumber([&](int i) { return isThere(filesOf(i).picture) || isThere(fmt::format("picture-{}-depth.pfm", i)); }));
+    const PictureFiles files = filesOf(freeNumber(
+        [&](int i) { return isThere(filesOf(i).picture) || isThere(fmt::format("picture-{}-depth.pfm", i)); }));
     beginSaving(choice, files.picture, files, {viewer_->camera()}, false);
 }
 
@@ -264,17 +278,20 @@ void ViewSession::savePath(const PictureChoice& choice, int pictures) {
     saveSequence(choice, "path", cameraPath(keys, pictures));
 }
 
-void ViewSession::saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras) {
+void ViewSession::saveSequence(const PictureChoice& choice, const std::string& name,
+                               const std::vector<OrbitCamera>& cameras) {
     const auto folderOf = [&](int number) { return std::filesystem::path(fmt::format("{}-{}", name, number)); };
     const std::filesystem::path folder = folderOf(freeNumber([&](int i) { return isThere(folderOf(i)); }));
     std::error_code failed;
-    if (!std::filesystem::create_directory(folder, failed)) return say(fmt::format("{}: no such folder can be made in {}", folder.string(), workingFolder()));
+    if (!std::filesystem::create_directory(folder, failed))
+        return say(fmt::format("{}: no such folder can be made in {}", folder.string(), workingFolder()));
     PictureFiles files{folder / "picture.png", {}, {}};
     if (choice.depth) files.depth = folder / "depth.pfm";
     beginSaving(choice, folder, files, cameras, true);
 }
 
-void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence) {
+void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files,
+                              const std::vector<OrbitCamera>& cameras, bool isSequence) {
     auto view = viewer_->renderer().addView();
     if (!view) {
         std::error_code failed;
@@ -283,7 +300,11 @@ void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path
     }
     FrameRequest request = viewer_->pictureOf(choice.size);
     request.shading.transparent = choice.transparent;
-    PictureSequenceOptions options{.request = request, .cameras = {}, .files = std::move(files), .isNumbered = isSequence, .tile = kSavedTile,
+    PictureSequenceOptions options{.request = request,
+                                   .cameras = {},
+                                   .files = std::move(files),
+                                   .isNumbered = isSequence,
+                                   .tile = kSavedTile,
                                    .problem = [this](const Error& problem) { say(problem.line()); }};
     for (const OrbitCamera& camera : cameras) options.cameras.push_back(camera.current());
     auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
@@ -304,7 +325,9 @@ std::string ViewSession::endSaving() {
     std::error_code failed;
     if (saving.isSequence && finished == 0) std::filesystem::remove(saving.name, failed);
     if (finished == 0) return fmt::format("{}: nothing is written", saving.name.string());
-    return fmt::format("written: {}{} in {}", saving.isSequence ? fmt::format("{} of {} pictures, ", finished, pictures) : "", saving.name.string(), workingFolder());
+    return fmt::format("written: {}{} in {}",
+                       saving.isSequence ? fmt::format("{} of {} pictures, ", finished, pictures) : "",
+                       saving.name.string(), workingFolder());
 }
 
 void ViewSession::cancelSaving() {
@@ -335,7 +358,8 @@ void ViewSession::togglePanel() {
 
 ViewSession::Looks ViewSession::looks() const {
     const Shading& shading = viewer_->shading();
-    return {shading.shadows, shading.occlusionRays > 0, viewer_->errorPixels(), viewer_->status().budgetBytes, shading.backgroundTop, shading.backgroundBottom};
+    return {shading.shadows,       shading.occlusionRays > 0, viewer_->errorPixels(), viewer_->status().budgetBytes,
+            shading.backgroundTop, shading.backgroundBottom};
 }
 
 /// What options and scenes set is there when they are set; what differs from the last update is by hand.

@@ -24,7 +24,8 @@
 namespace vcp {
 
 /// What is remembered stands in for options that were not given: `isGiven("--up")`.
-void applyRemembered(RenderSettings& render, const UserSettings& user, const std::function<bool(const char* option)>& isGiven);
+void applyRemembered(RenderSettings& render, const UserSettings& user,
+                     const std::function<bool(const char* option)>& isGiven);
 
 struct SessionOptions {
     std::vector<std::string> inputs;  ///< what the window opens first
@@ -45,7 +46,8 @@ struct PictureChoice {
 class ViewSession {
 public:
     /// `surface`: of the window; without one nothing may be presented. Errors: those of Renderer::create.
-    static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options, std::optional<SurfaceSource> surface);
+    static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options,
+                                                       std::optional<SurfaceSource> surface);
     ~ViewSession();
 
     [[nodiscard]] Viewer& viewer() { return *viewer_; }
@@ -96,13 +98,14 @@ public:
     /// measurement-1.csv and .json in the working folder, or the next free number; says so.
     void exportMeasurement();
 
-    /// What is shown, into the working folder, tile by tile between frames of the window: one at a time, and what is chosen
-    /// later changes nothing of it. picture-1.png, or the next free number, and picture-1-depth.pfm.
+    /// What is shown, into the working folder, tile by tile between frames of the window: one at a time, and what is
+    /// chosen later changes nothing of it. picture-1.png, or the next free number, and picture-1-depth.pfm.
     void savePicture(const PictureChoice& choice);
-    /// Once around the middle of all, about the up axis, from the view as it is: turntable-1/picture-0001.png and so on, a new folder.
+    /// Once around the middle of all, about the up axis, from the view as it is: turntable-1/picture-0001.png and so
+    /// on, a new folder.
     void saveTurntable(const PictureChoice& choice, int pictures);
-    /// From the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on. Says so where there are
-    /// fewer than two.
+    /// From the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on. Says so where
+    /// there are fewer than two.
     void savePath(const PictureChoice& choice, int pictures);
     struct SavingProgress {
         std::string name;  ///< of the file or folder
@@ -133,7 +136,8 @@ private:
     void takePicked();
     void endPick();
     void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
-    void beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files, const std::vector<OrbitCamera>& cameras, bool isSequence);
+    void beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files,
+                     const std::vector<OrbitCamera>& cameras, bool isSequence);
     void goOnSaving();
     [[nodiscard]] std::string endSaving();
 

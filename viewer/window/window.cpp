@@ -23,7 +23,8 @@ constexpr double kClickPixels = 4;  // a press that moves less is a click
 Error displayError(const std::string& what) {
     const char* why = nullptr;
     glfwGetError(&why);
-    return {ErrorCode::Device, what + (why ? std::string(": ") + why : "") + "; `vcp render` makes a picture without a window"};
+    return {ErrorCode::Device,
+            what + (why ? std::string(": ") + why : "") + "; `vcp render` makes a picture without a window"};
 }
 
 /// GLFW for as long as it lives, and its one window.
@@ -85,18 +86,28 @@ private:
 /// The session in its window: what the callbacks reach.
 class ViewWindow {
 public:
-    ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter, const WindowOptions& options)
-        : system_(&system), window_(system.window()), session_(&session), painter_(std::move(painter)), interface_(session, host()), options_(&options) {
+    ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter,
+               const WindowOptions& options)
+        : system_(&system),
+          window_(system.window()),
+          session_(&session),
+          painter_(std::move(painter)),
+          interface_(session, host()),
+          options_(&options) {
         session.viewer().renderer().onDeviceLoss([this] { painter_.reset(); });
         glfwSetWindowUserPointer(window_, this);
         glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
         glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).mustPresent_ = true; });
-        glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int b, int action, int mods) { of(w).button(b, action, mods); });
+        glfwSetMouseButtonCallback(window_,
+                                   [](GLFWwindow* w, int b, int action, int mods) { of(w).button(b, action, mods); });
         glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).moveCursor({x, y}); });
         glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double steps) { of(w).scroll(steps); });
-        glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
+        glfwSetKeyCallback(window_,
+                           [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
         glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { of(w).letGo(); });
-        glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) { of(w).session_->open({paths, paths + count}); });
+        glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
+            of(w).session_->open({paths, paths + count});
+        });
         glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float, float) { of(w).isRescaled_ = true; });
         int width = 0, height = 0;
         glfwGetFramebufferSize(window_, &width, &height);
@@ -114,8 +125,10 @@ public:
         std::optional<glm::ivec2> shownSize;
         while (!glfwWindowShouldClose(window_)) {
             // While something is built Ctrl-C is to clean up; the loop looks often enough then.
-            if (!session_->opening()) catching_.reset();
-            else if (!catching_ && options_->catchInterrupts) catching_ = options_->catchInterrupts();
+            if (!session_->opening())
+                catching_.reset();
+            else if (!catching_ && options_->catchInterrupts)
+                catching_ = options_->catchInterrupts();
             const auto next = session_->update(seconds());
             if (!next) return next.error();
             Viewer& viewer = session_->viewer();
@@ -123,7 +136,8 @@ public:
             if (!painter_) VCP_TRY(makePainter());
             VCP_TRY(present(next->draw));
             if (!report.windowSeconds) report.windowSeconds = seconds();
-            const bool isShown = viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);
+            const bool isShown =
+                viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);
             if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
             if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
             wait(*next);
@@ -213,7 +227,8 @@ private:
     void press(MouseButton which, glm::dvec2 pixel, Modifiers modifiers) {
         const double now = glfwGetTime();
         const bool plain = which == MouseButton::Left && !modifiers.shift && !modifiers.control;
-        const bool again = plain && now - pressedTime_ < kDoubleClickSeconds && glm::distance(pixel, pressedAt_) <= kClickPixels;
+        const bool again =
+            plain && now - pressedTime_ < kDoubleClickSeconds && glm::distance(pixel, pressedAt_) <= kClickPixels;
         pressedAt_ = pixel;
         pressedTime_ = again ? 0 : now;
         isClick_ = plain;
@@ -229,7 +244,8 @@ private:
     }
 
     void scroll(double steps) {
-        const bool shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS || glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+        const bool shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
+                           glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
         if (ImGui::GetIO().WantCaptureMouse) {
             ImGui::GetIO().MouseWheel += static_cast<float>(steps);
             layOut();
@@ -253,10 +269,14 @@ private:
         if (action != GLFW_PRESS) return;
         session_->note("");
         const bool isDigit = key >= GLFW_KEY_1 && key <= GLFW_KEY_9;
-        if (isDigit && (mods & GLFW_MOD_CONTROL) != 0) session_->keepBookmark(key - GLFW_KEY_0);
-        else if (isDigit && (mods & GLFW_MOD_SHIFT) != 0) session_->goToBookmark(key - GLFW_KEY_0);
-        else if ((mods & GLFW_MOD_CONTROL) != 0) controlKey(key);
-        else plainKey(key);
+        if (isDigit && (mods & GLFW_MOD_CONTROL) != 0)
+            session_->keepBookmark(key - GLFW_KEY_0);
+        else if (isDigit && (mods & GLFW_MOD_SHIFT) != 0)
+            session_->goToBookmark(key - GLFW_KEY_0);
+        else if ((mods & GLFW_MOD_CONTROL) != 0)
+            controlKey(key);
+        else
+            plainKey(key);
     }
 
     void controlKey(int key) {
@@ -271,16 +291,36 @@ private:
 
     void plainKey(int key) {
         switch (key) {
-            case GLFW_KEY_ESCAPE: escape(); break;
-            case GLFW_KEY_F1: interface_.showsHelp = !interface_.showsHelp; break;
-            case GLFW_KEY_TAB: togglePanel(); break;
-            case GLFW_KEY_D: session_->isMeasuring = !session_->isMeasuring; break;
-            case GLFW_KEY_ENTER: session_->measurement().finishLine(); break;
-            case GLFW_KEY_BACKSPACE: session_->measurement().takeBack(); break;
-            case GLFW_KEY_HOME: session_->act(ViewerAction::Reset); break;
-            case GLFW_KEY_G: toggleFly(); break;
-            case GLFW_KEY_B: session_->showsPages = !session_->showsPages; break;
-            case GLFW_KEY_I: session_->showFeedback(!session_->showsFeedback()); break;
+            case GLFW_KEY_ESCAPE:
+                escape();
+                break;
+            case GLFW_KEY_F1:
+                interface_.showsHelp = !interface_.showsHelp;
+                break;
+            case GLFW_KEY_TAB:
+                togglePanel();
+                break;
+            case GLFW_KEY_D:
+                session_->isMeasuring = !session_->isMeasuring;
+                break;
+            case GLFW_KEY_ENTER:
+                session_->measurement().finishLine();
+                break;
+            case GLFW_KEY_BACKSPACE:
+                session_->measurement().takeBack();
+                break;
+            case GLFW_KEY_HOME:
+                session_->act(ViewerAction::Reset);
+                break;
+            case GLFW_KEY_G:
+                toggleFly();
+                break;
+            case GLFW_KEY_B:
+                session_->showsPages = !session_->showsPages;
+                break;
+            case GLFW_KEY_I:
+                session_->showFeedback(!session_->showsFeedback());
+                break;
             default:
                 // GLFW names keys by the capitals on them.
                 if (const auto action = actionOf(static_cast<uint32_t>(key))) session_->act(*action);
@@ -299,12 +339,18 @@ private:
 
     void escape() {
         if (session_->viewer().cancelSectionDrag()) return;
-        if (interface_.showsHelp) interface_.showsHelp = false;
-        else if (session_->opening()) session_->opening()->cancel();
-        else if (session_->saving()) session_->cancelSaving();
-        else if (session_->viewer().isFlying()) toggleFly();
-        else if (session_->isMeasuring) session_->isMeasuring = false;
-        else glfwSetWindowShouldClose(window_, GLFW_TRUE);
+        if (interface_.showsHelp)
+            interface_.showsHelp = false;
+        else if (session_->opening())
+            session_->opening()->cancel();
+        else if (session_->saving())
+            session_->cancelSaving();
+        else if (session_->viewer().isFlying())
+            toggleFly();
+        else if (session_->isMeasuring)
+            session_->isMeasuring = false;
+        else
+            glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }
 
     /// Shows the last picture and the panels when either is new or the window was uncovered.
@@ -314,7 +360,8 @@ private:
         if (session_->viewer().framesDrawn() == 0 || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
         if (!drawn && !mustPresent_) return {};
         mustPresent_ = false;
-        return session_->viewer().renderer().present(static_cast<uint32_t>(framebuffer_.x), static_cast<uint32_t>(framebuffer_.y), painter_->drawOver());
+        return session_->viewer().renderer().present(static_cast<uint32_t>(framebuffer_.x),
+                                                     static_cast<uint32_t>(framebuffer_.y), painter_->drawOver());
     }
 
     void wait(const NextStep& next) {
@@ -356,7 +403,8 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     const std::vector<std::string>& inputs = options.session.inputs;
     WindowSystem system;
-    VCP_TRY(system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
+    VCP_TRY(
+        system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
     auto session = ViewSession::create(options.session, system.surfaceSource());
     if (!session) return session.error();
     (*session)->open(inputs);

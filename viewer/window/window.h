@@ -30,12 +30,12 @@ struct WindowReport {
     std::optional<double> settledSeconds;       ///< the first settled picture
     uint64_t framesDrawn = 0;
     ViewerStatus status;
-    std::string problem;  ///< what stood in the window when it was closed
+    std::string problem;      ///< what stood in the window when it was closed
     SettingsChanges changes;  ///< to be remembered
 };
 
-/// A window's size in units of a display that is not scaled, as it is made from (GLFW_SCALE_TO_MONITOR): where the window system counts
-/// pixels, `window` has grown by `scale`.
+/// A window's size in units of a display that is not scaled, as it is made from (GLFW_SCALE_TO_MONITOR): where the
+/// window system counts pixels, `window` has grown by `scale`.
 glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale);
 
 /// Opens the window at once, the inputs in it as soon as they are built, and returns when it is closed. Main thread

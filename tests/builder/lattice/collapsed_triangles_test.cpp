@@ -25,7 +25,8 @@ glm::i32vec3 pageOf(glm::i32vec3 p) { return p / 1000; }
 bool samePage(glm::i32vec3 p, glm::i32vec3 q) { return pageOf(p) == pageOf(q); }
 
 std::vector<LatticeTriangle> kept(std::vector<LatticeTriangle> soup, glm::i32vec3 page = {0, 0, 0}) {
-    keepCollapsed(soup, [&](glm::i32vec3 p) { return pageOf(p) == page; }, samePage);
+    keepCollapsed(
+        soup, [&](glm::i32vec3 p) { return pageOf(p) == page; }, samePage);
     return soup;
 }
 

@@ -36,7 +36,8 @@ LatticeTriangle coloured(LatticeTriangle t, uint32_t a, uint32_t b, uint32_t c) 
 }
 
 TEST(MeshOf, MergesEqualPositions) {
-    const LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, 0}, {9, 0, 0}, {0, 9, 0}, 1), triangle({9, 0, 0}, {9, 9, 0}, {0, 9, 0}, 4)}, false);
+    const LatticeMesh mesh = meshOf(
+        std::vector{triangle({0, 0, 0}, {9, 0, 0}, {0, 9, 0}, 1), triangle({9, 0, 0}, {9, 9, 0}, {0, 9, 0}, 4)}, false);
     // One cell: by z, y, x.
     EXPECT_EQ(mesh.positions, (Positions{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {9, 9, 0}}));
     EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {1, 3, 2}}));
@@ -46,14 +47,18 @@ TEST(MeshOf, MergesEqualPositions) {
 
 TEST(MeshOf, VerticesFollowTheMortonCurve) {
     constexpr int32_t cell = kLatticePerCell;
-    const LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, cell}, {cell, 0, 0}, {0, cell - 1, 0}), triangle({0, 2 * cell, 0}, {cell, 1, 0}, {5, 5, 5})}, false);
-    EXPECT_EQ(mesh.positions, (Positions{{0, cell - 1, 0}, {5, 5, 5}, {cell, 0, 0}, {cell, 1, 0}, {0, 0, cell}, {0, 2 * cell, 0}}));
+    const LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, cell}, {cell, 0, 0}, {0, cell - 1, 0}),
+                                                triangle({0, 2 * cell, 0}, {cell, 1, 0}, {5, 5, 5})},
+                                    false);
+    EXPECT_EQ(mesh.positions,
+              (Positions{{0, cell - 1, 0}, {5, 5, 5}, {cell, 0, 0}, {cell, 1, 0}, {0, 0, cell}, {0, 2 * cell, 0}}));
     EXPECT_TRUE(std::is_sorted(mesh.triangles.begin(), mesh.triangles.end()));
 }
 
 TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
     const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0};
-    const std::vector<LatticeTriangle> copies{triangle(c, b, a, 1), triangle(a, b, c, 2), triangle(b, c, a, 5), triangle(b, a, c, 3)};
+    const std::vector<LatticeTriangle> copies{triangle(c, b, a, 1), triangle(a, b, c, 2), triangle(b, c, a, 5),
+                                              triangle(b, a, c, 3)};
     // Of the two orientations the one that ascends, whichever comes first.
     for (size_t first = 0; first < copies.size(); ++first) {
         std::vector<LatticeTriangle> soup = copies;
@@ -67,7 +72,9 @@ TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
 
 TEST(MeshOf, ColoursAreMeansOverTheTriangles) {
     const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0}, d{9, 9, 0};
-    const std::vector<LatticeTriangle> soup{coloured(triangle(a, b, c), 0xff000001u, 0xff102030u, 0), coloured(triangle(b, d, c), 0xff122131u, 7, 0), coloured(triangle(d, a, c), 9, 0x00000004u, 3)};
+    const std::vector<LatticeTriangle> soup{coloured(triangle(a, b, c), 0xff000001u, 0xff102030u, 0),
+                                            coloured(triangle(b, d, c), 0xff122131u, 7, 0),
+                                            coloured(triangle(d, a, c), 9, 0x00000004u, 3)};
     const LatticeMesh mesh = meshOf(soup, true);
     // Halves are rounded up.
     EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0x80000003u, 0xff112131u, 1, 8}));
@@ -99,7 +106,8 @@ std::vector<LatticeTriangle> randomSoup(uint64_t seed) {
         LatticeTriangle t = triangle(point(), point(), point(), static_cast<float>(any(100)));
         if (!soup.empty() && any(3) == 0) std::copy_n(soup[random() % soup.size()].corner, 3, t.corner);
         if (any(2)) std::swap(t.corner[0], t.corner[1]);
-        if (hasArea(t.corner[0], t.corner[1], t.corner[2])) soup.push_back(coloured(t, static_cast<uint32_t>(random()), static_cast<uint32_t>(random()), 0xff00ff00u));
+        if (hasArea(t.corner[0], t.corner[1], t.corner[2]))
+            soup.push_back(coloured(t, static_cast<uint32_t>(random()), static_cast<uint32_t>(random()), 0xff00ff00u));
     }
     return soup;
 }

@@ -30,7 +30,8 @@ TEST(PageGrid, NearPagesAreThoseThatTheTriangleOverlaps) {
         const glm::i32vec3 base(random() % (64 * kCell), random() % (64 * kCell), random() % (64 * kCell));
         const int reach = i % 3 == 0 ? 40 * kCell : 2 * kCell;
         for (auto& c : corner) {
-            c = base + glm::i32vec3(random() % static_cast<uint64_t>(reach), random() % static_cast<uint64_t>(reach), random() % static_cast<uint64_t>(reach));
+            c = base + glm::i32vec3(random() % static_cast<uint64_t>(reach), random() % static_cast<uint64_t>(reach),
+                                    random() % static_cast<uint64_t>(reach));
             c = glm::min(c, 64 * kCell);
         }
         const double margin = i % 2 ? 4 : 0.25;
@@ -38,7 +39,8 @@ TEST(PageGrid, NearPagesAreThoseThatTheTriangleOverlaps) {
         grid.forPagesNear(corner, margin, [&](uint64_t page) { EXPECT_TRUE(near.insert(page).second) << "twice"; });
         // Where its corners are it overlaps.
         for (const auto& c : corner) EXPECT_TRUE(near.contains(grid.pageOf(c)));
-        const BoxOverlap overlap({glm::dvec3(corner[0]) / double(kCell), glm::dvec3(corner[1]) / double(kCell), glm::dvec3(corner[2]) / double(kCell)});
+        const BoxOverlap overlap({glm::dvec3(corner[0]) / double(kCell), glm::dvec3(corner[1]) / double(kCell),
+                                  glm::dvec3(corner[2]) / double(kCell)});
         for (uint32_t page = 0; page < 512; ++page) {
             const glm::dvec3 centre = (glm::dvec3(mortonDecode(page)) + 0.5) * 8.0;
             ASSERT_EQ(near.contains(page), overlap.test(centre, 4 + margin)) << i << " page " << page;
@@ -58,7 +60,8 @@ TEST(PagePartition, HoldsAtMostTheLimit) {
     for (uint64_t seed = 0; seed < 100; ++seed) {
         std::mt19937_64 random(seed);
         std::vector<std::pair<uint64_t, uint64_t>> pages;
-        for (uint64_t code = random() % 5; pages.size() < 200; code += 1 + random() % 9) pages.emplace_back(code, random() % (seed % 4 == 0 ? 2000 : 300));
+        for (uint64_t code = random() % 5; pages.size() < 200; code += 1 + random() % 9)
+            pages.emplace_back(code, random() % (seed % 4 == 0 ? 2000 : 300));
         constexpr uint64_t limit = 1000;
         const PagePartition partition(pages, limit);
         std::vector<uint64_t> held(partition.bins()), count(partition.bins());
@@ -82,7 +85,8 @@ TEST(PagePartition, HoldsAtMostTheLimit) {
         }
         // As few as can be, taken one after the other: a bin and the first page of the next are too many.
         for (size_t bin = 0; bin + 1 < held.size(); ++bin) {
-            const auto next = std::find_if(pages.begin(), pages.end(), [&](const auto& p) { return partition.binOf(p.first) == bin + 1; });
+            const auto next = std::find_if(pages.begin(), pages.end(),
+                                           [&](const auto& p) { return partition.binOf(p.first) == bin + 1; });
             ASSERT_GT(held[bin] + next->second, limit) << seed;
         }
     }
@@ -107,7 +111,8 @@ TEST(PagePartition, CoarserBinsKeepFamiliesTogether) {
                 ASSERT_LE(coarse.first()[last], page);
             }
             for (const uint64_t code : coarse.first())
-                ASSERT_TRUE(code == 0 || std::any_of(fine.first().begin(), fine.first().end(), [&](uint64_t f) { return f >> 3 == code; }));
+                ASSERT_TRUE(code == 0 || std::any_of(fine.first().begin(), fine.first().end(),
+                                                     [&](uint64_t f) { return f >> 3 == code; }));
             fine = coarse;
         }
         EXPECT_EQ(PagePartition(std::vector<uint64_t>{0, 1, 2, 7}).coarser().bins(), 1u);

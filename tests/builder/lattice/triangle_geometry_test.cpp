@@ -28,7 +28,8 @@ Long slowDistance(glm::dvec3 query, const Triangle3& t) {
     const Long3 n = glm::cross(b - a, c - a);
     const Long nn = glm::dot(n, n);
     if (nn > 0) {
-        const bool inside = glm::dot(glm::cross(b - a, p - a), n) >= 0 && glm::dot(glm::cross(c - b, p - b), n) >= 0 && glm::dot(glm::cross(a - c, p - c), n) >= 0;
+        const bool inside = glm::dot(glm::cross(b - a, p - a), n) >= 0 && glm::dot(glm::cross(c - b, p - b), n) >= 0 &&
+                            glm::dot(glm::cross(a - c, p - c), n) >= 0;
         const Long h = glm::dot(p - a, n);
         if (inside) best = std::min(best, h * h / nn);
     }
@@ -85,7 +86,8 @@ TEST(ClosestOnTriangle, SegmentsAndPoints) {
     for (uint64_t seed = 0; seed < 20000; ++seed) {
         Points p(seed);
         const glm::dvec3 a = p.latticePoint(4), b = p.latticePoint(4), query = p.point(6);
-        for (const Triangle3& t : {Triangle3{a, b, b}, Triangle3{a, a, b}, Triangle3{a, b, a}, Triangle3{a, a, a}, Triangle3{a, b, (a + b) / 2.0}}) {
+        for (const Triangle3& t : {Triangle3{a, b, b}, Triangle3{a, a, b}, Triangle3{a, b, a}, Triangle3{a, a, a},
+                                   Triangle3{a, b, (a + b) / 2.0}}) {
             const ClosestPoint c = closestOnTriangle(query, t);
             ASSERT_NEAR(std::sqrt(c.squared), static_cast<double>(slowDistance(query, t)), 1e-12) << seed;
         }
@@ -126,7 +128,7 @@ TEST(SquaredDistances, AreThoseOfTheTriangles) {
             Triangle3& t = triangles[i];
             t = {p.latticePoint(4), p.latticePoint(4), p.latticePoint(4)};
             if (i % 4 == 1) t[1] = t[0] + glm::round(p.point(0.01) * 2048.0) / 2048.0;  // a needle
-            if (i % 4 == 2) t[2] = (t[0] + t[1]) / 2.0;                                  // no area
+            if (i % 4 == 2) t[2] = (t[0] + t[1]) / 2.0;                                 // no area
             if (i == 3) t[2] = t[1] = t[0];
             if (i == 7) t[0] = query;
             for (int c = 0; c < 9; ++c) batch.corners[c][i] = static_cast<float>(t[c / 3][c % 3]);
@@ -148,7 +150,9 @@ std::vector<Long3> slowClip(const Triangle3& t, glm::dvec3 lower, glm::dvec3 upp
     for (int axis = 0; axis < 3; ++axis)
         for (const int side : {0, 1}) {
             std::vector<Long3> next;
-            const auto inside = [&](const Long3& p) { return side == 0 ? p[axis] - Long(lower[axis]) : Long(upper[axis]) - p[axis]; };
+            const auto inside = [&](const Long3& p) {
+                return side == 0 ? p[axis] - Long(lower[axis]) : Long(upper[axis]) - p[axis];
+            };
             for (size_t i = 0; i < polygon.size(); ++i) {
                 const Long3 a = polygon[i], b = polygon[(i + 1) % polygon.size()];
                 const Long da = inside(a), db = inside(b);
@@ -162,7 +166,8 @@ std::vector<Long3> slowClip(const Triangle3& t, glm::dvec3 lower, glm::dvec3 upp
 
 Long slowArea(const std::vector<Long3>& polygon) {
     Long3 sum(0);
-    for (size_t i = 1; i + 1 < polygon.size(); ++i) sum += glm::cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
+    for (size_t i = 1; i + 1 < polygon.size(); ++i)
+        sum += glm::cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
     return glm::length(sum) / 2;
 }
 
@@ -225,7 +230,9 @@ TEST(ClipToBox, AreasAndPoints) {
             for (int axis = 0; axis < 3; ++axis) ASSERT_LE(std::abs(q[axis] - centre[axis]), half + 1e-12) << seed;
             ASSERT_LT(static_cast<double>(slowDistance(q, t)), 1e-12) << seed;
         }
-        ASSERT_NEAR(static_cast<double>(slowArea(fast)), static_cast<double>(slowArea(slowClip(t, centre - half, centre + half))), 1e-11) << seed;
+        ASSERT_NEAR(static_cast<double>(slowArea(fast)),
+                    static_cast<double>(slowArea(slowClip(t, centre - half, centre + half))), 1e-11)
+            << seed;
         ASSERT_LE(polygon.size(), 9u);
     }
 }
@@ -254,10 +261,14 @@ TEST(SegmentMeetsBox, AgreesWithClipping) {
     for (uint64_t seed = 0; seed < 100000; ++seed) {
         Points p(seed);
         const bool coarse = seed % 2 == 0;
-        const auto any = [&] { return coarse ? glm::dvec3(p.integer(-3, 3), p.integer(-3, 3), p.integer(-3, 3)) : p.latticePoint(6); };
+        const auto any = [&] {
+            return coarse ? glm::dvec3(p.integer(-3, 3), p.integer(-3, 3), p.integer(-3, 3)) : p.latticePoint(6);
+        };
         const glm::dvec3 a = any(), b = any();
         // A segment is a triangle of two corners to the slow clipper.
-        const auto slow = [&](double half) { return !slowClip({a, b, b}, glm::dvec3(-half), glm::dvec3(half)).empty(); };
+        const auto slow = [&](double half) {
+            return !slowClip({a, b, b}, glm::dvec3(-half), glm::dvec3(half)).empty();
+        };
         const bool fast = segmentMeetsBox(a, b, glm::dvec3(0), 1);
         meets += fast;
         if (slow(1)) {

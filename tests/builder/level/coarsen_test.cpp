@@ -24,7 +24,8 @@ IndexedMesh randomSurface(uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
     const double radius = 2 + 12 * unit(random), noise = unit(random) < 0.7 ? 0.3 * unit(random) : 1.5;
-    IndexedMesh mesh = seed % 2 ? test::sphereMesh({24, 24, 24}, radius, static_cast<uint32_t>(8 + seed % 23)) : test::torusMesh({24, 24, 24}, radius, radius / 3, 40, 16);
+    IndexedMesh mesh = seed % 2 ? test::sphereMesh({24, 24, 24}, radius, static_cast<uint32_t>(8 + seed % 23))
+                                : test::torusMesh({24, 24, 24}, radius, radius / 3, 40, 16);
     for (glm::dvec3& p : mesh.positions) p += noise * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5);
     if (seed % 3 == 0) mesh.triangles.resize(mesh.triangles.size() * 2 / 3);  // a border
     return mesh;
@@ -39,7 +40,9 @@ IndexedMesh randomSoup(uint64_t seed) {
         const glm::dvec3 centre = 20.0 * glm::dvec3(unit(random), unit(random), unit(random)) + 5.0;
         const double size = std::pow(10, -3 + 4 * unit(random));
         const uint32_t first = static_cast<uint32_t>(mesh.positions.size());
-        for (int c = 0; c < 3; ++c) mesh.positions.push_back(glm::max(centre + size * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5), 0.0));
+        for (int c = 0; c < 3; ++c)
+            mesh.positions.push_back(
+                glm::max(centre + size * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5), 0.0));
         if (i % 5 == 0) mesh.positions.back() = 0.5 * (mesh.positions[first] + mesh.positions[first + 1]) + 0.002;
         mesh.triangles.push_back({first, first + 1, first + 2});
     }
@@ -60,7 +63,8 @@ void forSamples(const LatticeMesh& mesh, const Visit& visit) {
         for (int a = 0; a <= steps; ++a)
             for (int b = 0; a + b <= steps; ++b) {
                 const Index3& t = mesh.triangles[k];
-                const glm::dvec3 p = double(a) * glm::dvec3(mesh.positions[t[0]]) + double(b) * glm::dvec3(mesh.positions[t[1]]) +
+                const glm::dvec3 p = double(a) * glm::dvec3(mesh.positions[t[0]]) +
+                                     double(b) * glm::dvec3(mesh.positions[t[1]]) +
                                      double(steps - a - b) * glm::dvec3(mesh.positions[t[2]]);
                 visit(p / (steps * double(kLatticePerCell)), k);
             }
@@ -87,16 +91,20 @@ void expectWithinStray(const LatticeMesh& finest, int levels, const std::string&
             ASSERT_LE(distance, double(mesh.stray[k]) + 1e-9) << "triangle " << k;
         });
         const double stray = mostStray(mesh);
-        forSamples(finest, [&](glm::dvec3 p, size_t k) { ASSERT_LE(coarseBvh.nearestPoint(p * scale)->distance, stray + 1e-9) << "of finest triangle " << k; });
+        forSamples(finest, [&](glm::dvec3 p, size_t k) {
+            ASSERT_LE(coarseBvh.nearestPoint(p * scale)->distance, stray + 1e-9) << "of finest triangle " << k;
+        });
     }
 }
 
 TEST(Coarsen, SurfacesStayWithinTheirStray) {
-    for (uint64_t seed = 0; seed < 24; ++seed) expectWithinStray(withoutStray(randomSurface(seed)), 4, "seed " + std::to_string(seed));
+    for (uint64_t seed = 0; seed < 24; ++seed)
+        expectWithinStray(withoutStray(randomSurface(seed)), 4, "seed " + std::to_string(seed));
 }
 
 TEST(Coarsen, SoupsStayWithinTheirStray) {
-    for (uint64_t seed = 0; seed < 24; ++seed) expectWithinStray(withoutStray(randomSoup(seed)), 5, "seed " + std::to_string(seed));
+    for (uint64_t seed = 0; seed < 24; ++seed)
+        expectWithinStray(withoutStray(randomSoup(seed)), 5, "seed " + std::to_string(seed));
 }
 
 TEST(Coarsen, StraysOfTheFinerMeshAreHandedOn) {
@@ -112,13 +120,14 @@ TEST(Coarsen, SmoothSurfacesStayClose) {
     // The surface, not its vertices: those move by half a cell along it.
     // Triangles of about a cell: long ones are bounded by how far their corners move.
     const LatticeMesh coarse = coarsen(withoutStray(test::sphereMesh({60, 60, 60}, 50, 240)));
-    EXPECT_LT(mostStray(coarse), 0.26f);  // bounds below a quarter are not improved
+    EXPECT_LT(mostStray(coarse), 0.26f);                     // bounds below a quarter are not improved
     EXPECT_EQ(test::edgeUses(coarse.triangles).size(), 1u);  // still closed: every edge twice
 }
 
 TEST(Coarsen, FlatIsExact) {
     // Slanted a little, and far from any border inside.
-    const IndexedMesh plate = test::gridSurface(60, 60, false, [](double u, double v) { return glm::dvec3(10 + 50 * u, 10 + 50 * v, 20 + 10 * u); });
+    const IndexedMesh plate = test::gridSurface(
+        60, 60, false, [](double u, double v) { return glm::dvec3(10 + 50 * u, 10 + 50 * v, 20 + 10 * u); });
     LatticeMesh mesh = withoutStray(plate);
     const size_t before = mesh.triangles.size();
     mesh = coarsen(mesh);
@@ -134,7 +143,9 @@ TEST(Coarsen, WiresStayConnected) {
         // Winding up, thinner than any cluster.
         const IndexedMesh wire = test::gridSurface(8, 300, false, [&](double u, double v) {
             const double a = v * 3 * test::kTwoPi, around = u * test::kTwoPi;
-            return glm::dvec3(30, 30, 5) + glm::dvec3((15 + thickness * std::cos(around)) * std::cos(a), (15 + thickness * std::cos(around)) * std::sin(a), 30 * v + thickness * std::sin(around));
+            return glm::dvec3(30, 30, 5) + glm::dvec3((15 + thickness * std::cos(around)) * std::cos(a),
+                                                      (15 + thickness * std::cos(around)) * std::sin(a),
+                                                      30 * v + thickness * std::sin(around));
         });
         LatticeMesh mesh = withoutStray(wire);
         expectWithinStray(mesh, 4, "thickness " + std::to_string(thickness));
@@ -151,11 +162,14 @@ TEST(Coarsen, IslandsDoNotVanish) {
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> unit(0, 1);
     for (int i = 0; i < 60; ++i) {
-        const glm::dvec3 centre = 4.0 * glm::dvec3(i % 4, i / 4 % 4, i / 16) + 2.0 + glm::dvec3(unit(random), unit(random), unit(random));
+        const glm::dvec3 centre =
+            4.0 * glm::dvec3(i % 4, i / 4 % 4, i / 16) + 2.0 + glm::dvec3(unit(random), unit(random), unit(random));
         const double size = i % 3 == 0 ? 0.001 : 0.02;
         const uint32_t first = static_cast<uint32_t>(dust.positions.size());
-        for (const glm::dvec3 corner : {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) dust.positions.push_back(centre + size * corner);
-        for (const Index3& t : {Index3{0, 1, 2}, Index3{0, 1, 3}, Index3{0, 2, 3}, Index3{1, 2, 3}}) dust.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+        for (const glm::dvec3 corner : {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)})
+            dust.positions.push_back(centre + size * corner);
+        for (const Index3& t : {Index3{0, 1, 2}, Index3{0, 1, 3}, Index3{0, 2, 3}, Index3{1, 2, 3}})
+            dust.triangles.push_back({first + t[0], first + t[1], first + t[2]});
     }
     LatticeMesh mesh = withoutStray(dust);
     expectWithinStray(mesh, 6, "dust");
@@ -275,7 +289,8 @@ TEST(Coarsen, WhatIsFarAwayDoesNotMatter) {
     const int32_t cut = 26 * kLatticePerCell;
     part.triangles.clear();
     for (const Index3& t : whole.triangles)
-        if (std::min({whole.positions[t[0]].x, whole.positions[t[1]].x, whole.positions[t[2]].x}) < cut) part.triangles.push_back(t);
+        if (std::min({whole.positions[t[0]].x, whole.positions[t[1]].x, whole.positions[t[2]].x}) < cut)
+            part.triangles.push_back(t);
     part.stray.resize(part.triangles.size());
     ASSERT_LT(part.triangles.size(), whole.triangles.size());
     const auto shapes = [](LatticeMesh mesh) {
@@ -301,7 +316,9 @@ TEST(Coarsen, ColoursAndNormalsAreMeans) {
     // Two vertices in one cluster, the others on their own.
     mesh.positions = {{0, 0, 0}, {100, 0, 0}, {4 * 2048, 0, 0}, {0, 4 * 2048, 0}};
     mesh.colours = {0xff000010u, 0xff00ff31u, 0x80402010u, 0xffffffffu};
-    mesh.normals = {packNormal(glm::normalize(glm::dvec3(0.2, 0, 1)), false), packNormal(glm::normalize(glm::dvec3(0.2, 0, -1)), false), packNormal({0, 0, 1}, true), packNormal({0, 0, 1}, false)};
+    mesh.normals = {packNormal(glm::normalize(glm::dvec3(0.2, 0, 1)), false),
+                    packNormal(glm::normalize(glm::dvec3(0.2, 0, -1)), false), packNormal({0, 0, 1}, true),
+                    packNormal({0, 0, 1}, false)};
     mesh.triangles = {{0, 2, 3}, {1, 2, 3}};
     mesh.stray.assign(2, 0);
     const LatticeMesh coarse = coarsen(mesh);
@@ -309,7 +326,9 @@ TEST(Coarsen, ColoursAndNormalsAreMeans) {
     EXPECT_EQ(coarse.triangles.size(), 1u);  // both became the same
     const auto at = [&](glm::i32vec3 low, glm::i32vec3 high) {
         for (size_t v = 0; v < 3; ++v)
-            if (glm::all(glm::lessThanEqual(low, coarse.positions[v])) && glm::all(glm::lessThanEqual(coarse.positions[v], high))) return v;
+            if (glm::all(glm::lessThanEqual(low, coarse.positions[v])) &&
+                glm::all(glm::lessThanEqual(coarse.positions[v], high)))
+                return v;
         ADD_FAILURE();
         return size_t{0};
     };

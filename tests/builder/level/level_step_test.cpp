@@ -44,7 +44,8 @@ PagePartition randomPartition(uint32_t level, uint64_t seed) {
 class Levels {
 public:
     /// `soup`: as it comes from the snapper; `finest`: partition of the finest level.
-    Levels(const Soup& soup, uint32_t levels, PagePartition finest) : space_(folder_.path() / "temp", uint64_t{1} << 30), partition_(std::move(finest)), level_(levels - 1) {
+    Levels(const Soup& soup, uint32_t levels, PagePartition finest)
+        : space_(folder_.path() / "temp", uint64_t{1} << 30), partition_(std::move(finest)), level_(levels - 1) {
         const PageGrid grid{kLog2Cells, level_};
         bins_ = newBins("snapped", partition_);
         for (const LatticeTriangle& t : soup) {
@@ -130,7 +131,9 @@ void expectSame(const Levels& one, const Levels& many, const std::string& what) 
     }
     for (size_t bin = 0; bin < want.size(); ++bin) {
         std::sort(want[bin].begin(), want[bin].end());
-        ASSERT_TRUE(many.bin(bin) == want[bin]) << what << ", level " << one.level() << ", bin " << bin << " of " << want.size() << ": " << many.bin(bin).size() << " triangles, not " << want[bin].size();
+        ASSERT_TRUE(many.bin(bin) == want[bin])
+            << what << ", level " << one.level() << ", bin " << bin << " of " << want.size() << ": "
+            << many.bin(bin).size() << " triangles, not " << want[bin].size();
     }
     ASSERT_TRUE(many.all() == all) << what;
 }
@@ -142,7 +145,8 @@ IndexedMesh randomMesh(uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
     const double radius = 12 + 12 * unit(random), noise = 0.5 * unit(random);
-    IndexedMesh mesh = seed % 2 ? test::torusMesh({31, 33, 30}, radius, radius / 4, 60, 30) : test::sphereMesh({32, 31, 33}, radius, static_cast<uint32_t>(10 + seed % 30));
+    IndexedMesh mesh = seed % 2 ? test::torusMesh({31, 33, 30}, radius, radius / 4, 60, 30)
+                                : test::sphereMesh({32, 31, 33}, radius, static_cast<uint32_t>(10 + seed % 30));
     for (glm::dvec3& p : mesh.positions) p += noise * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5);
     return mesh;
 }
@@ -151,7 +155,9 @@ IndexedMesh randomMesh(uint64_t seed) {
 IndexedMesh longMesh(uint64_t seed) {
     IndexedMesh mesh = test::randomTriangles(300, seed, true);
     for (size_t i = 0; i < mesh.positions.size(); ++i) mesh.positions[i] = mesh.positions[i] * 60.0 + 2.0;
-    for (size_t i = 0; i + 3 <= mesh.positions.size(); i += 9) mesh.triangles.push_back({static_cast<uint32_t>(i), static_cast<uint32_t>((i * 7 + 1) % mesh.positions.size()), static_cast<uint32_t>((i * 13 + 2) % mesh.positions.size())});
+    for (size_t i = 0; i + 3 <= mesh.positions.size(); i += 9)
+        mesh.triangles.push_back({static_cast<uint32_t>(i), static_cast<uint32_t>((i * 7 + 1) % mesh.positions.size()),
+                                  static_cast<uint32_t>((i * 13 + 2) % mesh.positions.size())});
     test::append(mesh, test::boxMesh({3, 3, 3}, {61, 60, 62}, 1));
     test::append(mesh, test::sphereMesh({20, 20, 20}, 8, 20));
     return mesh;
@@ -209,7 +215,8 @@ TEST(LevelStep, FirstStepKeepsPositionsAndBringsNormals) {
 /// Corners, edge middles and points inside.
 template <class Visit>
 void forSamples(const LatticeMesh& mesh, const Visit& visit) {
-    constexpr double weights[7][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.5, 0.5, 0}, {0, 0.5, 0.5}, {0.25, 0.25, 0.5}, {0.4, 0.35, 0.25}};
+    constexpr double weights[7][3] = {{1, 0, 0},     {0, 1, 0},         {0, 0, 1},        {0.5, 0.5, 0},
+                                      {0, 0.5, 0.5}, {0.25, 0.25, 0.5}, {0.4, 0.35, 0.25}};
     for (size_t k = 0; k < mesh.triangles.size(); ++k)
         for (const auto& w : weights) {
             glm::dvec3 p(0);
@@ -239,7 +246,8 @@ TEST(LevelStep, StraysBoundTheDistanceBothWays) {
             const IndexedMesh coarseMesh = test::inCells(coarse);
             const MeshBvh bvh(coarseMesh);
             forSamples(meshOf(test::soupOf(mesh), false), [&](glm::dvec3 p, double) {
-                ASSERT_LE(bvh.nearestPoint(p / scale)->distance, most + 1e-9) << "seed " << seed << ", level " << levels.level();
+                ASSERT_LE(bvh.nearestPoint(p / scale)->distance, most + 1e-9)
+                    << "seed " << seed << ", level " << levels.level();
             });
         }
     }

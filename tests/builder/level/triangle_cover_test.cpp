@@ -15,7 +15,8 @@ namespace {
 
 double nearest(glm::dvec3 p, const std::vector<TrianglePrism>& others) {
     double least = std::numeric_limits<double>::infinity();
-    for (const TrianglePrism& o : others) least = std::min(least, std::sqrt(closestOnTriangle(p, o.corners).squared) + o.extra);
+    for (const TrianglePrism& o : others)
+        least = std::min(least, std::sqrt(closestOnTriangle(p, o.corners).squared) + o.extra);
     return least;
 }
 
@@ -24,11 +25,14 @@ double farthest(const Triangle3& t, const std::vector<TrianglePrism>& others) {
     double most = 0;
     for (int a = 0; a <= steps; ++a)
         for (int b = 0; a + b <= steps; ++b)
-            most = std::max(most, nearest((double(a) * t[0] + double(b) * t[1] + double(steps - a - b) * t[2]) / double(steps), others));
+            most = std::max(
+                most,
+                nearest((double(a) * t[0] + double(b) * t[1] + double(steps - a - b) * t[2]) / double(steps), others));
     return most;
 }
 
-double boundOf(const Triangle3& t, const std::vector<TrianglePrism>& others, double enough, std::span<double> worst = {}) {
+double boundOf(const Triangle3& t, const std::vector<TrianglePrism>& others, double enough,
+               std::span<double> worst = {}) {
     std::vector<const TrianglePrism*> pointers;
     for (const TrianglePrism& o : others) pointers.push_back(&o);
     return TriangleCover(enough).bound(t, pointers, worst);
@@ -38,7 +42,9 @@ TEST(TriangleCover, NeverLessThanTheFarthestPoint) {
     for (uint64_t seed = 0; seed < 400; ++seed) {
         std::mt19937_64 random(seed);
         std::uniform_real_distribution<double> unit(0, 1);
-        const auto point = [&](double flat) { return glm::dvec3(unit(random), unit(random), flat * unit(random)) * 2.0; };
+        const auto point = [&](double flat) {
+            return glm::dvec3(unit(random), unit(random), flat * unit(random)) * 2.0;
+        };
         const double flat = seed % 4 == 0 ? 1 : seed % 4 == 1 ? 0.2 : 0.01;
         std::vector<TrianglePrism> others;
         for (int i = 0; i < 1 + int(seed % 20); ++i) {
@@ -79,13 +85,17 @@ TEST(TriangleCover, CloseToTheTruthOnTiles) {
 }
 
 TEST(TriangleCover, FlatTilesAreExact) {
-    const std::vector<TrianglePrism> others{TrianglePrism({glm::dvec3(0, 0, 0), glm::dvec3(4, 0, 0), glm::dvec3(0, 4, 0)}),
-                                            TrianglePrism({glm::dvec3(4, 0, 0), glm::dvec3(4, 4, 0), glm::dvec3(0, 4, 0)})};
+    const std::vector<TrianglePrism> others{
+        TrianglePrism({glm::dvec3(0, 0, 0), glm::dvec3(4, 0, 0), glm::dvec3(0, 4, 0)}),
+        TrianglePrism({glm::dvec3(4, 0, 0), glm::dvec3(4, 4, 0), glm::dvec3(0, 4, 0)})};
     EXPECT_LT(boundOf({glm::dvec3(0.5, 0.5, 0), glm::dvec3(3.5, 1, 0), glm::dvec3(2, 3.5, 0)}, others, 0), 1e-5);
-    EXPECT_NEAR(boundOf({glm::dvec3(0.5, 0.5, 0.25), glm::dvec3(3.5, 1, 0.25), glm::dvec3(2, 3.5, 0.25)}, others, 0), 0.25, 1e-2);
+    EXPECT_NEAR(boundOf({glm::dvec3(0.5, 0.5, 0.25), glm::dvec3(3.5, 1, 0.25), glm::dvec3(2, 3.5, 0.25)}, others, 0),
+                0.25, 1e-2);
 }
 
-TEST(TriangleCover, NothingIsInfinitelyFar) { EXPECT_TRUE(std::isinf(boundOf({glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)}, {}, 0.1))); }
+TEST(TriangleCover, NothingIsInfinitelyFar) {
+    EXPECT_TRUE(std::isinf(boundOf({glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)}, {}, 0.1)));
+}
 
 }  // namespace
 }  // namespace vcp

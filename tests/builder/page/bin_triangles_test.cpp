@@ -84,14 +84,17 @@ TEST(BinTriangles, ARunOfPages) {
     const LatticeMesh mesh = test::onLattice(test::torusMesh({32, 32, 32}, 20, 8, 40, 20));
     const PageGrid grid{3, 3};
     const TriangleBins all = binTriangles(mesh, grid);
-    for (const auto& [first, end] : {std::pair<uint64_t, uint64_t>{0, 100}, {100, 101}, {77, 400}, {400, 512}, {5, 5}}) {
+    for (const auto& [first, end] :
+         {std::pair<uint64_t, uint64_t>{0, 100}, {100, 101}, {77, 400}, {400, 512}, {5, 5}}) {
         const TriangleBins run = binTriangles(mesh, grid, first, end);
         std::vector<uint64_t> expected;
         for (const uint64_t page : all.pages)
             if (page >= first && page < end) expected.push_back(page);
         ASSERT_EQ(run.pages, expected);
         for (size_t i = 0; i < run.pages.size(); ++i) {
-            const auto of = run.of(i), want = all.of(static_cast<size_t>(std::find(all.pages.begin(), all.pages.end(), run.pages[i]) - all.pages.begin()));
+            const auto of = run.of(i),
+                       want = all.of(static_cast<size_t>(std::find(all.pages.begin(), all.pages.end(), run.pages[i]) -
+                                                         all.pages.begin()));
             ASSERT_TRUE(std::equal(of.begin(), of.end(), want.begin(), want.end()));
         }
     }

@@ -35,7 +35,9 @@ TEST(CellOverlap, AgreesWithBoxOverlap) {
             for (int y = overlap.lower().y; y <= overlap.upper().y; ++y)
                 for (int x = overlap.lower().x; x <= overlap.upper().x; ++x, ++i) {
                     const glm::dvec3 centre = glm::dvec3(x, y, z) + 0.5;
-                    const int want = boxes.test(centre, 0.5) ? CellOverlap::kTouches : boxes.test(centre, 0.5 + kMargin) ? CellOverlap::kNear : 0;
+                    const int want = boxes.test(centre, 0.5)             ? CellOverlap::kTouches
+                                     : boxes.test(centre, 0.5 + kMargin) ? CellOverlap::kNear
+                                                                         : 0;
                     ASSERT_EQ(int(cells[i]), want) << "seed " << seed << " cell " << x << ' ' << y << ' ' << z;
                     touching += want == CellOverlap::kTouches;
                     near += want == CellOverlap::kNear;
@@ -75,7 +77,8 @@ TEST(CellOverlap, PartOfTheRange) {
             for (int y = low.y; y <= overlap.upper().y; ++y)
                 for (int x = low.x; x <= overlap.upper().x; ++x, ++i) {
                     const glm::ivec3 at = glm::ivec3(x, y, z) - overlap.lower();
-                    ASSERT_EQ(part[i], all[static_cast<size_t>(at.x + size.x * (at.y + size.y * at.z))]) << "seed " << seed;
+                    ASSERT_EQ(part[i], all[static_cast<size_t>(at.x + size.x * (at.y + size.y * at.z))])
+                        << "seed " << seed;
                 }
     }
 }

@@ -42,7 +42,8 @@ std::array<uint32_t, 8> tameCodes(uint64_t seed) {
 f64::LeafField asField(const std::array<uint32_t, 8>& codes, uint32_t axis) {
     uint4 face[2];
     for (uint32_t end = 0; end < 2; ++end)
-        for (uint32_t c = 0; c < 4; ++c) face[end][c] = codes[end << axis | (c & 1) << (axis + 1) % 3 | (c >> 1) << (axis + 2) % 3];
+        for (uint32_t c = 0; c < 4; ++c)
+            face[end][c] = codes[end << axis | (c & 1) << (axis + 1) % 3 | (c >> 1) << (axis + 2) % 3];
     return f64::decodeLeaf(face[0], face[1], axis);
 }
 
@@ -89,7 +90,8 @@ TEST(LeafSurface, BatchIsWithinItsRounding) {
             batch.z[i] = static_cast<float>(p.z);
         }
         surface.evaluate(batch);
-        for (int i = 8; i < 16; ++i) most = std::max(most, std::abs(batch.value[i] - surface.value({batch.x[i], batch.y[i], batch.z[i]})));
+        for (int i = 8; i < 16; ++i)
+            most = std::max(most, std::abs(batch.value[i] - surface.value({batch.x[i], batch.y[i], batch.z[i]})));
     }
     // Random codes are far wilder than a leaf that certifies.
     EXPECT_LE(most, 5 * LeafSurface::kBatchRounding);
@@ -130,7 +132,8 @@ void expectBernsteinBounds(const Codes& codesOf, uint64_t seeds) {
             const glm::dvec3 x = s.point(low, high), d = s.direction();
             const double derivative = (surface.value(x + h * n) - surface.value(x - h * n)) / (2 * h);
             ASSERT_GE(derivative, slope - 1e-5) << seed;
-            const double second = (surface.value(x + h * d) + surface.value(x - h * d) - 2 * surface.value(x)) / (h * h);
+            const double second =
+                (surface.value(x + h * d) + surface.value(x - h * d) - 2 * surface.value(x)) / (h * h);
             ASSERT_LE(std::abs(second), curvature + 1e-5) << seed;
             for (int axis = 0; axis < 3; ++axis)
                 for (int end = 0; end < 2; ++end) {
@@ -207,7 +210,9 @@ public:
         std::vector<const CertifiedTriangle*> triangles;
         for (const CertifiedTriangle& t : held) triangles.push_back(&t);
         CertificateScratch scratch;
-        const auto corner = [&](int i) -> const CornerVector& { return geometry_->corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)); };
+        const auto corner = [&](int i) -> const CornerVector& {
+            return geometry_->corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2));
+        };
         return certifyLeaf(box.lowerCells(), box.edgeCells(), triangles, tolerance, corner, scratch);
     }
     const LatticeMesh& mesh() const { return mesh_; }
@@ -239,7 +244,8 @@ IndexedMesh heightField(uint32_t n, const Height& height) {
 IndexedMesh smoothMesh(uint64_t seed) {
     Samples s(seed);
     switch (seed % 4) {
-        case 0: return test::sphereMesh(s.point(14, 18), s.between(2, 12), 40);
+        case 0:
+            return test::sphereMesh(s.point(14, 18), s.between(2, 12), 40);
         case 1: {
             IndexedMesh mesh = test::torusMesh(glm::dvec3(16), s.between(6, 9), s.between(2, 4), 90, 40);
             test::rotate(mesh, glm::dvec3(16), s.direction(), s.between(0, 3));
@@ -247,7 +253,8 @@ IndexedMesh smoothMesh(uint64_t seed) {
         }
         case 2: {
             const double k = s.between(0.2, 0.8), a = s.between(0.1, 1.5), phase = s.between(0, 6);
-            return heightField(60, [=](double x, double y) { return a * std::sin(k * x + phase) * std::cos(0.7 * k * y); });
+            return heightField(60,
+                               [=](double x, double y) { return a * std::sin(k * x + phase) * std::cos(0.7 * k * y); });
         }
         default: {
             // Noise, so that triangles are not all of one smooth surface.
@@ -304,7 +311,10 @@ TEST(Certificate, HoldsBothWays) {
                         const double bound = (c.maxValue + wallOf(wallCode(c.maxValue))) / c.minSlope * edge;
                         ASSERT_LE(bound, kTolerance + 1e-9);
                         const glm::dvec3 lower(x, y, z);
-                        const auto where = [&] { return testing::Message() << "seed " << seed << " leaf " << x << ' ' << y << ' ' << z << " edge " << edge; };
+                        const auto where = [&] {
+                            return testing::Message()
+                                   << "seed " << seed << " leaf " << x << ' ' << y << ' ' << z << " edge " << edge;
+                        };
                         // The surface to the mesh.
                         for (const glm::dvec3& q : surfacePoints(surface, s, 12)) {
                             const glm::dvec3 p = lower + q * double(edge);
@@ -321,7 +331,8 @@ TEST(Certificate, HoldsBothWays) {
                             if (glm::length(t[0] - lower) > 8) continue;
                             clipToBox(t, lower, lower + double(edge), polygon);
                             for (size_t i = 0; i < polygon.size(); ++i) {
-                                const glm::dvec3 p = ((polygon[i] + polygon[(i + 1) % polygon.size()]) / 2.0 - lower) / double(edge);
+                                const glm::dvec3 p =
+                                    ((polygon[i] + polygon[(i + 1) % polygon.size()]) / 2.0 - lower) / double(edge);
                                 constexpr double h = 1e-5;
                                 const double f = surface.value(p);
                                 ASSERT_LE(std::abs(f), c.maxValue + 1e-9) << where();
@@ -331,7 +342,8 @@ TEST(Certificate, HoldsBothWays) {
                                     step[axis] = h;
                                     gradient[axis] = (surface.value(p + step) - surface.value(p - step)) / (2 * h);
                                 }
-                                const glm::dvec3 q = p - gradient * (std::copysign(bound / edge, f) / glm::length(gradient));
+                                const glm::dvec3 q =
+                                    p - gradient * (std::copysign(bound / edge, f) / glm::length(gradient));
                                 ASSERT_LE(surface.value(q) * f, 1e-12) << where();
                             }
                         }
@@ -382,13 +394,16 @@ void expectRefused(const IndexedMesh& mesh, const std::function<bool(glm::dvec3 
 TEST(Certificate, BorderIsRefused) {
     // The field ends at y = 16.3: a quad's row is left out.
     IndexedMesh mesh = heightField(33, [](double x, double y) { return 0.3 + 0.05 * x + 0.02 * y; });
-    std::erase_if(mesh.triangles, [&](const auto& t) { return std::max({mesh.positions[t[0]].y, mesh.positions[t[1]].y, mesh.positions[t[2]].y}) > 16.6; });
+    std::erase_if(mesh.triangles, [&](const auto& t) {
+        return std::max({mesh.positions[t[0]].y, mesh.positions[t[1]].y, mesh.positions[t[2]].y}) > 16.6;
+    });
     expectRefused(mesh, [](glm::dvec3 lower) { return lower.y == 16; });
 }
 
 TEST(Certificate, CreaseIsRefused) {
     // A roof with its ridge at x = 16.5; 80 degrees.
-    expectRefused(heightField(33, [](double x, double) { return 0.37 - 0.85 * std::abs(x - 16.5); }), [](glm::dvec3 lower) { return lower.x == 16 && lower.z == 16; });
+    expectRefused(heightField(33, [](double x, double) { return 0.37 - 0.85 * std::abs(x - 16.5); }),
+                  [](glm::dvec3 lower) { return lower.x == 16 && lower.z == 16; });
 }
 
 TEST(Certificate, FoldIsRefused) {
@@ -458,7 +473,9 @@ TEST(Certificate, FarCornersAreRefused) {
     for (const CertifiedTriangle& t : held) triangles.push_back(&t);
     CornerVector far{1.8, {0, 0, 1}, 0};
     CertificateScratch scratch;
-    EXPECT_FALSE(certifyLeaf({10, 10, 16}, 1, triangles, 1, [&](int) -> const CornerVector& { return far; }, scratch).soft);
+    EXPECT_FALSE(certifyLeaf(
+                     {10, 10, 16}, 1, triangles, 1, [&](int) -> const CornerVector& { return far; }, scratch)
+                     .soft);
 }
 
 }  // namespace

@@ -32,14 +32,18 @@ struct Page {
     glm::u32vec3 at;
     std::optional<PageGeometry> geometry;
 
-    Page(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1) : mesh(std::move(m)), bins(binTriangles(mesh, {kLog2Cells, level})), at(position) {
+    Page(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1)
+        : mesh(std::move(m)), bins(binTriangles(mesh, {kLog2Cells, level})), at(position) {
         const auto page = std::find(bins.pages.begin(), bins.pages.end(), mortonEncode(at));
-        const auto triangles = page == bins.pages.end() ? std::span<const uint32_t>() : bins.of(static_cast<size_t>(page - bins.pages.begin()));
+        const auto triangles = page == bins.pages.end() ? std::span<const uint32_t>()
+                                                        : bins.of(static_cast<size_t>(page - bins.pages.begin()));
         geometry.emplace(mesh, triangles, at, kLog2Cells);
     }
     [[nodiscard]] Triangle3 triangle(size_t k) const {
         Triangle3 t;
-        for (int i = 0; i < 3; ++i) t[i] = glm::dvec3(mesh.positions[mesh.triangles[k][i]] - geometry->originLattice()) / double(kLatticePerCell);
+        for (int i = 0; i < 3; ++i)
+            t[i] =
+                glm::dvec3(mesh.positions[mesh.triangles[k][i]] - geometry->originLattice()) / double(kLatticePerCell);
         return t;
     }
 };
@@ -48,8 +52,11 @@ struct Page {
 LatticeMesh mixedMesh(uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
-    const auto point = [&](double low, double high) { return low + (high - low) * glm::dvec3(unit(random), unit(random), unit(random)); };
-    IndexedMesh mesh = test::sphereMesh(point(20, 44), 6 + 10 * unit(random), 20 + static_cast<uint32_t>(random() % 30));
+    const auto point = [&](double low, double high) {
+        return low + (high - low) * glm::dvec3(unit(random), unit(random), unit(random));
+    };
+    IndexedMesh mesh =
+        test::sphereMesh(point(20, 44), 6 + 10 * unit(random), 20 + static_cast<uint32_t>(random() % 30));
     IndexedMesh torus = test::torusMesh(glm::dvec3(32), 12 + 8 * unit(random), 2 + 3 * unit(random), 80, 30);
     test::rotate(torus, glm::dvec3(32), point(-1, 1), 6 * unit(random));
     test::append(mesh, torus);
@@ -73,8 +80,9 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
                     for (int x = 0; x < kCells; ++x) {
                         if (!page.geometry->occupied({x, y, z}) || random() % 4 != 0) continue;
                         // Corners of the cell and points of its subcells.
-                        const glm::ivec3 part = random() % 2 ? glm::ivec3(random() % 2, random() % 2, random() % 2) * kSubcells
-                                                             : glm::ivec3(random() % 9, random() % 9, random() % 9);
+                        const glm::ivec3 part = random() % 2
+                                                    ? glm::ivec3(random() % 2, random() % 2, random() % 2) * kSubcells
+                                                    : glm::ivec3(random() % 9, random() % 9, random() % 9);
                         const glm::ivec3 subcells = glm::ivec3(x, y, z) * kSubcells + part;
                         const glm::dvec3 p = glm::dvec3(subcells) / double(kSubcells);
                         const CornerVector& corner = page.geometry->corner(subcells);
@@ -85,7 +93,8 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
                             if (c.squared < best.squared) best = c;
                         }
                         ++compared;
-                        ASSERT_EQ(corner.distance, std::sqrt(best.squared)) << "seed " << seed << " cell " << x << ' ' << y << ' ' << z;
+                        ASSERT_EQ(corner.distance, std::sqrt(best.squared))
+                            << "seed " << seed << " cell " << x << ' ' << y << ' ' << z;
                         ASSERT_NEAR(glm::length(corner.direction), 1, 1e-12);
                         if (best.squared > 1e-12) {
                             ASSERT_EQ(corner.direction, -best.offset / corner.distance) << seed;
@@ -121,7 +130,8 @@ TEST(PageGeometry, OccupancyIsTouch) {
     for (size_t k = 0; k < page.mesh.triangles.size(); ++k) {
         const Triangle3 t = page.triangle(k);
         const BoxOverlap bounds(t);
-        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(bounds.lower())) - 1, 0), high = glm::min(glm::ivec3(glm::floor(bounds.upper())) + 1, kCells - 1);
+        const glm::ivec3 low = glm::max(glm::ivec3(glm::floor(bounds.lower())) - 1, 0),
+                         high = glm::min(glm::ivec3(glm::floor(bounds.upper())) + 1, kCells - 1);
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x) {
@@ -169,7 +179,10 @@ TEST(PageGeometry, TrianglesOfBoxesAndFiltersAgree) {
     std::vector<uint32_t> around, inside, filteredAround, filteredInside, all(page.bins.triangles.size());
     for (int i = 0; i < 300; ++i) {
         const int edge = 1 << random() % 4;
-        const NodeBox box{glm::ivec3(random() % (kCells / edge), random() % (kCells / edge), random() % (kCells / edge)) * edge * kSubcells, edge * kSubcells};
+        const NodeBox box{
+            glm::ivec3(random() % (kCells / edge), random() % (kCells / edge), random() % (kCells / edge)) * edge *
+                kSubcells,
+            edge * kSubcells};
         page.geometry->trianglesOf(box, around, inside);
         std::vector<uint32_t> candidates;
         for (uint32_t k = 0; k < page.bins.of(0).size(); ++k) candidates.push_back(k);
@@ -227,7 +240,8 @@ void expectSound(Page& page, const PageTree& tree) {
         for (int y = 0; y < kCells; ++y)
             for (int x = 0; x < kCells; ++x) {
                 if (!page.geometry->occupied({x, y, z})) continue;
-                ASSERT_TRUE(covered[static_cast<size_t>(x + kCells * (y + kCells * z))]) << "occupied cell without a leaf " << x << ' ' << y << ' ' << z;
+                ASSERT_TRUE(covered[static_cast<size_t>(x + kCells * (y + kCells * z))])
+                    << "occupied cell without a leaf " << x << ' ' << y << ' ' << z;
             }
     for (const HardLeaf& leaf : tree.hard) {
         ASSERT_FALSE(leaf.triangles.empty());
@@ -250,10 +264,12 @@ void expectHardLeavesComplete(Page& page, const PageTree& tree, std::span<const 
 }
 
 /// Empty nodes of the bytes: the grown box holds no occupied cell.
-void expectClearances(const PageGeometry& geometry, const PageView& view, uint32_t node, glm::ivec3 lower, int edge, size_t& seen) {
+void expectClearances(const PageGeometry& geometry, const PageView& view, uint32_t node, glm::ivec3 lower, int edge,
+                      size_t& seen) {
     if (nodeType(node) == kNodeInternal && edge > 1) {
         for (int i = 0; i < 8; ++i)
-            expectClearances(geometry, view, view.nodes[8 * uint64_t{node & kNodePayloadMask} + i], lower + edge / 2 * glm::ivec3(i & 1, i >> 1 & 1, i >> 2), edge / 2, seen);
+            expectClearances(geometry, view, view.nodes[8 * uint64_t{node & kNodePayloadMask} + i],
+                             lower + edge / 2 * glm::ivec3(i & 1, i >> 1 & 1, i >> 2), edge / 2, seen);
         return;
     }
     if (nodeType(node) != kNodeEmpty) return;
@@ -270,7 +286,8 @@ void expectClearances(const PageGeometry& geometry, const PageView& view, uint32
     bool freeBeyond = true;
     for (int z = std::max(low.z - 1, 0); z < std::min(high.z + 1, kCells); ++z)
         for (int y = std::max(low.y - 1, 0); y < std::min(high.y + 1, kCells); ++y)
-            for (int x = std::max(low.x - 1, 0); x < std::min(high.x + 1, kCells); ++x) freeBeyond = freeBeyond && !geometry.occupied({x, y, z});
+            for (int x = std::max(low.x - 1, 0); x < std::min(high.x + 1, kCells); ++x)
+                freeBeyond = freeBeyond && !geometry.occupied({x, y, z});
     ASSERT_FALSE(freeBeyond) << "clearance " << clear << " could be larger";
 }
 
@@ -286,7 +303,8 @@ TEST(PageBuilder, MixedMeshes) {
             ASSERT_NO_FATAL_FAILURE(expectSound(page, tree));
             const auto number = std::find(page.bins.pages.begin(), page.bins.pages.end(), mortonEncode(at));
             if (number == page.bins.pages.end()) continue;
-            ASSERT_NO_FATAL_FAILURE(expectHardLeavesComplete(page, tree, page.bins.of(static_cast<size_t>(number - page.bins.pages.begin()))));
+            ASSERT_NO_FATAL_FAILURE(expectHardLeavesComplete(
+                page, tree, page.bins.of(static_cast<size_t>(number - page.bins.pages.begin()))));
             soft += tree.soft.size();
             hard += tree.hard.size();
 
@@ -299,7 +317,8 @@ TEST(PageBuilder, MixedMeshes) {
             ASSERT_EQ(view->header.softLeaves, tree.soft.size());
             ASSERT_EQ(view->header.hardLeaves, tree.hard.size());
             ASSERT_GE(double(view->header.certifiedError), tree.certifiedError() + page.geometry->stray());
-            if (encoded.leaves > 0) expectClearances(*page.geometry, *view, view->header.root, glm::ivec3(0), kCells, empty);
+            if (encoded.leaves > 0)
+                expectClearances(*page.geometry, *view, view->header.root, glm::ivec3(0), kCells, empty);
         }
     }
     EXPECT_GT(soft, 1000u);
@@ -324,7 +343,8 @@ TEST(PageEncoder, LeavesComeBack) {
     for (uint64_t seed = 0; seed < 3; ++seed) {
         Page page(mixedMesh(seed), {0, 0, 0});
         page.mesh.colours.resize(page.mesh.positions.size());
-        for (size_t v = 0; v < page.mesh.colours.size(); ++v) page.mesh.colours[v] = static_cast<uint32_t>(v * 2654435761u);
+        for (size_t v = 0; v < page.mesh.colours.size(); ++v)
+            page.mesh.colours[v] = static_cast<uint32_t>(v * 2654435761u);
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
         const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
         std::vector<uint4> block(encoded.geometry.size() / 16), colour(encoded.colour.size() / 16);
@@ -340,7 +360,8 @@ TEST(PageEncoder, LeavesComeBack) {
             int same = 0, flipped = 0;
             for (uint32_t end = 0; end < 2; ++end)
                 for (uint32_t c = 0; c < 4; ++c) {
-                    const uint32_t want = leaf.certificate.codes[end << axis | (c & 1) << (axis + 1) % 3 | (c >> 1) << (axis + 2) % 3];
+                    const uint32_t want =
+                        leaf.certificate.codes[end << axis | (c & 1) << (axis + 1) % 3 | (c >> 1) << (axis + 2) % 3];
                     same += view->faces[face + end][c] == want;
                     flipped += view->faces[face + end][c] == flipSide(want);
                 }
@@ -355,7 +376,8 @@ TEST(PageEncoder, LeavesComeBack) {
                 const uint32_t v[3] = {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y), f64::decodeIndex2(r.y)};
                 for (int k = 0; k < 3; ++k) {
                     const uint32_t global = page.geometry->vertices(leaf.triangles[i])[k];
-                    ASSERT_EQ(f64::decodeVertex(view->vertices[v[k]].x, view->vertices[v[k]].y), page.geometry->triangle(leaf.triangles[i]).corners[k]);
+                    ASSERT_EQ(f64::decodeVertex(view->vertices[v[k]].x, view->vertices[v[k]].y),
+                              page.geometry->triangle(leaf.triangles[i]).corners[k]);
                     ASSERT_EQ(view->normals[v[k]], page.mesh.normals[global]);
                     ASSERT_EQ(view->vertexColours[v[k]], page.mesh.colours[global]);
                 }
@@ -369,8 +391,10 @@ TEST(PageBuilder, PagesAreStoredCoded) {
     IndexedMesh soup = test::randomTriangles(300, 8, true);
     const double scale = 8 / std::abs(soup.positions[0].x + 1e-3);
     for (glm::dvec3& p : soup.positions) p = glm::clamp(glm::dvec3(16) + scale * p, 2.0, 30.0);
-    const std::pair<IndexedMesh, size_t> scenes[] = {
-        {test::sphereMesh({16, 16, 16}, 11, 60), 4}, {test::sphereMesh({16, 16, 16}, 3, 90), 4}, {test::boxMesh({5, 6, 7}, {20, 21, 24}, 12), 4}, {soup, 2}};
+    const std::pair<IndexedMesh, size_t> scenes[] = {{test::sphereMesh({16, 16, 16}, 11, 60), 4},
+                                                     {test::sphereMesh({16, 16, 16}, 3, 90), 4},
+                                                     {test::boxMesh({5, 6, 7}, {20, 21, 24}, 12), 4},
+                                                     {soup, 2}};
     for (const auto& [mesh, factor] : scenes) {
         Page page(test::onLattice(mesh), {0, 0, 0});
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
@@ -391,7 +415,9 @@ TEST(PageBuilder, LongTrianglesStayWithinWhatAPageCanName) {
     IndexedMesh mesh;
     for (uint32_t k = 0; k < 300; ++k) {
         const double x = unit(random), y = unit(random);
-        for (const glm::dvec3 p : {glm::dvec3(x, y, 1), glm::dvec3(unit(random), unit(random), 31), glm::dvec3(x + 0.01, y, 1)}) mesh.positions.push_back(p);
+        for (const glm::dvec3 p :
+             {glm::dvec3(x, y, 1), glm::dvec3(unit(random), unit(random), 31), glm::dvec3(x + 0.01, y, 1)})
+            mesh.positions.push_back(p);
         mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
     }
     Page page(test::onLattice(mesh), {0, 0, 0});
@@ -440,7 +466,8 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
     fan.positions.push_back({16.3, 16.4, 16.2});
     for (uint32_t i = 0; i < kNeedles; ++i) {
         const double a = test::kTwoPi * i / kNeedles;
-        fan.positions.push_back(glm::dvec3(16.3, 16.4, 16.2) + 12.0 * glm::dvec3(std::cos(a), std::sin(a), 0.4 * std::sin(20 * a)));
+        fan.positions.push_back(glm::dvec3(16.3, 16.4, 16.2) +
+                                12.0 * glm::dvec3(std::cos(a), std::sin(a), 0.4 * std::sin(20 * a)));
     }
     for (uint32_t i = 0; i < kNeedles; ++i) fan.triangles.push_back({0, 1 + i, 1 + (i + 1) % kNeedles});
     Page page(test::onLattice(fan), {0, 0, 0});
@@ -459,7 +486,8 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
     std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
     const auto view = parsePage(std::as_bytes(std::span(block)));
     ASSERT_TRUE(view.ok()) << view.error().line();
-    for (const HardLeaf& leaf : tree.hard) EXPECT_EQ(hardLeafTriangles(*view, nodeAt(*view, leaf.box)).count, leaf.triangles.size());
+    for (const HardLeaf& leaf : tree.hard)
+        EXPECT_EQ(hardLeafTriangles(*view, nodeAt(*view, leaf.box)).count, leaf.triangles.size());
 }
 
 TEST(PageBuilder, CrowdedCellsAreSplit) {

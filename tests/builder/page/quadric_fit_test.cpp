@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 namespace vcp {
 namespace {
@@ -20,7 +20,9 @@ struct Points {
         y.push_back(static_cast<float>(p.y));
         z.push_back(static_cast<float>(p.z));
     }
-    [[nodiscard]] double residual(glm::dvec3 n) const { return quadricResidual(x.data(), y.data(), z.data(), x.size(), n); }
+    [[nodiscard]] double residual(glm::dvec3 n) const {
+        return quadricResidual(x.data(), y.data(), z.data(), x.size(), n);
+    }
 };
 
 struct Axes {
@@ -84,10 +86,13 @@ TEST(QuadricFit, AgreesWithAFitInDouble) {
         std::mt19937_64 random(seed);
         std::uniform_real_distribution<double> half(-0.5, 0.5);
         const Axes axes = axesAcross(unitVector(random));
-        const double noise = std::pow(10.0, -4 + static_cast<double>(seed % 4)), wave = 3 * half(random), bend = half(random);
+        const double noise = std::pow(10.0, -4 + static_cast<double>(seed % 4)), wave = 3 * half(random),
+                     bend = half(random);
         Points points;
         for (size_t count = 8 * (2 + random() % 30); count > 0; --count)
-            points.add(pointOver(axes, half(random), half(random), [&](double a, double b) { return bend * a * b + 0.1 * std::sin(wave * 5 * a) + noise * half(random); }));
+            points.add(pointOver(axes, half(random), half(random), [&](double a, double b) {
+                return bend * a * b + 0.1 * std::sin(wave * 5 * a) + noise * half(random);
+            }));
         const double square = std::pow(points.residual(axes.n), 2), least = referenceSquare(points, axes.n, 0);
         ASSERT_GT(square, least * (1 - 1e-4) - kFloatSquare);
         // Its ridge counts coefficients in other axes: at most twice.
@@ -107,7 +112,9 @@ TEST(QuadricFit, LeavesNothingOfAQuadric) {
         for (double& k : c) k = half(random);
         Points points;
         for (int i = 0; i < 64; ++i)
-            points.add(pointOver(axes, half(random), half(random), [&](double a, double b) { return c[0] + c[1] * a + c[2] * b + c[3] * a * a + c[4] * a * b + c[5] * b * b; }));
+            points.add(pointOver(axes, half(random), half(random), [&](double a, double b) {
+                return c[0] + c[1] * a + c[2] * b + c[3] * a * a + c[4] * a * b + c[5] * b * b;
+            }));
         EXPECT_LT(points.residual(axes.n), 1e-3);
         EXPECT_NEAR(points.residual(-axes.n), points.residual(axes.n), 1e-4);
     }
@@ -115,12 +122,15 @@ TEST(QuadricFit, LeavesNothingOfAQuadric) {
 
 // x^3 on [-1/2, 1/2] is nearest to 3/20 x: of its mean square 1/448, (3/20)^2 / 12 goes.
 TEST(QuadricFit, LeavesTheKnownPartOfACubic) {
-    for (const glm::dvec3 n : {glm::dvec3(0, 0, 1), glm::dvec3(0, -1, 0), glm::dvec3(1, 0, 0), glm::normalize(glm::dvec3(1, 2, -3))}) {
+    for (const glm::dvec3 n :
+         {glm::dvec3(0, 0, 1), glm::dvec3(0, -1, 0), glm::dvec3(1, 0, 0), glm::normalize(glm::dvec3(1, 2, -3))}) {
         const Axes axes = axesAcross(n);
         Points points;
         constexpr int kSteps = 64;
         for (int j = 0; j < kSteps; ++j)
-            for (int i = 0; i < kSteps; ++i) points.add(pointOver(axes, (i + 0.5) / kSteps - 0.5, (j + 0.5) / kSteps - 0.5, [](double a, double) { return a * a * a; }));
+            for (int i = 0; i < kSteps; ++i)
+                points.add(pointOver(axes, (i + 0.5) / kSteps - 0.5, (j + 0.5) / kSteps - 0.5,
+                                     [](double a, double) { return a * a * a; }));
         EXPECT_NEAR(points.residual(n), std::sqrt(1.0 / 448 - 9.0 / 400 / 12), 1e-4);
     }
 }

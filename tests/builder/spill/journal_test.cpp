@@ -104,7 +104,8 @@ TEST_F(JournalFile, LinksAreNotFollowed) {
     const auto expectRefused = [&](const Result<void>& result, const char* how) {
         ASSERT_FALSE(result.ok()) << how;
         EXPECT_EQ(result.error().code, ErrorCode::Io);
-        EXPECT_NE(result.error().line().find("journal: is not a file that a build made"), std::string::npos) << result.error().line();
+        EXPECT_NE(result.error().line().find("journal: is not a file that a build made"), std::string::npos)
+            << result.error().line();
         EXPECT_EQ(contentOf(folder_ / "diary"), "dear diary") << how;
         const auto fields = Journal::read(temp_);
         EXPECT_FALSE(fields.ok()) << how;

@@ -24,7 +24,8 @@ std::vector<std::byte> bytesOf(uint64_t seed, size_t count) {
 }
 
 StoredPage pageOf(uint64_t number) {
-    return {bytesOf(number, 50 + number * 3), bytesOf(~number, number % 3 == 0 ? 0 : 20 + number), static_cast<uint32_t>(1000 + number), static_cast<uint32_t>(number % 3 == 0 ? 0 : 500 + number)};
+    return {bytesOf(number, 50 + number * 3), bytesOf(~number, number % 3 == 0 ? 0 : 20 + number),
+            static_cast<uint32_t>(1000 + number), static_cast<uint32_t>(number % 3 == 0 ? 0 : 500 + number)};
 }
 
 class Pages : public ::testing::Test {
@@ -127,8 +128,11 @@ TEST_F(Pages, DamageAfterAnInterruptionIsNamed) {
     }
     EXPECT_TRUE(again(bytes, kPages).ok());
     // Numbers that do not fit each other, and those that would need all memory.
-    for (const uint64_t entries : {uint64_t{0}, kPages - 1, kPages + 1, uint64_t{1} << 40, ~uint64_t{0}, ~uint64_t{0} / 88 + 1}) EXPECT_FALSE(again(bytes, entries).ok()) << entries;
-    for (const uint64_t other : {bytes + 1, uint64_t{1} << 50, ~uint64_t{0}}) EXPECT_FALSE(again(other, kPages).ok()) << other;
+    for (const uint64_t entries :
+         {uint64_t{0}, kPages - 1, kPages + 1, uint64_t{1} << 40, ~uint64_t{0}, ~uint64_t{0} / 88 + 1})
+        EXPECT_FALSE(again(bytes, entries).ok()) << entries;
+    for (const uint64_t other : {bytes + 1, uint64_t{1} << 50, ~uint64_t{0}})
+        EXPECT_FALSE(again(other, kPages).ok()) << other;
     EXPECT_FALSE(again(bytes - 1, kPages).ok());
 }
 

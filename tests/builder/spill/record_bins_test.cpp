@@ -31,7 +31,9 @@ Record randomRecord(std::mt19937_64& random, uint64_t i) {
         const uint64_t words[3] = {random(), random(), random()};
         std::memcpy(&r, words, sizeof r);
     } else {
-        r = {{static_cast<int32_t>(i), -static_cast<int32_t>(i * 3), static_cast<int32_t>(random() % 100)}, 0.5f, static_cast<uint32_t>(i)};
+        r = {{static_cast<int32_t>(i), -static_cast<int32_t>(i * 3), static_cast<int32_t>(random() % 100)},
+             0.5f,
+             static_cast<uint32_t>(i)};
     }
     return r;
 }
@@ -151,7 +153,9 @@ TEST_F(Bins, SmoothRecordsAreSmall) {
     TempSpace space(folder_ / "temp", 1 << 30);
     RecordBins<Record> bins(space, "bins", 1, 1 << 20);
     std::vector<Record> records(50000);
-    for (size_t i = 0; i < records.size(); ++i) records[i] = {{static_cast<int32_t>(i * 5), 1000000 - static_cast<int32_t>(i), 7}, 1, static_cast<uint32_t>(i / 3)};
+    for (size_t i = 0; i < records.size(); ++i)
+        records[i] = {
+            {static_cast<int32_t>(i * 5), 1000000 - static_cast<int32_t>(i), 7}, 1, static_cast<uint32_t>(i / 3)};
     ASSERT_TRUE(bins.append(0, records).ok());
     ASSERT_TRUE(bins.raw().flush().ok());
     EXPECT_LT(bins.raw().bytes(), records.size() * sizeof(Record) / 4);
@@ -183,7 +187,8 @@ TEST_F(Bins, EveryDamageIsNoticed) {
         ASSERT_FALSE(result.ok()) << "byte " << at << " of " << intact.size();
         EXPECT_EQ(result.error().code, ErrorCode::InvalidInput);
         EXPECT_NE(result.error().line().find("bins.spill: byte "), std::string::npos) << result.error().line();
-        EXPECT_NE(result.error().line().find("temporary data came back damaged"), std::string::npos) << result.error().line();
+        EXPECT_NE(result.error().line().find("temporary data came back damaged"), std::string::npos)
+            << result.error().line();
     }
 }
 
@@ -206,7 +211,8 @@ TEST_F(Bins, TheIndexIsOfIntactHeadersOnly) {
         RecordBins<Record> bins(space, "bins", 3, 1 << 14);
         const auto reopened = bins.raw().reopen(intact.size());
         ASSERT_FALSE(reopened.ok()) << "bit " << bit;
-        EXPECT_NE(reopened.error().line().find("byte 0: temporary data came back damaged"), std::string::npos) << reopened.error().line();
+        EXPECT_NE(reopened.error().line().find("byte 0: temporary data came back damaged"), std::string::npos)
+            << reopened.error().line();
     }
 }
 

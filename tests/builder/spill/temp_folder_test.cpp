@@ -56,8 +56,10 @@ TEST_F(TempFolderTest, IsMadeMarkedAndRemoved) {
 TEST_F(TempFolderTest, RemovesItsOwnFilesOnly) {
     TempFolder temp(place());
     ASSERT_TRUE(temp.take().ok());
-    const char* const own[] = {"level0.spill", "level12.spill", "waiting3.spill", "waiting.spill", "pages3.spill", "entries3.spill", "floats.spill", "doubles.spill", "vertices.spill", "journal"};
-    const char* const others[] = {"diary.txt", "my.spill", "level.txt", "levels3.spill", "level3.spill.bak", "3.spill", ".spill"};
+    const char* const own[] = {"level0.spill",   "level12.spill", "waiting3.spill", "waiting.spill",  "pages3.spill",
+                               "entries3.spill", "floats.spill",  "doubles.spill",  "vertices.spill", "journal"};
+    const char* const others[] = {"diary.txt",        "my.spill", "level.txt", "levels3.spill",
+                                  "level3.spill.bak", "3.spill",  ".spill"};
     for (const char* name : own) write(place() / name);
     for (const char* name : others) write(place() / name);
     fs::create_directory(place() / "pages9.spill");
@@ -84,7 +86,8 @@ TEST_F(TempFolderTest, FoldersOfOthersAreRefused) {
     expectRefused(temp.take(), "out.vcp.build: is not known to be a build's");
     temp.clear();
     temp.remove();
-    for (const char* name : {"pages3.spill", "journal", "diary.txt"}) EXPECT_EQ(contentOf(place() / name), "text") << name;
+    for (const char* name : {"pages3.spill", "journal", "diary.txt"})
+        EXPECT_EQ(contentOf(place() / name), "text") << name;
     // A link is no mark.
     write(folder_ / "elsewhere");
     fs::create_symlink(folder_ / "elsewhere", place() / kTempMark);
@@ -134,10 +137,12 @@ TEST_F(TempFolderTest, FilesAreNotOpenedThroughLinks) {
         make(kind);
         const auto opened = temp.open("level3.spill");
         ASSERT_FALSE(opened.ok()) << kind;
-        EXPECT_NE(opened.error().line().find("level3.spill: is not a file that a build made"), std::string::npos) << opened.error().line();
+        EXPECT_NE(opened.error().line().find("level3.spill: is not a file that a build made"), std::string::npos)
+            << opened.error().line();
         const auto created = temp.create("level3.spill");
         ASSERT_FALSE(created.ok()) << kind;
-        EXPECT_NE(created.error().line().find("level3.spill: a build makes this file itself"), std::string::npos) << created.error().line();
+        EXPECT_NE(created.error().line().find("level3.spill: a build makes this file itself"), std::string::npos)
+            << created.error().line();
         EXPECT_EQ(contentOf(victim), "text") << kind;
         EXPECT_FALSE(fs::exists(folder_ / "none"));
         fs::remove(name);
@@ -212,7 +217,8 @@ TEST_F(TempFolderTest, BuildsLeaveWhatIsNotTheirs) {
     options.resume = false;
     const auto report = buildOctree(options);
     ASSERT_FALSE(report.ok());
-    EXPECT_NE(report.error().line().find("level0.spill: a build makes this file itself"), std::string::npos) << report.error().line();
+    EXPECT_NE(report.error().line().find("level0.spill: a build makes this file itself"), std::string::npos)
+        << report.error().line();
     EXPECT_EQ(contentOf(folder_ / "victim"), "text");
     EXPECT_TRUE(fs::is_symlink(place() / "level0.spill"));
 }

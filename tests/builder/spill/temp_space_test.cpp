@@ -102,10 +102,12 @@ TEST_F(Temp, ReadersBesideTheWriter) {
                 if (size == 0) continue;
                 const uint64_t from = random() % size;
                 Bytes part(std::min<uint64_t>(size - from, 5000));
-                if (!file.read(from, part) || std::memcmp(part.data(), bytes.data() + from, part.size()) != 0) wrong = true;
+                if (!file.read(from, part) || std::memcmp(part.data(), bytes.data() + from, part.size()) != 0)
+                    wrong = true;
             }
         });
-    for (size_t at = 0; at < bytes.size(); at += 7777) ASSERT_TRUE(file.append(std::span(bytes).subspan(at, std::min<size_t>(7777, bytes.size() - at))).ok());
+    for (size_t at = 0; at < bytes.size(); at += 7777)
+        ASSERT_TRUE(file.append(std::span(bytes).subspan(at, std::min<size_t>(7777, bytes.size() - at))).ok());
     for (std::thread& reader : readers) reader.join();
     EXPECT_FALSE(wrong);
     EXPECT_GT(space.peakDiskBytes(), 0u);

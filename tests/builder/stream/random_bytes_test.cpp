@@ -45,7 +45,8 @@ TEST(Spool, DamageIsNoticed) {
     for (char& c : all) c = static_cast<char>(random());
     for (const size_t damaged : {size_t{0}, size_t{65'535}, size_t{65'536}, size_t{131'071}}) {
         Spool spool(folder.path(), 1000);
-        for (size_t at = 0; at < all.size(); at += 777) ASSERT_TRUE(spool.append(std::string_view(all).substr(at, 777)).ok());
+        for (size_t at = 0; at < all.size(); at += 777)
+            ASSERT_TRUE(spool.append(std::string_view(all).substr(at, 777)).ok());
         // Its file has no name, but the descriptor has one.
         for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
             std::error_code ignored;

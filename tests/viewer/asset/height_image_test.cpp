@@ -1,4 +1,5 @@
-// Heights from EXR and PNG pictures, whole and hostile. PNG is tested through the program, too (meso_commands_test.cpp).
+// Heights from EXR and PNG pictures, whole and hostile. PNG is tested through the program, too
+// (meso_commands_test.cpp).
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -9,17 +10,18 @@
 
 #include <gtest/gtest.h>
 
-#include "viewer/asset/height_image.h"
 #include "tests/support/peak_memory.h"
 #include "tests/support/png_files.h"
 #include "tests/support/test_folder.h"
+#include "viewer/asset/height_image.h"
 
 namespace vcp {
 namespace {
 
 using Bytes = std::vector<std::byte>;
 
-/// An uncompressed EXR of scan lines as its specification has it; a channel is a name and a value for each texel, floats.
+/// An uncompressed EXR of scan lines as its specification has it; a channel is a name and a value for each texel,
+/// floats.
 class ExrFile {
 public:
     ExrFile(int left, int top, int width, int height) : window_{left, top, left + width - 1, top + height - 1} {}
@@ -63,8 +65,10 @@ public:
             for (const Channel& c : channels_)
                 for (int x = 0; x < width; ++x) {
                     const float value = c.values[size_t(y * width + x)];
-                    if (c.isHalf) put<uint16_t>(out, halfOf(value));
-                    else put(out, value);
+                    if (c.isHalf)
+                        put<uint16_t>(out, halfOf(value));
+                    else
+                        put(out, value);
                 }
         }
         return out;
@@ -121,7 +125,8 @@ protected:
     }
     Result<meso::HeightMap> read(const Bytes& bytes, double range = 0.5) const {
         const std::string path = (folder_ / "a.exr").string();
-        std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+        std::ofstream(path, std::ios::binary)
+            .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
         return readHeightImage(path, range);
     }
     TestFolder folder_;
@@ -150,7 +155,8 @@ TEST_F(Exr, FloatsBecomeHeightsBetweenTheirLeastAndGreatest) {
     EXPECT_EQ(map->range, 0.5);
     const double wanted[2][3] = {{8, 3, 0}, {0, 2, 4}};  // from the lower row, over the least
     for (int y = 0; y < 2; ++y)
-        for (int x = 0; x < 3; ++x) EXPECT_NEAR(map->height(x, y), wanted[y][x] / 8 * 0.5, 0.5 / 65535) << x << ", " << y;
+        for (int x = 0; x < 3; ++x)
+            EXPECT_NEAR(map->height(x, y), wanted[y][x] / 8 * 0.5, 0.5 / 65535) << x << ", " << y;
 }
 
 TEST_F(Exr, ChannelsAreChosenByName) {
@@ -164,15 +170,20 @@ TEST_F(Exr, ChannelsAreChosenByName) {
     EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("height", ramp)), rising) << "the only one";
     EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("R", ramp, true)), rising) << "half";
     EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("A", other).channel("Y", ramp)), rising) << "Y before others";
-    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("A", other).channel("B", ramp).channel("G", ramp).channel("R", ramp, true)), rising) << "the mean";
-    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("G", back).channel("R", ramp)), std::vector<uint16_t>(4, 0)) << "the mean is flat, and flat is the bottom";
+    EXPECT_EQ(
+        texels(ExrFile(0, 0, 4, 1).channel("A", other).channel("B", ramp).channel("G", ramp).channel("R", ramp, true)),
+        rising)
+        << "the mean";
+    EXPECT_EQ(texels(ExrFile(0, 0, 4, 1).channel("G", back).channel("R", ramp)), std::vector<uint16_t>(4, 0))
+        << "the mean is flat, and flat is the bottom";
     const auto none = read(ExrFile(0, 0, 4, 1).channel("U", ramp).channel("V", ramp).bytes());
     ASSERT_FALSE(none);
     EXPECT_EQ(none.error().code, ErrorCode::Unsupported) << none.error().line();
 }
 
 TEST_F(Exr, RefusesWhatIsNoNumber) {
-    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                            -std::numeric_limits<float>::infinity()}) {
         const auto map = read(ExrFile(0, 0, 2, 2).channel("Y", {0, 1, bad, 3}).bytes());
         ASSERT_FALSE(map);
         EXPECT_EQ(map.error().code, ErrorCode::InvalidInput);
@@ -186,7 +197,8 @@ TEST_F(Exr, SizesAreCheckedBeforeTexels) {
     const auto refused = [&](int width, int height, ErrorCode code) {
         Bytes bytes = ExrFile(0, 0, 1, 1).channel("Y", {1}).bytes();
         const std::string name = "dataWindow";
-        const auto at = std::search(bytes.begin(), bytes.end(), name.begin(), name.end(), [](std::byte a, char b) { return a == std::byte(b); });
+        const auto at = std::search(bytes.begin(), bytes.end(), name.begin(), name.end(),
+                                    [](std::byte a, char b) { return a == std::byte(b); });
         const int32_t window[4] = {0, 0, width - 1, height - 1};
         std::memcpy(&*at + name.size() + 1 + sizeof "box2i" + 4, window, sizeof window);
         const auto map = read(bytes);
@@ -203,7 +215,8 @@ TEST_F(Exr, SizesAreCheckedBeforeTexels) {
 /// Where the value of an attribute begins.
 size_t valueAt(const Bytes& bytes, const std::string& name, const std::string& type) {
     const std::string words = name + '\0' + type + '\0';
-    const auto at = std::search(bytes.begin(), bytes.end(), words.begin(), words.end(), [](std::byte a, char b) { return a == std::byte(b); });
+    const auto at = std::search(bytes.begin(), bytes.end(), words.begin(), words.end(),
+                                [](std::byte a, char b) { return a == std::byte(b); });
     return size_t(at - bytes.begin()) + words.size() + 4;
 }
 
@@ -234,7 +247,8 @@ TEST_F(Exr, TilesOutOfProportionAreRefused) {
         std::memcpy(bytes.data() + at, &x, sizeof x), std::memcpy(bytes.data() + at + sizeof x, &y, sizeof y);
         return bytes;
     };
-    for (const auto& [x, y] : {std::pair(65537u, 1u), std::pair(1u, 65537u), std::pair(~0u, ~0u), std::pair(1u << 31, 2u), std::pair(65536u, 65536u), std::pair(8192u, 8192u)})
+    for (const auto& [x, y] : {std::pair(65537u, 1u), std::pair(1u, 65537u), std::pair(~0u, ~0u),
+                               std::pair(1u << 31, 2u), std::pair(65536u, 65536u), std::pair(8192u, 8192u)})
         expectRefused(with(x, y), ErrorCode::Limit, "in tiles of");
     expectRefused(with(0, 4), ErrorCode::InvalidInput, "tiles without texels");
 }
@@ -250,7 +264,8 @@ TEST_F(Exr, LinesAndChannelsOutOfProportionAreRefused) {
     for (int i = 0; i < 65; ++i) many.channel(std::string(1, char('0' + i)), {1, 2});
     expectRefused(many.bytes(), ErrorCode::Limit, "65 channels");
     // What the library would join, or take the last of.
-    expectRefused(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("compression", "compression", 1).bytes(), ErrorCode::InvalidInput, "twice");
+    expectRefused(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("compression", "compression", 1).bytes(),
+                  ErrorCode::InvalidInput, "twice");
 }
 
 TEST_F(Exr, APictureIsNotLargerThanItsBytesCanHold) {
@@ -265,8 +280,9 @@ TEST_F(Exr, APictureIsNotLargerThanItsBytesCanHold) {
 
 TEST_F(Exr, OtherAttributesArePassedOver) {
     // Of sizes that their types do not have, which a reader by type would take for what follows.
-    for (const auto& [type, size] : {std::pair("string", size_t{40}), std::pair("int", size_t{0}), std::pair("m44f", size_t{3}), std::pair("stringvector", size_t{12}),
-                                     std::pair("preview", size_t{8}), std::pair("of mine", size_t{5})}) {
+    for (const auto& [type, size] :
+         {std::pair("string", size_t{40}), std::pair("int", size_t{0}), std::pair("m44f", size_t{3}),
+          std::pair("stringvector", size_t{12}), std::pair("preview", size_t{8}), std::pair("of mine", size_t{5})}) {
         const auto map = read(ExrFile(0, 0, 2, 1).channel("Y", {0, 1}).with("other", type, size).bytes());
         ASSERT_TRUE(map) << type << ": " << map.error().line();
         EXPECT_EQ(map->texels, (std::vector<uint16_t>{0, 65535}));
@@ -287,20 +303,25 @@ TEST_F(Exr, HostileBytesAreOneLine) {
         Bytes bytes = whole;
         bytes[bit / 8] ^= std::byte(1 << bit % 8);
         const auto flipped = decodeExr(bytes, 64);
-        if (!flipped) EXPECT_EQ(flipped.error().line().find('\n'), std::string::npos) << bit;
-        else EXPECT_EQ(flipped->values.size(), size_t(flipped->size.x) * size_t(flipped->size.y)) << bit;
+        if (!flipped)
+            EXPECT_EQ(flipped.error().line().find('\n'), std::string::npos) << bit;
+        else
+            EXPECT_EQ(flipped->values.size(), size_t(flipped->size.x) * size_t(flipped->size.y)) << bit;
     }
 }
 
-Result<meso::HeightMap> heightsOfPng(const std::string& file) { return decodeHeights(std::as_bytes(std::span(file)), 1); }
+Result<meso::HeightMap> heightsOfPng(const std::string& file) {
+    return decodeHeights(std::as_bytes(std::span(file)), 1);
+}
 
 TEST(PngHeights, EveryDepthInterlacedAndPalette) {
     const std::string four("\0\x1b", 2);  // of 2 bits: 0, 1, 2, 3
     const std::string eight("\0\x00\x55\xaa\xff", 5), sixteen("\0\x00\x00\x55\x55\xaa\xaa\xff\xff", 9);
     const std::string palette = test::pngChunk("PLTE", std::string("\0\0\0\x55\x55\x55\xaa\xaa\xaa\xff\xff\xff", 12));
     const std::vector<uint16_t> rising = {0, 0x5555, 0xaaaa, 0xffff};
-    for (const std::string& file : {test::pngFile(4, 1, 2, 0, four), test::pngFile(4, 1, 8, 0, eight), test::pngFile(4, 1, 16, 0, sixteen),
-                                    test::pngFile(4, 1, 2, 3, four, palette), test::pngFile(4, 1, 2, 3, four, palette + test::pngChunk("tRNS", "\x10"))}) {
+    for (const std::string& file : {test::pngFile(4, 1, 2, 0, four), test::pngFile(4, 1, 8, 0, eight),
+                                    test::pngFile(4, 1, 16, 0, sixteen), test::pngFile(4, 1, 2, 3, four, palette),
+                                    test::pngFile(4, 1, 2, 3, four, palette + test::pngChunk("tRNS", "\x10"))}) {
         const auto map = heightsOfPng(file);
         ASSERT_TRUE(map) << map.error().line();
         EXPECT_EQ(map->texels, rising);

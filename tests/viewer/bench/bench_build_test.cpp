@@ -22,7 +22,9 @@ class BenchBuild : public testing::Test {
 protected:
     BenchBuild() : folder_("vcp_bench_build_test"), ball_((folder_ / "ball.ply").string()) { writeBall(ball_, 30, 60); }
 
-    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords("bench build " + arguments); }
+    [[nodiscard]] Ran run(const std::string& arguments) const {
+        return VcpProgram(folder_).runWords("bench build " + arguments);
+    }
 
     static constexpr const char* kQuick = " --repetitions 1 --samples 500 --json";
 
@@ -32,10 +34,30 @@ protected:
 
 /// What DESIGN and docs/measuring.md promise, and that a row agrees with itself.
 void expectRow(const Json& row) {
-    for (const char* field : {"model", "triangles", "seconds", "triangles_per_second", "peak_rss_bytes", "file_bytes", "embree_bvh_seconds",
-                              "ratio_to_embree", "generated", "cpu_seconds", "memory_bytes", "temp_bytes", "bytes_per_triangle", "leaves",
-                              "hard_leaves", "cell", "error_cells", "certified_max_cells", "p50_cells", "p99_cells", "max_cells",
-                              "mesh_to_surface_p99_cells", "surface_to_mesh_p99_cells", "samples"})
+    for (const char* field : {"model",
+                              "triangles",
+                              "seconds",
+                              "triangles_per_second",
+                              "peak_rss_bytes",
+                              "file_bytes",
+                              "embree_bvh_seconds",
+                              "ratio_to_embree",
+                              "generated",
+                              "cpu_seconds",
+                              "memory_bytes",
+                              "temp_bytes",
+                              "bytes_per_triangle",
+                              "leaves",
+                              "hard_leaves",
+                              "cell",
+                              "error_cells",
+                              "certified_max_cells",
+                              "p50_cells",
+                              "p99_cells",
+                              "max_cells",
+                              "mesh_to_surface_p99_cells",
+                              "surface_to_mesh_p99_cells",
+                              "samples"})
         ASSERT_TRUE(row.contains(field)) << field;
     const double triangles = row["triangles"], seconds = row["seconds"];
     EXPECT_GT(triangles, 0);
@@ -114,8 +136,8 @@ TEST_F(BenchBuild, GeneratedScansAreBuiltAndRemoved) {
     EXPECT_EQ(rows[1]["triangles"], 20'000u);
     std::set<std::string> files;
     for (const auto& entry : fs::directory_iterator(out)) files.insert(entry.path().filename().string());
-    EXPECT_EQ(files, (std::set<std::string>{"scan_10k.vcp", "scan_20k.vcp", "bench_build.json", "bench_build.csv", "bench_build.md",
-                                            "bench_build_cost.svg", "bench_build_memory.svg"}));
+    EXPECT_EQ(files, (std::set<std::string>{"scan_10k.vcp", "scan_20k.vcp", "bench_build.json", "bench_build.csv",
+                                            "bench_build.md", "bench_build_cost.svg", "bench_build_memory.svg"}));
 }
 
 TEST_F(BenchBuild, AModelThatFailsDoesNotTakeTheOthersAlong) {
@@ -132,7 +154,8 @@ TEST_F(BenchBuild, AModelThatFailsDoesNotTakeTheOthersAlong) {
 }
 
 TEST_F(BenchBuild, WrongUsageEndsWith2) {
-    for (const std::string wrong : {"", "--generated 10", "--generated 1.5", "--generated 2G", "--errors 0", "--errors x", "--memory 0", "--samples -1"}) {
+    for (const std::string wrong : {"", "--generated 10", "--generated 1.5", "--generated 2G", "--errors 0",
+                                    "--errors x", "--memory 0", "--samples -1"}) {
         const Ran ran = run((wrong.starts_with("--gen") ? "" : wrong.empty() ? "" : ball_ + " ") + wrong);
         EXPECT_EQ(ran.status, 2) << wrong;
         EXPECT_EQ(ran.errLines(), 1u) << ran.err;

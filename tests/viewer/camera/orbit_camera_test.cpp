@@ -5,8 +5,8 @@
 #include <numbers>
 #include <random>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 namespace vcp {
 namespace {
@@ -96,7 +96,8 @@ TEST_P(CameraMoves, OriginFarAway) {
 
 TEST_P(CameraMoves, FitShowsTheWholeBoxAndNearlyFillsThePicture) {
     for (const glm::ivec2 size : {glm::ivec2(1280, 720), glm::ivec2(200, 900), glm::ivec2(1, 1)}) {
-        for (const View view : {View::Front, View::Back, View::Left, View::Right, View::Top, View::Bottom, View::Isometric}) {
+        for (const View view :
+             {View::Front, View::Back, View::Left, View::Right, View::Top, View::Bottom, View::Isometric}) {
             OrbitCamera camera;
             camera.projection = GetParam();
             const Box box{{10, 20, 30}, {13, 21, 35}};
@@ -118,7 +119,8 @@ TEST_P(CameraMoves, FitShowsTheWholeBoxAndNearlyFillsThePicture) {
 TEST_P(CameraMoves, FitKeepsClearOfWhatIsCovered) {
     const Box box{{10, 20, 30}, {13, 21, 35}};
     const glm::ivec2 size(1280, 720);
-    for (const PictureMargins covered : {PictureMargins{.right = 400, .bottom = 20}, PictureMargins{.left = 100, .top = 300}, PictureMargins{.right = 640}}) {
+    for (const PictureMargins covered : {PictureMargins{.right = 400, .bottom = 20},
+                                         PictureMargins{.left = 100, .top = 300}, PictureMargins{.right = 640}}) {
         for (const View view : {View::Front, View::Right, View::Top, View::Isometric}) {
             OrbitCamera camera;
             camera.projection = GetParam();
@@ -144,9 +146,10 @@ TEST_P(CameraMoves, FitKeepsClearOfWhatIsCovered) {
     EXPECT_EQ(camera.position, whole.position);
 }
 
-INSTANTIATE_TEST_SUITE_P(Projections, CameraMoves,
-                         testing::Values(Projection::Perspective, Projection::Orthographic),
-                         [](const auto& projection) { return projection.param == Projection::Perspective ? "Perspective" : "Orthographic"; });
+INSTANTIATE_TEST_SUITE_P(Projections, CameraMoves, testing::Values(Projection::Perspective, Projection::Orthographic),
+                         [](const auto& projection) {
+                             return projection.param == Projection::Perspective ? "Perspective" : "Orthographic";
+                         });
 
 TEST(OrbitCamera, StandardViewsLookWhereTheirNameSays) {
     const Box box{{-1, -1, -1}, {1, 1, 1}};
@@ -286,8 +289,10 @@ TEST(OrbitCamera, BetweenEndsAtBothAndKeepsALengthOfView) {
     for (const double part : {0.1, 0.5, 0.9}) {
         const OrbitCamera camera = between(from, to, part);
         EXPECT_NEAR(glm::length(camera.orientation), 1, 1e-12);
-        EXPECT_LT(glm::distance(camera.focus(), box.centre()), 1e-9) << "both look at the same point, and so does all between";
-        EXPECT_NEAR(camera.focusDistance, from.focusDistance * std::pow(to.focusDistance / from.focusDistance, part), 1e-9);
+        EXPECT_LT(glm::distance(camera.focus(), box.centre()), 1e-9)
+            << "both look at the same point, and so does all between";
+        EXPECT_NEAR(camera.focusDistance, from.focusDistance * std::pow(to.focusDistance / from.focusDistance, part),
+                    1e-9);
     }
 }
 

@@ -11,8 +11,8 @@
 #include <sys/stat.h>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include "render/picture.h"
 #include "render/renderer.h"
@@ -57,7 +57,9 @@ protected:
         EXPECT_NE(ran.err.find(named), std::string::npos) << ran.err << " does not name " << named;
     }
 
-    static void write(const fs::path& file, const std::string& content) { std::ofstream(file, std::ios::binary) << content; }
+    static void write(const fs::path& file, const std::string& content) {
+        std::ofstream(file, std::ios::binary) << content;
+    }
 
     static bool hasDevice() { return listDevices().ok(); }
 
@@ -120,7 +122,8 @@ TEST_F(CommandLine, WrongUsageEndsWith2) {
 
 // Every command, every kind of file that is no good: one line that names it.
 TEST_F(CommandLine, BadInputsEndWith1AndNameTheFile) {
-    const fs::path empty = *folder_ / "empty.ply", garbage = *folder_ / "garbage.ply", missing = *folder_ / "missing.ply";
+    const fs::path empty = *folder_ / "empty.ply", garbage = *folder_ / "garbage.ply",
+                   missing = *folder_ / "missing.ply";
     const fs::path emptyDataset = *folder_ / "empty.vcp", garbageDataset = *folder_ / "garbage.vcp";
     const fs::path missingDataset = *folder_ / "missing.vcp", out = *folder_ / "bad_out";
     write(empty, "");
@@ -160,12 +163,14 @@ TEST_F(CommandLine, BadInputsEndWith1AndNameTheFile) {
 TEST_F(CommandLine, NothingThatANameHoldsDrivesTheTerminal) {
     const auto expectHarmless = [](const Ran& ran) {
         for (const std::string* said : {&ran.out, &ran.err})
-            for (const char c : *said) ASSERT_TRUE(c == '\n' || (static_cast<unsigned char>(c) >= 0x20 && c != '\x7f')) << ran.out << ran.err;
+            for (const char c : *said)
+                ASSERT_TRUE(c == '\n' || (static_cast<unsigned char>(c) >= 0x20 && c != '\x7f')) << ran.out << ran.err;
         EXPECT_EQ((ran.out + ran.err).find("\u202e"), std::string::npos) << ran.out << ran.err;
     };
     const fs::path hostile = *folder_ / "a\x1b]0;owned\x07\x7f\u202e.vcp", missing = *folder_ / "b\x1b[2J.vcp";
     fs::copy_file(dataset(), hostile, fs::copy_options::overwrite_existing);
-    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{{"info", hostile.string()}, {"verify", hostile.string(), "--progress", "plain"}}) {
+    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+             {"info", hostile.string()}, {"verify", hostile.string(), "--progress", "plain"}}) {
         const Ran ran = run(arguments);
         EXPECT_EQ(ran.status, 0) << ran.err;
         EXPECT_NE(ran.out.find("a\\x1b]0;owned\\x07\\x7f\\xe2\\x80\\xae.vcp"), std::string::npos) << ran.out;
@@ -182,7 +187,9 @@ TEST_F(CommandLine, NothingThatANameHoldsDrivesTheTerminal) {
     expectHarmless(usage);
 
     const fs::path mesh = *folder_ / "hostile.obj", built = *folder_ / "hostile.vcp";
-    write(mesh, "mtllib \x1b[31m\xc2\x9b" "31m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \x1b[1m\nf 1 2 3\n");
+    write(mesh,
+          "mtllib \x1b[31m\xc2\x9b"
+          "31m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \x1b[1m\nf 1 2 3\n");
     const Ran ran = run({"build", mesh.string(), "-o", built.string()});
     EXPECT_EQ(ran.status, 0) << ran.err;
     EXPECT_NE(ran.out.find("\\x1b[31m"), std::string::npos) << ran.out << ran.err;
@@ -197,7 +204,8 @@ TEST_F(CommandLine, NothingThatANameHoldsDrivesTheTerminal) {
 
 /// What a scene, a camera or a path says wrongly is not the command line's fault.
 TEST_F(CommandLine, WhatFilesSayEndsWith1) {
-    const fs::path scene = *folder_ / "wrong_scene.json", camera = *folder_ / "wrong_camera.json", path = *folder_ / "wrong_path.json", png = *folder_ / "wrong.png";
+    const fs::path scene = *folder_ / "wrong_scene.json", camera = *folder_ / "wrong_camera.json",
+                   path = *folder_ / "wrong_path.json", png = *folder_ / "wrong.png";
     const fs::path points = *folder_ / "points.xyz";
     write(points, "0 0 0\n");
     write(scene, "{\"datasets\": [\n{\"file\": \"points.xyz\"}]}");
@@ -206,7 +214,8 @@ TEST_F(CommandLine, WhatFilesSayEndsWith1) {
         {"{\"mesostructure\": [\n{\"asset\": \"brick\"}]}", ": line 2: \"asset\" must be"},
         {"{\"mesostructure\": [\n{\"asset\": \"beads\", \"surface\": \"blob\"}]}", ": line 2: "},
         {"{\"mesostructure\": [\n{\"asset\": \"beads\",\n\"tiles\": 1e6}]}", ": line "},
-        {"{\"datasets\": [{\"file\": \"a.vcp\"}],\n\"sections\": [{\"normal\": [1e-320, 0, 0], \"offset\": 0}]}", ": line 2: \"normal\""},
+        {"{\"datasets\": [{\"file\": \"a.vcp\"}],\n\"sections\": [{\"normal\": [1e-320, 0, 0], \"offset\": 0}]}",
+         ": line 2: \"normal\""},
     };
     for (const auto& [text, words] : scenes) {
         write(scene, text);
@@ -215,9 +224,11 @@ TEST_F(CommandLine, WhatFilesSayEndsWith1) {
         EXPECT_EQ(ran.err.find("vcp help"), std::string::npos) << ran.err;
     }
     write(camera, "{\"position\": [0, 0, 5],\n\"target\": [0, 0, 0],\n\"fov_degrees\": 178.5}");
-    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--camera", camera.string()}), 1, camera.string() + ": line 3: \"fov_degrees\"");
+    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--camera", camera.string()}), 1,
+                  camera.string() + ": line 3: \"fov_degrees\"");
     write(path, "[{\"position\": [0, 0, 5], \"target\": [0, 0, 0]},\n{\"position\": [0, 0, 5]}]");
-    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--path", path.string(), "--frames", "2"}), 1, path.string() + ": line 2: camera 1: \"target\"");
+    expectFailure(run({"render", dataset().string(), "-o", png.string(), "--path", path.string(), "--frames", "2"}), 1,
+                  path.string() + ": line 2: camera 1: \"target\"");
     EXPECT_FALSE(fs::exists(png));
 }
 
@@ -230,8 +241,10 @@ TEST_F(CommandLine, PipesAreNoFiles) {
     expectFailure(run({"info", pipe.string()}), 1, pipe.string() + ": is a pipe, not a file");
     expectFailure(run({"verify", pipe.string()}), 1, pipe.string() + ": is a pipe, not a file");
     expectFailure(run({"render", scene.string(), "-o", png.string()}), 1, scene.string() + ": is a pipe, not a file");
-    expectFailure(run({"render", whole, "-o", png.string(), "--camera", pipe.string()}), 1, pipe.string() + ": is a pipe, not a file");
-    expectFailure(run({"render", whole, "-o", png.string(), "--path", pipe.string(), "--frames", "2"}), 1, pipe.string() + ": is a pipe, not a file");
+    expectFailure(run({"render", whole, "-o", png.string(), "--camera", pipe.string()}), 1,
+                  pipe.string() + ": is a pipe, not a file");
+    expectFailure(run({"render", whole, "-o", png.string(), "--path", pipe.string(), "--frames", "2"}), 1,
+                  pipe.string() + ": is a pipe, not a file");
     expectFailure(run({"meso", "info", pipe.string()}), 1, pipe.string());
     EXPECT_EQ(run({"render", pipe.string(), "-o", png.string()}).status, 1);
     EXPECT_FALSE(fs::exists(png));
@@ -247,8 +260,9 @@ TEST_F(CommandLine, BuildReportsWhatProgramsRelyOn) {
     const Ran ran = run({"build", ball().string(), "-o", file.string(), "--json", "--progress", "json"});
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json json = Json::parse(ran.out);
-    for (const char* field : {"triangles", "degenerate_triangles", "seconds", "peak_rss_bytes", "temp_bytes", "file_bytes", "levels",
-                              "subvolumes", "leaves", "hard_leaves", "cell", "certified_error_max"})
+    for (const char* field :
+         {"triangles", "degenerate_triangles", "seconds", "peak_rss_bytes", "temp_bytes", "file_bytes", "levels",
+          "subvolumes", "leaves", "hard_leaves", "cell", "certified_error_max"})
         EXPECT_TRUE(json.contains(field) && json[field].is_number()) << field;
     EXPECT_EQ(json["triangles"], 14160);
     EXPECT_EQ(json["file_bytes"], fs::file_size(file));
@@ -257,8 +271,8 @@ TEST_F(CommandLine, BuildReportsWhatProgramsRelyOn) {
     for (std::string line; std::getline(progress, line);) EXPECT_TRUE(Json::parse(line).contains("fraction")) << line;
 
     const Json info = Json::parse(run({"info", file.string(), "--json"}).out);
-    for (const char* field : {"triangles", "degenerate_triangles", "levels", "subvolumes", "leaves", "hard_leaves", "cell",
-                              "certified_error_max", "file_bytes"})
+    for (const char* field : {"triangles", "degenerate_triangles", "levels", "subvolumes", "leaves", "hard_leaves",
+                              "cell", "certified_error_max", "file_bytes"})
         EXPECT_EQ(info[field], json[field]) << field;
     EXPECT_EQ(info["level"].size(), json["levels"].get<size_t>());
     EXPECT_EQ(info["level"].back()["certified_error_max"], json["certified_error_max"]);
@@ -313,12 +327,12 @@ TEST_F(CommandLine, VerifyFindsAChangedByteAnywhere) {
 TEST_F(CommandLine, RenderReportsWhatProgramsRelyOn) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const fs::path png = *folder_ / "ball.png", depth = *folder_ / "ball.pfm", normals = *folder_ / "normals.png";
-    const Ran ran = run({"render", dataset().string(), "-o", png.string(), "--size", "160x120", "--depth", depth.string(), "--normals",
-                         normals.string(), "--json"});
+    const Ran ran = run({"render", dataset().string(), "-o", png.string(), "--size", "160x120", "--depth",
+                         depth.string(), "--normals", normals.string(), "--json"});
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json json = Json::parse(ran.out);
-    for (const char* field : {"frames", "ms_per_frame", "rays_per_second", "hit_pixels", "resident_bytes", "bytes_read", "error_pixels",
-                              "pipelines"})
+    for (const char* field : {"frames", "ms_per_frame", "rays_per_second", "hit_pixels", "resident_bytes", "bytes_read",
+                              "error_pixels", "pipelines"})
         EXPECT_TRUE(json.contains(field) && json[field].is_number()) << field;
     EXPECT_EQ(json["settled"], true);
     EXPECT_TRUE(json["device"].is_string());
@@ -350,11 +364,14 @@ TEST_F(CommandLine, RenderOfAMeshBuildsItOnce) {
 TEST_F(CommandLine, CamerasByNameAndByFile) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const fs::path camera = *folder_ / "camera.json", png = *folder_ / "camera.png";
-    const Ran named = run({"render", dataset().string(), "-o", png.string(), "--size", "64x64", "--camera", "iso", "--json"});
+    const Ran named =
+        run({"render", dataset().string(), "-o", png.string(), "--size", "64x64", "--camera", "iso", "--json"});
     ASSERT_EQ(named.status, 0) << named.err;
     const std::string picture = contentOf(png);
     write(camera, Json::parse(named.out)["camera"].dump());
-    ASSERT_EQ(run({"render", dataset().string(), "-o", png.string(), "--size", "64x64", "--camera", camera.string()}).status, 0);
+    ASSERT_EQ(
+        run({"render", dataset().string(), "-o", png.string(), "--size", "64x64", "--camera", camera.string()}).status,
+        0);
     const auto again = readPng(png);
     ASSERT_TRUE(again);
 
@@ -370,7 +387,8 @@ TEST_F(CommandLine, RenderRefusesBrokenPagesWithoutAPicture) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const Json info = Json::parse(run({"info", dataset().string(), "--json"}).out);
     std::string bytes = contentOf(dataset());
-    for (size_t at = bytes.size() / 3; at + 200 < bytes.size(); at += 97) bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
+    for (size_t at = bytes.size() / 3; at + 200 < bytes.size(); at += 97)
+        bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
     const fs::path file = *folder_ / "broken_pages.vcp", png = *folder_ / "broken_pages.png";
     write(file, bytes);
     expectFailure(run({"render", file.string(), "-o", png.string(), "--size", "64x64"}), 1, file.string());
@@ -379,12 +397,16 @@ TEST_F(CommandLine, RenderRefusesBrokenPagesWithoutAPicture) {
 
 TEST_F(CommandLine, ThePapersMethodFromMeshToPicture) {
     const fs::path file = *folder_ / "paper.vcp", again = *folder_ / "paper_again.vcp", png = *folder_ / "paper.png";
-    const Ran built = run({"build", ball().string(), "-o", file.string(), "--method", "paper", "--cell", "0.05", "--paper-k", "4", "--threads", "1", "--json"});
+    const Ran built = run({"build", ball().string(), "-o", file.string(), "--method", "paper", "--cell", "0.05",
+                           "--paper-k", "4", "--threads", "1", "--json"});
     ASSERT_EQ(built.status, 0) << built.err;
     const Json report = Json::parse(built.out);
     EXPECT_TRUE(report["certified_error_max"].is_null());
     EXPECT_EQ(report["file_bytes"], fs::file_size(file));
-    ASSERT_EQ(run({"build", ball().string(), "-o", again.string(), "--method", "paper", "--cell", "0.05", "--paper-k", "4", "--threads", "3"}).status, 0);
+    ASSERT_EQ(run({"build", ball().string(), "-o", again.string(), "--method", "paper", "--cell", "0.05", "--paper-k",
+                   "4", "--threads", "3"})
+                  .status,
+              0);
     EXPECT_EQ(contentOf(file), contentOf(again));
 
     const Json info = Json::parse(run({"info", file.string(), "--json"}).out);
@@ -396,9 +418,11 @@ TEST_F(CommandLine, ThePapersMethodFromMeshToPicture) {
     EXPECT_EQ(run({"verify", file.string()}).status, 0);
     expectFailure(run({"verify", file.string(), "--against", ball().string()}), 1, "--method paper");
     expectFailure(run({"build", ball().string(), "-o", file.string(), "--paper-k", "4"}), 2, "--method paper");
-    expectFailure(run({"build", ball().string(), "-o", file.string(), "--method", "paper", "--error", "0.1"}), 2, "--error");
+    expectFailure(run({"build", ball().string(), "-o", file.string(), "--method", "paper", "--error", "0.1"}), 2,
+                  "--error");
     if (!hasDevice()) return;
-    const Ran drawn = run({"render", file.string(), "-o", png.string(), "--size", "64x64", "--paper-epsilon", "0.1", "--json"});
+    const Ran drawn =
+        run({"render", file.string(), "-o", png.string(), "--size", "64x64", "--paper-epsilon", "0.1", "--json"});
     ASSERT_EQ(drawn.status, 0) << drawn.err;
     EXPECT_GT(Json::parse(drawn.out)["hit_pixels"], 64 * 64 / 5);
     EXPECT_TRUE(Json::parse(drawn.out)["error_pixels"].is_null());
@@ -422,13 +446,15 @@ TEST_F(CommandLine, Devices) {
     const std::string text = run({"devices"}).out;
     EXPECT_EQ(text.find("software") != std::string::npos, ran.out.find("\"software\": true") != std::string::npos);
     expectFailure(run({"devices", "--device", "no such device"}), 1, "no such device");
-    expectFailure(run({"render", dataset().string(), "-o", "x.png", "--device", "no such device"}), 1, "no such device");
+    expectFailure(run({"render", dataset().string(), "-o", "x.png", "--device", "no such device"}), 1,
+                  "no such device");
 }
 
 TEST_F(CommandLine, PicturesInTilesAndSequences) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const auto render = [&](const std::string& name, std::vector<std::string> more) {
-        std::vector<std::string> arguments{"render", dataset().string(), "-o", (*folder_ / name).string(), "--size", "96x64"};
+        std::vector<std::string> arguments{"render", dataset().string(), "-o", (*folder_ / name).string(), "--size",
+                                           "96x64"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         return run(arguments);
     };
@@ -453,8 +479,12 @@ TEST_F(CommandLine, PicturesInTilesAndSequences) {
     expectFailure(render("x.png", {"--path", path.string()}), 1, path.string());
     expectFailure(render("x.png", {"--path", path.string(), "--turntable", "3"}), 2, "--turntable");
 
-    ASSERT_EQ(render("deep.png", {"--turntable", "2", "--depth", (*folder_ / "deep.pfm").string(), "--normals", (*folder_ / "normal.png").string()}).status, 0);
-    for (const char* name : {"deep-0001.pfm", "deep-0002.pfm", "normal-0001.png", "normal-0002.png"}) EXPECT_TRUE(fs::exists(*folder_ / name)) << name;
+    ASSERT_EQ(render("deep.png", {"--turntable", "2", "--depth", (*folder_ / "deep.pfm").string(), "--normals",
+                                  (*folder_ / "normal.png").string()})
+                  .status,
+              0);
+    for (const char* name : {"deep-0001.pfm", "deep-0002.pfm", "normal-0001.png", "normal-0002.png"})
+        EXPECT_TRUE(fs::exists(*folder_ / name)) << name;
     EXPECT_NE(contentOf(*folder_ / "deep-0001.pfm"), contentOf(*folder_ / "deep-0002.pfm"));
     EXPECT_FALSE(fs::exists(*folder_ / "deep.pfm") || fs::exists(*folder_ / "deep-0003.pfm"));
 }
@@ -479,12 +509,18 @@ TEST_F(CommandLine, ScenesOfSeveralDatasets) {
     };
     render("one.png", {dataset().string()});
     render("twice.png", {dataset().string(), dataset().string()});
-    EXPECT_EQ(readPng(*folder_ / "one.png").value(), readPng(*folder_ / "twice.png").value()) << "two in one place look like one";
+    EXPECT_EQ(readPng(*folder_ / "one.png").value(), readPng(*folder_ / "twice.png").value())
+        << "two in one place look like one";
     const fs::path scene = *folder_ / "scene.json";
     // A small one before the large one, a mesh, and one beside; the camera is the scene's.
-    write(scene, Json{{"datasets", {{{"file", dataset().filename().string()}}, {{"file", ball().string()}, {"scale", 0.25}, {"translate", {0, 0, 1.5}}},
-                                    {{"file", dataset().string()}, {"translate", {-3, 0, 0}}, {"rotate", {{"axis", {0, 0, 1}}, {"degrees", 90}}}}}},
-                      {"camera", {{"position", {-1, 0, 8}}, {"target", {-1, 0, 0}}}}}.dump());
+    write(scene, Json{{"datasets",
+                       {{{"file", dataset().filename().string()}},
+                        {{"file", ball().string()}, {"scale", 0.25}, {"translate", {0, 0, 1.5}}},
+                        {{"file", dataset().string()},
+                         {"translate", {-3, 0, 0}},
+                         {"rotate", {{"axis", {0, 0, 1}}, {"degrees", 90}}}}}},
+                      {"camera", {{"position", {-1, 0, 8}}, {"target", {-1, 0, 0}}}}}
+                     .dump());
     const Json whole = render("scene.png", {scene.string(), "--depth", (*folder_ / "scene.pfm").string()});
     EXPECT_EQ(whole["settled"], true);
     EXPECT_EQ(whole["camera"]["position"], (Json{-1.0, 0.0, 8.0}));
@@ -502,18 +538,23 @@ TEST_F(CommandLine, UnwritableOutputs) {
     const std::string under = (ball() / "x.vcp").string();
     expectFailure(run({"build", ball().string(), "-o", under}), 1, under);
     if (!hasDevice()) return;
-    expectFailure(run({"render", dataset().string(), "-o", (nowhere / "x.png").string(), "--size", "64x64"}), 1, (nowhere / "x.png").string());
+    expectFailure(run({"render", dataset().string(), "-o", (nowhere / "x.png").string(), "--size", "64x64"}), 1,
+                  (nowhere / "x.png").string());
 }
 
 TEST_F(CommandLine, FullDiskLeavesNothingHalfWritten) {
     dataset();
     const fs::path file = *folder_ / "full.vcp", png = *folder_ / "full.png";
-    expectFailure(program().wait(program().start({"build", ball().string(), "-o", file.string()}, "stdout", true)), 1, "full.vcp");
+    expectFailure(program().wait(program().start({"build", ball().string(), "-o", file.string()}, "stdout", true)), 1,
+                  "full.vcp");
     EXPECT_FALSE(fs::exists(file));
     EXPECT_FALSE(fs::exists(file.string() + ".partial"));
     if (!hasDevice()) return;
     const fs::path depth = *folder_ / "full.pfm";
-    expectFailure(program().wait(program().start({"render", dataset().string(), "-o", png.string(), "--depth", depth.string(), "--size", "300x200"}, "stdout", true)), 1, "full.");
+    expectFailure(program().wait(program().start({"render", dataset().string(), "-o", png.string(), "--depth",
+                                                  depth.string(), "--size", "300x200"},
+                                                 "stdout", true)),
+                  1, "full.");
     EXPECT_FALSE(fs::exists(png));
     EXPECT_FALSE(fs::exists(depth));
     EXPECT_FALSE(fs::exists(depth.string() + ".partial"));
@@ -542,9 +583,10 @@ TEST_F(CommandLine, InterruptedBuildLeavesNothing) {
 
 TEST_F(CommandLine, DegenerateTrianglesAreCountedNotFatal) {
     const fs::path mesh = *folder_ / "degenerate.ply", file = *folder_ / "degenerate.vcp";
-    write(mesh, "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-                "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
-                "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 1\n3 0 1 3\n");
+    write(mesh,
+          "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+          "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
+          "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 1\n3 0 1 3\n");
     const Ran ran = run({"build", mesh.string(), "-o", file.string(), "--json"});
     ASSERT_EQ(ran.status, 0) << ran.err;
     EXPECT_EQ(Json::parse(ran.out)["triangles"], 3);
@@ -557,7 +599,8 @@ TEST_F(CommandLine, ADatasetBehindAServerIsThatOfTheFile) {
     const test::RangeServer server(folder_->path());
     ASSERT_TRUE(server.runs());
     const std::string url = server.url("ball.vcp"), cache = (*folder_ / "blocks").string();
-    const Json local = Json::parse(run({"info", file.string(), "--json"}).out), remote = Json::parse(run({"info", url, "--json"}).out);
+    const Json local = Json::parse(run({"info", file.string(), "--json"}).out),
+               remote = Json::parse(run({"info", url, "--json"}).out);
     EXPECT_EQ(local["triangles"], remote["triangles"]);
     EXPECT_EQ(local["level"], remote["level"]);
     EXPECT_EQ(run({"verify", url, "--progress", "none"}).status, 0);
@@ -571,27 +614,50 @@ TEST_F(CommandLine, ADatasetBehindAServerIsThatOfTheFile) {
     }
     EXPECT_FALSE(fs::is_empty(cache));
     expectFailure(run({"info", server.url("none.vcp")}), 1, "no such file on the server");
-    expectFailure(run({"render", server.url("ball.vcp?fault=whole"), "-o", there}), 1, "does not answer range requests");
+    expectFailure(run({"render", server.url("ball.vcp?fault=whole"), "-o", there}), 1,
+                  "does not answer range requests");
 }
 
 TEST_F(CommandLine, StressReportsAndItsInvariantsHold) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const std::string out = (*folder_ / "stress").string();
-    const Ran ran = run({"stress", dataset().string(), "--path", "teleport", "--frames", "20", "--size", "96x64", "--budget", "1M", "--error-pixels", "0.05",
-                         "--faults", "error=0.1,corrupt=0.01,stall=30ms,spread=2ms", "--seed", "3", "--out", out, "--json", "--progress", "none"});
+    const Ran ran = run({"stress",
+                         dataset().string(),
+                         "--path",
+                         "teleport",
+                         "--frames",
+                         "20",
+                         "--size",
+                         "96x64",
+                         "--budget",
+                         "1M",
+                         "--error-pixels",
+                         "0.05",
+                         "--faults",
+                         "error=0.1,corrupt=0.01,stall=30ms,spread=2ms",
+                         "--seed",
+                         "3",
+                         "--out",
+                         out,
+                         "--json",
+                         "--progress",
+                         "none"});
     ASSERT_EQ(ran.status, 0) << ran.err << ran.out.substr(0, 2000);
     const Json json = Json::parse(ran.out);
     EXPECT_EQ(json["violations"], Json::array());
-    for (const char* field : {"first_picture_seconds", "settled_seconds", "bytes_read", "bytes_needed", "budget_bytes", "resident_bytes_max"})
+    for (const char* field : {"first_picture_seconds", "settled_seconds", "bytes_read", "bytes_needed", "budget_bytes",
+                              "resident_bytes_max"})
         EXPECT_GT(json[field].get<double>(), 0) << field;
     for (const char* field : {"frame_ms", "frame_ms_no_loads"})
         for (const char* q : {"p50", "p95", "p99", "max"}) EXPECT_GT(json[field][q].get<double>(), 0) << field << q;
     EXPECT_LE(json["resident_bytes_max"].get<uint64_t>(), json["budget_bytes"].get<uint64_t>());
     EXPECT_EQ(json["samples"].size(), 20u);
-    for (const char* name : {"stress.json", "stress.md", "stress_bytes.svg", "stress_pages.svg", "stress_frames.svg", "stress_error.svg"})
+    for (const char* name :
+         {"stress.json", "stress.md", "stress_bytes.svg", "stress_pages.svg", "stress_frames.svg", "stress_error.svg"})
         EXPECT_GT(fs::file_size(fs::path(out) / name), 100u) << name;
-    const Ran orders = run({"stress", dataset().string(), "--path", "orbit", "--frames", "2", "--size", "96x64", "--error-pixels", "0.02", "--order",
-                            "feedback,error,nearest,breadth,random", "--out", out, "--json", "--progress", "none"});
+    const Ran orders =
+        run({"stress", dataset().string(), "--path", "orbit", "--frames", "2", "--size", "96x64", "--error-pixels",
+             "0.02", "--order", "feedback,error,nearest,breadth,random", "--out", out, "--json", "--progress", "none"});
     ASSERT_EQ(orders.status, 0) << orders.err << orders.out.substr(0, 2000);
     const Json curves = Json::parse(orders.out)["orders"];
     ASSERT_EQ(curves.size(), 5u);
@@ -601,8 +667,8 @@ TEST_F(CommandLine, StressReportsAndItsInvariantsHold) {
         EXPECT_GT(curve["samples"][0]["error"].get<double>(), 0);
     }
     EXPECT_GT(fs::file_size(fs::path(out) / "stress_orders.svg"), 100u);
-    const Ran together = run({"stress", dataset().string(), "--path", "orbit", "--frames", "4", "--size", "64x48", "--error-pixels", "0.02", "--views", "3", "--json",
-                              "--progress", "none"});
+    const Ran together = run({"stress", dataset().string(), "--path", "orbit", "--frames", "4", "--size", "64x48",
+                              "--error-pixels", "0.02", "--views", "3", "--json", "--progress", "none"});
     ASSERT_EQ(together.status, 0) << together.out << together.err;
     const Json views = Json::parse(together.out)["several_views"];
     EXPECT_EQ(views["views"], 3);

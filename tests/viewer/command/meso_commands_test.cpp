@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <png.h>
+#include <nlohmann/json.hpp>
 
 #include "render/picture.h"
 #include "tests/support/vcp_program.h"
@@ -74,7 +74,10 @@ TEST_F(MesoCommands, MeshesMustBeClosed) {
     const Ran built = run("meso build " + path("closed.obj") + " -o " + path("a.meso") + " --grid 12 --json");
     ASSERT_EQ(built.status, 0) << built.err;
     EXPECT_EQ(Json::parse(built.out)["source"], "mesh");
-    EXPECT_EQ(run("meso build " + path("closed.obj") + " -o " + path("b.meso") + " --grid 12 --up y --period 2,1.5 --json").status, 0);
+    EXPECT_EQ(
+        run("meso build " + path("closed.obj") + " -o " + path("b.meso") + " --grid 12 --up y --period 2,1.5 --json")
+            .status,
+        0);
     const Ran open = run("meso build " + path("open.obj") + " -o " + path("c.meso") + " --grid 12");
     EXPECT_EQ(open.status, 1);
     EXPECT_NE(open.err.find("not closed"), std::string::npos) << open.err;
@@ -97,12 +100,15 @@ std::pair<size_t, double> hitsOf(const std::string& pfm) {
 
 TEST_F(MesoCommands, ScenesHaveSurfacesBesideDatasets) {
     writeBall(path("ball.ply"), 20, 40);
-    const std::string surface = R"("mesostructure": [{"asset": "hemispheres", "tiles": 2, "up": "y", "method": "pyramid"}],
+    const std::string surface =
+        R"("mesostructure": [{"asset": "hemispheres", "tiles": 2, "up": "y", "method": "pyramid"}],
         "camera": {"position": [0.5, 1, 1.2], "target": [0, 0, 0]})";
     std::ofstream(path("alone.json")) << "{" << surface << "}";
-    std::ofstream(path("both.json")) << R"({"datasets": [{"file": "ball.ply", "scale": 0.2, "translate": [0, 0.3, 0]}], )" << surface << "}";
+    std::ofstream(path("both.json"))
+        << R"({"datasets": [{"file": "ball.ply", "scale": 0.2, "translate": [0, 0.3, 0]}], )" << surface << "}";
     const auto draw = [&](const std::string& scene) {
-        const Ran ran = run("render " + path(scene) + " -o " + path("a.png") + " --size 64x48 --progress none --depth " + path("a.pfm") + " --normals " + path("n.png"));
+        const Ran ran = run("render " + path(scene) + " -o " + path("a.png") +
+                            " --size 64x48 --progress none --depth " + path("a.pfm") + " --normals " + path("n.png"));
         EXPECT_EQ(ran.status, 0) << ran.err;
         return hitsOf(path("a.pfm"));
     };
@@ -111,14 +117,16 @@ TEST_F(MesoCommands, ScenesHaveSurfacesBesideDatasets) {
     EXPECT_GE(both.first, alone.first);
     EXPECT_GT(both.second, alone.second * 1.01) << "the ball is nearer than what it hides";
     EXPECT_LT(both.second, alone.second * 1.5) << "most is the surface";
-    const Ran turned = run("render " + path("both.json") + " -o " + path("b.png") + " --turntable 3 --size 64x48 --progress none");
+    const Ran turned =
+        run("render " + path("both.json") + " -o " + path("b.png") + " --turntable 3 --size 64x48 --progress none");
     EXPECT_EQ(turned.status, 0) << turned.err;
     EXPECT_TRUE(std::filesystem::exists(path("b-0003.png")));
 }
 
 TEST_F(MesoCommands, TheScenesOfTheDocumentsAreDrawn) {
     for (const std::string scene : {"maze_ball", "beads_gallery", "kitten_wall"}) {
-        const Ran ran = run("render " VCP_SOURCE_DIR "/docs/scenes/" + scene + ".json -o " + path("a.png") + " --size 96x64 --progress none --depth " + path("a.pfm"));
+        const Ran ran = run("render " VCP_SOURCE_DIR "/docs/scenes/" + scene + ".json -o " + path("a.png") +
+                            " --size 96x64 --progress none --depth " + path("a.pfm"));
         ASSERT_EQ(ran.status, 0) << ran.err;
         EXPECT_GT(hitsOf(path("a.pfm")).first, 500u) << scene;
     }
@@ -128,7 +136,8 @@ TEST_F(MesoCommands, TheDogOfTheDocumentsIsDrawn) {
     const auto makeScan = std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan";
     ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 10000 -o " + path("dog.obj")).c_str()), 0);
     std::filesystem::copy_file(VCP_SOURCE_DIR "/docs/scenes/beads_dog.json", path("beads_dog.json"));
-    const Ran ran = run("render " + path("beads_dog.json") + " -o " + path("a.png") + " --size 96x64 --progress none --depth " + path("a.pfm"));
+    const Ran ran = run("render " + path("beads_dog.json") + " -o " + path("a.png") +
+                        " --size 96x64 --progress none --depth " + path("a.pfm"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     EXPECT_GT(hitsOf(path("a.pfm")).first, 1500u);
 }
@@ -136,16 +145,19 @@ TEST_F(MesoCommands, TheDogOfTheDocumentsIsDrawn) {
 TEST_F(MesoCommands, TexturesArePictures) {
     writeRamp("ramp.png", false);
     const auto draw = [&](const std::string& options) {
-        const Ran ran = run("meso render edge --method pyramid --size 64x48 --validation --json -o " + path("a.png") + options);
+        const Ran ran =
+            run("meso render edge --method pyramid --size 64x48 --validation --json -o " + path("a.png") + options);
         EXPECT_EQ(ran.status, 0) << ran.err;
         const auto picture = readPng(path("a.png"));
         EXPECT_TRUE(picture);
         return picture ? picture->rgba : std::vector<uint8_t>();
     };
-    const auto plain = draw(""), textured = draw(" --texture " + path("ramp.png")), bent = draw(" --normal-texture " + path("ramp.png"));
+    const auto plain = draw(""), textured = draw(" --texture " + path("ramp.png")),
+               bent = draw(" --normal-texture " + path("ramp.png"));
     EXPECT_NE(plain, textured);
     EXPECT_NE(plain, bent);
-    std::ofstream(path("scene.json")) << R"({"mesostructure": [{"asset": "edge", "method": "pyramid", "texture": "ramp.png", "normal_texture": "ramp.png"}],
+    std::ofstream(path("scene.json"))
+        << R"({"mesostructure": [{"asset": "edge", "method": "pyramid", "texture": "ramp.png", "normal_texture": "ramp.png"}],
         "camera": {"position": [0.5, 1, 1.2], "target": [0, 0, 0]}})";
     const Ran scene = run("render " + path("scene.json") + " -o " + path("b.png") + " --size 64x48 --progress none");
     EXPECT_EQ(scene.status, 0) << scene.err;
@@ -159,8 +171,11 @@ TEST_F(MesoCommands, TexturesArePictures) {
 }
 
 TEST_F(MesoCommands, FarSurfacesAreNotMarched) {
-    const std::string arguments = "meso render hemispheres --tiles 40 --height 0.5 --size 64x48 --view 30,35,0.5 --validation --json -o " + path("a.png");
-    const Json far = Json::parse(run(arguments).out)["panels"][0], marched = Json::parse(run(arguments + " --error-pixels 0").out)["panels"][0];
+    const std::string arguments =
+        "meso render hemispheres --tiles 40 --height 0.5 --size 64x48 --view 30,35,0.5 --validation --json -o " +
+        path("a.png");
+    const Json far = Json::parse(run(arguments).out)["panels"][0],
+               marched = Json::parse(run(arguments + " --error-pixels 0").out)["panels"][0];
     EXPECT_GT(far["far_hits"], far["hit_pixels"].get<int>() / 2);
     EXPECT_EQ(marched["far_hits"], 0);
     EXPECT_LT(far["iterations_mean"], 0.5 * marched["iterations_mean"].get<double>());
@@ -176,12 +191,13 @@ TEST_F(MesoCommands, SaysWhatIsWrong) {
         std::string arguments;
         int status;
         std::string says;
-    } cases[] = {{"meso build " + path("empty.png"), 1, "empty"},       {"meso build " + path("text.png"), 1, "neither a PNG"},
-                 {"meso build " + path("cut.png"), 1, "damaged"},       {"meso build " + path("a.exr"), 1, "EXR"},
-                 {"meso build " + path("none.png"), 1, "none.png"},     {"meso build nothing", 2, "no procedural one"},
-                 {"meso build fbm --texels 60 --grid 7", 2, "divide"},  {"meso build beads --cones 0x1", 2, "--cones"},
-                 {"meso build beads --cones 99x1", 2, "cones"},         {"meso build beads --blocks 1", 2, "block"},
-                 {"meso build beads --grid 5000", 2, "grid"}};
+    } cases[] = {
+        {"meso build " + path("empty.png"), 1, "empty"},      {"meso build " + path("text.png"), 1, "neither a PNG"},
+        {"meso build " + path("cut.png"), 1, "damaged"},      {"meso build " + path("a.exr"), 1, "EXR"},
+        {"meso build " + path("none.png"), 1, "none.png"},    {"meso build nothing", 2, "no procedural one"},
+        {"meso build fbm --texels 60 --grid 7", 2, "divide"}, {"meso build beads --cones 0x1", 2, "--cones"},
+        {"meso build beads --cones 99x1", 2, "cones"},        {"meso build beads --blocks 1", 2, "block"},
+        {"meso build beads --grid 5000", 2, "grid"}};
     for (const auto& c : cases) {
         const Ran ran = run(c.arguments + " -o " + path("x.meso"));
         EXPECT_EQ(ran.status, c.status) << c.arguments << ": " << ran.err;
@@ -194,17 +210,22 @@ TEST_F(MesoCommands, SaysWhatIsWrong) {
 }
 
 TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
-    const Ran ran = run("bench meso beads needle --methods boxes,ddm-quadric,relief-secant --views 45,shadow --rays 100 --repetitions 1 --check-rays 100 --progress none --json --out " +
-                        path("report"));
+    const Ran ran =
+        run("bench meso beads needle --methods boxes,ddm-quadric,relief-secant --views 45,shadow --rays 100 "
+            "--repetitions 1 --check-rays 100 --progress none --json --out " +
+            path("report"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json report = Json::parse(ran.out);
     std::set<std::string> methods;
     for (const Json& row : report["rows"]) {
-        for (const char* field : {"asset", "view", "method", "knob", "ns_per_ray", "ratio_to_peer", "ratio_p25", "ratio_p75", "fetches_mean", "iterations_mean", "missed", "false", "wrong_feature", "unresolved", "p50_texels", "p95_texels",
-                                  "p99_texels", "bytes", "preprocess_seconds"})
+        for (const char* field :
+             {"asset", "view", "method", "knob", "ns_per_ray", "ratio_to_peer", "ratio_p25", "ratio_p75",
+              "fetches_mean", "iterations_mean", "missed", "false", "wrong_feature", "unresolved", "p50_texels",
+              "p95_texels", "p99_texels", "bytes", "preprocess_seconds"})
             ASSERT_TRUE(row.contains(field)) << field;
         double sum = 0;
-        for (const char* part : {"hit", "miss", "missed", "false", "wrong_feature", "unresolved"}) sum += row[part].get<double>();
+        for (const char* part : {"hit", "miss", "missed", "false", "wrong_feature", "unresolved"})
+            sum += row[part].get<double>();
         EXPECT_NEAR(sum, 1, 1e-9);
         EXPECT_GT(row["bytes"], 0);
         EXPECT_LE(row["p50_texels"], row["p99_texels"]);
@@ -224,23 +245,30 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
         double wrong = 0;
         int views = 0;
         for (const Json& row : report["rows"]) {
-            if (row["asset"] != best["asset"] || row["method"] != best["method"] || row["knob"] != best["fetches_knob"]) continue;
-            for (const char* part : {"missed", "false", "wrong_feature", "unresolved"}) wrong += row[part].get<double>();
+            if (row["asset"] != best["asset"] || row["method"] != best["method"] || row["knob"] != best["fetches_knob"])
+                continue;
+            for (const char* part : {"missed", "false", "wrong_feature", "unresolved"})
+                wrong += row[part].get<double>();
             EXPECT_LE(row["p95_texels"], 0.25);
             ++views;
         }
         EXPECT_EQ(views, 2);
         EXPECT_LE(wrong / views, 1e-3);
     }
-    EXPECT_TRUE(std::ranges::any_of(report["headline"], [](const Json& best) { return best["asset"] == "needle" && best["method"] == "boxes"; })) << report["headline"];
-    for (const char* file : {"bench_meso.json", "bench_meso.csv", "bench_meso.md", "bench_meso_beads_p95_time.svg"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
+    EXPECT_TRUE(std::ranges::any_of(report["headline"], [](const Json& best) {
+        return best["asset"] == "needle" && best["method"] == "boxes";
+    })) << report["headline"];
+    for (const char* file : {"bench_meso.json", "bench_meso.csv", "bench_meso.md", "bench_meso_beads_p95_time.svg"})
+        EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
     EXPECT_EQ(run("bench meso beads --methods nothing").status, 2);
     EXPECT_EQ(run("bench meso nothing").status, 2);
 }
 
 TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
-    std::ofstream(path("mapped.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
-    const Ran ran = run("meso render hemispheres --method pyramid --surface " + path("mapped.obj") + " --tiles 2 --size 64x48 --shadows --validation --json -o " + path("a.png"));
+    std::ofstream(path("mapped.obj"))
+        << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    const Ran ran = run("meso render hemispheres --method pyramid --surface " + path("mapped.obj") +
+                        " --tiles 2 --size 64x48 --shadows --validation --json -o " + path("a.png"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json told = Json::parse(ran.out);
     ASSERT_EQ(told["panels"].size(), 1u);
@@ -249,14 +277,19 @@ TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
     EXPECT_EQ(told["warnings"].size(), 0u);
     EXPECT_TRUE(std::filesystem::exists(path("a.png")));
     // Two assets, and coordinates along a line.
-    std::ofstream(path("line.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 2/2\nf 1/1 2/1 3/1\n";
-    const Ran smeared = run("meso render fbm maze --method pyramid --tiles 2 --tiles 1 --heat --surface " + path("line.obj") + " --size 32x32 --json -o " + path("b.png"));
+    std::ofstream(path("line.obj"))
+        << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 2/2\nf 1/1 2/1 3/1\n";
+    const Ran smeared = run("meso render fbm maze --method pyramid --tiles 2 --tiles 1 --heat --surface " +
+                            path("line.obj") + " --size 32x32 --json -o " + path("b.png"));
     ASSERT_EQ(smeared.status, 0) << smeared.err;
     EXPECT_NE(smeared.out.find("smeared"), std::string::npos) << smeared.out;
 }
 
 TEST_F(MesoCommands, RendersMethodsSideBySide) {
-    const Ran ran = run("meso render maze ball --method boxes,dm,cells --tiles 1 --at 0,0,0 --at 0.1,0.2,-0.05 --scale 1 --scale 0.5 --heat --size 40x32 --json -o " + path("a.png"));
+    const Ran ran =
+        run("meso render maze ball --method boxes,dm,cells --tiles 1 --at 0,0,0 --at 0.1,0.2,-0.05 --scale 1 --scale "
+            "0.5 --heat --size 40x32 --json -o " +
+            path("a.png"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json panels = Json::parse(ran.out)["panels"];
     ASSERT_EQ(panels.size(), 3u);
@@ -270,15 +303,20 @@ TEST_F(MesoCommands, RendersMethodsSideBySide) {
 
 TEST_F(MesoCommands, RendersWithAScanInTheSamePicture) {
     // A box from 0 to 0.4 over a quad, y up.
-    std::ofstream(path("box.obj")) << "v 0 0 0\nv .4 0 0\nv .4 .4 0\nv 0 .4 0\nv 0 0 .4\nv .4 0 .4\nv .4 .4 .4\nv 0 .4 .4\n"
-                                      "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    std::ofstream(path("box.obj"))
+        << "v 0 0 0\nv .4 0 0\nv .4 .4 0\nv 0 .4 0\nv 0 0 .4\nv .4 0 .4\nv .4 .4 .4\nv 0 .4 .4\n"
+           "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
     ASSERT_EQ(run("build " + path("box.obj") + " -o " + path("box.vcp")).status, 0);
-    const std::string arguments = "meso render edge --method pyramid --up y --tiles 1 --scale 0.5 --camera front --size 64x64 --validation --json -o " + path("a.png");
+    const std::string arguments =
+        "meso render edge --method pyramid --up y --tiles 1 --scale 0.5 --camera front --size 64x64 --validation "
+        "--json -o " +
+        path("a.png");
     const Ran alone = run(arguments), both = run(arguments + " --scan " + path("box.vcp"));
     ASSERT_EQ(alone.status, 0) << alone.err;
     ASSERT_EQ(both.status, 0) << both.err;
     // From the front the quad is a line, the box a square of two fifths of its width, and nearer.
-    EXPECT_GT(Json::parse(both.out)["panels"][0]["hit_pixels"], Json::parse(alone.out)["panels"][0]["hit_pixels"].get<int>() + 64 * 64 / 16);
+    EXPECT_GT(Json::parse(both.out)["panels"][0]["hit_pixels"],
+              Json::parse(alone.out)["panels"][0]["hit_pixels"].get<int>() + 64 * 64 / 16);
     EXPECT_EQ(run(arguments + " --scan " + path("none.vcp")).status, 1);
 }
 
@@ -286,9 +324,11 @@ TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
     std::ofstream(path("bare.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
     std::ofstream(path("wild.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/1 9/1\n";
     std::ofstream(path("nan.obj")) << "v 0 0 0\nv 1 nan 0\n";
-    std::ofstream(path("back.obj")) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 2/2\n";
+    std::ofstream(path("back.obj"))
+        << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 2/2\n";
     std::ofstream(path("far.obj")) << "v 0 0 0\nv 1e39 0 0\nv 1e39 1e39 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n";
-    std::ofstream(path("bare.stl")) << "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\nendsolid a\n";
+    std::ofstream(path("bare.stl")) << "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 "
+                                       "1 0\nendloop\nendfacet\nendsolid a\n";
     const struct {
         std::string arguments;
         int status;
@@ -324,7 +364,8 @@ TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
 }
 
 TEST_F(MesoCommands, BenchOnADeviceFindsWhatTheProcessorFinds) {
-    const std::string arguments = "bench meso beads --methods boxes,dm --views 45 --rays 400 --repetitions 1 --progress none --json";
+    const std::string arguments =
+        "bench meso beads --methods boxes,dm --views 45 --rays 400 --repetitions 1 --progress none --json";
     const Ran here = run(arguments), there = run(arguments + " --device");
     ASSERT_EQ(here.status, 0) << here.err;
     ASSERT_EQ(there.status, 0) << there.err;
@@ -337,7 +378,8 @@ TEST_F(MesoCommands, BenchOnADeviceFindsWhatTheProcessorFinds) {
         // The peer is what times are divided by.
         for (const Json& row : {a[i], b[i]}) EXPECT_TRUE(row["method"] != "dm" || row["ratio_to_peer"] == 1) << row;
         EXPECT_NEAR(a[i]["hit"].get<double>(), b[i]["hit"].get<double>(), 0.01);
-        EXPECT_NEAR(a[i]["fetches_mean"].get<double>(), b[i]["fetches_mean"].get<double>(), 0.02 * a[i]["fetches_mean"].get<double>());
+        EXPECT_NEAR(a[i]["fetches_mean"].get<double>(), b[i]["fetches_mean"].get<double>(),
+                    0.02 * a[i]["fetches_mean"].get<double>());
     }
 }
 

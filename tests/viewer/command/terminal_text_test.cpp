@@ -12,7 +12,8 @@ namespace {
 using namespace std::string_literals;
 
 TEST(TerminalText, WhatIsShownStays) {
-    for (const std::string text : {"", "a plain line; 100 % of it", "Größe, 測量, Δ, 🗿, e\u0301", "C:\\scans\\x1b.ply"}) {
+    for (const std::string text :
+         {"", "a plain line; 100 % of it", "Größe, 測量, Δ, 🗿, e\u0301", "C:\\scans\\x1b.ply"}) {
         EXPECT_EQ(terminalText(text), text);
         EXPECT_EQ(terminalLines(text), text);
         EXPECT_EQ(terminalJson(text), text);
@@ -23,7 +24,10 @@ TEST(TerminalText, ControlsAreSpelledOut) {
     EXPECT_EQ(terminalText("\x1b]0;owned\x07"), "\\x1b]0;owned\\x07");
     EXPECT_EQ(terminalText("a\rb\nc\td\x7f\0e"s), "a\\x0db\\x0ac\\x09d\\x7f\\x00e");
     EXPECT_EQ(terminalText("\u009b31m"), "\\xc2\\x9b31m") << "C1: CSI in two bytes";
-    EXPECT_EQ(terminalText("\x9b" "31m"), "\\x9b31m") << "C1: CSI in one byte is not UTF-8";
+    EXPECT_EQ(terminalText("\x9b"
+                           "31m"),
+              "\\x9b31m")
+        << "C1: CSI in one byte is not UTF-8";
     EXPECT_EQ(terminalText("gpj.\u202eply"), "gpj.\\xe2\\x80\\xaeply");
     EXPECT_EQ(terminalText("\u2066a\u2028b\u200f"), "\\xe2\\x81\\xa6a\\xe2\\x80\\xa8b\\xe2\\x80\\x8f");
     EXPECT_EQ(terminalLines("a\nb\r\n"), "a\nb\\x0d\n");

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "tests/support/built_ball.h"
 #include "viewer/camera/orbit_camera.h"
@@ -125,7 +125,8 @@ TEST_F(TiledPictureTest, DepthAndNormalsComeInTilesToo) {
     size_t wrong = 0;
     for (size_t i = 0; i < depth.size(); ++i)
         if (std::isfinite(depth[i]) != std::isfinite(planes.depth[i]) ||
-            (std::isfinite(depth[i]) && (std::abs(depth[i] - planes.depth[i]) > 1e-3f || glm::dot(normals[i], planes.normals[i]) < 0.99f)))
+            (std::isfinite(depth[i]) &&
+             (std::abs(depth[i] - planes.depth[i]) > 1e-3f || glm::dot(normals[i], planes.normals[i]) < 0.99f)))
             ++wrong;
     EXPECT_LT(wrong, depth.size() / 500);
 }

@@ -11,7 +11,6 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-
 namespace vcp {
 namespace {
 
@@ -102,11 +101,12 @@ TEST_F(MeshCacheTest, AMeshWithItsTimeSetBackIsAnother) {
 }
 
 TEST_F(MeshCacheTest, AMeshThatChangesWhileItIsReadIsNotKept) {
-    const auto path = MeshCache(cacheFolder()).dataset(options_, [&](const BuildOptions& options) -> Result<BuildReport> {
-        std::ofstream(options.output) << "of half of it";
-        std::ofstream(mesh_, std::ios::app) << "more";
-        return BuildReport{};
-    });
+    const auto path =
+        MeshCache(cacheFolder()).dataset(options_, [&](const BuildOptions& options) -> Result<BuildReport> {
+            std::ofstream(options.output) << "of half of it";
+            std::ofstream(mesh_, std::ios::app) << "more";
+            return BuildReport{};
+        });
     ASSERT_FALSE(path);
     EXPECT_EQ(path.error().file, mesh_.string());
     EXPECT_NE(path.error().message.find("changed"), std::string::npos) << path.error().message;
@@ -146,7 +146,9 @@ protected:
 TEST_F(MeshCacheSideFilesTest, MaterialsOfAnObj) {
     mesh_ = folder_ / "mesh.obj";
     options_.inputs = {mesh_};
-    write(mesh_, "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 2/1 4/1 3/1\n");
+    write(mesh_,
+          "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 2/1 "
+          "4/1 3/1\n");
     const fs::path mtl = folder_ / "colours.mtl";
     expectStale([&] { write(mtl, "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n"); });  // which was missing
     expectStale([&] { write(mtl, "newmtl a\nKd 0 0 1\nnewmtl b\nKd 0 1 0\n"); });
@@ -191,7 +193,8 @@ TEST_F(MeshCacheSideFilesTest, ListsGoWithTheirDatasets) {
     write(mesh_, "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     const fs::path dataset = build();
     const auto lists = [&] {
-        return std::count_if(fs::directory_iterator(cacheFolder()), fs::directory_iterator(), [](const fs::directory_entry& each) { return each.path().extension() == ".files"; });
+        return std::count_if(fs::directory_iterator(cacheFolder()), fs::directory_iterator(),
+                             [](const fs::directory_entry& each) { return each.path().extension() == ".files"; });
     };
     EXPECT_EQ(lists(), 1);
     MeshCache(cacheFolder(), 1).trim(dataset);

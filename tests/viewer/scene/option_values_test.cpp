@@ -41,7 +41,8 @@ TEST(OptionValues, Sizes) {
     EXPECT_EQ(parseSize("1920x1200"), glm::ivec2(1920, 1200));
     EXPECT_EQ(parseSize("1X1"), glm::ivec2(1, 1));
     EXPECT_EQ(parseSize("16384x16384"), glm::ivec2(16384));
-    for (const char* wrong : {"", "1920", "1920x", "x1200", "0x1", "1x0", "-1x1", "1x-1", "16385x1", "1x1x1", "1 x1", "99999999999x1"})
+    for (const char* wrong :
+         {"", "1920", "1920x", "x1200", "0x1", "1x0", "-1x1", "1x-1", "16385x1", "1x1x1", "1 x1", "99999999999x1"})
         EXPECT_FALSE(parseSize(wrong)) << wrong;
 }
 
@@ -54,7 +55,8 @@ TEST(OptionValues, PlanesAndDirections) {
     EXPECT_EQ(parsePlane("y<25%")->offset, -0.25);
     EXPECT_EQ(parsePlane("1,0,-2.5,7")->normal, glm::dvec3(1, 0, -2.5));
     EXPECT_EQ(parsePlane("1,0,-2.5,7")->offset, 7);
-    for (const char* wrong : {"", "x", "x<", "x=1", "w<1", "x<1cm", "x<nan", "1,2,3", "0,0,0,1", "1,2,3,4,5", "1,2,3,", "1,2,3,inf"})
+    for (const char* wrong :
+         {"", "x", "x<", "x=1", "w<1", "x<1cm", "x<nan", "1,2,3", "0,0,0,1", "1,2,3,4,5", "1,2,3,", "1,2,3,inf"})
         EXPECT_FALSE(parsePlane(wrong)) << wrong;
     EXPECT_EQ(*parseDirection("1,0,-0.5"), glm::dvec3(1, 0, -0.5));
     for (const char* wrong : {"", "1,2", "0,0,0", "1,2,3,4", "1 2 3"}) EXPECT_FALSE(parseDirection(wrong)) << wrong;

@@ -4,8 +4,8 @@
 #include <fstream>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "tests/support/test_folder.h"
 #include "viewer/scene/opened_scene.h"
@@ -34,8 +34,12 @@ TEST(SceneFile, TheDocumentsExampleIsRead) {
 }
 
 TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
-    const auto inDataset = [](const std::string& more) { return "{\n \"datasets\": [\n  {\"file\": \"a.vcp\",\n   " + more + "}\n ]\n}"; };
-    const auto beside = [](const std::string& more) { return "{\"datasets\": [{\"file\": \"a.vcp\"}],\n\n" + more + "}"; };
+    const auto inDataset = [](const std::string& more) {
+        return "{\n \"datasets\": [\n  {\"file\": \"a.vcp\",\n   " + more + "}\n ]\n}";
+    };
+    const auto beside = [](const std::string& more) {
+        return "{\"datasets\": [{\"file\": \"a.vcp\"}],\n\n" + more + "}";
+    };
     const std::tuple<std::string, size_t, const char*> wrong[] = {
         {"[]", 1, "object"},
         {"{}", 1, "\"datasets\" is missing"},
@@ -68,10 +72,12 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"caps\": 1"), 3, "true or false"},
         {beside("\"camera\": {\"position\": [0, 0, 0],\n \"target\": [0, 0, 0]}"), 4, "\"target\""},
         {beside("\"camera\": {\"position\": [0, 0, 0]}"), 3, "\"target\""},
-        {beside("\"sections\": [\n{\"normal\": [1, 0, 0], \"offset\": 0},\n{\"normal\": [0, 0, 0], \"offset\": 0}]"), 5, "\"normal\""},
+        {beside("\"sections\": [\n{\"normal\": [1, 0, 0], \"offset\": 0},\n{\"normal\": [0, 0, 0], \"offset\": 0}]"), 5,
+         "\"normal\""},
         {beside("\"sections\": [{\"normal\": [1, 0, 0]}]"), 3, "offset"},
         {beside("\"sections\": [\n{\"normal\": [1e-320, 0, 0], \"offset\": 0}]"), 4, "\"normal\" is too short"},
-        {beside("\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0],\n \"fov_degrees\": 178.5}"), 4, "\"fov_degrees\""},
+        {beside("\"camera\": {\"position\": [0, 0, 5], \"target\": [0, 0, 0],\n \"fov_degrees\": 178.5}"), 4,
+         "\"fov_degrees\""},
         {"{\n\n\"datasets\" [", 3, "JSON"},
         {"", 1, "JSON"},
         {beside("\"caps\":\n 1e999"), 4, "out of range"},
@@ -97,12 +103,15 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
     EXPECT_FALSE(sceneFromJson(std::string(40, '[') + std::string(40, ']'), "deep.json", {}));
 }
 
-// What is wrong only with the file or the asset that a scene names is the scene's fault too, not that of who typed its name.
+// What is wrong only with the file or the asset that a scene names is the scene's fault too, not that of who typed its
+// name.
 TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
     const auto refusal = [](const std::string& text) {
         auto scene = sceneFromJson(text, "museum.json", {});
         EXPECT_TRUE(scene) << scene.error().line();
-        const auto open = [](const std::string& file) -> Result<OpenDataset> { return Error{ErrorCode::Usage, "unknown mesh format", file}; };
+        const auto open = [](const std::string& file) -> Result<OpenDataset> {
+            return Error{ErrorCode::Usage, "unknown mesh format", file};
+        };
         const auto opened = openScene(*std::move(scene), "museum.json", open);
         EXPECT_FALSE(opened);
         return opened ? Error{} : opened.error();
@@ -114,7 +123,8 @@ TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
     EXPECT_EQ(method.code, ErrorCode::InvalidInput);
     EXPECT_TRUE(method.line().starts_with("museum.json: line 3: ")) << method.line();
     // What cannot be read is named itself, as before.
-    EXPECT_EQ(ScenePlace({"museum.json", 3, "file"}).blamed({ErrorCode::Io, "no such file", "a.vcp"}).line(), "a.vcp: no such file");
+    EXPECT_EQ(ScenePlace({"museum.json", 3, "file"}).blamed({ErrorCode::Io, "no such file", "a.vcp"}).line(),
+              "a.vcp: no such file");
     EXPECT_EQ(ScenePlace().blamed({ErrorCode::Usage, "no such name"}).code, ErrorCode::Usage);
 }
 

@@ -1,6 +1,6 @@
 // Commands on datasets behind a server: a slow one can be left at once, and nobody is told its password.
-#include <csignal>
 #include <chrono>
+#include <csignal>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -42,9 +42,12 @@ protected:
 TEST_F(Servers, EverySignalEndsACommandThatWaitsForASlowServer) {
     const std::string url = server_->url("scan.vcp?fault=silent&log=1"), picture = (folder_ / "x.png").string();
     const std::pair<std::vector<std::string>, int> cases[] = {
-        {{"info", url}, SIGINT},   {{"info", url}, SIGHUP},
-        {{"verify", url}, SIGTERM}, {{"render", url, "-o", picture, "--device", "host"}, SIGINT},
-        {{"stress", url, "--device", "host"}, SIGTERM}, {{"bench", "stream", url, "--device", "host"}, SIGINT},
+        {{"info", url}, SIGINT},
+        {{"info", url}, SIGHUP},
+        {{"verify", url}, SIGTERM},
+        {{"render", url, "-o", picture, "--device", "host"}, SIGINT},
+        {{"stress", url, "--device", "host"}, SIGTERM},
+        {{"bench", "stream", url, "--device", "host"}, SIGINT},
     };
     for (const auto& [arguments, signal] : cases) {
         SCOPED_TRACE(arguments.front());
@@ -73,7 +76,8 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
 }
 
 TEST_F(Servers, WhatWasOpenedIsReadAfterItsOpeningIsGone) {
-    auto opening = std::make_unique<DatasetOpening>(std::vector{server_->url("scan.vcp")}, BuildSettings{}, SourceAccess{}, ProgressStyle::None);
+    auto opening = std::make_unique<DatasetOpening>(std::vector{server_->url("scan.vcp")}, BuildSettings{},
+                                                    SourceAccess{}, ProgressStyle::None);
     while (!opening->isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const auto open = opening->take();
     opening.reset();
@@ -84,10 +88,20 @@ TEST_F(Servers, WhatWasOpenedIsReadAfterItsOpeningIsGone) {
 }
 
 TEST_F(Servers, NoCommandSaysThePassword) {
-    const std::string good = withUser("scan.vcp?fault=auth"), none = withUser("none.vcp"), picture = (folder_ / "x.png").string();
-    for (const std::vector<std::string>& arguments : std::initializer_list<std::vector<std::string>>{
-             {"info", good}, {"info", good, "--json"}, {"info", none}, {"verify", good}, {"verify", none, "--json"}, {"render", none, "-o", picture},
-             {"stress", none}, {"info", good, none}, {"info", "http://user:secret"}, {"info", "http://user:se/cret@host"}, {"info", good, "--no-such-option=" + good}}) {
+    const std::string good = withUser("scan.vcp?fault=auth"), none = withUser("none.vcp"),
+                      picture = (folder_ / "x.png").string();
+    for (const std::vector<std::string>& arguments :
+         std::initializer_list<std::vector<std::string>>{{"info", good},
+                                                         {"info", good, "--json"},
+                                                         {"info", none},
+                                                         {"verify", good},
+                                                         {"verify", none, "--json"},
+                                                         {"render", none, "-o", picture},
+                                                         {"stress", none},
+                                                         {"info", good, none},
+                                                         {"info", "http://user:secret"},
+                                                         {"info", "http://user:se/cret@host"},
+                                                         {"info", good, "--no-such-option=" + good}}) {
         SCOPED_TRACE(arguments.front());
         const Ran ran = vcp_.run(arguments);
         EXPECT_EQ((ran.out + ran.err).find("cret@"), std::string::npos) << ran.out << ran.err;

@@ -92,7 +92,8 @@ TEST(Measurement, TextShowsTheDigitsThatTheErrorLeaves) {
 TEST(Measurement, PointsThatCoincideHaveNoAngle) {
     Measurement measurement;
     for (int i = 0; i < 3; ++i) measurement.add({{1, 2, 3}, 0.1, 0});
-    for (const std::string& text : {measurementText(measurement), measurementCsv(measurement), measurementJson(measurement)})
+    for (const std::string& text :
+         {measurementText(measurement), measurementCsv(measurement), measurementJson(measurement)})
         EXPECT_EQ(text.find("nan"), std::string::npos) << text;
 }
 

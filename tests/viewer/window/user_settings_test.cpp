@@ -115,7 +115,10 @@ TEST_F(UserSettingsTest, PasswordsAreNotRemembered) {
     EXPECT_EQ(rememberedName("https://user:secret@host/x.vcp"), "https://host/x.vcp");
     // Those of before go.
     const std::string camera = cameraToJson(OrbitCamera{});
-    write(std::string(R"({"recent": ["https://user:secret@host/y.vcp"], "bookmarks": {"https://user:secret@host/y.vcp": {"1": )") + camera + "}}}");
+    write(
+        std::string(
+            R"({"recent": ["https://user:secret@host/y.vcp"], "bookmarks": {"https://user:secret@host/y.vcp": {"1": )") +
+        camera + "}}}");
     const auto read = readUserSettings(file_);
     ASSERT_TRUE(read) << read.error().line();
     EXPECT_EQ(read->recent, std::vector<std::string>{"https://host/y.vcp"});

@@ -37,7 +37,8 @@ protected:
         session_ = *std::move(session);
         session_->viewer().resize({96, 64});
         session_->open({(*folder_ / "ball.vcp").string()});
-        ASSERT_TRUE(turnUntil([&] { return session_->viewer().dataset() && session_->viewer().status().update.settled; }));
+        ASSERT_TRUE(
+            turnUntil([&] { return session_->viewer().dataset() && session_->viewer().status().update.settled; }));
     }
     void TearDown() override {
         session_.reset();
@@ -73,7 +74,8 @@ protected:
 
     static std::set<std::string> filesIn(const fs::path& path) {
         std::set<std::string> names;
-        for (const fs::directory_entry& each : fs::directory_iterator(path)) names.insert(each.path().filename().string());
+        for (const fs::directory_entry& each : fs::directory_iterator(path))
+            names.insert(each.path().filename().string());
         return names;
     }
     static Picture picture(const fs::path& path) { return readPng(path).value(); }
@@ -182,7 +184,8 @@ TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
     EXPECT_EQ(plain.session->viewer().errorPixels(), 0.5);
     EXPECT_EQ(plain.session->viewer().status().budgetBytes, 512u << 20);
     const auto json = contentOf(settings_);
-    for (const char* field : {"up", "shadows", "occlusion", "error_pixels", "budget_bytes", "background", "width", "panel"})
+    for (const char* field :
+         {"up", "shadows", "occlusion", "error_pixels", "budget_bytes", "background", "width", "panel"})
         EXPECT_EQ(json.find(field), std::string::npos) << field << " in " << json;
 }
 
@@ -259,7 +262,8 @@ TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
     const uint64_t drawn = session_->viewer().framesDrawn();
     ASSERT_TRUE(isSaved());
     EXPECT_GT(session_->viewer().framesDrawn(), drawn);
-    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"picture-0001.png", "picture-0002.png", "picture-0003.png"}));
+    EXPECT_EQ(filesIn("turntable-1"),
+              (std::set<std::string>{"picture-0001.png", "picture-0002.png", "picture-0003.png"}));
     EXPECT_EQ(picture("turntable-1/picture-0001.png"), picture("picture-1.png")) << "it begins with the view as it was";
     EXPECT_NE(picture("turntable-1/picture-0002.png"), picture("turntable-1/picture-0001.png"));
     EXPECT_NE(picture("turntable-1/picture-0003.png"), picture("turntable-1/picture-0002.png"));
@@ -283,7 +287,8 @@ TEST_F(ViewSessionTest, APathGoesThroughTheBookmarks) {
     session_->savePath(kSmall, 3);
     ASSERT_TRUE(isSaved());
     EXPECT_EQ(filesIn("path-1").size(), 3u);
-    EXPECT_EQ(picture("path-1/picture-0001.png"), picture("picture-1.png")) << "from the bookmark with the lower number";
+    EXPECT_EQ(picture("path-1/picture-0001.png"), picture("picture-1.png"))
+        << "from the bookmark with the lower number";
     EXPECT_NE(picture("path-1/picture-0002.png"), picture("path-1/picture-0001.png"));
     EXPECT_NE(picture("path-1/picture-0003.png"), picture("path-1/picture-0002.png"));
 }
@@ -300,7 +305,8 @@ TEST_F(ViewSessionTest, DepthAndTransparencyAreChosen) {
     EXPECT_EQ(picture("picture-2.png").rgba[3], 255) << "what belongs to the depth that is left has another number";
     session_->saveTurntable({.size = {64, 48}, .depth = true}, 2);
     ASSERT_TRUE(isSaved());
-    EXPECT_EQ(filesIn("turntable-1"), (std::set<std::string>{"depth-0001.pfm", "depth-0002.pfm", "picture-0001.png", "picture-0002.png"}));
+    EXPECT_EQ(filesIn("turntable-1"),
+              (std::set<std::string>{"depth-0001.pfm", "depth-0002.pfm", "picture-0001.png", "picture-0002.png"}));
 }
 
 TEST_F(ViewSessionTest, WhatIsCancelledLeavesWhatIsFinished) {

@@ -46,7 +46,9 @@ Camera latticeCamera(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
     camera.projection = Projection::Orthographic;
     camera.forward = glm::normalize(d);
     // Sideways, corners are a whole number of pixels apart.
-    const glm::dvec3 side = d.x != 0 && d.y != 0 ? glm::dvec3(-d.y, d.x, 0) : d.x != 0 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+    const glm::dvec3 side = d.x != 0 && d.y != 0 ? glm::dvec3(-d.y, d.x, 0)
+                            : d.x != 0           ? glm::dvec3(0, 1, 0)
+                                                 : glm::dvec3(1, 0, 0);
     camera.up = glm::cross(side, d);
     const double pixel = grid.cell * glm::length(side) / 4;
     camera.orthographicHeight = pixel * size.y;
@@ -54,7 +56,8 @@ Camera latticeCamera(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
     const glm::dvec3 corner = nearestCorner(grid, 0.5 * (mesh.low() + mesh.high()));
     const auto steps = std::ceil(1.5 * radius / (grid.cell * glm::length(d)));
     // Through the corner goes the middle of a pixel.
-    camera.eye = corner - steps * grid.cell * d + 0.5 * pixel * ((size.x % 2 == 0 ? 1.0 : 0.0) * basis.right + (size.y % 2 == 0 ? 1.0 : 0.0) * basis.up);
+    camera.eye = corner - steps * grid.cell * d +
+                 0.5 * pixel * ((size.x % 2 == 0 ? 1.0 : 0.0) * basis.right + (size.y % 2 == 0 ? 1.0 : 0.0) * basis.up);
     return camera;
 }
 

@@ -20,16 +20,16 @@ struct RayMethod {
 };
 
 const std::vector<RayMethod> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
-                                      {"reference"},
-                                      {"paper", 0.25, {0.5, 0.25, 0.1}},
-                                      {"paper-gpu", 0.25, {0.5, 0.25, 0.1}},
-                                      {"paper-rules"},
-                                      {"sdf", 1, {2, 1, 0.5}},
-                                      {"sdf-analytic", 1, {2, 1, 0.5}},
-                                      {"voxel", 1, {1, 0.5, 0.25}},
-                                      {"svo-contours", 1, {2, 1, 0.5}},
-                                      {"embree"},
-                                      {"embree-single"}};
+                                         {"reference"},
+                                         {"paper", 0.25, {0.5, 0.25, 0.1}},
+                                         {"paper-gpu", 0.25, {0.5, 0.25, 0.1}},
+                                         {"paper-rules"},
+                                         {"sdf", 1, {2, 1, 0.5}},
+                                         {"sdf-analytic", 1, {2, 1, 0.5}},
+                                         {"voxel", 1, {1, 0.5, 0.25}},
+                                         {"svo-contours", 1, {2, 1, 0.5}},
+                                         {"embree"},
+                                         {"embree-single"}};
 
 /// One rule of the paper's method changed. Those of the march first: they need no other octree.
 struct PaperRule {
@@ -75,7 +75,8 @@ const std::vector<std::string>& rayMethodNames() {
 std::vector<double> rayMethodKnobs(const std::string& method, bool sweep) {
     const auto found = std::ranges::find(kMethods, method, &RayMethod::name);
     if (found == kMethods.end()) return {};
-    if (method != "paper-rules") return sweep && !found->swept.empty() ? found->swept : std::vector<double>{found->knob};
+    if (method != "paper-rules")
+        return sweep && !found->swept.empty() ? found->swept : std::vector<double>{found->knob};
     std::vector<double> rules;
     for (size_t i = 0; i < std::size(kPaperRules); ++i) rules.push_back(static_cast<double>(i));
     return rules;

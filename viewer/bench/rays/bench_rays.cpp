@@ -153,8 +153,7 @@ private:
         RayMethods methods({m.mesh, *m.bvh, *m.cache, m.files.vcp, options_.device, options_.threads,
                             m.cache->dataset().header.cell, options_.paper});
         size_t runs = 0, done = 0;
-        for (const std::string& method : options_.methods)
-            runs += knobsOf(method).size() * options_.cameras.size();
+        for (const std::string& method : options_.methods) runs += knobsOf(method).size() * options_.cameras.size();
         const auto fraction = [&] { return 0.1 + 0.9 * static_cast<double>(done) / static_cast<double>(runs); };
         for (const std::string& method : options_.methods)
             for (const double knob : knobsOf(method)) {
@@ -162,7 +161,8 @@ private:
                 auto tracer = methods.make(method, knob);
                 if (!tracer) return tracer.error();
                 for (const std::string& camera : options_.cameras) {
-                    VCP_TRY(report(fmt::format("{}: {} {}, {}", m.files.name, method, (*tracer)->knob(), camera), fraction()));
+                    VCP_TRY(report(fmt::format("{}: {} {}, {}", m.files.name, method, (*tracer)->knob(), camera),
+                                   fraction()));
                     VCP_TRY(runCamera(m, method, camera, **tracer, peer.get()));
                     ++done;
                 }
@@ -188,7 +188,9 @@ private:
         RayClassTable classes;
         double seconds = 0, peerSeconds = 0;
         for (int view = 0; view < options_.views; ++view) {
-            const Camera camera = *benchCamera(name, *model.bvh, {glm::dvec3(header.origin[0], header.origin[1], header.origin[2]), header.cell}, options_.size, view, options_.views);
+            const Camera camera = *benchCamera(
+                name, *model.bvh, {glm::dvec3(header.origin[0], header.origin[1], header.origin[2]), header.cell},
+                options_.size, view, options_.views);
             const auto traced = tracer.trace(camera, options_.size, options_.repetitions);
             if (!traced) return traced.error();
             seconds += traced->seconds;

@@ -1,8 +1,8 @@
 // vcp bench rays: run time against error of ray-casters on the same meshes and cameras, each beside Embree's
 // coherent packets measured in the same run (docs/measuring.md).
 //
-// The methods and their knobs are in viewer/bench/rays/bench_methods.h. Times are the median of the repetitions after a warm-up;
-// all methods get the same rays.
+// The methods and their knobs are in viewer/bench/rays/bench_methods.h. Times are the median of the repetitions after a
+// warm-up; all methods get the same rays.
 #pragma once
 
 #include <array>
@@ -63,9 +63,9 @@ struct BenchRaysRow {
     double nsPerRay = 0;
     double ratioToEmbree = 0;  ///< rays per second over those of Embree's packets on the same rays; 0 without Embree
     RaySummary classes;
-    double cell = 0;           ///< the model's finest edge, world units: that of all methods' rows
-    RaysWork work;             ///< empty where the method does not count
-    uint64_t bytes = 0;        ///< of what is traced: pages, a peer's octree, or Embree's tree and buffers
+    double cell = 0;     ///< the model's finest edge, world units: that of all methods' rows
+    RaysWork work;       ///< empty where the method does not count
+    uint64_t bytes = 0;  ///< of what is traced: pages, a peer's octree, or Embree's tree and buffers
 };
 
 struct BenchRaysReport {

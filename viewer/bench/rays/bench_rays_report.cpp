@@ -140,7 +140,8 @@ std::string benchRaysCsv(const BenchRaysReport& report) { return csvOf(rowsOf(re
 std::string benchRaysMarkdown(const BenchRaysReport& report) {
     std::string text =
         "| model | camera | method | knob | Mray/s | of Embree | hit % | missed % | false % | wrong sheet % | "
-        "unresolved % | holes | beyond certified | p50 | p95 | p99 | max cells | normal p50 | steps | p99 | cells | p99 | fetches | "
+        "unresolved % | holes | beyond certified | p50 | p95 | p99 | max cells | normal p50 | steps | p99 | cells | "
+        "p99 | fetches | "
         "p99 | MB |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     const auto tail = [](const WorkHistogram& rays) {

@@ -43,7 +43,8 @@ IndexedMesh shape() {
     const auto first = static_cast<uint32_t>(mesh.positions.size());
     for (int corner = 0; corner < 8; ++corner)
         mesh.positions.push_back(kHalf * (2.0 * glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) - 1.0));
-    for (const std::array<uint32_t, 4> face : {std::array<uint32_t, 4>{0, 2, 6, 4}, {1, 5, 7, 3}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 6, 7, 5}}) {
+    for (const std::array<uint32_t, 4> face :
+         {std::array<uint32_t, 4>{0, 2, 6, 4}, {1, 5, 7, 3}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 6, 7, 5}}) {
         mesh.triangles.push_back({first + face[0], first + face[1], first + face[2]});
         mesh.triangles.push_back({first + face[0], first + face[2], first + face[3]});
     }
@@ -53,11 +54,13 @@ IndexedMesh shape() {
 /// The shape with one cell at one origin, and who casts rays into it.
 class StabilityCase {
 public:
-    StabilityCase(const StabilityOptions& options, double cell, double originCells) : options_(options), cell_(cell), mesh_(shape()) {
+    StabilityCase(const StabilityOptions& options, double cell, double originCells)
+        : options_(options), cell_(cell), mesh_(shape()) {
         const glm::dvec3 origin = originCells * glm::dvec3(1, -1.0 / 3, 0.7);
         for (glm::dvec3& p : mesh_.positions) p = (p + origin) * cell;
         bvh_ = std::make_unique<MeshBvh>(mesh_);
-        camera_ = fitCamera(bvh_->low(), bvh_->high(), {-0.3, -0.5, -1}, {0.1, 1, 0.2}, 0.6, double(options.width) / options.height);
+        camera_ = fitCamera(bvh_->low(), bvh_->high(), {-0.3, -0.5, -1}, {0.1, 1, 0.2}, 0.6,
+                            double(options.width) / options.height);
         row_.cell = cell;
         row_.originCells = originCells;
         row_.rays = uint64_t(options.width) * options.height;
@@ -87,7 +90,8 @@ private:
         const FileHeader& header = cache->dataset().header;
         VCP_TRY(cache->loadLevel(header.levels - 1));
         row_.certifiedCells = header.certifiedErrorMax / header.cell;
-        const auto exact = castReference(*cache, {}), floats = castReference(*cache, {.singlePrecision = true, .steps = 8});
+        const auto exact = castReference(*cache, {}),
+                   floats = castReference(*cache, {.singlePrecision = true, .steps = 8});
         if (!exact) return exact.error();
         if (!floats) return floats.error();
         const auto device = castDevice(vcp, renderer);
@@ -99,7 +103,8 @@ private:
     }
 
     [[nodiscard]] CameraRay rayOf(int x, int y) const {
-        return cameraRay(camera_, static_cast<uint32_t>(options_.width), static_cast<uint32_t>(options_.height), x + 0.5, y + 0.5);
+        return cameraRay(camera_, static_cast<uint32_t>(options_.width), static_cast<uint32_t>(options_.height),
+                         x + 0.5, y + 0.5);
     }
     template <class Work>
     void forRays(const Work& work) const {
@@ -109,11 +114,13 @@ private:
     }
 
     Result<Hits> castReference(const PageCache& cache, const CastOptions& precision) const {
-        const auto caster = ReferenceCaster::create(cache, cutAtLevel(cache.dataset(), cache.dataset().header.levels), precision);
+        const auto caster =
+            ReferenceCaster::create(cache, cutAtLevel(cache.dataset(), cache.dataset().header.levels), precision);
         if (!caster) return caster.error();
         Hits hits(row_.rays);
         forRays([&](size_t i, const CameraRay& ray) {
-            if (const auto hit = caster->cast({ray.origin, ray.direction})) hits[i] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
+            if (const auto hit = caster->cast({ray.origin, ray.direction}))
+                hits[i] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
         });
         return hits;
     }
@@ -146,13 +153,17 @@ private:
         for (size_t i = 0; i < hits.size(); ++i) {
             row.hits += hits[i] ? 1 : 0;
             const double apart = hits[i] && exact[i] ? std::abs(hits[i]->t - exact[i]->t) / cell_ : 0;
-            if (hits[i].has_value() != exact[i].has_value() || apart > kWrongSheetCells) ++row.otherOutcome;
-            else if (hits[i]) differences.push_back(static_cast<float>(apart));
+            if (hits[i].has_value() != exact[i].has_value() || apart > kWrongSheetCells)
+                ++row.otherOutcome;
+            else if (hits[i])
+                differences.push_back(static_cast<float>(apart));
         }
         row.depthCells = quantilesOf(std::move(differences));
         std::vector<RayClassTable> tables(static_cast<size_t>(options_.height));
         const RayJudge judge(*bvh_, cell_, row_.certifiedCells * cell_);
-        forRays([&](size_t i, const CameraRay& ray) { tables[i / static_cast<size_t>(options_.width)].add(judge.judge(ray.origin, ray.direction, hits[i])); });
+        forRays([&](size_t i, const CameraRay& ray) {
+            tables[i / static_cast<size_t>(options_.width)].add(judge.judge(ray.origin, ray.direction, hits[i]));
+        });
         RayClassTable all;
         for (const RayClassTable& table : tables) all.merge(table);
         row.holes = all.holes();
@@ -180,7 +191,8 @@ Result<std::vector<StabilityRow>> benchStability(const StabilityOptions& options
     for (const double cell : options.cells)
         for (const double origin : options.originCells) {
             const auto what = fmt::format("stability: cell {:g}, origin {:g} cells", cell, origin);
-            if (options.progress && !options.progress(what, static_cast<double>(rows.size()) / static_cast<double>(cases)))
+            if (options.progress &&
+                !options.progress(what, static_cast<double>(rows.size()) / static_cast<double>(cases)))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
             auto row = StabilityCase(options, cell, origin).run(**renderer);
             if (!row) return row.error();
@@ -192,18 +204,22 @@ Result<std::vector<StabilityRow>> benchStability(const StabilityOptions& options
 std::string stabilityMarkdown(const std::vector<StabilityRow>& rows) {
     if (rows.empty()) return "";
     std::string text = fmt::format(
-        "\n## Numerical stability\n\nSingle precision on the processor and on the device against double, {} rays each, in cells: a torus about a box on "
-        "planes of the grid. *Other* rays hit where double misses, miss where it hits, or hit over {:g} cells away; *error* is the distance of hits to the mesh.\n\n"
-        "| cell | origin, cells | hits | holes, double | error p99 | float: other | holes | depth p50 | p99 | max | error p99 "
-        "| device: other | holes | depth p50 | p99 | max | error p99 |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "\n## Numerical stability\n\nSingle precision on the processor and on the device against double, {} rays each, "
+        "in cells: a torus about a box on "
+        "planes of the grid. *Other* rays hit where double misses, miss where it hits, or hit over {:g} cells away; "
+        "*error* is the distance of hits to the mesh.\n\n"
+        "| cell | origin, cells | hits | holes, double | error p99 | float: other | holes | depth p50 | p99 | max | "
+        "error p99 "
+        "| device: other | holes | depth p50 | p99 | max | error p99 "
+        "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         rows.front().rays, kWrongSheetCells);
     const auto beside = [](const PrecisionRow& row) {
-        return fmt::format(" {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.5f} |", row.otherOutcome, row.holes, row.depthCells.p50, row.depthCells.p99, row.depthCells.max,
-                           row.distanceCells.p99);
+        return fmt::format(" {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.5f} |", row.otherOutcome, row.holes,
+                           row.depthCells.p50, row.depthCells.p99, row.depthCells.max, row.distanceCells.p99);
     };
     for (const StabilityRow& row : rows)
-        text += fmt::format("| {:g} | {:g} | {} | {} | {:.5f} |{}{}\n", row.cell, row.originCells, row.doubles.hits, row.doubles.holes, row.doubles.distanceCells.p99,
-                            beside(row.floats), beside(row.device));
+        text += fmt::format("| {:g} | {:g} | {} | {} | {:.5f} |{}{}\n", row.cell, row.originCells, row.doubles.hits,
+                            row.doubles.holes, row.doubles.distanceCells.p99, beside(row.floats), beside(row.device));
     return text;
 }
 

@@ -36,7 +36,7 @@ struct StabilityOptions {
     int width = 192, height = 120;
     std::string device;  ///< as for --device
     unsigned threads = 0;
-    std::filesystem::path folder;  ///< for what is built; removed again
+    std::filesystem::path folder;                                       ///< for what is built; removed again
     std::function<bool(const std::string&, double fraction)> progress;  ///< false cancels; may be empty
 };
 

@@ -14,7 +14,9 @@ namespace vcp {
 class BenchFolder {
 public:
     explicit BenchFolder(const std::filesystem::path& wanted)
-        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid()) : wanted / "built"), temporary_(wanted.empty()) {}
+        : path_(wanted.empty() ? std::filesystem::temp_directory_path() / fmt::format("vcp-bench-{}", ::getpid())
+                               : wanted / "built"),
+          temporary_(wanted.empty()) {}
     ~BenchFolder() {
         std::error_code ignored;
         if (temporary_) std::filesystem::remove_all(path_, ignored);
@@ -26,7 +28,10 @@ public:
     [[nodiscard]] Result<void> make() const {
         std::error_code failed;
         std::filesystem::create_directories(path_, failed);
-        if (failed) return Error{.code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = path_.string()};
+        if (failed)
+            return Error{.code = ErrorCode::Io,
+                         .message = "the folder cannot be made: " + failed.message(),
+                         .file = path_.string()};
         return {};
     }
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }

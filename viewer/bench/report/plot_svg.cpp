@@ -16,16 +16,21 @@ constexpr double kWidth = 720, kHeight = 440, kLeft = 76, kRight = 170, kTop = 4
 
 // Okabe and Ito's palette, which colour-blind people can tell apart.
 constexpr std::array<std::string_view, 10> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
-                                                      "#56b4e9", "#000000", "#7b3fa0", "#8c6d31", "#a01010"};
+                                                       "#56b4e9", "#000000", "#7b3fa0", "#8c6d31", "#a01010"};
 
 std::string escaped(std::string_view text) {
     std::string safe;
     for (const char c : text) {
-        if (c == '<') safe += "&lt;";
-        else if (c == '>') safe += "&gt;";
-        else if (c == '&') safe += "&amp;";
-        else if (c == '"') safe += "&quot;";
-        else safe += c;
+        if (c == '<')
+            safe += "&lt;";
+        else if (c == '>')
+            safe += "&gt;";
+        else if (c == '&')
+            safe += "&amp;";
+        else if (c == '"')
+            safe += "&quot;";
+        else
+            safe += c;
     }
     return safe;
 }
@@ -100,7 +105,8 @@ struct Axes {
 };
 
 std::string text(double x, double y, std::string_view anchor, std::string_view words, std::string_view more = "") {
-    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", x, y, anchor, more, escaped(words));
+    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", x, y, anchor, more,
+                       escaped(words));
 }
 
 std::string line(double x1, double y1, double x2, double y2, std::string_view stroke) {
@@ -149,7 +155,8 @@ std::vector<double> plotMarks(double low, double high, bool isLog) {
         const bool isWide = std::log10(high / low) > 3;
         for (int decade = static_cast<int>(std::floor(std::log10(low))); std::pow(10.0, decade) <= high; ++decade)
             for (const double step : {1.0, 2.0, 5.0})
-                if (const double mark = step * std::pow(10.0, decade); mark >= low && mark <= high && (step == 1 || !isWide))
+                if (const double mark = step * std::pow(10.0, decade);
+                    mark >= low && mark <= high && (step == 1 || !isWide))
                     marks.push_back(mark);
         return marks;
     }
@@ -172,7 +179,8 @@ std::string plotSvg(const Plot& plot) {
     for (const PlotLevel& level : plot.levels) {
         if (!axes.y.shows(level.y)) continue;
         const double y = axes.y.pixel(level.y);
-        svg += line(kLeft, y, right, y, "stroke=\"#888888\" stroke-dasharray=\"5 4\"") + text(right - 4, y - 4, "end", level.name);
+        svg += line(kLeft, y, right, y, "stroke=\"#888888\" stroke-dasharray=\"5 4\"") +
+               text(right - 4, y - 4, "end", level.name);
     }
     double legend = kTop + 8;
     for (size_t i = 0; i < plot.series.size(); ++i, legend += 18) {

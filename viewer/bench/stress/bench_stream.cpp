@@ -55,7 +55,9 @@ public:
     }
 
 private:
-    [[nodiscard]] bool progress(const std::string& what, double fraction) const { return !o_.run.progress || o_.run.progress(what, done_ + share_ * fraction); }
+    [[nodiscard]] bool progress(const std::string& what, double fraction) const {
+        return !o_.run.progress || o_.run.progress(what, done_ + share_ * fraction);
+    }
 
     /// Of cells half as large as other benchmarks take: more to load.
     Result<std::vector<std::string>> buildAnalyticModels() {
@@ -75,7 +77,8 @@ private:
     }
 
     Result<std::string> datasetOf(const std::string& model) const {
-        auto file = datasetFor({model}, {}, [&](const BuildProgress&) { return progress(fmt::format("{}: building", model), 0); });
+        auto file = datasetFor({model}, {},
+                               [&](const BuildProgress&) { return progress(fmt::format("{}: building", model), 0); });
         if (!file) return file.error();
         return file->string();
     }

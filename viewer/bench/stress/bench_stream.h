@@ -13,7 +13,8 @@
 namespace vcp {
 
 struct BenchStreamOptions {
-    /// .vcp files, their http(s) addresses, or meshes, which are built into the cache first; none: viewer/bench/rays/analytic_models.h.
+    /// .vcp files, their http(s) addresses, or meshes, which are built into the cache first; none:
+    /// viewer/bench/rays/analytic_models.h.
     std::vector<std::string> models;
     std::vector<std::string> paths = {"fly"};
     std::vector<uint64_t> budgets = {64ull << 20, 256ull << 20, 1ull << 30};
@@ -22,8 +23,8 @@ struct BenchStreamOptions {
     std::filesystem::path out;  ///< what is built of the analytic models is left here; empty: a temporary folder
 };
 
-/// A row for each model, path and budget, in this order. A local file leaves the system's cache before each run, where the
-/// system lets it. Blocks. Errors: those of openDataset, of the build and of runStress. Violations are no errors.
+/// A row for each model, path and budget, in this order. A local file leaves the system's cache before each run, where
+/// the system lets it. Blocks. Errors: those of openDataset, of the build and of runStress. Violations are no errors.
 Result<std::vector<StressReport>> benchStream(const BenchStreamOptions& options);
 
 /// The rows as one JSON object {"rows": [...]}, as CSV with a header line, and as a Markdown table.
@@ -31,7 +32,8 @@ std::string benchStreamJson(const std::vector<StressReport>& rows);
 std::string benchStreamCsv(const std::vector<StressReport>& rows);
 std::string benchStreamMarkdown(const std::vector<StressReport>& rows);
 
-/// Pictures by file name without extension, over the budget: frame times with loads over without, bytes read over needed.
+/// Pictures by file name without extension, over the budget: frame times with loads over without, bytes read over
+/// needed.
 std::vector<std::pair<std::string, std::string>> benchStreamPlots(const std::vector<StressReport>& rows);
 
 }  // namespace vcp

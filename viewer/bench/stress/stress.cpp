@@ -61,7 +61,9 @@ public:
             ++pagesGivenUp;
         }
     }
-    void check(const FrameStats& stats) { require(stats.poolBytes <= budgetBytes_, "the pool is larger than the budget"); }
+    void check(const FrameStats& stats) {
+        require(stats.poolBytes <= budgetBytes_, "the pool is larger than the budget");
+    }
     void require(bool holds, const std::string& otherwise) {
         if (!holds && noted_.insert(otherwise).second) violations_.push_back(otherwise);
     }
@@ -77,7 +79,9 @@ private:
 class StressRun {
 public:
     StressRun(const OpenDataset& open, const StressOptions& options)
-        : open_(open), o_(options), invariants_(options.renderer.budgetBytes, options.renderer.ramBytes, report_.violations) {}
+        : open_(open),
+          o_(options),
+          invariants_(options.renderer.budgetBytes, options.renderer.ramBytes, report_.violations) {}
 
     Result<StressReport> run() {
         start_ = Clock::now();
@@ -99,7 +103,8 @@ private:
         auto made = Renderer::create(o_.renderer);
         if (!made) return made.error();
         renderer = std::move(*made);
-        return renderer->open(open_.dataset, std::make_shared<FilePageSource>(std::move(reader), open_.dataset, open_.runBytes()));
+        return renderer->open(open_.dataset,
+                              std::make_shared<FilePageSource>(std::move(reader), open_.dataset, open_.runBytes()));
     }
 
     void describe() {
@@ -146,12 +151,14 @@ private:
     }
 
     Result<void> ask(const std::string& what, double fraction) const {
-        if (o_.progress && !o_.progress(what, fraction)) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        if (o_.progress && !o_.progress(what, fraction))
+            return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         return {};
     }
 
     /// Updates until the view has settled; `each` sees every one.
-    Result<UpdateResult> settle(const FrameRequest& request, const std::function<void(const UpdateResult&)>& each = {}) {
+    Result<UpdateResult> settle(const FrameRequest& request,
+                                const std::function<void(const UpdateResult&)>& each = {}) {
         auto changedAt = Clock::now();
         uint64_t seen = 0;
         for (;;) {
@@ -171,12 +178,15 @@ private:
 
     /// Draws what there is as soon as there is something, then refines.
     Result<void> firstView() {
-        const Camera whole = fitCamera(open_.bounds().low, open_.bounds().high, {0, -0.35, -1}, {0, 1, 0}, 0.6, double(o_.size.x) / o_.size.y);
+        const Camera whole = fitCamera(open_.bounds().low, open_.bounds().high, {0, -0.35, -1}, {0, 1, 0}, 0.6,
+                                       double(o_.size.x) / o_.size.y);
         const FrameRequest request = requestFor(whole);
         const auto settled = settle(request, [&](const UpdateResult& update) {
             const auto now = [&] { return o_.openSeconds + secondsSince(start_); };
-            if (update.drawable && report_.firstPictureSeconds == 0 && renderer_->render(request)) report_.firstPictureSeconds = now();
-            if (update.drawable && report_.detail90Seconds == 0 && update.pagesMissing * 10 <= update.pagesWanted) report_.detail90Seconds = now();
+            if (update.drawable && report_.firstPictureSeconds == 0 && renderer_->render(request))
+                report_.firstPictureSeconds = now();
+            if (update.drawable && report_.detail90Seconds == 0 && update.pagesMissing * 10 <= update.pagesWanted)
+                report_.detail90Seconds = now();
         });
         if (!settled) return settled.error();
         auto drawn = renderer_->render(request);
@@ -188,13 +198,15 @@ private:
     }
 
     Result<void> choosePath() {
-        StressPathOptions path{o_.path, open_.bounds(), target_, open_.dataset->header.cell, o_.size, o_.frames, o_.seed};
+        StressPathOptions path{o_.path, open_.bounds(), target_, open_.dataset->header.cell,
+                               o_.size, o_.frames,      o_.seed};
         if (auto known = stressPath(path)) {
             cameras_ = *std::move(known);
             return {};
         }
         const auto keys = readCameras(o_.path);
-        if (!keys && keys.error().code == ErrorCode::Io) return Error{ErrorCode::Io, "is neither a path's name nor a file that can be read", o_.path};
+        if (!keys && keys.error().code == ErrorCode::Io)
+            return Error{ErrorCode::Io, "is neither a path's name nor a file that can be read", o_.path};
         if (!keys) return keys.error();
         for (const OrbitCamera& camera : cameraPath(*keys, o_.frames)) cameras_.push_back(camera.current());
         return {};
@@ -236,7 +248,8 @@ private:
     /// The same frames, each with all it wants; and what that is.
     Result<void> withoutLoads() {
         const bool colour = o_.renderer.colour && open_.dataset->hasColour();
-        ResidencyPolicy wants(open_.dataset, colour, poolShapeFor(*open_.dataset, colour, o_.renderer.budgetBytes, uint64_t{1} << 40));
+        ResidencyPolicy wants(open_.dataset, colour,
+                              poolShapeFor(*open_.dataset, colour, o_.renderer.budgetBytes, uint64_t{1} << 40));
         std::set<uint64_t> needed;
         std::vector<float> times;
         for (size_t i = 0; i < cameras_.size(); ++i) {
@@ -272,18 +285,21 @@ private:
         const auto picture = renderer_->readPicture();
         if (!picture) return picture.error();
         // A page given up by bad luck is drawn from its parent, and said so.
-        invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0, "the settled picture is not that of a run without faults");
+        invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0,
+                            "the settled picture is not that of a run without faults");
         return {};
     }
 
     Result<void> compareOrdersOfArrival() {
         if (o_.orders.size() < 2) return {};
         renderer_.reset();
-        auto curves = compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders, kOrderDraws, o_.progress);
+        auto curves =
+            compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders, kOrderDraws, o_.progress);
         if (!curves) return curves.error();
         report_.orders = *std::move(curves);
         for (const OrderCurve& curve : report_.orders)
-            invariants_.require(curve.settled == report_.orders[0].settled, "the settled picture depends on the order of arrival");
+            invariants_.require(curve.settled == report_.orders[0].settled,
+                                "the settled picture depends on the order of arrival");
         return {};
     }
 
@@ -313,6 +329,8 @@ private:
 
 }  // namespace
 
-Result<StressReport> runStress(const OpenDataset& open, const StressOptions& options) { return StressRun(open, options).run(); }
+Result<StressReport> runStress(const OpenDataset& open, const StressOptions& options) {
+    return StressRun(open, options).run();
+}
 
 }  // namespace vcp

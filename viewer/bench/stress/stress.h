@@ -25,7 +25,7 @@
 namespace vcp {
 
 struct StressOptions {
-    std::string name;        ///< of the dataset, for the report
+    std::string name;            ///< of the dataset, for the report
     std::string path = "orbit";  ///< a name of stress_path.h, or a file of cameras
     Faults faults;
     uint64_t seed = 1;
@@ -34,8 +34,8 @@ struct StressOptions {
     double errorPixels = 0.5;
     RendererOptions renderer;
     std::vector<LoadOrder> orders;  ///< compared on the path's last view; fewer than two: no comparison
-    int views = 1;           ///< more than one: so many share a pool
-    double openSeconds = 0;  ///< what opening the dataset took: counted into the times below
+    int views = 1;                  ///< more than one: so many share a pool
+    double openSeconds = 0;         ///< what opening the dataset took: counted into the times below
     /// Asked between frames; false cancels.
     std::function<bool(const std::string& what, double fraction)> progress;
 };
@@ -55,9 +55,9 @@ struct StressReport {
     int frames = 0;
     double firstPictureSeconds = 0, detail90Seconds = 0, settledSeconds = 0;
     double pathSettledSeconds = 0;  ///< from the last frame of the path until it had settled
-    uint64_t bytesRead = 0;    ///< of the file, until every view of the path had settled
-    uint64_t bytesNeeded = 0;  ///< stored bytes of the pages in these settled views, each once
-    uint64_t requests = 0;     ///< reads of the source
+    uint64_t bytesRead = 0;         ///< of the file, until every view of the path had settled
+    uint64_t bytesNeeded = 0;       ///< stored bytes of the pages in these settled views, each once
+    uint64_t requests = 0;          ///< reads of the source
     uint64_t failures = 0, pagesGivenUp = 0;
     uint64_t budgetBytes = 0, residentBytesMax = 0, ramBytes = 0, heldBytesMax = 0;
     uint64_t loads = 0, evictions = 0;

@@ -55,7 +55,8 @@ private:
         const bool colour = options_.colour && open_.dataset->hasColour();
         options_.loaderThreads = 1;
         options_.ramBytes = options_.uploadBytes = 1;
-        for (uint64_t page = 0; page < open_.dataset->pages.size(); ++page) options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
+        for (uint64_t page = 0; page < open_.dataset->pages.size(); ++page)
+            options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
         auto made = Renderer::create(options_);
         if (!made) return made.error();
         renderer_ = std::move(*made);
@@ -79,7 +80,8 @@ private:
         for (size_t i = 0; i < pictures_.size(); ++i) samples[i].error = rmsDifference(pictures_[i], curve_.settled);
         double area = 0;
         // A picture stays until the next is drawn.
-        for (size_t i = 0; i + 1 < samples.size(); ++i) area += samples[i].error * double(samples[i + 1].bytes - samples[i].bytes);
+        for (size_t i = 0; i + 1 < samples.size(); ++i)
+            area += samples[i].error * double(samples[i + 1].bytes - samples[i].bytes);
         curve_.meanError = area / std::max<double>(1, double(samples.back().bytes - samples.front().bytes));
         size_t last = samples.size() - 1;
         while (last > 0 && samples[last - 1].error < 0.1 * samples[0].error) --last;
@@ -99,9 +101,10 @@ private:
 
 }  // namespace
 
-Result<std::vector<OrderCurve>> compareOrders(const OpenDataset& open, const RendererOptions& options, const FrameRequest& request,
-                                              const std::vector<LoadOrder>& orders, int draws,
-                                              const std::function<bool(const std::string& what, double fraction)>& progress) {
+Result<std::vector<OrderCurve>> compareOrders(
+    const OpenDataset& open, const RendererOptions& options, const FrameRequest& request,
+    const std::vector<LoadOrder>& orders, int draws,
+    const std::function<bool(const std::string& what, double fraction)>& progress) {
     // Every entry: the largest page says how much memory one takes.
     auto dataset = readDataset(*open.reader);
     if (!dataset) return dataset.error();
@@ -110,7 +113,9 @@ Result<std::vector<OrderCurve>> compareOrders(const OpenDataset& open, const Ren
     std::vector<OrderCurve> curves;
     for (const LoadOrder order : orders) {
         const std::string what = fmt::format("order {}", nameOf(order));
-        auto curve = OrderRun(whole, options, request, order, draws).run([&](double fraction) { return !progress || progress(what, fraction); });
+        auto curve = OrderRun(whole, options, request, order, draws).run([&](double fraction) {
+            return !progress || progress(what, fraction);
+        });
         if (!curve) return curve.error();
         curves.push_back(*std::move(curve));
     }

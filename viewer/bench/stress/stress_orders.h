@@ -1,7 +1,7 @@
 // Orders in which pages may arrive, compared: how far a picture is from the settled one, over the bytes that have come.
 //
-// Each order starts from nothing, with a renderer of its own that reads one page at a time; so bytes are what time is on
-// a line of constant speed. What the picture settles on must not depend on the order.
+// Each order starts from nothing, with a renderer of its own that reads one page at a time; so bytes are what time is
+// on a line of constant speed. What the picture settles on must not depend on the order.
 #pragma once
 
 #include <functional>
@@ -15,9 +15,9 @@
 namespace vcp {
 
 struct OrderSample {
-    double seconds = 0;   ///< since the start; mostly drawing
-    uint64_t bytes = 0;   ///< of pages that have come, decoded
-    double error = 0;     ///< root of the mean squared difference to the settled picture, of colours from 0 to 255
+    double seconds = 0;  ///< since the start; mostly drawing
+    uint64_t bytes = 0;  ///< of pages that have come, decoded
+    double error = 0;    ///< root of the mean squared difference to the settled picture, of colours from 0 to 255
 };
 
 struct OrderCurve {
@@ -30,9 +30,10 @@ struct OrderCurve {
 
 /// Draws `request` about `draws` times an order. Blocks. Errors: those of Renderer; Cancelled, where `progress` returns
 /// false.
-Result<std::vector<OrderCurve>> compareOrders(const OpenDataset& open, const RendererOptions& options, const FrameRequest& request,
-                                              const std::vector<LoadOrder>& orders, int draws,
-                                              const std::function<bool(const std::string& what, double fraction)>& progress);
+Result<std::vector<OrderCurve>> compareOrders(
+    const OpenDataset& open, const RendererOptions& options, const FrameRequest& request,
+    const std::vector<LoadOrder>& orders, int draws,
+    const std::function<bool(const std::string& what, double fraction)>& progress);
 
 /// "feedback,nearest"; nothing where a name is unknown.
 std::optional<std::vector<LoadOrder>> parseOrders(std::string_view text);

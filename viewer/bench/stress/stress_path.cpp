@@ -40,7 +40,8 @@ glm::dvec3 upFor(glm::dvec3 forward) {
 
 class Path {
 public:
-    explicit Path(const StressPathOptions& options) : o_(options), random_(options.seed), centre_(options.bounds.centre()) {
+    explicit Path(const StressPathOptions& options)
+        : o_(options), random_(options.seed), centre_(options.bounds.centre()) {
         fit_ = looking({0, -0.35, -1});
         reach_ = glm::length(fit_.eye - centre_);
     }
@@ -67,7 +68,8 @@ public:
             Camera camera = fit_;
             camera.eye = centre_ + random_.direction() * (reach_ * random_.between(0.05, 1));
             // Mostly towards the middle, now and then anywhere.
-            const glm::dvec3 aim = random_.unit() < 0.8 ? centre_ - camera.eye + random_.direction() * (0.2 * reach_) : random_.direction();
+            const glm::dvec3 aim = random_.unit() < 0.8 ? centre_ - camera.eye + random_.direction() * (0.2 * reach_)
+                                                        : random_.direction();
             last_ = turned(camera, aim);
         }
         return last_;
@@ -80,7 +82,8 @@ public:
 
 private:
     [[nodiscard]] Camera looking(glm::dvec3 forward) const {
-        return fitCamera(o_.bounds.low, o_.bounds.high, forward, upFor(forward), kVerticalFov, static_cast<double>(o_.size.x) / o_.size.y);
+        return fitCamera(o_.bounds.low, o_.bounds.high, forward, upFor(forward), kVerticalFov,
+                         static_cast<double>(o_.size.x) / o_.size.y);
     }
     static Camera turned(Camera camera, glm::dvec3 forward) {
         camera.forward = forward;
@@ -151,14 +154,22 @@ std::optional<Faults> parseFaults(std::string_view text) {
             number = bytes ? std::optional(static_cast<double>(*bytes)) : std::nullopt;
         }
         if (!number) return std::nullopt;
-        if (name == "error") faults.errorRate = *number;
-        else if (name == "corrupt") faults.corruptRate = *number;
-        else if (name == "stalls") stallRate = number;
-        else if (name == "stall") faults.stallSeconds = *number;
-        else if (name == "latency") faults.latencySeconds = *number;
-        else if (name == "spread") faults.spreadSeconds = *number;
-        else if (name == "bandwidth") faults.bytesPerSecond = *number;
-        else return std::nullopt;
+        if (name == "error")
+            faults.errorRate = *number;
+        else if (name == "corrupt")
+            faults.corruptRate = *number;
+        else if (name == "stalls")
+            stallRate = number;
+        else if (name == "stall")
+            faults.stallSeconds = *number;
+        else if (name == "latency")
+            faults.latencySeconds = *number;
+        else if (name == "spread")
+            faults.spreadSeconds = *number;
+        else if (name == "bandwidth")
+            faults.bytesPerSecond = *number;
+        else
+            return std::nullopt;
     }
     if (faults.stallSeconds > 0) faults.stallRate = stallRate.value_or(kDefaultStallRate);
     return faults;

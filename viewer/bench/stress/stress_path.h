@@ -27,7 +27,7 @@ struct StressPathOptions {
     glm::dvec3 target{0};  ///< what dive goes to: a point of the surface
     double cell = 1;       ///< finest
     glm::ivec2 size{640, 400};
-    int frames = 120;      ///< at least 1
+    int frames = 120;  ///< at least 1
     uint64_t seed = 1;
 };
 

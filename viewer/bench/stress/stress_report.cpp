@@ -17,22 +17,31 @@ using Json = nlohmann::ordered_json;
 Json toJson(const Quantiles& q) { return {{"p50", q.p50}, {"p95", q.p95}, {"p99", q.p99}, {"max", q.max}}; }
 
 Json toJson(const StressSample& s) {
-    return {{"seconds", s.seconds}, {"frame_ms", s.frameMs}, {"error_pixels", s.errorPixels}, {"resident_bytes", s.residentBytes},
-            {"requests", s.pending}, {"loads", s.loads},     {"evictions", s.evictions},       {"missing", s.missing}};
+    return {{"seconds", s.seconds},          {"frame_ms", s.frameMs},
+            {"error_pixels", s.errorPixels}, {"resident_bytes", s.residentBytes},
+            {"requests", s.pending},         {"loads", s.loads},
+            {"evictions", s.evictions},      {"missing", s.missing}};
 }
 
 Json toJson(const OrderCurve& curve) {
     Json samples = Json::array();
-    for (const OrderSample& s : curve.samples) samples.push_back({{"seconds", s.seconds}, {"bytes", s.bytes}, {"error", s.error}});
-    return {{"order", nameOf(curve.order)}, {"mean_error", curve.meanError}, {"bytes_to_tenth", curve.bytesToTenth}, {"samples", samples}};
+    for (const OrderSample& s : curve.samples)
+        samples.push_back({{"seconds", s.seconds}, {"bytes", s.bytes}, {"error", s.error}});
+    return {{"order", nameOf(curve.order)},
+            {"mean_error", curve.meanError},
+            {"bytes_to_tenth", curve.bytesToTenth},
+            {"samples", samples}};
 }
 
 std::string ordersMarkdown(const std::vector<OrderCurve>& orders) {
     if (orders.empty()) return "";
-    std::string text = "\nThe path's last view from nothing, pages in different orders; error: root mean square of colours (0 to 255) against the settled picture.\n\n"
-                       "| order | mean error over the bytes | read until a tenth of the error | read |\n|---|---|---|---|\n";
+    std::string text =
+        "\nThe path's last view from nothing, pages in different orders; error: root mean square of colours (0 to 255) "
+        "against the settled picture.\n\n"
+        "| order | mean error over the bytes | read until a tenth of the error | read |\n|---|---|---|---|\n";
     for (const OrderCurve& curve : orders)
-        text += fmt::format("| {} | {:.3f} | {} | {} |\n", nameOf(curve.order), curve.meanError, formatBytes(curve.bytesToTenth),
+        text += fmt::format("| {} | {:.3f} | {} | {} |\n", nameOf(curve.order), curve.meanError,
+                            formatBytes(curve.bytesToTenth),
                             formatBytes(curve.samples.empty() ? 0 : curve.samples.back().bytes));
     return text + "\n![orders of arrival](stress_orders.svg)\n";
 }
@@ -50,10 +59,12 @@ Json toJson(const StressViews& v) {
 
 std::string viewsMarkdown(const std::optional<StressViews>& views) {
     if (!views) return "";
-    return fmt::format("\n{} views shared the pool: {} pages wanted by each summed up, {} resident together, at most {}. All had settled {:.3f} s after the last "
-                       "frame; {} showed what they show alone, the budget was too small for {}.\n",
-                       views->views, formatCount(views->pagesWanted), formatCount(views->pagesResident), formatBytes(views->residentBytesMax),
-                       views->settledSeconds, views->identical, views->relaxed);
+    return fmt::format(
+        "\n{} views shared the pool: {} pages wanted by each summed up, {} resident together, at most {}. All had "
+        "settled {:.3f} s after the last "
+        "frame; {} showed what they show alone, the budget was too small for {}.\n",
+        views->views, formatCount(views->pagesWanted), formatCount(views->pagesResident),
+        formatBytes(views->residentBytesMax), views->settledSeconds, views->identical, views->relaxed);
 }
 
 double ratio(double a, double b) { return b > 0 ? a / b : 0; }
@@ -99,23 +110,29 @@ Json flatOf(const StressReport& report) {
     for (const auto& [name, value] : summary.items()) {
         if (value.is_object())
             for (const auto& [part, number] : value.items()) flat[fmt::format("{}_{}", name, part)] = number;
-        else flat[name] = value.is_array() ? Json(fmt::format("{}", fmt::join(report.violations, "; "))) : value;
+        else
+            flat[name] = value.is_array() ? Json(fmt::format("{}", fmt::join(report.violations, "; "))) : value;
     }
     return flat;
 }
 
-std::string timesOf(const Quantiles& q) { return fmt::format("{:.0f} / {:.0f} / {:.0f} / {:.0f}", q.p50, q.p95, q.p99, q.max); }
+std::string timesOf(const Quantiles& q) {
+    return fmt::format("{:.0f} / {:.0f} / {:.0f} / {:.0f}", q.p50, q.p95, q.p99, q.max);
+}
 
 std::string streamRow(const StressReport& r) {
-    return fmt::format("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {} | {} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {} |{}\n", r.name, r.path, formatBytes(r.budgetBytes),
-                       r.firstPictureSeconds, r.detail90Seconds, r.settledSeconds, timesOf(r.frameMs), timesOf(r.frameMsNoLoads),
-                       ratio(r.frameMs.p99, r.frameMsNoLoads.p99), 1e-6 * double(r.bytesRead), 1e-6 * double(r.bytesNeeded),
-                       ratio(double(r.bytesRead), double(r.bytesNeeded)), r.relaxed ? "yes" : "no",
-                       r.violations.empty() ? "" : fmt::format(" **broken: {}**", fmt::join(r.violations, "; ")));
+    return fmt::format(
+        "| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {} | {} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {} |{}\n", r.name,
+        r.path, formatBytes(r.budgetBytes), r.firstPictureSeconds, r.detail90Seconds, r.settledSeconds,
+        timesOf(r.frameMs), timesOf(r.frameMsNoLoads), ratio(r.frameMs.p99, r.frameMsNoLoads.p99),
+        1e-6 * double(r.bytesRead), 1e-6 * double(r.bytesNeeded), ratio(double(r.bytesRead), double(r.bytesNeeded)),
+        r.relaxed ? "yes" : "no",
+        r.violations.empty() ? "" : fmt::format(" **broken: {}**", fmt::join(r.violations, "; ")));
 }
 
 /// A line for each model and path over the budgets.
-Plot overBudgets(const std::string& title, const std::string& yName, const std::vector<StressReport>& rows, double (*valueOf)(const StressReport&)) {
+Plot overBudgets(const std::string& title, const std::string& yName, const std::vector<StressReport>& rows,
+                 double (*valueOf)(const StressReport&)) {
     Plot plot{.title = title, .xName = "budget, MB", .yName = yName, .logX = true};
     for (const StressReport& row : rows) {
         const std::string name = fmt::format("{}, {}", row.name, row.path);
@@ -147,23 +164,33 @@ std::string stressJson(const StressReport& r) {
 }
 
 std::string stressMarkdown(const StressReport& r) {
-    std::string text = fmt::format("# Streaming {}\n\nPath {}, {} frames, seed {}, on {}. Faults: {}.\n\n", r.name, r.path, r.frames, r.seed,
-                                   r.device, r.faults.empty() ? "none" : r.faults);
+    std::string text = fmt::format("# Streaming {}\n\nPath {}, {} frames, seed {}, on {}. Faults: {}.\n\n", r.name,
+                                   r.path, r.frames, r.seed, r.device, r.faults.empty() ? "none" : r.faults);
     text += r.violations.empty() ? "**All invariants hold.**\n\n" : "**Broken invariants:**\n\n";
     for (const std::string& violation : r.violations) text += "- " + violation + "\n";
     if (!r.violations.empty()) text += "\n";
-    text += fmt::format("| first picture | 90 % detail | settled | path settled |\n|---|---|---|---|\n| {:.3f} s | {:.3f} s | {:.3f} s | {:.3f} s |\n\n",
-                        r.firstPictureSeconds, r.detail90Seconds, r.settledSeconds, r.pathSettledSeconds);
-    text += fmt::format("| budget | resident at most | memory | held at most | read | needed | read over needed |\n|---|---|---|---|---|---|---|\n"
-                        "| {} | {} | {} | {} | {} | {} | {:.2f} |\n\n",
-                        formatBytes(r.budgetBytes), formatBytes(r.residentBytesMax), formatBytes(r.ramBytes), formatBytes(r.heldBytesMax),
-                        formatBytes(r.bytesRead), formatBytes(r.bytesNeeded), ratio(double(r.bytesRead), double(r.bytesNeeded)));
-    text += "| frame, ms | p50 | p95 | p99 | max |\n|---|---|---|---|---|\n" + row("with loads", r.frameMs) + row("without loads", r.frameMsNoLoads);
-    text += fmt::format("\np99 with loads is {:.2f} of that without. {} pages loaded, {} evicted; {} reads failed, {} pages given up. "
-                        "The last view settled at {:.2g} pixels of error{}.\n",
-                        ratio(r.frameMs.p99, r.frameMsNoLoads.p99), formatCount(r.loads), formatCount(r.evictions), formatCount(r.failures),
-                        formatCount(r.pagesGivenUp), r.errorPixels, r.relaxed ? "; the budget was too small for some views" : "");
-    text += "\n![resident bytes](stress_bytes.svg)\n![pages](stress_pages.svg)\n![frame time](stress_frames.svg)\n![error](stress_error.svg)\n";
+    text += fmt::format(
+        "| first picture | 90 % detail | settled | path settled |\n|---|---|---|---|\n| {:.3f} s | {:.3f} s | {:.3f} s "
+        "| {:.3f} s |\n\n",
+        r.firstPictureSeconds, r.detail90Seconds, r.settledSeconds, r.pathSettledSeconds);
+    text += fmt::format(
+        "| budget | resident at most | memory | held at most | read | needed | read over needed "
+        "|\n|---|---|---|---|---|---|---|\n"
+        "| {} | {} | {} | {} | {} | {} | {:.2f} |\n\n",
+        formatBytes(r.budgetBytes), formatBytes(r.residentBytesMax), formatBytes(r.ramBytes),
+        formatBytes(r.heldBytesMax), formatBytes(r.bytesRead), formatBytes(r.bytesNeeded),
+        ratio(double(r.bytesRead), double(r.bytesNeeded)));
+    text += "| frame, ms | p50 | p95 | p99 | max |\n|---|---|---|---|---|\n" + row("with loads", r.frameMs) +
+            row("without loads", r.frameMsNoLoads);
+    text += fmt::format(
+        "\np99 with loads is {:.2f} of that without. {} pages loaded, {} evicted; {} reads failed, {} pages given up. "
+        "The last view settled at {:.2g} pixels of error{}.\n",
+        ratio(r.frameMs.p99, r.frameMsNoLoads.p99), formatCount(r.loads), formatCount(r.evictions),
+        formatCount(r.failures), formatCount(r.pagesGivenUp), r.errorPixels,
+        r.relaxed ? "; the budget was too small for some views" : "");
+    text +=
+        "\n![resident bytes](stress_bytes.svg)\n![pages](stress_pages.svg)\n![frame "
+        "time](stress_frames.svg)\n![error](stress_error.svg)\n";
     return text + ordersMarkdown(r.orders) + viewsMarkdown(r.views);
 }
 
@@ -173,22 +200,28 @@ std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport&
         made.series = std::move(all);
         return made;
     };
-    Plot bytes = plot("Resident bytes", "MB", {series(r, "resident", [](const StressSample& s) { return 1e-6 * double(s.residentBytes); })});
+    Plot bytes = plot("Resident bytes", "MB",
+                      {series(r, "resident", [](const StressSample& s) { return 1e-6 * double(s.residentBytes); })});
     bytes.levels = {{"budget", 1e-6 * double(r.budgetBytes)}};
-    const Plot pages = plot("Pages", "pages", {series(r, "requests", [](const StressSample& s) { return double(s.pending); }),
-                                               series(r, "loads a frame", [](const StressSample& s) { return double(s.loads); }),
-                                               series(r, "evictions a frame", [](const StressSample& s) { return double(s.evictions); })});
+    const Plot pages =
+        plot("Pages", "pages",
+             {series(r, "requests", [](const StressSample& s) { return double(s.pending); }),
+              series(r, "loads a frame", [](const StressSample& s) { return double(s.loads); }),
+              series(r, "evictions a frame", [](const StressSample& s) { return double(s.evictions); })});
     const Plot frames = plot("Frame time", "ms", {series(r, "frame", [](const StressSample& s) { return s.frameMs; })});
     const Plot error = plot("Error and missing detail", "pixels; % of pages",
                             {series(r, "pixel error", [](const StressSample& s) { return s.errorPixels; }),
                              series(r, "missing detail, %", [](const StressSample& s) { return 100 * s.missing; })});
-    std::vector<std::pair<std::string, std::string>> plots{
-        {"stress_bytes", plotSvg(bytes)}, {"stress_pages", plotSvg(pages)}, {"stress_frames", plotSvg(frames)}, {"stress_error", plotSvg(error)}};
+    std::vector<std::pair<std::string, std::string>> plots{{"stress_bytes", plotSvg(bytes)},
+                                                           {"stress_pages", plotSvg(pages)},
+                                                           {"stress_frames", plotSvg(frames)},
+                                                           {"stress_error", plotSvg(error)}};
     if (r.orders.empty()) return plots;
     Plot orders{.title = "Orders of arrival", .xName = "MB read", .yName = "error of the picture"};
     for (const OrderCurve& curve : r.orders) {
         PlotSeries points{std::string(nameOf(curve.order)), {}};
-        for (const OrderSample& sample : curve.samples) points.points.push_back({1e-6 * double(sample.bytes), sample.error});
+        for (const OrderSample& sample : curve.samples)
+            points.points.push_back({1e-6 * double(sample.bytes), sample.error});
         orders.series.push_back(std::move(points));
     }
     plots.emplace_back("stress_orders", plotSvg(orders));
@@ -209,7 +242,8 @@ std::string benchStreamCsv(const std::vector<StressReport>& rows) {
 
 std::string benchStreamMarkdown(const std::vector<StressReport>& rows) {
     std::string text =
-        "| source | path | budget | first picture, s | 90 % detail, s | settled, s | frame p50 / p95 / p99 / max, ms | without loads | p99 ratio | read, MB | needed, MB | "
+        "| source | path | budget | first picture, s | 90 % detail, s | settled, s | frame p50 / p95 / p99 / max, ms | "
+        "without loads | p99 ratio | read, MB | needed, MB | "
         "ratio | relaxed |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for (const StressReport& row : rows) text += streamRow(row);
     return text;

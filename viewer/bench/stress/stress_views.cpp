@@ -24,7 +24,8 @@ public:
     Result<StressViews> run(const std::function<bool(const std::string& what, double fraction)>& progress) {
         VCP_TRY(start());
         for (size_t frame = 0; frame < path_.size(); ++frame) {
-            if (!progress("flying together", double(frame) / double(path_.size()))) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            if (!progress("flying together", double(frame) / double(path_.size())))
+                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
             for (size_t view = 0; view < views_.size(); ++view) {
                 VCP_TRY(update(view, frame));
                 if (auto drawn = views_[view]->render(requestOf(view, frame)); !drawn) return drawn.error();
@@ -57,8 +58,10 @@ private:
     Result<void> update(size_t view, size_t frame) {
         auto update = views_[view]->update(requestOf(view, frame));
         if (!update) return update.error();
-        require(update->residentBytes <= options_.budgetBytes, "several views: more bytes are resident than the budget allows");
-        require(update->heldBytesMax <= options_.ramBytes, "several views: pages on their way and kept take more memory than --ram allows");
+        require(update->residentBytes <= options_.budgetBytes,
+                "several views: more bytes are resident than the budget allows");
+        require(update->heldBytesMax <= options_.ramBytes,
+                "several views: pages on their way and kept take more memory than --ram allows");
         require(update->reloads == 0, "several views: a page was loaded twice in still views");
         result_.residentBytesMax = std::max(result_.residentBytesMax, update->residentBytes);
         result_.loads = update->loads;
@@ -73,7 +76,8 @@ private:
         uint64_t loads = 0;
         for (bool settled = false; !settled;) {
             for (size_t view = 0; view < views_.size(); ++view) VCP_TRY(update(view, path_.size() - 1));
-            settled = std::all_of(last_.begin(), last_.end(), [](const UpdateResult& update) { return update.settled; });
+            settled =
+                std::all_of(last_.begin(), last_.end(), [](const UpdateResult& update) { return update.settled; });
             if (result_.loads != loads) changedAt = Clock::now();
             loads = result_.loads;
             require(secondsSince(changedAt) < kHopelessSeconds, "several views: they do not settle");
@@ -128,9 +132,12 @@ private:
 
 }  // namespace
 
-Result<StressViews> flyTogether(const OpenDataset& open, const RendererOptions& options, const std::vector<FrameRequest>& path, int views,
+Result<StressViews> flyTogether(const OpenDataset& open, const RendererOptions& options,
+                                const std::vector<FrameRequest>& path, int views,
                                 const std::function<bool(const std::string& what, double fraction)>& progress) {
-    return ViewsRun(open, options, path, views).run([&](const std::string& what, double fraction) { return !progress || progress(what, fraction); });
+    return ViewsRun(open, options, path, views).run([&](const std::string& what, double fraction) {
+        return !progress || progress(what, fraction);
+    });
 }
 
 }  // namespace vcp

@@ -16,7 +16,7 @@ namespace vcp {
 
 struct StressViews {
     int views = 0;
-    double settledSeconds = 0;      ///< from the last frame until all had settled
+    double settledSeconds = 0;  ///< from the last frame until all had settled
     uint64_t residentBytesMax = 0;
     uint64_t loads = 0, pagesWanted = 0;  ///< pages into the pool; the sum over the views of what each wants at the end
     uint64_t pagesResident = 0;
@@ -27,7 +27,8 @@ struct StressViews {
 
 /// `path`: the frames of one view, at least one. Blocks. Errors: those of Renderer; Cancelled, where `progress` returns
 /// false.
-Result<StressViews> flyTogether(const OpenDataset& open, const RendererOptions& options, const std::vector<FrameRequest>& path, int views,
+Result<StressViews> flyTogether(const OpenDataset& open, const RendererOptions& options,
+                                const std::vector<FrameRequest>& path, int views,
                                 const std::function<bool(const std::string& what, double fraction)>& progress);
 
 }  // namespace vcp

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <random>
 
+#include <meshoptimizer.h>
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
-#include <meshoptimizer.h>
 
 #include "builder/mesh/gltf/gltf.h"
 #include "tests/support/gltf_files.h"

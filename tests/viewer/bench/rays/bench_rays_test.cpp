@@ -8,13 +8,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "viewer/bench/rays/bench_rays.h"
 #include "render/renderer.h"
 #include "tests/support/test_meshes.h"
 #include "tests/support/vcp_program.h"
 #include "viewer/bench/rays/analytic_models.h"
 #include "viewer/bench/rays/bench_cameras.h"
 #include "viewer/bench/rays/bench_methods.h"
+#include "viewer/bench/rays/bench_rays.h"
 #include "viewer/bench/rays/bench_stability.h"
 #include "viewer/bench/rays/paper_tables.h"
 
@@ -30,7 +30,9 @@ protected:
         EXPECT_TRUE(writePly(test::sphereMesh({3, 4, 5}, 1, 48), ball_));
     }
 
-    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords("bench rays " + arguments); }
+    [[nodiscard]] Ran run(const std::string& arguments) const {
+        return VcpProgram(folder_).runWords("bench rays " + arguments);
+    }
 
     static constexpr const char* kQuick = " --repetitions 1 --size 48x32 --cell 0.1 --json";
 
@@ -41,10 +43,10 @@ protected:
 /// What DESIGN and docs/measuring.md promise, and that a row agrees with itself.
 void expectRow(const Json& row) {
     for (const char* field :
-         {"model",           "camera",      "method",      "knob",      "device",     "rays",        "ns_per_ray",
-          "ratio_to_embree", "hit",         "miss",        "missed",    "false",      "wrong_sheet", "unresolved",
-          "p50_cells",       "p95_cells",   "p99_cells",   "max_cells", "steps_mean", "steps_p95",   "steps_p99",
-          "cells_mean",      "cells_p95",   "cells_p99",   "fetches_mean",    "fetches_p95", "fetches_p99", "bytes"})
+         {"model",           "camera",    "method",    "knob",         "device",      "rays",        "ns_per_ray",
+          "ratio_to_embree", "hit",       "miss",      "missed",       "false",       "wrong_sheet", "unresolved",
+          "p50_cells",       "p95_cells", "p99_cells", "max_cells",    "steps_mean",  "steps_p95",   "steps_p99",
+          "cells_mean",      "cells_p95", "cells_p99", "fetches_mean", "fetches_p95", "fetches_p99", "bytes"})
         ASSERT_TRUE(row.contains(field)) << field;
     double sum = 0;
     for (const char* part : {"hit", "miss", "missed", "false", "wrong_sheet", "unresolved"})
@@ -170,18 +172,21 @@ TEST_F(BenchRays, TheDeviceShowsThePaperAndCountsRayByRay) {
         rows[row["method"]] = row;
     }
     const Json &cpu = rows["paper"], &gpu = rows["paper-gpu"];
-    EXPECT_EQ(gpu["bytes"].get<uint64_t>() / 16384, (cpu["bytes"].get<uint64_t>() + 64 + 16383) / 16384) << "in units of the pool";
+    EXPECT_EQ(gpu["bytes"].get<uint64_t>() / 16384, (cpu["bytes"].get<uint64_t>() + 64 + 16383) / 16384)
+        << "in units of the pool";
     EXPECT_NEAR(gpu["p50_cells"], cpu["p50_cells"].get<double>(), 0.01);
     EXPECT_NEAR(gpu["hit"], cpu["hit"].get<double>(), 0.01);
     EXPECT_NEAR(gpu["steps_mean"], cpu["steps_mean"].get<double>(), 0.02 * cpu["steps_mean"].get<double>());
     EXPECT_NEAR(gpu["fetches_mean"], cpu["fetches_mean"].get<double>(), 0.02 * cpu["fetches_mean"].get<double>());
-    EXPECT_LE(rows["certified"]["cells_p99"], rows["reference"]["cells_p99"]) << "the reference looks at leaves that it could skip";
+    EXPECT_LE(rows["certified"]["cells_p99"], rows["reference"]["cells_p99"])
+        << "the reference looks at leaves that it could skip";
 }
 
 TEST_F(BenchRays, AnotherCellIsBuiltAnew) {
     const std::string out = " --out " + (folder_ / "cells").string();
     const auto cellOf = [&](const std::string& cell) {
-        const Ran ran = run(ball_ + " --cameras whole --methods reference --repetitions 1 --size 16x12 --json --cell " + cell + out);
+        const Ran ran = run(ball_ + " --cameras whole --methods reference --repetitions 1 --size 16x12 --json --cell " +
+                            cell + out);
         EXPECT_EQ(ran.status, 0) << ran.err;
         const Json report = Json::parse(ran.out, nullptr, false);
         return report.is_discarded() ? 0.0 : report["rows"][0]["cell"].get<double>();
@@ -221,7 +226,9 @@ TEST(BenchStability, FloatsStayWithDoubles) {
 /// A plain half, whose pages stay coarse, beside one full of balls and posts, whose pages do not.
 IndexedMesh plainBesideDetail() {
     std::mt19937_64 random(3);
-    const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    const auto between = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
     IndexedMesh mesh = test::boxMesh({-2.5, -1.1, -0.053}, {2.5, 1.1, 0}, 1);
     for (int i = 0; i < 60; ++i) {
         const double x = between(-2.4, -0.6), y = between(-0.95, 0.95), radius = between(0.01, 0.05);
@@ -305,7 +312,8 @@ TEST(BenchCameras, RaysOfTheLatticeCameraRunThroughCorners) {
             const Camera camera = *benchCamera("lattice", bvh, grid, size, view, 26);
             int throughCorners = 0;
             for (int x = 0; x < size.x; ++x) {
-                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, size.y / 2 + 0.5);
+                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y),
+                                                x + 0.5, size.y / 2 + 0.5);
                 // The corner nearest to the mesh's middle, moved sideways by whole cells, lies on every fourth ray.
                 const double t = glm::dot(glm::dvec3(3, 4, 5) - ray.origin, ray.direction);
                 double nearest = 1;

@@ -29,13 +29,19 @@ TEST(PlotSvg, MarksAreRound) {
     EXPECT_EQ(plotMarks(-1, 1.2, false), (std::vector<double>{-1, -0.5, 0, 0.5, 1}));
     EXPECT_EQ(plotMarks(0.9, 11, true), (std::vector<double>{1, 2, 5, 10}));
     EXPECT_EQ(plotMarks(0.5, 2e6, true), (std::vector<double>{1, 10, 100, 1e3, 1e4, 1e5, 1e6}));
-    for (const auto& [low, high, isLog] : {std::tuple{1.0, 1.0, false}, {2.0, 1.0, true}, {0.0, 1.0, true}, {-1.0, 1.0, true}, {NAN, 1.0, false}})
+    for (const auto& [low, high, isLog] :
+         {std::tuple{1.0, 1.0, false}, {2.0, 1.0, true}, {0.0, 1.0, true}, {-1.0, 1.0, true}, {NAN, 1.0, false}})
         EXPECT_TRUE(plotMarks(low, high, isLog).empty()) << low << " " << high;
 }
 
 TEST(PlotSvg, PointsLieWhereTheirValuesAre) {
-    const std::string svg = plotSvg({.title = "", .xName = "", .yName = "", .logX = true, .logY = false,
-                                     .series = {{"a", {{1, 0}, {10, 5}, {100, 10}}}}, .levels = {}});
+    const std::string svg = plotSvg({.title = "",
+                                     .xName = "",
+                                     .yName = "",
+                                     .logX = true,
+                                     .logY = false,
+                                     .series = {{"a", {{1, 0}, {10, 5}, {100, 10}}}},
+                                     .levels = {}});
     const auto points = pointsOf(svg);
     ASSERT_EQ(points.size(), 3u);
     EXPECT_NEAR(points[1].first, (points[0].first + points[2].first) / 2, 0.2) << "logarithmic across";
@@ -46,9 +52,14 @@ TEST(PlotSvg, PointsLieWhereTheirValuesAre) {
 
 TEST(PlotSvg, WhatCannotBeShownIsLeftOut) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-    const std::string svg = plotSvg({.title = "t", .xName = "x", .yName = "y", .logX = true, .logY = true,
-                                     .series = {{"a", {{1, 1}, {0, 1}, {-1, 1}, {1, nan}, {inf, 1}, {2, 3}}}, {"b", {{nan, nan}}}},
-                                     .levels = {{"none", 0}, {"some", 2}}});
+    const std::string svg =
+        plotSvg({.title = "t",
+                 .xName = "x",
+                 .yName = "y",
+                 .logX = true,
+                 .logY = true,
+                 .series = {{"a", {{1, 1}, {0, 1}, {-1, 1}, {1, nan}, {inf, 1}, {2, 3}}}, {"b", {{nan, nan}}}},
+                 .levels = {{"none", 0}, {"some", 2}}});
     EXPECT_EQ(pointsOf(svg).size(), 2u);
     EXPECT_EQ(countOf(svg, "stroke-dasharray"), 1u);
     EXPECT_EQ(svg.find("nan"), std::string::npos);
@@ -68,8 +79,13 @@ TEST(PlotSvg, NothingAndOnePointAreFramesToo) {
 }
 
 TEST(PlotSvg, NamesAreEscaped) {
-    const std::string svg = plotSvg({.title = "a<b & \"c\"", .xName = "x>y", .yName = "", .logX = false, .logY = false,
-                                     .series = {{"<&>", {{1, 1, "<"}}}}, .levels = {{"l<", 1}}});
+    const std::string svg = plotSvg({.title = "a<b & \"c\"",
+                                     .xName = "x>y",
+                                     .yName = "",
+                                     .logX = false,
+                                     .logY = false,
+                                     .series = {{"<&>", {{1, 1, "<"}}}},
+                                     .levels = {{"l<", 1}}});
     EXPECT_NE(svg.find("a&lt;b &amp; &quot;c&quot;"), std::string::npos);
     EXPECT_EQ(svg.find("<b"), std::string::npos);
     EXPECT_EQ(svg.find("<&"), std::string::npos);

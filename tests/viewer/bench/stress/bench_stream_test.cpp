@@ -18,9 +18,13 @@ using Json = nlohmann::json;
 
 class BenchStream : public testing::Test {
 protected:
-    BenchStream() : folder_("vcp_bench_stream_test"), ball_((folder_ / "ball.ply").string()) { writeBall(ball_, 60, 120); }
+    BenchStream() : folder_("vcp_bench_stream_test"), ball_((folder_ / "ball.ply").string()) {
+        writeBall(ball_, 60, 120);
+    }
 
-    [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords("bench stream " + arguments); }
+    [[nodiscard]] Ran run(const std::string& arguments) const {
+        return VcpProgram(folder_).runWords("bench stream " + arguments);
+    }
 
     /// Of a line of CSV.
     static long columns(const std::string& line) {
@@ -68,7 +72,8 @@ TEST_F(BenchStream, ARowForEveryPathAndBudget) {
     EXPECT_EQ(Json::parse(contentOf(out / "bench_stream.json")), said);
     const std::string table = contentOf(out / "bench_stream.md");
     EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 6) << table;
-    for (const char* plot : {"bench_stream_frames.svg", "bench_stream_bytes.svg"}) EXPECT_EQ(contentOf(out / plot).substr(0, 5), "<svg ") << plot;
+    for (const char* plot : {"bench_stream_frames.svg", "bench_stream_bytes.svg"})
+        EXPECT_EQ(contentOf(out / plot).substr(0, 5), "<svg ") << plot;
 }
 
 TEST_F(BenchStream, WhatIsWrongIsOneLine) {

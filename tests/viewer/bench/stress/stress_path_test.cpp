@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 namespace vcp {
 namespace {
@@ -41,7 +41,8 @@ TEST(StressPath, DoesWhatItsNameSays) {
     EXPECT_LT(glm::distance(orbit.front().eye, orbit.back().eye), 1e-9) << "once around";
     const auto dive = *stressPath(optionsFor("dive"));
     EXPECT_NEAR(glm::distance(dive.back().eye, {1, 0, 1}), 0.032, 1e-9);
-    for (size_t i = 1; i < dive.size(); ++i) EXPECT_LT(glm::distance(dive[i].eye, {1, 0, 1}), glm::distance(dive[i - 1].eye, {1, 0, 1}));
+    for (size_t i = 1; i < dive.size(); ++i)
+        EXPECT_LT(glm::distance(dive[i].eye, {1, 0, 1}), glm::distance(dive[i - 1].eye, {1, 0, 1}));
     const auto fly = *stressPath(optionsFor("fly"));
     EXPECT_NEAR(glm::distance(0.5 * (fly.front().eye + fly.back().eye), optionsFor("fly").bounds.centre()), 0, 1e-9);
     const auto teleport = *stressPath(optionsFor("teleport"));
@@ -52,17 +53,24 @@ TEST(StressPath, DoesWhatItsNameSays) {
     EXPECT_NE(*stressPath(other), teleport);
     const auto jitter = *stressPath(optionsFor("jitter"));
     EXPECT_NE(jitter[0], jitter[1]);
-    EXPECT_LT(glm::distance(jitter[0].eye, jitter[1].eye), 0.1 * glm::distance(jitter[0].eye, optionsFor("jitter").bounds.centre()));
+    EXPECT_LT(glm::distance(jitter[0].eye, jitter[1].eye),
+              0.1 * glm::distance(jitter[0].eye, optionsFor("jitter").bounds.centre()));
 }
 
 TEST(StressPath, FaultsAsText) {
-    const Faults all = *parseFaults("error=0.1,corrupt=0.01,stall=500ms,stalls=0.5,latency=0.05s,spread=20ms,bandwidth=2M");
-    EXPECT_EQ(all, (Faults{.errorRate = 0.1, .corruptRate = 0.01, .stallRate = 0.5, .stallSeconds = 0.5, .latencySeconds = 0.05,
-                           .spreadSeconds = 0.02, .bytesPerSecond = 2 << 20}));
+    const Faults all =
+        *parseFaults("error=0.1,corrupt=0.01,stall=500ms,stalls=0.5,latency=0.05s,spread=20ms,bandwidth=2M");
+    EXPECT_EQ(all, (Faults{.errorRate = 0.1,
+                           .corruptRate = 0.01,
+                           .stallRate = 0.5,
+                           .stallSeconds = 0.5,
+                           .latencySeconds = 0.05,
+                           .spreadSeconds = 0.02,
+                           .bytesPerSecond = 2 << 20}));
     EXPECT_EQ(*parseFaults(""), Faults{});
     EXPECT_GT(parseFaults("stall=1s")->stallRate, 0);
-    for (const char* bad : {"error", "error=", "error=2", "error=-0.1", "error=nan", "stall=500", "stall=-1s", "stall=1e9s", "flood=1", "error=0.1x", "bandwidth=0",
-                            "stall=ms", ","})
+    for (const char* bad : {"error", "error=", "error=2", "error=-0.1", "error=nan", "stall=500", "stall=-1s",
+                            "stall=1e9s", "flood=1", "error=0.1x", "bandwidth=0", "stall=ms", ","})
         EXPECT_FALSE(parseFaults(bad)) << bad;
 }
 
