@@ -1,8 +1,9 @@
-// What README.md names exists: links, files, folders, subcommands of ./run, presets.
-#include <cstdlib>
+// What README.md names exists: links, files, folders, subcommands of ./run, presets. All documents: lines fit, links
+// lead somewhere.
+#include <algorithm>
 #include <filesystem>
 #include <regex>
-#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,38 @@ TEST(Readme, FirstScreenIsInOrder) {
         EXPECT_GE(at, last) << part;
         last = at;
     }
+}
+
+std::vector<fs::path> documents() {
+    std::vector<fs::path> found = {kRoot / "README.md", kRoot / "CHANGELOG.md"};
+    for (const auto& entry : fs::recursive_directory_iterator(kRoot / "docs"))
+        if (entry.path().extension() == ".md") found.push_back(entry.path());
+    return found;
+}
+
+TEST(Documents, LinesAreShort) {
+    for (const fs::path& document : documents()) {
+        std::istringstream text(readText(document));
+        std::string line;
+        for (int number = 1; std::getline(text, line); ++number) {
+            // Tables and links cannot be broken. Bytes that continue a character of UTF-8 are none of their own.
+            if (line.starts_with('|') || line.find("](") != std::string::npos) continue;
+            const auto isCharacter = [](char c) { return (c & 0xc0) != 0x80; };
+            EXPECT_LE(std::ranges::count_if(line, isCharacter), 120) << document << ':' << number;
+        }
+    }
+}
+
+TEST(Documents, LinksExist) {
+    for (const fs::path& document : documents())
+        for (const std::string& link : allMatches(readText(document), "\\]\\(([^): ]+)\\)")) {
+            const size_t hash = link.find('#');
+            const fs::path file = hash == 0 ? document : document.parent_path() / link.substr(0, hash);
+            ASSERT_TRUE(fs::exists(file)) << document << ": " << link;
+            if (hash == std::string::npos) continue;
+            const std::string anchor = "id=\"" + link.substr(hash + 1) + "\"";
+            EXPECT_NE(readText(file).find(anchor), std::string::npos) << document << ": " << link;
+        }
 }
 
 }  // namespace
