@@ -18,6 +18,15 @@ namespace {
 // Of the staging buffer, where there is one: what an update brings, in one submission; more where a page is larger.
 constexpr uint64_t kStagingBytes = 16ull << 20;
 
+/// Copies before it are done before copies after it begin; also on queues that can do nothing else.
+void keepOrder(VkCommandBuffer commands) {
+    VkMemoryBarrier memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER};
+    memory.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    memory.dstAccessMask = VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 1, &memory, 0,
+                         nullptr, 0, nullptr);
+}
+
 }  // namespace
 
 uint64_t poolChunkBytes(const VkPhysicalDeviceLimits& limits, PageAccess access) {
@@ -99,8 +108,21 @@ Result<void> PagePool::flush() {
     const std::vector<StagedCopy> copies = std::exchange(waiting_, {});
     return device_.submitCopies([&](VkCommandBuffer commands) {
         for (const StagedCopy& copy : copies)
-            vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
+            if (copy.isMove)
+                recordMove(commands, copy);
+            else
+                vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
     });
+}
+
+void PagePool::recordMove(VkCommandBuffer commands, const StagedCopy& move) const {
+    const VkBuffer chunk = chunks_[move.chunk].buffer.handle();
+    const VkBufferCopy out{move.region.srcOffset, 0, move.region.size}, in{0, move.region.dstOffset, move.region.size};
+    keepOrder(commands);
+    vkCmdCopyBuffer(commands, chunk, scratch_.handle(), 1, &out);
+    keepOrder(commands);
+    vkCmdCopyBuffer(commands, scratch_.handle(), chunk, 1, &in);
+    keepOrder(commands);
 }
 
 Result<void> PagePool::read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes) {
@@ -131,17 +153,17 @@ Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
         std::memmove(mapped + target % chunkBytes(), mapped + source % chunkBytes(), bytes);
         return {};
     }
-    // Regions of one copy must not overlap: by way of the staging buffer.
-    VCP_TRY(flush());
-    VCP_TRY(reserveStaging(bytes));
-    VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
-        const VkBufferCopy region{source % chunkBytes(), 0, bytes};
-        vkCmdCopyBuffer(commands, chunk.buffer.handle(), staging_.handle(), 1, &region);
-    }));
-    return device_.submitAndWait([&](VkCommandBuffer commands) {
-        const VkBufferCopy region{0, target % chunkBytes(), bytes};
-        vkCmdCopyBuffer(commands, staging_.handle(), chunk.buffer.handle(), 1, &region);
-    });
+    if (scratch_.bytes() < bytes) {
+        VCP_TRY(flush());
+        VCP_TRY(device_.waitForCopies());
+        auto scratch =
+            device_.createBuffer(std::bit_ceil(bytes),
+                                 VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
+        if (!scratch) return scratch.error();
+        scratch_ = std::move(*scratch);
+    }
+    waiting_.push_back({source / chunkBytes(), {source % chunkBytes(), target % chunkBytes(), bytes}, true});
+    return {};
 }
 
 }  // namespace vcp

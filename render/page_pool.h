@@ -27,7 +27,8 @@ public:
     Result<void> flush();
     /// Reads from byte `at` of a slot; as write(). Errors: Device.
     Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes);
-    /// Copies a slot's bytes; the two are of one chunk and may overlap. Errors: Device.
+    /// Copies a slot's bytes, at the latest with flush(), in order with what is written; the two are of one chunk and
+    /// may overlap. Errors: Device.
     Result<void> move(PoolSlot from, PoolSlot to);
 
     /// Number of the slot's first texel, over all chunks.
@@ -48,10 +49,13 @@ private:
     };
     PagePool(Device& device, uint64_t bytes) : device_(device), bytes_(bytes) {}
     [[nodiscard]] uint64_t chunkBytes() const { return uint64_t{16} << chunkShift_; }
+    /// From the staging buffer to a chunk, or within a chunk by way of the scratch buffer.
     struct StagedCopy {
         uint64_t chunk = 0;
         VkBufferCopy region{};
+        bool isMove = false;
     };
+    void recordMove(VkCommandBuffer commands, const StagedCopy& move) const;
     Result<void> reserveStaging(uint64_t bytes);
     [[nodiscard]] bool overlapsWaiting(uint64_t chunk, uint64_t at, uint64_t bytes) const;
 
@@ -61,7 +65,8 @@ private:
     uint32_t chunkShift_ = 0;
     Buffer staging_;
     uint64_t stagedBytes_ = 0;
-    std::vector<StagedCopy> waiting_;  // from the staging buffer to the pool, not submitted yet
+    Buffer scratch_;                   // as large as the largest move: regions of one copy must not overlap
+    std::vector<StagedCopy> waiting_;  // in order; not submitted yet
 };
 
 /// Largest chunk that shaders of this device can address whole, a power of two of at most 1 GiB.

@@ -222,8 +222,9 @@ struct FrameStats {
     double msSurfaces = 0;   ///< of surfaces with mesostructure; GPU timestamps
     uint64_t unresolvedRays =
         0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
-    uint64_t farHits = 0;         ///< of pixels and surfaces, shown by what they are from far and not marched
-    uint64_t surfaceBytes = 0;    ///< of mesostructure on the device, beside the pool: assets and shells
+    uint64_t farHits = 0;       ///< of pixels and surfaces, shown by what they are from far and not marched
+    uint64_t surfaceBytes = 0;  ///< of mesostructure on the device, beside the pool: assets and shells
+    uint64_t submissions = 0, hostWaits = 0;  ///< to the device by this frame, and how often the CPU waited for one
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 

@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 
 #include "render/frame_setup.h"
-#include "render/passes/readback.h"
 #include "render/renderer_state.h"
 
 namespace vcp {
@@ -146,6 +145,8 @@ void Renderer::State::recordFrame(VkCommandBuffer commands, const Layer& layer, 
     timer.mark(commands, 4);
     if (layer.listens()) feedback.record(commands);
     timer.mark(commands, 5);
+    resources->recordReadback(commands);
+    if (composes()) target.recordReadback(commands);
 }
 
 FrameRequest Renderer::State::Layer::drawable(const FrameRequest& wanted) const {
@@ -164,6 +165,7 @@ Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
     drawn.reset();
     if (!device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
+    const DeviceWork before = device->work();
     if (std::any_of(layers.begin(), layers.end(), [](const Layer& layer) { return layer.listens(); }))
         feedbackPicture.reset();
     std::optional<FrameStats> all;
@@ -179,11 +181,11 @@ Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
     if (shared->meso) {
         VCP_TRY(drawSurfaces(request, *all));
     } else if (composes()) {
-        const auto hits = target.hitPixels(*device);
-        if (!hits) return hits.error();
-        all->hitPixels = *hits;
+        all->hitPixels = target.hitPixels();
     }
     drawn = request;
+    all->submissions = device->work().submissions - before.submissions;
+    all->hostWaits = device->work().waits - before.waits;
     return *all;
 }
 
@@ -216,13 +218,12 @@ Result<void> Renderer::State::drawSurfaces(const FrameRequest& request, FrameSta
         meso.timer.mark(commands, 1);
     }));
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    const auto counters = readWords(*device, mesoTarget.counters, 0, 3);
-    if (!counters) return counters.error();
+    const MesoCounts counts = mesoTarget.counts();
     const auto ms = meso.timer.read();
     if (!ms) return ms.error();
     stats.msFrame += took.count();
     stats.msSurfaces = ms->front();
-    stats.unresolvedRays = (*counters)[0], stats.farHits = (*counters)[1], stats.hitPixels = (*counters)[2];
+    stats.unresolvedRays = counts.unresolvedRays, stats.farHits = counts.farHits, stats.hitPixels = counts.hitPixels;
     stats.pipelines += meso.resources->pipelinesMade();
     stats.surfaceBytes = meso.pass->assetBytes();
     return {};
@@ -245,14 +246,12 @@ Result<FrameStats> Renderer::State::collectStats(const Layer& layer, const Frame
     const auto& resources = layer.resources;
     FrameStats stats;
     stats.rays = uint64_t{request.width} * request.height;
-    auto counters = readWords(*device, resources->counters(), 0, sizeof(frame::FrameCounters) / 4);
-    if (!counters) return counters.error();
-    auto listed = readWords(*device, resources->tileList(), 3, 1);
-    if (!listed) return listed.error();
-    stats.hitPixels = (*counters)[0];
-    stats.tracedRays = std::min<uint64_t>(stats.rays, uint64_t{listed->front()} * frame::kTileSize * frame::kTileSize);
-    stats.steps = (*counters)[2];
-    stats.fetches = (*counters)[3];
+    const FrameCounts counts = resources->counts();
+    stats.hitPixels = counts.counters.hitPixels;
+    stats.tracedRays =
+        std::min<uint64_t>(stats.rays, uint64_t{counts.listedTiles} * frame::kTileSize * frame::kTileSize);
+    stats.steps = counts.counters.steps;
+    stats.fetches = counts.counters.fetches;
     auto ms = timer.read();
     if (!ms) return ms.error();
     stats.msBeam = (*ms)[0];

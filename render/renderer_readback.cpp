@@ -154,13 +154,14 @@ Result<std::optional<PixelHit>> Renderer::State::pickSurfaces(uint32_t x, uint32
     const PictureSize size = mesoTarget.size;
     if (x >= size.width || y >= size.height) return std::optional<PixelHit>{};
     const uint64_t at = uint64_t{y} * size.width + x;
-    const auto depth = readWords(*device, mesoTarget.hits, kMesoDepth * size.pixels() + at, 1);
-    if (!depth) return depth.error();
-    const auto normal = readWords(*device, mesoTarget.hits, kMesoNormal * size.pixels() + at, 1);
-    if (!normal) return normal.error();
-    if (normal->front() == 0) return std::optional<PixelHit>{};
-    PixelHit hit = hitAt(x, y, double(std::bit_cast<float>(depth->front())));
-    hit.normal = unpackNormal(normal->front());
+    const WordPlace places[] = {{&mesoTarget.hits, kMesoDepth * size.pixels() + at},
+                                {&mesoTarget.hits, kMesoNormal * size.pixels() + at}};
+    const auto words = readEach(*device, places);
+    if (!words) return words.error();
+    const auto [depth, normal] = std::pair((*words)[0], (*words)[1]);
+    if (normal == 0) return std::optional<PixelHit>{};
+    PixelHit hit = hitAt(x, y, double(std::bit_cast<float>(depth)));
+    hit.normal = unpackNormal(normal);
     hit.onSurface = true;
     return std::optional<PixelHit>(hit);
 }
@@ -178,14 +179,11 @@ Result<std::optional<PixelHit>> Renderer::State::pick(const Layer& layer, uint32
     if (x >= size.width || y >= size.height || layer.residency == nullptr) return std::optional<PixelHit>{};
     const uint64_t tile = uint64_t{y / frame::kTileSize} * size.tilesX() + x / frame::kTileSize;
     const uint64_t at = uint64_t{y} * size.width + x;
-    uint32_t words[3];
-    const std::pair<const Buffer*, uint64_t> reads[] = {
+    const WordPlace places[] = {
         {&resources->tileStarts(), tile}, {&resources->hits(), at}, {&resources->hits(), size.pixels() + at}};
-    for (int i = 0; i < 3; ++i) {
-        auto word = readWords(*device, *reads[i].first, reads[i].second, 1);
-        if (!word) return word.error();
-        words[i] = word->front();
-    }
+    const auto read = readEach(*device, places);
+    if (!read) return read.error();
+    const std::vector<uint32_t>& words = *read;
     const float cells = std::abs(std::bit_cast<float>(words[1]));
     const bool onCap = std::signbit(std::bit_cast<float>(words[1]));
     if (std::bit_cast<float>(words[0]) >= frame::kTileEmpty || cells >= frame::kNoHit) return std::optional<PixelHit>{};

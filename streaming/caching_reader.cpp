@@ -4,11 +4,12 @@
 #include <atomic>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "octree/durable_file.h"
 #include "octree/regular_file.h"
 
 namespace vcp {
@@ -99,14 +100,15 @@ void CachingReader::keep(uint64_t block, std::span<const std::byte> bytes) const
     static std::atomic<uint64_t> number{0};
     const fs::path path = pathOf(block),
                    partial = folder_ / fmt::format("{:016x}-{}-{}.partial", source_, ::getpid(), number++);
-    std::ofstream file(partial, std::ios::binary | std::ios::trunc);
+    // The name is our own: what is there already, or leads elsewhere, is not written into.
+    const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    if (file < 0) return;
     const uint64_t seal = sealOf(source_, block, bytes);
-    file.write(reinterpret_cast<const char*>(&seal), sizeof seal);
-    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    file.close();
+    const bool isWritten =
+        appendAll(file, std::as_bytes(std::span(&seal, 1)), partial).ok() && appendAll(file, bytes, partial).ok();
     std::error_code failed;
-    if (file) fs::rename(partial, path, failed);
-    if (!file || failed) {
+    if (::close(file) == 0 && isWritten) fs::rename(partial, path, failed);
+    if (!isWritten || failed) {
         fs::remove(partial, failed);
         return;
     }

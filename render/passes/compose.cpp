@@ -1,9 +1,9 @@
 #include "render/passes/compose.h"
 
 #include <bit>
+#include <cstring>
 
 #include "render/compose_spirv.h"
-#include "render/passes/readback.h"
 
 namespace vcp {
 
@@ -14,6 +14,11 @@ Result<void> ComposeTarget::resize(Device& device, PictureSize size) {
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
         MemoryUse::Local);
     if (!depths) return depths.error();
+    if (counted_.bytes() == 0) {
+        auto counted = device.createBuffer(4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
+        if (!counted) return counted.error();
+        counted_ = std::move(*counted);
+    }
     depths_ = std::move(*depths);
     size_ = size;
     return {};
@@ -26,10 +31,16 @@ void ComposeTarget::clear(VkCommandBuffer commands) const {
     barrierTransferToAll(commands);
 }
 
-Result<uint32_t> ComposeTarget::hitPixels(Device& device) const {
-    auto count = readWords(device, depths_, size_.pixels(), 1);
-    if (!count) return count.error();
-    return count->front();
+void ComposeTarget::recordReadback(VkCommandBuffer commands) const {
+    const VkBufferCopy count{size_.pixels() * 4, 0, 4};
+    vkCmdCopyBuffer(commands, depths_.handle(), counted_.handle(), 1, &count);
+    barrierTransferToHost(commands);
+}
+
+uint32_t ComposeTarget::hitPixels() const {
+    uint32_t count;
+    std::memcpy(&count, counted_.mapped(), sizeof count);
+    return count;
 }
 
 ComposePass::ComposePass() : pipelines_(kComposeSpirv) {}

@@ -15,12 +15,16 @@ public:
     /// For the first dataset of a frame: nothing is hit yet. Between begin() and the passes' first barrier.
     void clear(VkCommandBuffer commands) const;
     [[nodiscard]] const Buffer& depths() const { return depths_; }
-    /// Pixels that something is hit in. Precondition: the frame is done. Errors: Device.
-    [[nodiscard]] Result<uint32_t> hitPixels(Device& device) const;
+    /// Copies the count of hits to where hitPixels() reads it. After ComposePass::record; ends with
+    /// barrierTransferToHost.
+    void recordReadback(VkCommandBuffer commands) const;
+    /// Pixels that something is hit in. Precondition: the frame is done.
+    [[nodiscard]] uint32_t hitPixels() const;
 
 private:
     PictureSize size_;
-    Buffer depths_;  // a word a pixel, and the count of pixels that are hit
+    Buffer depths_;   // a word a pixel, and the count of pixels that are hit
+    Buffer counted_;  // that count, for the CPU
 };
 
 class ComposePass {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "render/vulkan/check.h"
@@ -41,6 +43,9 @@ constexpr Binding kBindings[] = {
 };
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
+// Word of the tile list's header that counts the tiles (frame_layout.h).
+constexpr uint64_t kListedTilesWord = 3;
+
 }  // namespace
 
 Result<std::unique_ptr<FrameResources>> FrameResources::create(Device& device) {
@@ -57,6 +62,9 @@ Result<std::unique_ptr<FrameResources>> FrameResources::create(Device& device) {
         MemoryUse::Local);
     if (!counters) return counters.error();
     made->counters_ = std::move(*counters);
+    auto counted = device.createBuffer(sizeof(FrameCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
+    if (!counted) return counted.error();
+    made->counted_ = std::move(*counted);
     auto none = made->wordBuffer(16, 0, VK_FORMAT_R32G32B32A32_UINT);
     if (!none) return none.error();
     made->none_ = std::move(*none);
@@ -161,13 +169,14 @@ Result<void> FrameResources::setTable(std::span<const glm::uvec4> table) {
         std::memcpy(mapped, table.data(), table.size_bytes());
         return {};
     }
-    auto staging = device_.createBuffer(table.size_bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
-    if (!staging) return staging.error();
-    std::memcpy(staging->mapped(), table.data(), table.size_bytes());
-    return device_.submitAndWait([&](VkCommandBuffer commands) {
-        const VkBufferCopy region{0, 0, table.size_bytes()};
-        vkCmdCopyBuffer(commands, staging->handle(), table_.buffer.handle(), 1, &region);
-    });
+    if (tableUpload_.bytes() < table.size_bytes()) {
+        auto upload = device_.createBuffer(table_.buffer.bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
+        if (!upload) return upload.error();
+        tableUpload_ = std::move(*upload);
+    }
+    std::memcpy(tableUpload_.mapped(), table.data(), table.size_bytes());
+    tableToCopy_ = table.size_bytes();
+    return {};
 }
 
 void FrameResources::setPools(const PagePool* pages, const PagePool* colours) {
@@ -242,6 +251,10 @@ void FrameResources::writeSet() {
 void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants& constants) {
     if (setStale_) writeSet();
     vkCmdUpdateBuffer(commands, constants_.handle(), 0, sizeof(constants), &constants);
+    if (tableToCopy_ > 0) {
+        const VkBufferCopy table{0, 0, std::exchange(tableToCopy_, 0)};
+        vkCmdCopyBuffer(commands, tableUpload_.handle(), table_.buffer.handle(), 1, &table);
+    }
     const VkBufferCopy whole{0, 0, picture_.bytes()};
     vkCmdCopyBuffer(commands, background_.handle(), picture_.handle(), 1, &whole);
     vkCmdFillBuffer(commands, counters_.handle(), 0, VK_WHOLE_SIZE, 0);
@@ -249,6 +262,20 @@ void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants
     vkCmdUpdateBuffer(commands, tileList_.buffer.handle(), 0, sizeof(list), list);
     barrierTransferToAll(commands);
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set_, 0, nullptr);
+}
+
+void FrameResources::recordReadback(VkCommandBuffer commands) const {
+    const VkBufferCopy counters{0, offsetof(FrameCounts, counters), sizeof(frame::FrameCounters)};
+    vkCmdCopyBuffer(commands, counters_.handle(), counted_.handle(), 1, &counters);
+    const VkBufferCopy listed{kListedTilesWord * 4, offsetof(FrameCounts, listedTiles), 4};
+    vkCmdCopyBuffer(commands, tileList_.buffer.handle(), counted_.handle(), 1, &listed);
+    barrierTransferToHost(commands);
+}
+
+FrameCounts FrameResources::counts() const {
+    FrameCounts counts;
+    std::memcpy(&counts, counted_.mapped(), sizeof counts);
+    return counts;
 }
 
 Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants) {

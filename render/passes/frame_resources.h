@@ -70,6 +70,12 @@ struct WordBuffer {
     TexelView view;
 };
 
+/// What a frame counted.
+struct FrameCounts {
+    frame::FrameCounters counters;
+    uint32_t listedTiles = 0;  ///< tiles that the beam pass could not prove empty
+};
+
 class FrameResources {
 public:
     static Result<std::unique_ptr<FrameResources>> create(Device& device);
@@ -79,7 +85,8 @@ public:
 
     /// Makes the buffers fit. `hitPlanes`: words that a pixel's hit takes. Errors: Device.
     Result<void> resize(PictureSize size, uint32_t hitPlanes);
-    /// Writes the table for the next frame; grows its buffer. Errors: Device.
+    /// The table of the frames from the next one on; grows its buffer. Where the CPU does not see the device's memory,
+    /// begin() copies it. Errors: Device.
     Result<void> setTable(std::span<const glm::uvec4> table);
     /// What the picture shows where nothing is hit: a word a row. Precondition: resize(), and a row each.
     void setBackground(std::vector<uint32_t> rows);
@@ -94,13 +101,18 @@ public:
     /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
 
+    /// Copies what a frame counted to where counts() reads it. After the last pass's barrierComputeToReadback; ends
+    /// with barrierTransferToHost.
+    void recordReadback(VkCommandBuffer commands) const;
+    /// Precondition: the frame is done.
+    [[nodiscard]] FrameCounts counts() const;
+
     [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
     [[nodiscard]] PictureSize size() const { return size_; }
     [[nodiscard]] const Buffer& hits() const { return hits_.buffer; }
     [[nodiscard]] const Buffer& picture() const { return picture_; }
     [[nodiscard]] const Buffer& tileStarts() const { return tileStarts_.buffer; }
     [[nodiscard]] const Buffer& tileList() const { return tileList_.buffer; }
-    [[nodiscard]] const Buffer& counters() const { return counters_; }
 
     /// One pipeline of this layout; counts it.
     Result<ComputePipeline> pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants);
@@ -121,7 +133,10 @@ private:
     PictureSize size_;
     uint32_t hitPlanes_ = 0;
     Buffer constants_, picture_, counters_;
-    Buffer background_;  // as large as the picture, copied over it before each frame
+    Buffer counted_;            // counters and the number of listed tiles, for the CPU
+    Buffer tableUpload_;        // the next frame's table, where the CPU does not see the device's memory
+    uint64_t tableToCopy_ = 0;  // bytes
+    Buffer background_;         // as large as the picture, copied over it before each frame
     std::vector<uint32_t> backgroundRows_;
     WordBuffer tileStarts_, tileList_, hits_, table_, none_;
     const PagePool* pages_ = nullptr;

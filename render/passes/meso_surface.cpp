@@ -1,6 +1,7 @@
 #include "render/passes/meso_surface.h"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -107,11 +108,14 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
         // Nothing has a size until all is made.
         target = {};
         for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
-                                            std::pair(&target.counters, uint64_t{16})}) {
+                                            std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
             auto made = resources_.storage(bytes);
             if (!made) return made.error();
             *buffer = std::move(*made);
         }
+        auto counted = device_.createBuffer(sizeof(MesoCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
+        if (!counted) return counted.error();
+        target.counted = std::move(*counted);
         for (const Placed& surface : surfaces_) {
             auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits,
                                            &picture, &target.counters, surface.look.get()});
@@ -175,6 +179,12 @@ void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, co
     barrierComputeToCompute(commands);
 }
 
+MesoCounts MesoTarget::counts() const {
+    MesoCounts counts;
+    std::memcpy(&counts, counted.mapped(), sizeof counts);
+    return counts;
+}
+
 void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look,
                              const Buffer& depths) {
     const uint64_t plane = target.size.pixels() * 4;
@@ -192,6 +202,9 @@ void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target,
         for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].shadow, target, i);
     dispatch(commands, shade_, target, 0);
     barrierComputeToReadback(commands);
+    const VkBufferCopy counts{0, 0, sizeof(MesoCounts)};
+    vkCmdCopyBuffer(commands, target.counters.handle(), target.counted.handle(), 1, &counts);
+    barrierTransferToHost(commands);
 }
 
 }  // namespace vcp

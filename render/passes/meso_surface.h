@@ -57,13 +57,22 @@ struct MesoLook {
         0.5;  ///< surfaces that stray less from their mean height are not marched (MesoSurface::far); 0: all are
 };
 
+/// What a frame counted (shaders/meso_bindings.glsl).
+struct MesoCounts {
+    uint32_t unresolvedRays = 0, farHits = 0, hitPixels = 0, unused = 0;
+};
+
 /// What one view's pictures of the surfaces are drawn into.
 struct MesoTarget {
     PictureSize size;       ///< 0: nothing is made
     uint64_t surfaces = 0;  ///< MesoSurfacePass::version() that the sets are of
     Buffer hits, counters;
+    Buffer counted;                     ///< the counters, for the CPU
     VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
     std::vector<MesoSet> sets;          ///< of each surface
+
+    /// Precondition: the frame is done.
+    [[nodiscard]] MesoCounts counts() const;
 };
 
 class MesoSurfacePass {

@@ -27,6 +27,30 @@ Result<std::vector<uint32_t>> readWords(Device& device, const Buffer& source, ui
     return result;
 }
 
+Result<std::vector<uint32_t>> readEach(Device& device, std::span<const WordPlace> places) {
+    std::vector<uint32_t> result(places.size());
+    std::vector<size_t> hidden;
+    for (size_t i = 0; i < places.size(); ++i) {
+        const std::byte* mapped = places[i].source->mapped();
+        if (mapped != nullptr)
+            std::memcpy(&result[i], mapped + places[i].word * 4, 4);
+        else
+            hidden.push_back(i);
+    }
+    if (hidden.empty()) return result;
+    auto staging = device.createBuffer(hidden.size() * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
+    if (!staging) return staging.error();
+    VCP_TRY(device.submitAndWait([&](VkCommandBuffer commands) {
+        for (size_t i = 0; i < hidden.size(); ++i) {
+            const VkBufferCopy region{places[hidden[i]].word * 4, i * 4, 4};
+            vkCmdCopyBuffer(commands, places[hidden[i]].source->handle(), staging->handle(), 1, &region);
+        }
+        barrierTransferToHost(commands);
+    }));
+    for (size_t i = 0; i < hidden.size(); ++i) std::memcpy(&result[hidden[i]], staging->mapped() + i * 4, 4);
+    return result;
+}
+
 glm::vec3 unpackNormal(uint32_t code) {
     glm::vec3 n(float(code & 0xffff) / 65535.0f * 2 - 1, float(code >> 16) / 65535.0f * 2 - 1, 0);
     n.z = 1 - std::abs(n.x) - std::abs(n.y);

@@ -14,6 +14,14 @@ namespace vcp {
 /// copied from. Errors: Device.
 Result<std::vector<uint32_t>> readWords(Device& device, const Buffer& source, uint64_t firstWord, uint64_t words);
 
+struct WordPlace {
+    const Buffer* source;
+    uint64_t word;
+};
+
+/// Words from several places, with one wait at most. Precondition: as readWords. Errors: Device.
+Result<std::vector<uint32_t>> readEach(Device& device, std::span<const WordPlace> places);
+
 /// A unit vector as hit_records.glsl packs it.
 glm::vec3 unpackNormal(uint32_t code);
 

@@ -325,6 +325,7 @@ Result<void> Device::submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence
 }
 
 Result<void> Device::waitFor(VkFence fence) {
+    ++waits_;
     const VkResult done = vkWaitForFences(device_, 1, &fence, VK_TRUE, UINT64_MAX);
     lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
     if (done != VK_SUCCESS) return vulkanError("vkWaitForFences", done);

@@ -66,6 +66,10 @@ private:
 /// device, read by the CPU.
 enum class MemoryUse { Local, Upload, Readback };
 
+struct DeviceWork {
+    uint64_t submissions = 0, waits = 0;
+};
+
 class Device {
 public:
     /// `choice` as in RendererOptions::device. `forWindows` asks for the swapchain extension and a queue with graphics,
@@ -90,6 +94,9 @@ public:
     [[nodiscard]] const VkPhysicalDeviceLimits& limits() const { return limits_; }
     /// Nanoseconds a timestamp step, 0 where the queue has no timestamps.
     [[nodiscard]] double timestampNanoseconds() const { return timestampNanoseconds_; }
+
+    /// Submissions, and how often the CPU waited for one, since create().
+    [[nodiscard]] DeviceWork work() const { return {submissions_, waits_}; }
 
     /// Whether the queue can show pictures in this window.
     [[nodiscard]] bool shows(VkSurfaceKHR surface) const;
@@ -163,7 +170,7 @@ private:
     VkPhysicalDeviceLimits limits_{};
     VkPhysicalDeviceMemoryProperties memory_{};
     DeviceFaults faults_;
-    uint64_t submissions_ = 0;
+    uint64_t submissions_ = 0, waits_ = 0;
     mutable uint64_t allocated_ = 0;
     mutable bool outOfMemory_ = false;
     bool lost_ = false;

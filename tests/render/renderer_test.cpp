@@ -535,6 +535,29 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
     }
 }
 
+// What a frame counted, its table and its feedback travel with its own commands.
+TEST_F(RendererTest, AFrameIsOneSubmissionWhereTheMemoryIsSeparate) {
+    const Scene scene = test::sphereScene(4);
+    RendererOptions options;
+    options.budgetBytes = uint64_t{1} << 20;
+    options.faults.separateMemory = true;
+    start(options);
+    show(scene);
+    for (int view = 0; view < 8; ++view) {
+        FrameRequest request = requestOf(cameras(scene)[static_cast<size_t>(view % 4)].camera, 64, 48);
+        request.errorPixels = view < 4 ? 0.001 : 0.5;
+        for (int frame = 0; frame < 3; ++frame) {
+            ASSERT_TRUE(renderer_->update(request).ok());
+            const auto stats = renderer_->render(request);
+            ASSERT_TRUE(stats.ok()) << stats.error().line();
+            EXPECT_EQ(stats->submissions, 1u) << view << " " << frame;
+            EXPECT_EQ(stats->hostWaits, 1u) << view << " " << frame;
+        }
+        drawAllTheWay(*renderer_, request);
+    }
+    for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+}
+
 TEST_F(RendererTest, PagesGoThroughStagingWhereTheMemoryIsSeparate) {
     const Scene scene = test::sphereScene(4);
     for (const uint64_t budget : {uint64_t{1} << 20, uint64_t{64} << 20}) {

@@ -253,8 +253,10 @@ Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels,
 
 /// What the picture may replace: nothing that is read.
 OutputRules rulesOf(const RenderMeso& command, const std::vector<MesoSurfaceDescription>& descriptions) {
-    OutputRules rules{.overwrite = command.overwrite,
-                      .inputs = filesOf(SceneFile{.datasets = {{command.scan, {}}}, .surfaces = descriptions})};
+    SceneFile scene;
+    scene.datasets.push_back({command.scan, {}});
+    scene.surfaces = descriptions;
+    OutputRules rules{.overwrite = command.overwrite, .inputs = filesOf(scene)};
     rules.inputs.emplace_back(command.camera);
     return rules;
 }
@@ -269,7 +271,9 @@ Result<int> runRender(const RenderMeso& command) {
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
     OpenedScene behind;
     if (!command.scan.empty()) {
-        auto opened = openSceneShown({command.scan}, BuildSettings{}, SourceSettings{}, ProgressStyle::None);
+        SourceSettings source;
+        source.cancelled = interrupted;
+        auto opened = openSceneShown({command.scan}, BuildSettings{}, source, ProgressStyle::None);
         if (!opened) return opened.error();
         behind = *std::move(opened);
     }

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "octree/output_file.h"
 #include "octree/regular_file.h"
 #include "octree/vcp_file.h"
 
@@ -86,15 +87,9 @@ void writeList(const fs::path& path, const std::vector<fs::path>& files) {
         fs::remove(path, ignored);
         return;
     }
-    fs::path partial = path;
-    partial += fmt::format(".{}.building.", getpid());
-    std::ofstream file(partial, std::ios::binary);
-    for (const fs::path& each : files) file << each.string() << '\0';
-    file.close();
-    if (file)
-        fs::rename(partial, path, ignored);
-    else
-        fs::remove(partial, ignored);
+    std::string text;
+    for (const fs::path& each : files) text += each.string() + '\0';
+    (void)writeFile(path, OutputKind::Text, std::as_bytes(std::span(text)), {.overwrite = true});
 }
 
 /// Errors: InvalidInput, where what was read is not what is there.

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
+#include "octree/output_file.h"
 #include "viewer/camera/camera_path.h"
 
 namespace vcp {
@@ -38,11 +38,6 @@ bool isThere(const std::filesystem::path& path) {
 std::string workingFolder() {
     std::error_code failed;
     return std::filesystem::current_path(failed).string();
-}
-
-bool writeText(const std::filesystem::path& path, const std::string& text) {
-    std::ofstream file(path, std::ios::binary);
-    return static_cast<bool>((file << text).flush());
 }
 
 }  // namespace
@@ -245,10 +240,9 @@ void ViewSession::exportMeasurement() {
     const auto nameOf = [](int number) { return fmt::format("measurement-{}", number); };
     const std::string name =
         nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
-    std::error_code failed;
-    if (!writeText(name + ".csv", measurementCsv(measurement_)) ||
-        !writeText(name + ".json", measurementJson(measurement_)))
-        return say(std::filesystem::absolute(name + ".csv", failed).string() + ": cannot be written");
+    const auto table = writeFile(name + ".csv", OutputKind::Text, std::string_view(measurementCsv(measurement_)));
+    const auto json = writeFile(name + ".json", OutputKind::JsonText, std::string_view(measurementJson(measurement_)));
+    if (!table || !json) return say((table ? json : table).error().line());
     note(fmt::format("written: {}.csv and .json in {}", name, workingFolder()));
 }
 

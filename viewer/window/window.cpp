@@ -394,11 +394,6 @@ private:
 
 }  // namespace
 
-glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale) {
-    if (window != framebuffer || !(scale.x > 0 && scale.y > 0)) return window;
-    return glm::ivec2(glm::round(glm::dvec2(window) / scale));
-}
-
 Result<WindowReport> showWindow(const WindowOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     const std::vector<std::string>& inputs = options.session.inputs;

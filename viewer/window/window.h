@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/vec2.hpp>
 
 #include "octree/result.h"
@@ -36,7 +37,10 @@ struct WindowReport {
 
 /// A window's size in units of a display that is not scaled, as it is made from (GLFW_SCALE_TO_MONITOR): where the
 /// window system counts pixels, `window` has grown by `scale`.
-glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale);
+inline glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale) {
+    if (window != framebuffer || !(scale.x > 0 && scale.y > 0)) return window;
+    return glm::ivec2(glm::round(glm::dvec2(window) / scale));
+}
 
 /// Opens the window at once, the inputs in it as soon as they are built, and returns when it is closed. Main thread
 /// only, one at a time (GLFW). Errors: Device (no display, no Vulkan for it, and what the renderer says).

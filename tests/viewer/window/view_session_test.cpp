@@ -13,6 +13,7 @@
 #include "render/picture.h"
 #include "tests/support/built_ball.h"
 #include "viewer/camera/orbit_camera.h"
+#include "viewer/window/window.h"
 
 namespace vcp {
 namespace {
@@ -246,6 +247,14 @@ TEST_F(RememberingSessionTest, ScenesBookmarksAndPastedCamerasTurnNothingOver) {
     EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Y);
     EXPECT_TRUE(second.session->viewer().sections().empty());
     EXPECT_TRUE(second.session->viewer().shading().lightFollowsCamera);
+}
+
+TEST(Window, ASizeIsRememberedAsItIsMadeFrom) {
+    EXPECT_EQ(unscaledSize({1280, 800}, {1280, 800}, {1, 1}), glm::ivec2(1280, 800));
+    EXPECT_EQ(unscaledSize({2560, 1600}, {2560, 1600}, {2, 2}), glm::ivec2(1280, 800))
+        << "made larger, and it would be again";
+    EXPECT_EQ(unscaledSize({1280, 800}, {2560, 1600}, {2, 2}), glm::ivec2(1280, 800))
+        << "in units that are scaled already";
 }
 
 TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
