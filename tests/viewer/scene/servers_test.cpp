@@ -66,7 +66,7 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
     SourceAccess access;
     for (const bool isCancelled : {true, false}) {
         std::filesystem::remove(folder_ / "asked");
-        DatasetOpening opening({server_->url("scan.vcp?fault=silent&log=1")}, {}, access, ProgressStyle::None);
+        DatasetOpening opening({server_->url("scan.vcp?fault=silent&log=1")}, {}, access, nullptr);
         waitForRequest();
         if (!isCancelled) continue;  // destroyed
         opening.cancel();
@@ -77,7 +77,7 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
 
 TEST_F(Servers, WhatWasOpenedIsReadAfterItsOpeningIsGone) {
     auto opening = std::make_unique<DatasetOpening>(std::vector{server_->url("scan.vcp")}, BuildSettings{},
-                                                    SourceAccess{}, ProgressStyle::None);
+                                                    SourceAccess{}, nullptr);
     while (!opening->isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const auto open = opening->take();
     opening.reset();
