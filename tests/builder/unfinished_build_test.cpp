@@ -51,8 +51,9 @@ protected:
     void stopAt(const std::string& stage) {
         BuildOptions o = options();
         o.progress = [&](const BuildProgress& now) {
-            // A folder of the output's name lets the last stage fail.
-            if (stage == "writing") return fs::exists(output()) || fs::create_directory(output());
+            // A folder of the output's name lets the last stage fail; it is looked for once more when all is read.
+            if (stage == "writing")
+                return now.stage == "reading" || fs::exists(output()) || fs::create_directory(output());
             // A call that takes so long is followed by one for each report.
             std::this_thread::sleep_for(std::chrono::milliseconds(101));
             return !std::string(now.stage).starts_with(stage);

@@ -134,7 +134,7 @@ TEST_F(OutputFiles, PartialNamesAreOurOwn) {
     put("out.vcp.partial.2", "a user's own");
     fs::create_hard_link(treasure, folder_ / "out.vcp.partial.3");
     for (const OutputKind kind : {OutputKind::Dataset, OutputKind::Asset, OutputKind::JsonText}) {
-        ASSERT_TRUE(checkOutput(out, kind, {}).ok());
+        ASSERT_TRUE(checkOutput(out, kind, {.overwrite = true}).ok());
         ASSERT_TRUE(writeFile(out, kind, "{}", {.overwrite = true}).ok());
     }
     EXPECT_EQ(contentOf(treasure), "gold");

@@ -495,7 +495,9 @@ Picture drawAllTheWay(Renderer& renderer, const FrameRequest& request) {
         if (!update || update->settled) break;
         renderer.waitForPage(std::chrono::milliseconds(100));
     }
-    return *renderer.readPicture();
+    // A device may be lost while the picture is read, too.
+    const auto picture = renderer.readPicture();
+    return picture ? *picture : Picture{};
 }
 
 TEST_F(RendererTest, ALostDeviceIsMadeAnew) {

@@ -1,4 +1,5 @@
 // A server that sends 64 KiB and claims any number of pages: what opening it takes follows from what it sends.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -24,21 +25,26 @@ public:
     explicit ClaimingFile(uint64_t pages) : head_(kLeadBytes) {
         FileHeader& h = header_;
         h.pages = pages;
-        h.levels = 2;
         h.log2Cells = 5;
         h.cell = 1;
-        h.level[0] = {0, 1, 0};
-        h.level[1] = {1, pages - 1, 0};
+        // Each level has as many pages as there is room for below the one above.
+        for (uint64_t left = pages, room = 1; left > 0; room *= 8) {
+            h.level[h.levels++] = {pages - left, std::min(room, left), 0};
+            left -= std::min(room, left);
+        }
+        h.level[0].certifiedError = 1;
         const uint64_t blocks = (pages + kEntriesPerBlock - 1) / kEntriesPerBlock,
                        pagesBegin = (blockOffset(blocks) + 255) / 256 * 256;
         h.fileBytes = pagesBegin + 256 * pages + sizeof(CommitRecord);
+        uint32_t level = 0;
         for (uint64_t page = 0; page < (kLeadBytes - kDirectoryOffset) / kBlockBytes * kEntriesPerBlock; ++page) {
             PageEntry e;
             e.offset = pagesBegin + 256 * page;
             e.storedBytes = 16;
             e.pageBytes = 4096;
-            e.level = page == 0 ? 0 : 1;
-            e.morton = page == 0 ? 0 : page - 1;
+            while (page >= h.level[level].firstEntry + h.level[level].pages) ++level;
+            e.level = level;
+            e.morton = page - h.level[level].firstEntry;
             e.childMask = page == 0 ? 0xff : 0;
             e.firstChild = page == 0 ? 1 : 0;
             e.certifiedError = page == 0 ? 1.0f : 0.0f;
@@ -119,7 +125,7 @@ TEST(ClaimedPages, TheFirstPartAndWhatViewsMakeOfItTakeWhatCame) {
     const Dataset copy = *start;
     EXPECT_EQ(copy.pages.blocksKnown(), 15u);
     EXPECT_TRUE(copy.pages.knows(700));
-    EXPECT_EQ(copy.pages[700].morton, 699u);
+    EXPECT_EQ(copy.pages[700].morton, 700u - (1 + 8 + 64 + 512));
     EXPECT_FALSE(copy.pages.knows(kMany - 1));
     const auto dataset = std::make_shared<const Dataset>(*std::move(start));
     ASSERT_LT(grownSince(before), kMost);

@@ -50,6 +50,12 @@ protected:
         return {folder_ / file, fs::relative(folder_ / file), folder_.path() / "." / file, link, hard, detour / file};
     }
 
+    static bool saysWhy(const std::string& line) {
+        for (const char* why : {"never written over", "which is read", "must end in"})
+            if (line.find(why) != std::string::npos) return true;
+        return false;
+    }
+
     /// Runs `arguments` with `-o NAME` for each name of `file`, which must be refused in one line and stay as it is.
     void expectKept(const std::vector<std::string>& arguments, const std::string& file) const {
         const std::string before = contentOf(folder_ / file);
@@ -61,6 +67,7 @@ protected:
                 const Ran ran = run(words);
                 EXPECT_NE(ran.status, 0) << arguments[0] << " -o " << name;
                 EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+                EXPECT_TRUE(saysWhy(ran.err)) << ran.err;
                 EXPECT_EQ(contentOf(folder_ / file), before) << arguments[0] << " -o " << name;
                 EXPECT_FALSE(fs::exists(name + ".partial"));
             }
@@ -118,10 +125,10 @@ TEST_F(NothingLost, InputsAmongTheTemporaryFilesAreKept) {
 TEST_F(NothingLost, ExtensionsSayWhatIsWritten) {
     const std::string ball = folder_ / "ball.ply";
     for (const auto& [command, name] : std::vector<std::pair<std::string, std::string>>{{"build", "x.ply"},
-                                                                                        {"build", "x"},
+                                                                                        {"build", "x.v2"},
                                                                                         {"build", "-"},
                                                                                         {"render", "x.jpg"},
-                                                                                        {"render", "x"},
+                                                                                        {"render", "x.pngg"},
                                                                                         {"render", "x.vcp"},
                                                                                         {"meso build", "x.png"},
                                                                                         {"meso render", "x.jpg"}}) {
@@ -143,8 +150,9 @@ TEST_F(NothingLost, RenderKeepsItsInputs) {
     for (int i = 0; i < 2; ++i) expectKept({"render", wall, "--size", "16x16"}, "wall.png");
     write(
         "scene.json",
-        R"({"datasets": [{"file": "ball.vcp"}], "surfaces": [{"asset": "ball", "base": "quad", "texture": "wall.png"}]})");
+        R"({"datasets": [{"file": "ball.vcp"}], "mesostructure": [{"asset": "ball", "surface": "quad", "texture": "wall.png"}]})");
     expectKept({"render", folder_ / "scene.json", "--size", "16x16"}, "wall.png");
+    EXPECT_EQ(run({"render", folder_ / "scene.json", "--size", "16x16", "-o", folder_ / "scene.png"}).status, 0);
     // Other outputs than -o.
     for (const char* option : {"--depth", "--normals"}) {
         const std::string before = contentOf(folder_ / "wall.png");
@@ -159,7 +167,7 @@ TEST_F(NothingLost, RenderKeepsItsInputs) {
     }
     // Pictures of a sequence have names of their own.
     fs::copy_file(folder_ / "wall.png", folder_ / "turn-0002.png");
-    write("turn.json", R"({"surfaces": [{"asset": "ball", "base": "quad", "texture": "turn-0002.png"}]})");
+    write("turn.json", R"({"mesostructure": [{"asset": "ball", "surface": "quad", "texture": "turn-0002.png"}]})");
     const std::string before = contentOf(folder_ / "turn-0002.png");
     EXPECT_EQ(run({"render", folder_ / "turn.json", "--size", "16x16", "--turntable", "3", "-o", folder_ / "turn.png"})
                   .status,

@@ -48,7 +48,12 @@ Error damaged(std::string detail) {
     detail = detail.substr(0, 200);
     for (char& c : detail)
         if (c < ' ' || c > '~') c = ' ';
-    return wrong(ErrorCode::InvalidInput, "the EXR is damaged: " + detail);
+    // OpenEXR names the stream that it reads, which has no name.
+    constexpr std::string_view kNobody = "image file \"\"";
+    std::string plain = detail;
+    if (const size_t at = plain.find(kNobody); at != std::string::npos)
+        plain.replace(at, kNobody.size(), "the picture");
+    return wrong(ErrorCode::InvalidInput, "the EXR is damaged: " + plain);
 }
 
 /// The attributes that the library needs, and their bytes; those of "channels" vary.

@@ -238,10 +238,12 @@ OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesys
 
 /// Finds what would be refused before anything is built or drawn.
 Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules, size_t pictures) {
-    for (const std::string& name : {command.output, command.depth, command.normals})
-        for (size_t i = 1; !name.empty() && i <= pictures; ++i)
-            VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name),
-                                *outputKindOf(name == kStandardOutput ? "-.png" : name), rules));
+    for (const std::string& name : {command.output, command.depth, command.normals}) {
+        if (name.empty()) continue;
+        const OutputKind kind = outputKindOf(name).value_or(OutputKind::Png);
+        for (size_t i = 1; i <= pictures; ++i)
+            VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name), kind, rules));
+    }
     return {};
 }
 

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 
 #include "octree/output_file.h"
 #include "viewer/command/terminal_text.h"
@@ -38,6 +39,7 @@ void addOverwriteOption(CLI::App& app, bool& overwrite) {
 
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe) {
     const auto wanted = outputKindOf("x" + extension);
+    if (name != kStandardOutput && !std::filesystem::path(name).has_extension()) return {};
     if (outputKindOf(name) == wanted || (mayBePipe && name == kStandardOutput)) return {};
     return "must end in " + extension + (mayBePipe ? ", or be - for standard output" : "") + ", not \"" + name + "\"";
 }

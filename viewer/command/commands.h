@@ -55,7 +55,7 @@ void addProgressOption(CLI::App& app, ReportOptions& options);
 /// --overwrite: also what is there and is of another kind, or write-protected, is replaced.
 void addOverwriteOption(CLI::App& app, bool& overwrite);
 
-/// Empty where `name` ends in `extension`, or is "-" and `mayBePipe`; else what to write instead.
+/// Empty where `name` ends in `extension` or has none, or is "-" and `mayBePipe`; else what to write instead.
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe);
 
 /// Writes lines of text to stdout, shown as terminal_text.h says, with a newline behind. Errors: Io (stdout is closed

@@ -212,7 +212,6 @@ TEST_F(CommandLine, WhatFilesSayEndsWith1) {
     expectFailure(run({"render", scene.string(), "-o", png.string()}), 1, points.string() + ": unknown mesh format");
     const std::pair<const char*, const char*> scenes[] = {
         {"{\"mesostructure\": [\n{\"asset\": \"brick\"}]}", ": line 2: \"asset\" must be"},
-        {"{\"mesostructure\": [\n{\"asset\": \"beads\", \"surface\": \"blob\"}]}", ": line 2: "},
         {"{\"mesostructure\": [\n{\"asset\": \"beads\",\n\"tiles\": 1e6}]}", ": line "},
         {"{\"datasets\": [{\"file\": \"a.vcp\"}],\n\"sections\": [{\"normal\": [1e-320, 0, 0], \"offset\": 0}]}",
          ": line 2: \"normal\""},
