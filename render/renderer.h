@@ -34,9 +34,9 @@
 #include <vulkan/vulkan_core.h>
 #include <glm/vec3.hpp>
 
+#include "octree/dataset_reader.h"
 #include "octree/paper_page.h"
 #include "octree/result.h"
-#include "octree/vcp_file.h"
 #include "render/camera.h"
 #include "render/picture.h"
 #include "render/similarity.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "octree/vcp_file.h"
+#include "octree/page_reader.h"
 #include "streaming/stored_pages.h"
 
 namespace vcp {

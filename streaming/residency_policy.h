@@ -37,7 +37,7 @@
 #include <tuple>
 #include <vector>
 
-#include "octree/vcp_file.h"
+#include "octree/dataset_reader.h"
 #include "streaming/load_order.h"
 #include "streaming/page_selection.h"
 #include "streaming/request_queue.h"

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "builder/measure/surface_distance.h"
-#include "octree/vcp_file.h"
+#include "octree/vcp_verify.h"
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
 #include "viewer/command/commands.h"

@@ -1,0 +1,66 @@
+#include "octree/byte_reader.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cerrno>
+#include <cstring>
+
+#include "octree/regular_file.h"
+
+namespace vcp {
+
+namespace {
+
+class LocalFile final : public ByteReader {
+public:
+    LocalFile(int fd, uint64_t size, std::string name) : fd_(fd), size_(size), name_(std::move(name)) {}
+    ~LocalFile() override { ::close(fd_); }
+    LocalFile(const LocalFile&) = delete;
+    LocalFile& operator=(const LocalFile&) = delete;
+
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
+        while (!bytes.empty()) {
+            const ssize_t n = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+            if (n < 0 && errno == EINTR) continue;
+            if (n < 0) return fail(offset, std::string("read failed: ") + std::strerror(errno));
+            if (n == 0) return fail(offset, "the file ends here; it was truncated");
+            offset += static_cast<uint64_t>(n);
+            bytes = bytes.subspan(static_cast<size_t>(n));
+        }
+        return {};
+    }
+    [[nodiscard]] uint64_t size() const override { return size_; }
+    [[nodiscard]] const std::string& name() const override { return name_; }
+
+private:
+    Error fail(uint64_t offset, std::string message) const {
+        return {.code = ErrorCode::Io, .message = std::move(message), .file = name_, .byte = offset};
+    }
+    int fd_;
+    uint64_t size_;
+    std::string name_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) {
+    const auto file = openRegular(path);
+    if (!file) return file.error();
+    struct stat info {};
+    if (::fstat(*file, &info) != 0) {
+        ::close(*file);
+        return Error{.code = ErrorCode::Io, .message = "its size cannot be asked", .file = path.string()};
+    }
+    return std::shared_ptr<ByteReader>(
+        std::make_shared<LocalFile>(*file, static_cast<uint64_t>(info.st_size), path.string()));
+}
+
+Error brokenBytes(const std::string& file, std::string element, uint64_t byte, std::string message) {
+    return {.code = ErrorCode::InvalidInput,
+            .message = std::move(message),
+            .file = file,
+            .element = std::move(element),
+            .byte = byte};
+}
+
+}  // namespace vcp
