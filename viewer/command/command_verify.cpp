@@ -84,8 +84,6 @@ bool isWithin(const SurfaceDistance& distance) {
 
 Json toJson(const Quantiles& q) { return {{"p50", q.p50}, {"p95", q.p95}, {"p99", q.p99}, {"max", q.max}}; }
 
-Quantiles inCells(const Quantiles& q, double cell) { return {q.p50 / cell, q.p95 / cell, q.p99 / cell, q.max / cell}; }
-
 void addDistances(Json& json, const SurfaceDistance& distance) {
     json["mesh_to_surface"] = toJson(distance.meshToSurface);
     json["surface_to_mesh"] = toJson(distance.surfaceToMesh);
