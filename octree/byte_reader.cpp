@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "octree/file_descriptor.h"
 #include "octree/regular_file.h"
 
 namespace vcp {
@@ -13,14 +14,12 @@ namespace {
 
 class LocalFile final : public ByteReader {
 public:
-    LocalFile(int fd, uint64_t size, std::string name) : fd_(fd), size_(size), name_(std::move(name)) {}
-    ~LocalFile() override { ::close(fd_); }
-    LocalFile(const LocalFile&) = delete;
-    LocalFile& operator=(const LocalFile&) = delete;
+    LocalFile(FileDescriptor file, uint64_t size, std::string name)
+        : file_(std::move(file)), size_(size), name_(std::move(name)) {}
 
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
         while (!bytes.empty()) {
-            const ssize_t n = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+            const ssize_t n = ::pread(file_.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
             if (n < 0 && errno == EINTR) continue;
             if (n < 0) return fail(offset, std::string("read failed: ") + std::strerror(errno));
             if (n == 0) return fail(offset, "the file ends here; it was truncated");
@@ -36,7 +35,7 @@ private:
     Error fail(uint64_t offset, std::string message) const {
         return {.code = ErrorCode::Io, .message = std::move(message), .file = name_, .byte = offset};
     }
-    int fd_;
+    FileDescriptor file_;
     uint64_t size_;
     std::string name_;
 };
@@ -44,15 +43,14 @@ private:
 }  // namespace
 
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) {
-    const auto file = openRegular(path);
-    if (!file) return file.error();
+    const auto opened = openRegular(path);
+    if (!opened) return opened.error();
+    FileDescriptor file(*opened);
     struct stat info {};
-    if (::fstat(*file, &info) != 0) {
-        ::close(*file);
+    if (::fstat(file.number(), &info) != 0)
         return Error{.code = ErrorCode::Io, .message = "its size cannot be asked", .file = path.string()};
-    }
     return std::shared_ptr<ByteReader>(
-        std::make_shared<LocalFile>(*file, static_cast<uint64_t>(info.st_size), path.string()));
+        std::make_shared<LocalFile>(std::move(file), static_cast<uint64_t>(info.st_size), path.string()));
 }
 
 Error brokenBytes(const std::string& file, std::string element, uint64_t byte, std::string message) {
