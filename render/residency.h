@@ -13,9 +13,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "render/frame_result.h"
 #include "render/page_pool.h"
 #include "render/page_table.h"
-#include "render/renderer.h"
 #include "streaming/page_loader.h"
 #include "streaming/residency_policy.h"
 
