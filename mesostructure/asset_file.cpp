@@ -10,8 +10,9 @@
 #include <fmt/format.h>
 
 #include "mesostructure/solids.h"
+#include "octree/byte_reader.h"
+#include "octree/content_hash.h"
 #include "octree/durable_file.h"
-#include "octree/vcp_file.h"
 
 namespace vcp::meso {
 

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include <fmt/format.h>
+
+#include "octree/content_hash.h"
 
 namespace vcp {
 

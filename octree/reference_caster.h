@@ -20,8 +20,7 @@
 #include <vector>
 
 #include <glm/vec3.hpp>
-
-#include "octree/vcp_file.h"
+#include "octree/page_reader.h"
 
 namespace vcp {
 

@@ -12,24 +12,16 @@
 // Every header, block and page carries an XXH3-64; a file whose commit record, header or size disagree was
 // not finished or was changed. Sizes, counts and offsets are checked before use: a hostile file wastes
 // neither memory nor time. All numbers little endian. Readers refuse versions they do not know.
+//
+// dataset_reader.h reads header and directory, page_reader.h one page, vcp_verify.h every byte; vcp_writer.h writes.
 #pragma once
 
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <iterator>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
-#include <glm/vec3.hpp>
-
-#include "octree/page.h"
 #include "octree/paper_page.h"
-#include "octree/result.h"
-#include "octree/sparse_array.h"
 
 namespace vcp {
 
@@ -41,6 +33,11 @@ inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
 inline constexpr uint32_t kEntriesPerBlock = 51;
 inline constexpr uint64_t kPageAlignment = 256;
+
+/// Where a block of the directory is in the file.
+constexpr uint64_t blockOffset(uint64_t block) { return kDirectoryOffset + block * kBlockBytes; }
+/// How many blocks hold the entries of so many pages.
+constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock; }
 
 /// What pages hold.
 enum class Method : uint32_t {
@@ -149,122 +146,5 @@ struct CommitRecord {
     uint64_t hash = 0;  ///< XXH3-64 of the 56 bytes before
 };
 static_assert(sizeof(CommitRecord) == 64);
-
-/// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those
-/// of some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any
-/// thread may read it; the entry of a page that is not known must not be read. Entries that are not known take no
-/// memory.
-class PageDirectory {
-public:
-    PageDirectory();
-    PageDirectory(const PageDirectory& other);
-    PageDirectory(PageDirectory&& other) noexcept;
-    PageDirectory& operator=(const PageDirectory& other);
-    PageDirectory& operator=(PageDirectory&& other) noexcept;
-    ~PageDirectory();
-
-    [[nodiscard]] size_t size() const { return parts_ ? sparse_.size() : entries_.size(); }
-    [[nodiscard]] bool empty() const { return size() == 0; }
-    [[nodiscard]] const PageEntry& operator[](size_t page) const { return data()[page]; }
-    [[nodiscard]] PageEntry& operator[](size_t page) { return parts_ ? sparse_[page] : entries_[page]; }
-    [[nodiscard]] const PageEntry* begin() const { return data(); }
-    [[nodiscard]] const PageEntry* end() const { return data() + size(); }
-    [[nodiscard]] const PageEntry* data() const { return parts_ ? sparse_.data() : entries_.data(); }
-    /// Of a directory that is known as a whole.
-    void push_back(const PageEntry& entry) { entries_.push_back(entry); }
-    void resize(size_t pages) { entries_.resize(pages); }
-
-    /// So many pages, none of them known. Throws std::bad_alloc where there are no addresses for them.
-    void expect(size_t pages);
-    [[nodiscard]] bool knows(uint64_t page) const { return !parts_ || knowsBlock(page / kEntriesPerBlock); }
-    [[nodiscard]] bool knowsBlock(uint64_t block) const;
-    [[nodiscard]] uint64_t blocks() const { return (size() + kEntriesPerBlock - 1) / kEntriesPerBlock; }
-    [[nodiscard]] uint64_t blocksKnown() const;
-
-private:
-    friend class BlockAdmission;
-    struct Parts;
-    std::vector<PageEntry> entries_;         // where all is known
-    mutable SparseArray<PageEntry> sparse_;  // where it comes in parts
-    std::unique_ptr<Parts> parts_;           // nothing: all is known
-};
-
-/// Header and directory of a .vcp file, checked. Copy it, share it, read from any thread.
-struct Dataset {
-    FileHeader header;
-    PageDirectory pages;
-
-    [[nodiscard]] bool hasColour() const { return (header.flags & kFlagColour) != 0; }
-    /// Edge of a cell of `level`, world units.
-    [[nodiscard]] double cellOf(uint32_t level) const;
-    /// World position of the lowest corner of a page.
-    [[nodiscard]] glm::dvec3 originOf(const PageEntry& page) const;
-    /// Edge of a page, world units.
-    [[nodiscard]] double edgeOf(const PageEntry& page) const;
-};
-
-/// Where the bytes of a file come from: bounded reads at an offset. Implemented by streaming/ (file, HTTP,
-/// faulty) and by tests. Any thread may call read.
-class ByteReader {
-public:
-    virtual ~ByteReader() = default;
-    virtual Result<void> read(uint64_t offset, std::span<std::byte> bytes) const = 0;
-    [[nodiscard]] virtual uint64_t size() const = 0;
-    [[nodiscard]] virtual const std::string& name() const = 0;
-    /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
-    virtual void interrupt() const {}
-    /// What read() gave for these bytes proved wrong: a copy of them is not used again.
-    virtual void distrust(uint64_t offset, uint64_t bytes) const {
-        static_cast<void>(offset), static_cast<void>(bytes);
-    }
-};
-
-/// Opens a local file for bounded reads (pread); a pipe or device in its place is not waited for. Errors: Io.
-Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
-
-/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header
-/// claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
-Result<Dataset> readDataset(const ByteReader& reader);
-
-inline constexpr uint64_t kLeadBytes = 64 << 10;
-
-/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so
-/// that what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of
-/// kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many
-/// pages.
-Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
-constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
-
-/// Checks a block of the directory, by its hash and against the blocks that are known, and makes its entries known;
-/// nothing where they are. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`. Any thread. Errors:
-/// InvalidInput.
-Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block,
-                        std::span<const std::byte> bytes);
-constexpr uint64_t blockOffset(uint64_t block) { return kDirectoryOffset + block * kBlockBytes; }
-
-/// A page's decoded bytes, 16-byte aligned.
-struct PageBytes {
-    std::vector<uint4> geometry;
-    std::vector<uint4> colour;  ///< empty when not asked for or absent
-
-    [[nodiscard]] std::span<const std::byte> geometryBytes() const { return std::as_bytes(std::span(geometry)); }
-    [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
-};
-
-/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page.
-/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded. The
-/// page's entry is known. Any thread.
-Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
-
-/// Reads every byte of the file and checks it, also those between pages, and that header, directory and pages say the
-/// same. Calls `progress(bytes done)` now and then; it returns false to cancel. Errors: the first thing that is wrong.
-Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t) = nullptr, void* user = nullptr);
-
-/// XXH3-64.
-uint64_t hashBytes(std::span<const std::byte> bytes);
-
-/// Interleaves three 21-bit coordinates, x lowest; and back.
-uint64_t mortonEncode(glm::u32vec3 cell);
-glm::u32vec3 mortonDecode(uint64_t code);
 
 }  // namespace vcp

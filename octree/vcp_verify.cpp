@@ -1,10 +1,11 @@
-// verifyFile: every byte of a .vcp, and that what it says of itself in several places is the same.
+#include "octree/vcp_verify.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "octree/vcp_file.h"
+#include "octree/page_reader.h"
 
 namespace vcp {
 
@@ -68,11 +69,7 @@ public:
 
 private:
     [[nodiscard]] Error broken(std::string element, uint64_t byte, std::string message) const {
-        return {.code = ErrorCode::InvalidInput,
-                .message = std::move(message),
-                .file = reader_.name(),
-                .element = std::move(element),
-                .byte = byte};
+        return brokenBytes(reader_.name(), std::move(element), byte, std::move(message));
     }
 
     /// The mesh lies in the root page.

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "octree/content_hash.h"
 #include "octree/page_codec.h"
 
 namespace vcp {
@@ -9,7 +10,7 @@ namespace vcp {
 namespace {
 
 uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
-uint64_t directoryBytes(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock * kBlockBytes; }
+uint64_t directoryBytes(uint64_t pages) { return blocksOf(pages) * kBlockBytes; }
 
 }  // namespace
 

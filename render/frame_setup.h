@@ -2,7 +2,8 @@
 #pragma once
 
 #include "render/frame.h"
-#include "render/renderer.h"
+#include "render/frame_request.h"
+#include "render/similarity.h"
 #include "streaming/page_selection.h"
 
 namespace vcp {

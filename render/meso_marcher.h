@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "mesostructure/method.h"
-#include "render/renderer.h"
+#include "render/vulkan/device_info.h"
 
 namespace vcp {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include <glm/vec4.hpp>
-
-#include "octree/vcp_file.h"
+#include "octree/dataset_reader.h"
+#include "octree/page.h"
 
 namespace vcp {
 

@@ -96,7 +96,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
     options_.budgetBytes = budgetBytes;
     options_.loader.heldBytes = ramBytes;
     startLoader();  // what the old one held is gone
-    for (const uint64_t page : std::exchange(tooLarge_, {})) policy_->restore(page);
+    for (const Request request : std::exchange(tooLarge_, {})) policy_->restore(request);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
     auto carried = pool_ ? carryOut() : std::vector<CarriedPage>();
     if (!carried) return carried.error();
@@ -137,16 +137,16 @@ const std::vector<uint64_t>& Residency::cut(ViewNumber number) {
 }
 
 Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber number) {
-    std::vector<LoadedPage> loaded = loader_->collect(uploadBytes());
-    for (const LoadedPage& page : loaded) {
-        if (page.bytes || !policy_->giveUp(page.page)) continue;
+    std::vector<Loaded> loaded = loader_->collect(uploadBytes());
+    for (const Loaded& page : loaded) {
+        if (page.bytes || !policy_->giveUp(page.request)) continue;
         problems_.push_back(page.bytes.error());
-        if (page.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(page.page);
+        if (page.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(page.request);
     }
     policy_->look(view, steadySeconds(), number);
-    for (const LoadedPage& page : loaded) {
-        if (!page.bytes || isBlock(page.page)) continue;
-        if (auto placed = place(page); !placed) return placed.error();
+    for (const Loaded& page : loaded) {
+        if (!page.bytes || !page.request.isPage()) continue;
+        if (auto placed = place(page.request.number, *page.bytes); !placed) return placed.error();
     }
     VCP_TRY(pool_->flush());
     PolicyOutcome outcome = policy_->finish(number);
@@ -195,16 +195,16 @@ Result<std::optional<PoolSlot>> Residency::slotFor(uint64_t page) {
     return placement.slot;
 }
 
-Result<void> Residency::place(const LoadedPage& page) {
-    const auto slot = slotFor(page.page);
+Result<void> Residency::place(uint64_t page, const PageBytes& bytes) {
+    const auto slot = slotFor(page);
     if (!slot) return slot.error();
     if (!*slot) return {};
-    const std::span geometry = page.bytes->geometryBytes();
-    PageHeader& header = headers_[page.page];
+    const std::span geometry = bytes.geometryBytes();
+    PageHeader& header = headers_[page];
     // Pages of the other method say all in a header of their own, which the shader reads.
     if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
     VCP_TRY(pool_->write(**slot, 0, geometry));
-    if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), page.bytes->colourBytes()));
+    if (!bytes.colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), bytes.colourBytes()));
     return {};
 }
 

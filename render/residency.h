@@ -13,9 +13,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "render/frame_result.h"
 #include "render/page_pool.h"
 #include "render/page_table.h"
-#include "render/renderer.h"
 #include "streaming/page_loader.h"
 #include "streaming/residency_policy.h"
 
@@ -86,7 +86,7 @@ private:
     [[nodiscard]] bool hasRoomIn(PoolShape shape) const;
     /// A slot for the page, with pages moved out of its way; nothing where there is none.
     Result<std::optional<PoolSlot>> slotFor(uint64_t page);
-    Result<void> place(const LoadedPage& page);
+    Result<void> place(uint64_t page, const PageBytes& bytes);
     struct ViewCut {
         std::vector<uint64_t> pages;
         uint64_t version = UINT64_MAX;
@@ -107,8 +107,8 @@ private:
     LoaderStats past_;                                  // of the loaders before this one
     std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
     std::map<ViewNumber, ViewCut> cuts_;
-    std::vector<Error> problems_;     // not reported yet
-    std::vector<uint64_t> tooLarge_;  // pages given up because reading them takes more memory than there is
+    std::vector<Error> problems_;    // not reported yet
+    std::vector<Request> tooLarge_;  // given up because reading them takes more memory than there is
     bool listens_ = false;
 };
 

@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "render/renderer.h"
+#include "render/frame_request.h"
 
 namespace vcp {
 

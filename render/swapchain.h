@@ -7,6 +7,7 @@
 #include "render/passes/frame_resources.h"
 #include "render/picture_scaling.h"
 #include "render/vulkan/device.h"
+#include "render/window_drawing.h"
 
 namespace vcp {
 

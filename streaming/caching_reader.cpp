@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "octree/content_hash.h"
 #include "octree/durable_file.h"
 #include "octree/regular_file.h"
 

@@ -12,8 +12,7 @@
 #include <mutex>
 #include <string>
 #include <vector>
-
-#include "octree/vcp_file.h"
+#include "octree/byte_reader.h"
 
 namespace vcp {
 

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <condition_variable>
 
+#include "octree/content_hash.h"
+
 namespace vcp {
 
 namespace {

@@ -9,8 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <unordered_map>
-
-#include "octree/vcp_file.h"
+#include "octree/byte_reader.h"
 
 namespace vcp {
 

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "octree/dataset_reader.h"
 #include "streaming/http_exchange.h"
 
 namespace vcp {

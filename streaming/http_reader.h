@@ -24,7 +24,7 @@
 #include <memory>
 #include <string>
 
-#include "octree/vcp_file.h"
+#include "octree/byte_reader.h"
 #include "streaming/web_address.h"
 
 namespace vcp {

@@ -15,8 +15,13 @@ constexpr uint32_t kLongestRun = 64;
 /// Pages are read with a more urgent one where they are at least so urgent, compared with it.
 constexpr double kRunUrgency = 0.5;
 
-uint64_t sizeOf(const LoadedPage& page) {
-    return page.bytes ? page.bytes->geometryBytes().size() + page.bytes->colourBytes().size() : 0;
+uint64_t sizeOf(const Loaded& loaded) {
+    return loaded.bytes ? loaded.bytes->geometryBytes().size() + loaded.bytes->colourBytes().size() : 0;
+}
+
+/// As messages name it.
+std::string elementOf(Request request) {
+    return fmt::format("{} {}", request.isPage() ? "page" : "directory block", request.number);
 }
 
 // Makes this thread, one of so many, less urgent than what started it: by steps of the system's niceness, of which each
@@ -57,7 +62,7 @@ PageLoader::~PageLoader() {
     for (std::thread& thread : threads_) thread.join();
 }
 
-void PageLoader::request(std::vector<PageRequest> wishes, uint64_t mostDone) {
+void PageLoader::request(std::vector<Wish> wishes, uint64_t mostDone) {
     {
         const std::lock_guard lock(mutex_);
         mostDone_ = mostDone;
@@ -67,8 +72,8 @@ void PageLoader::request(std::vector<PageRequest> wishes, uint64_t mostDone) {
     ready_.notify_all();
 }
 
-std::vector<LoadedPage> PageLoader::collect(uint64_t mostBytes) {
-    std::vector<LoadedPage> pages;
+std::vector<Loaded> PageLoader::collect(uint64_t mostBytes) {
+    std::vector<Loaded> pages;
     {
         const std::lock_guard lock(mutex_);
         uint64_t bytes = 0;
@@ -77,7 +82,7 @@ std::vector<LoadedPage> PageLoader::collect(uint64_t mostBytes) {
             bytes += sizeOf(*end++);
         pages.assign(std::make_move_iterator(done_.begin()), std::make_move_iterator(end));
         done_.erase(done_.begin(), end);
-        for (const LoadedPage& page : pages) queue_.delivered(page.page);
+        for (const Loaded& page : pages) queue_.delivered(page.request);
         stats_.heldBytes -= bytes;
         doneBytes_ -= bytes;
     }
@@ -107,7 +112,7 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     if (doneBytes_ >= mostDone_) return std::nullopt;
     const auto wish = queue_.next(now);
     if (!wish) return std::nullopt;
-    const uint64_t first = wish->page;
+    const Request first = wish->request;
     const uint64_t bytes = source_->bytesToRead(first, options_.withColour);
     if (bytes > options_.heldBytes) {
         queue_.begin(first);
@@ -117,14 +122,14 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
                                               "pages on their way; allow more, or build the file with smaller cells",
                                               bytes, options_.heldBytes),
                        .file = source_->name(),
-                       .element = fmt::format("page {}", first)});
+                       .element = elementOf(first)});
         return Run{first, 0};
     }
     if (!fits(bytes)) return std::nullopt;
     Run run{first, 0};
     const uint32_t most = source_->runFrom(first, kLongestRun, options_.withColour);
     do {
-        const uint64_t page = first + run.count;
+        const Request page = first.after(run.count);
         const uint64_t more = source_->bytesToRead(page, options_.withColour);
         if (run.count > 0 && (!queue_.mayBegin(page, wish->priority * kRunUrgency, now) || !fits(more))) break;
         queue_.begin(page);
@@ -140,8 +145,8 @@ void PageLoader::shareMemory() {
     stats_.heldBytesMax = std::max(stats_.heldBytesMax, stats_.heldBytes + kept);
 }
 
-void PageLoader::handOver(uint64_t page, Result<PageBytes> bytes) {
-    done_.push_back({page, std::move(bytes)});
+void PageLoader::handOver(Request request, Result<PageBytes> bytes) {
+    done_.push_back({request, std::move(bytes)});
     stats_.heldBytes += sizeOf(done_.back());
     doneBytes_ += sizeOf(done_.back());
     ready_.notify_all();
@@ -149,7 +154,7 @@ void PageLoader::handOver(uint64_t page, Result<PageBytes> bytes) {
 
 void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
     for (uint32_t i = 0; i < run.count; ++i) {
-        const uint64_t page = run.first + i;
+        const Request page = run.first.after(i);
         stats_.heldBytes -= source_->bytesToRead(page, options_.withColour);
         if (pages[i]) {
             handOver(page, std::move(pages[i]));

@@ -1,5 +1,6 @@
-// Background threads that read pages. They give way to the threads that draw: where these keep the processor busy, as a
-// software device does, a frame takes about as long with loads as without.
+// Background threads that read pages and blocks of the directory, called pages here. They give way to the threads that
+// draw: where these keep the processor busy, as a software device does, a frame takes about as long with loads as
+// without.
 //
 // A page's way: wished for in request(), read and checked by a thread, fetched with collect(). request()
 // replaces all wishes before it, but those that a thread has begun with; so what no view wants any more is
@@ -25,13 +26,15 @@
 #include <vector>
 
 #include "streaming/page_source.h"
+#include "streaming/request.h"
 #include "streaming/request_queue.h"
 
 namespace vcp {
 
-struct LoadedPage {
-    uint64_t page;
-    Result<PageBytes> bytes;  ///< an error: the page was given up
+/// What came of a request.
+struct Loaded {
+    Request request;
+    Result<PageBytes> bytes;  ///< an error: it was given up
 };
 
 struct LoaderOptions {
@@ -61,11 +64,11 @@ public:
 
     /// Replaces the list of wishes. Pages being read or waiting to be collected are not read again. While pages of
     /// `mostDone` bytes wait to be collected, no further read begins.
-    void request(std::vector<PageRequest> wishes, uint64_t mostDone = UINT64_MAX);
+    void request(std::vector<Wish> wishes, uint64_t mostDone = UINT64_MAX);
 
     /// Pages that are done, in the order they were; as many as have `mostBytes` together, but one at least.
     /// Never waits for a read.
-    std::vector<LoadedPage> collect(uint64_t mostBytes = UINT64_MAX);
+    std::vector<Loaded> collect(uint64_t mostBytes = UINT64_MAX);
 
     /// Waits until collect() would give something. False: after `timeout`, or nothing is wished for or under
     /// way.
@@ -77,14 +80,14 @@ public:
 
 private:
     struct Run {
-        uint64_t first = 0;
+        Request first;
         uint32_t count = 0;
     };
     void work();
     [[nodiscard]] std::optional<Run> beginRun(double now);
     void finishRun(Run run, std::vector<Result<PageBytes>> pages);
     void shareMemory();
-    void handOver(uint64_t page, Result<PageBytes> bytes);
+    void handOver(Request request, Result<PageBytes> bytes);
     [[nodiscard]] bool fits(uint64_t bytes) const { return bytes <= options_.heldBytes - stats_.heldBytes; }
 
     const std::shared_ptr<const PageSource> source_;
@@ -93,7 +96,7 @@ private:
     mutable std::mutex mutex_;
     std::condition_variable work_, ready_;
     RequestQueue queue_;
-    std::vector<LoadedPage> done_;
+    std::vector<Loaded> done_;
     uint64_t doneBytes_ = 0, mostDone_ = UINT64_MAX;
     LoaderStats stats_;
     bool stop_ = false;

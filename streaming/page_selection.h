@@ -22,8 +22,7 @@
 
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
-
-#include "octree/vcp_file.h"
+#include "octree/dataset_reader.h"
 
 namespace vcp {
 

@@ -42,17 +42,16 @@ private:
 
 }  // namespace
 
-std::vector<Result<PageBytes>> PageSource::readRun(uint64_t first, uint32_t count, bool withColour) const {
-    std::vector<Result<PageBytes>> pages;
-    for (uint64_t page = first; page < first + count; ++page) pages.push_back(read(page, withColour));
-    return pages;
+std::vector<Result<PageBytes>> PageSource::readRun(Request first, uint32_t count, bool withColour) const {
+    std::vector<Result<PageBytes>> run;
+    for (uint32_t i = 0; i < count; ++i) run.push_back(read(first.after(i), withColour));
+    return run;
 }
 
-uint32_t PageSource::runFrom(uint64_t, uint32_t, bool) const { return 1; }
+uint32_t PageSource::runFrom(Request, uint32_t, bool) const { return 1; }
 
-Result<PageBytes> FilePageSource::read(uint64_t page, bool withColour) const {
-    if (isBlock(page)) return std::move(readBlocks(page - kFirstBlockNumber, 1).front());
-    return std::move(readRun(page, 1, withColour).front());
+Result<PageBytes> FilePageSource::read(Request request, bool withColour) const {
+    return std::move(readRun(request, 1, withColour).front());
 }
 
 Result<PageBytes> FilePageSource::readFrom(const ByteReader& bytes, uint64_t page, bool withColour) const {
@@ -78,8 +77,11 @@ std::vector<Result<PageBytes>> FilePageSource::readBlocks(uint64_t first, uint32
     return blocks;
 }
 
-std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t count, bool withColour) const {
-    if (isBlock(first)) return readBlocks(first - kFirstBlockNumber, count);
+std::vector<Result<PageBytes>> FilePageSource::readRun(Request first, uint32_t count, bool withColour) const {
+    return first.isPage() ? readPages(first.number, count, withColour) : readBlocks(first.number, count);
+}
+
+std::vector<Result<PageBytes>> FilePageSource::readPages(uint64_t first, uint32_t count, bool withColour) const {
     std::vector<StoredPages::Bytes> kept;
     for (uint64_t page = first; page < first + count; ++page) kept.push_back(kept_.find(page));
     const auto extent = [&](uint32_t i) { return extentOf(dataset_->pages[first + i], withColour); };
@@ -105,9 +107,12 @@ std::vector<Result<PageBytes>> FilePageSource::readRun(uint64_t first, uint32_t 
     return pages;
 }
 
-uint32_t FilePageSource::runFrom(uint64_t first, uint32_t most, bool withColour) const {
-    if (isBlock(first))
-        return static_cast<uint32_t>(std::min<uint64_t>(most, kFirstBlockNumber + dataset_->pages.blocks() - first));
+uint32_t FilePageSource::runFrom(Request first, uint32_t most, bool withColour) const {
+    if (first.isPage()) return pageRunFrom(first.number, most, withColour);
+    return static_cast<uint32_t>(std::min<uint64_t>(most, dataset_->pages.blocks() - first.number));
+}
+
+uint32_t FilePageSource::pageRunFrom(uint64_t first, uint32_t most, bool withColour) const {
     uint32_t count = 1;
     const Extent start = extentOf(dataset_->pages[first], withColour);
     for (uint64_t last = start.end;
@@ -119,9 +124,9 @@ uint32_t FilePageSource::runFrom(uint64_t first, uint32_t most, bool withColour)
     return count;
 }
 
-uint64_t FilePageSource::bytesToRead(uint64_t page, bool withColour) const {
-    if (isBlock(page)) return kBlockBytes;
-    const PageEntry& entry = dataset_->pages[page];
+uint64_t FilePageSource::bytesToRead(Request request, bool withColour) const {
+    if (!request.isPage()) return kBlockBytes;
+    const PageEntry& entry = dataset_->pages[request.number];
     const uint64_t geometry = 2 * uint64_t{entry.storedBytes} + entry.pageBytes;
     return withColour ? geometry + 2 * uint64_t{entry.colourStoredBytes} + entry.colourBytes : geometry;
 }

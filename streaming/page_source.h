@@ -5,32 +5,28 @@
 #include <memory>
 #include <vector>
 
-#include "octree/vcp_file.h"
+#include "octree/page_reader.h"
+#include "streaming/request.h"
 #include "streaming/stored_pages.h"
 
 namespace vcp {
 
-/// A block of the directory (octree/vcp_file.h) is asked for as a page of this number or above; it takes no bytes when
-/// it has been read, but its entries are known then.
-inline constexpr uint64_t kFirstBlockNumber = uint64_t{1} << 63;
-constexpr bool isBlock(uint64_t number) { return number >= kFirstBlockNumber; }
-constexpr uint64_t numberOfBlock(uint64_t block) { return kFirstBlockNumber + block; }
-
-/// Delivers checked pages. Any thread may call, several at once. Entries of pages that are asked for are known.
+/// Delivers checked pages, and takes in blocks of the directory. Any thread may call, several at once. Entries of pages
+/// that are asked for are known.
 class PageSource {
 public:
     virtual ~PageSource() = default;
-    /// Bytes of page `page` of the directory, verified, decompressed and parsed without complaint (readPage).
-    /// Colour is empty where the dataset has none or it is not asked for.
-    virtual Result<PageBytes> read(uint64_t page, bool withColour) const = 0;
+    /// A page's bytes, verified, decompressed and parsed without complaint (readPage). Colour is empty where the
+    /// dataset has none or it is not asked for. Of a block of the directory: no bytes, but its entries are known now.
+    virtual Result<PageBytes> read(Request request, bool withColour) const = 0;
 
-    /// Pages `first` to `first + count - 1`, as read() would give each; where they lie together, in one read.
-    virtual std::vector<Result<PageBytes>> readRun(uint64_t first, uint32_t count, bool withColour) const;
-    /// How many pages from `first` on are best read together, at most `most`; at least 1.
-    [[nodiscard]] virtual uint32_t runFrom(uint64_t first, uint32_t most, bool withColour) const;
+    /// `first` and what follows it, `count` in all, as read() would give each; where they lie together, in one read.
+    virtual std::vector<Result<PageBytes>> readRun(Request first, uint32_t count, bool withColour) const;
+    /// How many pages or blocks from `first` on are best read together, at most `most`; at least 1.
+    [[nodiscard]] virtual uint32_t runFrom(Request first, uint32_t most, bool withColour) const;
 
-    /// Memory that reading a page takes: its stored bytes, twice, and what it returns.
-    [[nodiscard]] virtual uint64_t bytesToRead(uint64_t page, bool withColour) const = 0;
+    /// Memory that reading a page takes: its stored bytes, twice, and what it returns. Of a block: its bytes.
+    [[nodiscard]] virtual uint64_t bytesToRead(Request request, bool withColour) const = 0;
     /// What pages take as they are stored may be kept in memory to be read again: at most `bytes` from now on, whatever
     /// is being read. Returns how many are kept. For one PageLoader, which has the memory.
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
@@ -49,16 +45,18 @@ public:
                    uint64_t runBytes = 0)
         : reader_(std::move(reader)), dataset_(std::move(dataset)), runBytes_(runBytes) {}
 
-    Result<PageBytes> read(uint64_t page, bool withColour) const override;
-    std::vector<Result<PageBytes>> readRun(uint64_t first, uint32_t count, bool withColour) const override;
-    [[nodiscard]] uint32_t runFrom(uint64_t first, uint32_t most, bool withColour) const override;
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override;
+    Result<PageBytes> read(Request request, bool withColour) const override;
+    std::vector<Result<PageBytes>> readRun(Request first, uint32_t count, bool withColour) const override;
+    [[nodiscard]] uint32_t runFrom(Request first, uint32_t most, bool withColour) const override;
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override;
     uint64_t keepWithin(uint64_t bytes) const override { return kept_.limitTo(bytes); }
     void interrupt() const override { reader_->interrupt(); }
     [[nodiscard]] std::string name() const override { return reader_->name(); }
 
 private:
     Result<PageBytes> readFrom(const ByteReader& bytes, uint64_t page, bool withColour) const;
+    std::vector<Result<PageBytes>> readPages(uint64_t first, uint32_t count, bool withColour) const;
+    [[nodiscard]] uint32_t pageRunFrom(uint64_t first, uint32_t most, bool withColour) const;
     std::vector<Result<PageBytes>> readBlocks(uint64_t first, uint32_t count) const;
 
     std::shared_ptr<const ByteReader> reader_;

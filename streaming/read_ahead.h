@@ -6,8 +6,7 @@
 #include <cstring>
 #include <memory>
 #include <vector>
-
-#include "octree/vcp_file.h"
+#include "octree/byte_reader.h"
 
 namespace vcp {
 

@@ -10,59 +10,59 @@ std::optional<double> RetryPolicy::delayAfter(uint32_t failures, uint32_t damage
     return std::min(firstDelaySeconds * std::pow(growth, double(failures) - 1), longestDelaySeconds);
 }
 
-void RequestQueue::replace(std::vector<PageRequest> wishes) {
+void RequestQueue::replace(std::vector<Wish> wishes) {
     std::stable_sort(wishes.begin(), wishes.end(),
-                     [](const PageRequest& a, const PageRequest& b) { return a.priority > b.priority; });
+                     [](const Wish& a, const Wish& b) { return a.priority > b.priority; });
     wishes_ = std::move(wishes);
     over_.clear();
     priorities_.clear();
-    for (const PageRequest& wish : wishes_) priorities_.emplace(wish.page, wish.priority);
+    for (const Wish& wish : wishes_) priorities_.emplace(wish.request, wish.priority);
 }
 
-double RequestQueue::dueOf(uint64_t page) const {
-    const auto trial = trials_.find(page);
+double RequestQueue::dueOf(Request request) const {
+    const auto trial = trials_.find(request);
     return trial != trials_.end() ? trial->second.due : 0;
 }
 
-std::optional<PageRequest> RequestQueue::next(double now) const {
-    for (const PageRequest& wish : wishes_)
-        if (isIdle(wish.page) && dueOf(wish.page) <= now) return wish;
+std::optional<Wish> RequestQueue::next(double now) const {
+    for (const Wish& wish : wishes_)
+        if (isIdle(wish.request) && dueOf(wish.request) <= now) return wish;
     return std::nullopt;
 }
 
-bool RequestQueue::mayBegin(uint64_t page, double leastPriority, double now) const {
-    const auto wish = priorities_.find(page);
-    return wish != priorities_.end() && wish->second >= leastPriority && isIdle(page) && dueOf(page) <= now;
+bool RequestQueue::mayBegin(Request request, double leastPriority, double now) const {
+    const auto wish = priorities_.find(request);
+    return wish != priorities_.end() && wish->second >= leastPriority && isIdle(request) && dueOf(request) <= now;
 }
 
-void RequestQueue::delivered(uint64_t page) {
-    underWay_.erase(page);
-    over_.insert(page);
-    trials_.erase(page);
+void RequestQueue::delivered(Request request) {
+    underWay_.erase(request);
+    over_.insert(request);
+    trials_.erase(request);
 }
 
-bool RequestQueue::failed(uint64_t page, ErrorCode code, double now) {
-    Trial& trial = trials_[page];
+bool RequestQueue::failed(Request request, ErrorCode code, double now) {
+    Trial& trial = trials_[request];
     ++trial.failures;
     if (code != ErrorCode::Io) ++trial.damaged;
     if (const auto delay = policy_.delayAfter(trial.failures, trial.damaged)) {
         trial.due = now + *delay;
-        underWay_.erase(page);
+        underWay_.erase(request);
         return false;
     }
-    givenUp_.insert(page);
+    givenUp_.insert(request);
     return true;
 }
 
 double RequestQueue::nextTry() const {
     double first = std::numeric_limits<double>::infinity();
-    for (const auto& [page, trial] : trials_)
-        if (isIdle(page) && priorities_.contains(page)) first = std::min(first, trial.due);
+    for (const auto& [request, trial] : trials_)
+        if (isIdle(request) && priorities_.contains(request)) first = std::min(first, trial.due);
     return first;
 }
 
 size_t RequestQueue::pending() const {
-    const auto waits = [&](const PageRequest& wish) { return isIdle(wish.page); };
+    const auto waits = [&](const Wish& wish) { return isIdle(wish.request); };
     return static_cast<size_t>(std::count_if(wishes_.begin(), wishes_.end(), waits)) + underWay_.size();
 }
 

@@ -1,10 +1,10 @@
-// Which page is read next. Pure: no threads, and time is what the caller says.
+// Which page, or block of the directory, is read next. Pure: no threads, and time is what the caller says.
 //
-// A page's way: wished for (replace), begun (begin) as soon as it is the most urgent one, then
+// The way of both: wished for (replace), begun (begin) as soon as it is the most urgent one, then
 //   delivered    it is not begun again until a new list wishes for it
 //   failed       it waits, longer after each failure, and is begun again while it is wished for; after a few
 //                failures it is given up: reported once, and never begun again
-// A page that waits holds nobody up: the next most urgent one is begun in its place.
+// What waits holds nobody up: the next most urgent one is begun in its place.
 #pragma once
 
 #include <cstdint>
@@ -15,17 +15,11 @@
 #include <vector>
 
 #include "octree/result.h"
+#include "streaming/request.h"
 
 namespace vcp {
 
-struct PageRequest {
-    uint64_t page;
-    double priority;  ///< larger first; of equals the order of the list
-
-    bool operator==(const PageRequest&) const = default;
-};
-
-/// When a page that failed is read again.
+/// When what failed is read again.
 struct RetryPolicy {
     uint32_t attempts = 8;         ///< of a read that fails
     uint32_t damagedAttempts = 4;  ///< of these, where bytes came and were wrong
@@ -41,27 +35,27 @@ class RequestQueue {
 public:
     explicit RequestQueue(const RetryPolicy& policy = {}) : policy_(policy) {}
 
-    /// The wishes from now on. Pages that are under way stay so.
-    void replace(std::vector<PageRequest> wishes);
+    /// The wishes from now on. What is under way stays so.
+    void replace(std::vector<Wish> wishes);
 
-    /// The most urgent page that may begin at `now`.
-    [[nodiscard]] std::optional<PageRequest> next(double now) const;
-    /// Whether this page may begin at `now`, wished for with at least this priority.
-    [[nodiscard]] bool mayBegin(uint64_t page, double leastPriority, double now) const;
-    void begin(uint64_t page) { underWay_.insert(page); }
+    /// The most urgent wish that may begin at `now`.
+    [[nodiscard]] std::optional<Wish> next(double now) const;
+    /// Whether this request may begin at `now`, wished for with at least this priority.
+    [[nodiscard]] bool mayBegin(Request request, double leastPriority, double now) const;
+    void begin(Request request) { underWay_.insert(request); }
 
     /// It was handed over.
-    void delivered(uint64_t page);
+    void delivered(Request request);
     /// True: it is given up, and the error is to be handed over (then delivered). False: it will be begun again.
-    [[nodiscard]] bool failed(uint64_t page, ErrorCode code, double now);
+    [[nodiscard]] bool failed(Request request, ErrorCode code, double now);
     /// It was neither read nor did it fail: Cancelled.
-    void returned(uint64_t page) { underWay_.erase(page); }
+    void returned(Request request) { underWay_.erase(request); }
 
-    /// When a page that waits may be begun; infinity where none waits.
+    /// When a request that waits may be begun; infinity where none waits.
     [[nodiscard]] double nextTry() const;
-    /// Pages wished for or under way.
+    /// Requests wished for or under way.
     [[nodiscard]] size_t pending() const;
-    /// Elements of all containers: bounded by the dataset's pages.
+    /// Elements of all containers: bounded by the dataset's pages and blocks.
     [[nodiscard]] size_t entries() const {
         return wishes_.size() + priorities_.size() + underWay_.size() + over_.size() + givenUp_.size() + trials_.size();
     }
@@ -71,18 +65,18 @@ private:
         uint32_t failures = 0, damaged = 0;
         double due = 0;
     };
-    [[nodiscard]] bool isIdle(uint64_t page) const {
-        return !underWay_.contains(page) && !over_.contains(page) && !givenUp_.contains(page);
+    [[nodiscard]] bool isIdle(Request request) const {
+        return !underWay_.contains(request) && !over_.contains(request) && !givenUp_.contains(request);
     }
-    [[nodiscard]] double dueOf(uint64_t page) const;
+    [[nodiscard]] double dueOf(Request request) const;
 
     RetryPolicy policy_;
-    std::vector<PageRequest> wishes_;  // the most urgent first
-    std::unordered_map<uint64_t, double> priorities_;
-    std::unordered_set<uint64_t> underWay_;  // until handed over
-    std::unordered_set<uint64_t> over_;      // handed over since the list came
-    std::unordered_set<uint64_t> givenUp_;
-    std::unordered_map<uint64_t, Trial> trials_;
+    std::vector<Wish> wishes_;  // the most urgent first
+    std::unordered_map<Request, double, RequestHash> priorities_;
+    std::unordered_set<Request, RequestHash> underWay_;  // until handed over
+    std::unordered_set<Request, RequestHash> over_;      // handed over since the list came
+    std::unordered_set<Request, RequestHash> givenUp_;
+    std::unordered_map<Request, Trial, RequestHash> trials_;
 };
 
 }  // namespace vcp

@@ -341,28 +341,28 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
 
 /// Those that hold children of the pages that wait for them, but `blocks`, which have been wished for.
 void ResidencyPolicy::wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
-                                    std::vector<PageRequest>& wishes) const {
+                                    std::vector<Wish>& wishes) const {
     uint64_t last = UINT64_MAX;
     for (const uint64_t page : awaited) {
         for (const uint64_t child : childrenOf(dataset_->pages[page])) {
             const uint64_t block = child / kEntriesPerBlock;
             if (block == last || blocksSeen_[block] != 0 || !blocks.insert(block).second) continue;
             last = block;
-            wishes.push_back({numberOfBlock(block), urgency});
+            wishes.push_back({Request::directoryBlock(block), urgency});
         }
     }
 }
 
-/// Of a page, or of all in a block of the directory.
-std::span<uint8_t> ResidencyPolicy::statesOf(uint64_t number) {
+/// The state of a page, or those of all pages in a block of the directory.
+std::span<uint8_t> ResidencyPolicy::statesOf(Request request) {
     const std::span<uint8_t> states(states_);
-    if (!isBlock(number)) return states.subspan(number, 1);
-    const uint64_t first = (number - kFirstBlockNumber) * kEntriesPerBlock;
+    if (request.isPage()) return states.subspan(request.number, 1);
+    const uint64_t first = request.number * kEntriesPerBlock;
     return states.subspan(first, std::min<uint64_t>(kEntriesPerBlock, states.size() - first));
 }
 
-bool ResidencyPolicy::giveUp(uint64_t page) {
-    const std::span<uint8_t> states = statesOf(page);
+bool ResidencyPolicy::giveUp(Request request) {
+    const std::span<uint8_t> states = statesOf(request);
     if (states[0] == kUnavailable) return false;
     std::fill(states.begin(), states.end(), uint8_t{kUnavailable});
     stale_ = true;
@@ -380,8 +380,8 @@ uint64_t ResidencyPolicy::bytesHeld() const {
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);
 }
 
-void ResidencyPolicy::restore(uint64_t page) {
-    const std::span<uint8_t> states = statesOf(page);
+void ResidencyPolicy::restore(Request request) {
+    const std::span<uint8_t> states = statesOf(request);
     std::fill(states.begin(), states.end(), uint8_t{kAvailable});
     stale_ = true;
 }

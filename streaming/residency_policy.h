@@ -37,10 +37,10 @@
 #include <tuple>
 #include <vector>
 
-#include "octree/vcp_file.h"
+#include "octree/dataset_reader.h"
 #include "streaming/load_order.h"
 #include "streaming/page_selection.h"
-#include "streaming/request_queue.h"
+#include "streaming/request.h"
 #include "streaming/slot_allocator.h"
 
 namespace vcp {
@@ -83,9 +83,9 @@ struct PolicyCounts {
 };
 
 struct PolicyOutcome {
-    DrawableCut drawable;             ///< of one view
-    std::vector<PageRequest> wishes;  ///< of all views
-    uint64_t missing = 0;             ///< pages that any view wants
+    DrawableCut drawable;      ///< of one view
+    std::vector<Wish> wishes;  ///< of all views
+    uint64_t missing = 0;      ///< pages that any view wants
 };
 
 class ResidencyPolicy {
@@ -110,11 +110,11 @@ public:
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
     [[nodiscard]] DrawableCut drawable(ViewNumber number) const;
 
-    /// The page, or block of the directory (numberOfBlock), cannot be read: from the next look() its parents are drawn
-    /// in its place. True the first time.
-    bool giveUp(uint64_t page);
+    /// The page, or the pages of the directory's block, cannot be read: from the next look() their parents are drawn in
+    /// their place. True the first time.
+    bool giveUp(Request request);
     /// It can be read after all.
-    void restore(uint64_t page);
+    void restore(Request request);
     /// Forgets all pages: the pool's content was lost.
     void clear();
     /// Another pool, empty; from the next look() on, views want what fits into it. Forgets all pages, but not which
@@ -172,9 +172,9 @@ private:
     void planFor(PoolShape pool);
     void learnBlocks();
     void choose();
-    [[nodiscard]] std::span<uint8_t> statesOf(uint64_t number);
+    [[nodiscard]] std::span<uint8_t> statesOf(Request request);
     void wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
-                       std::vector<PageRequest>& wishes) const;
+                       std::vector<Wish>& wishes) const;
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
     std::shared_ptr<const Dataset> dataset_;

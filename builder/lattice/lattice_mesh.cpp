@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "octree/leaf_math.h"
-#include "octree/vcp_file.h"
+#include "octree/morton.h"
 #include "octree/vertex_normal.h"
 
 namespace vcp {

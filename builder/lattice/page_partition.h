@@ -10,7 +10,7 @@
 
 #include "builder/lattice/triangle_geometry.h"
 #include "octree/leaf_math.h"
-#include "octree/vcp_file.h"
+#include "octree/morton.h"
 
 namespace vcp {
 

@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 
 #include "octree/leaf_math.h"
+#include "octree/morton.h"
 #include "octree/packing.h"
-#include "octree/vcp_file.h"
 
 namespace vcp {
 

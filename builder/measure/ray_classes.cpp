@@ -143,17 +143,6 @@ bool RayJudge::borderNear(glm::dvec3 first, glm::dvec3 last) const {
     });
 }
 
-Quantiles quantilesOf(std::vector<float> values) {
-    if (values.empty()) return {};
-    const auto at = [&](double quantile) {
-        const auto rank = static_cast<size_t>(std::ceil(quantile * static_cast<double>(values.size())));
-        const auto nth = values.begin() + static_cast<std::ptrdiff_t>(std::max<size_t>(rank, 1) - 1);
-        std::nth_element(values.begin(), nth, values.end());
-        return static_cast<double>(*nth);
-    };
-    return {at(0.50), at(0.95), at(0.99), at(1.0)};
-}
-
 void RayClassTable::add(const RayJudgement& j) {
     ++counts_[static_cast<size_t>(j.rayClass)];
     holes_ += j.hole ? 1 : 0;
@@ -188,12 +177,6 @@ double RayClassTable::fraction(RayClass rayClass) const {
     const uint64_t all = rays();
     return all > 0 ? static_cast<double>(count(rayClass)) / static_cast<double>(all) : 0;
 }
-
-namespace {
-
-Quantiles inCells(Quantiles q, double cell) { return {q.p50 / cell, q.p95 / cell, q.p99 / cell, q.max / cell}; }
-
-}  // namespace
 
 Quantiles RayClassTable::distanceCells(double cell) const { return inCells(quantilesOf(distances_), cell); }
 Quantiles RayClassTable::depthCells(double cell) const { return inCells(quantilesOf(depthErrors_), cell); }

@@ -32,6 +32,7 @@
 #include <glm/vec3.hpp>
 
 #include "builder/measure/mesh_bvh.h"
+#include "builder/measure/quantile.h"
 
 namespace vcp {
 
@@ -85,12 +86,6 @@ private:
     double cell_;
     double radius_;  ///< e, world units
 };
-
-/// p50, p95, p99 and max of a set of numbers; zeros of an empty one.
-struct Quantiles {
-    double p50 = 0, p95 = 0, p99 = 0, max = 0;
-};
-Quantiles quantilesOf(std::vector<float> values);
 
 /// Sums of judgements. Add from one thread, or one table a thread and merge.
 class RayClassTable {

@@ -3,7 +3,7 @@
 
 #include "builder/build.h"
 #include "builder/paper/paper_octree.h"
-#include "octree/vcp_file.h"
+#include "octree/page_reader.h"
 
 namespace vcp {
 

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include "octree/content_hash.h"
+
 namespace vcp {
 
 namespace {

@@ -35,18 +35,16 @@ Result<void> readFully(int file, uint64_t offset, char* to, size_t count) {
 
 class FileBytes final : public RandomBytes {
 public:
-    FileBytes(int file, uint64_t offset, uint64_t size) : file_(file), offset_(offset), size_(size) {}
-    FileBytes(const FileBytes&) = delete;
-    FileBytes& operator=(const FileBytes&) = delete;
-    ~FileBytes() override { ::close(file_); }
+    FileBytes(FileDescriptor file, uint64_t offset, uint64_t size)
+        : file_(std::move(file)), offset_(offset), size_(size) {}
 
     [[nodiscard]] uint64_t size() const override { return size_; }
     Result<void> read(uint64_t offset, char* to, size_t count) override {
-        return readFully(file_, offset_ + offset, to, count);
+        return readFully(file_.number(), offset_ + offset, to, count);
     }
 
 private:
-    int file_;
+    FileDescriptor file_;
     uint64_t offset_;
     uint64_t size_;
 };
@@ -72,29 +70,24 @@ Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path
         return error;
     };
     // O_NONBLOCK: a named pipe must not hang the open; it has no effect on regular files.
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (file < 0 && errno == ENOENT) return refuse({.code = ErrorCode::Io, .message = "no such file"});
-    if (file < 0) return refuse(systemError("cannot be opened", errno));
+    FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    if (!file.isOpen() && errno == ENOENT) return refuse({.code = ErrorCode::Io, .message = "no such file"});
+    if (!file.isOpen()) return refuse(systemError("cannot be opened", errno));
     struct stat status {};
-    if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-        ::close(file);
+    if (::fstat(file.number(), &status) != 0 || !S_ISREG(status.st_mode))
         return refuse({.code = ErrorCode::Io, .message = "is not a regular file"});
-    }
     const auto size = static_cast<uint64_t>(status.st_size);
-    return std::unique_ptr<RandomBytes>(std::make_unique<FileBytes>(file, offset, size > offset ? size - offset : 0));
+    return std::unique_ptr<RandomBytes>(
+        std::make_unique<FileBytes>(std::move(file), offset, size > offset ? size - offset : 0));
 }
 
 std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes) {
     return std::make_unique<MemoryBytes>(std::move(bytes));
 }
 
-Spool::~Spool() {
-    if (file_ >= 0) ::close(file_);
-}
-
 Result<void> Spool::append(std::string_view bytes) {
-    if (file_ < 0 && size_ + bytes.size() > memoryBytes_) VCP_TRY(moveToFile());
-    if (file_ < 0)
+    if (!file_.isOpen() && size_ + bytes.size() > memoryBytes_) VCP_TRY(moveToFile());
+    if (!file_.isOpen())
         memory_ += bytes;
     else
         VCP_TRY(write(bytes));
@@ -106,8 +99,8 @@ Result<void> Spool::moveToFile() {
     std::error_code ignored;
     if (folder_.empty()) folder_ = std::filesystem::temp_directory_path(ignored);
     std::string name = (folder_ / "vcp_spool_XXXXXX").string();
-    file_ = ::mkostemp(name.data(), O_CLOEXEC);
-    if (file_ < 0) {
+    file_ = FileDescriptor(::mkostemp(name.data(), O_CLOEXEC));
+    if (!file_.isOpen()) {
         Error error = systemError("no temporary file can be made here", errno);
         error.file = folder_.string();
         return error;
@@ -121,7 +114,7 @@ Result<void> Spool::moveToFile() {
 Result<void> Spool::write(std::string_view bytes) {
     hash(bytes);
     while (!bytes.empty()) {
-        const ssize_t put = ::write(file_, bytes.data(), bytes.size());
+        const ssize_t put = ::write(file_.number(), bytes.data(), bytes.size());
         if (put < 0 && errno == EINTR) continue;
         if (put < 0) {
             Error error = systemError("a temporary file cannot be written", errno);
@@ -150,7 +143,7 @@ Result<void> Spool::load(uint64_t piece) {
     if (piece == pieceNumber_) return {};
     pieceNumber_ = ~uint64_t{0};
     piece_.resize(kPieceBytes);
-    VCP_TRY(readFully(file_, piece * kPieceBytes, piece_.data(), kPieceBytes));
+    VCP_TRY(readFully(file_.number(), piece * kPieceBytes, piece_.data(), kPieceBytes));
     if (XXH3_64bits(piece_.data(), kPieceBytes) != hashes_[piece])
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "what was kept of it in a temporary file came back damaged; check the disk of " +
@@ -160,7 +153,7 @@ Result<void> Spool::load(uint64_t piece) {
 }
 
 Result<void> Spool::read(uint64_t offset, char* to, size_t count) {
-    if (file_ < 0) {
+    if (!file_.isOpen()) {
         if (count > 0) std::memcpy(to, memory_.data() + offset, count);
         return {};
     }

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "octree/file_descriptor.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -37,7 +38,6 @@ public:
         : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
     Spool(const Spool&) = delete;
     Spool& operator=(const Spool&) = delete;
-    ~Spool() override;
 
     /// Errors: Io (no space, the folder cannot be written), with the folder's name.
     Result<void> append(std::string_view bytes);
@@ -57,7 +57,7 @@ private:
     std::filesystem::path folder_;
     size_t memoryBytes_;
     std::string memory_;
-    int file_ = -1;
+    FileDescriptor file_;
     uint64_t size_ = 0;
     std::vector<uint64_t> hashes_;  ///< of the file's whole pieces
     std::string last_;              ///< the bytes after them, which the file has too

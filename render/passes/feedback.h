@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "render/passes/frame_resources.h"
 #include "streaming/load_order.h"
 

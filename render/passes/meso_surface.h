@@ -14,10 +14,10 @@
 #include "mesostructure/appearance.h"
 #include "mesostructure/shell.h"
 #include "render/camera.h"
+#include "render/frame_request.h"
 #include "render/meso_texture.h"
 #include "render/passes/frame_resources.h"
 #include "render/passes/meso_resources.h"
-#include "render/renderer.h"
 
 namespace vcp {
 

@@ -9,7 +9,7 @@
 #include <vulkan/vulkan_core.h>
 
 #include "octree/result.h"
-#include "render/renderer.h"
+#include "render/vulkan/device_info.h"
 
 namespace vcp {
 

@@ -15,7 +15,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "octree/vcp_file.h"
+#include "octree/dataset_reader.h"
+#include "octree/vcp_verify.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
 

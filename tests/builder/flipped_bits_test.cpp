@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "octree/vcp_file.h"
+#include "octree/vcp_verify.h"
 #include "tests/support/built_mesh.h"
 
 namespace vcp {

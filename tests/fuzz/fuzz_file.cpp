@@ -11,8 +11,10 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "octree/content_hash.h"
+#include "octree/dataset_reader.h"
 #include "octree/header_check.h"
-#include "octree/vcp_file.h"
+#include "octree/vcp_verify.h"
 
 namespace {
 
@@ -57,8 +59,6 @@ void hashPage(const std::vector<std::byte>& file, uint64_t offset, uint32_t stor
     if (stored > 0 && offset < file.size() && stored <= file.size() - offset)
         hash = hashBytes(std::span(file).subspan(offset, stored));
 }
-
-uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock; }
 
 /// The file that the input stands for.
 std::vector<std::byte> fileOf(std::span<const std::byte> input) {

@@ -50,6 +50,20 @@ TEST(IncludeRules, EveryRoomKeepsTheArrows) {
     EXPECT_GT(checked, 300u);
 }
 
+/// The renderer stands on all of its room: what lies below it does not know it.
+TEST(IncludeRules, NothingBelowTheRendererIncludesIt) {
+    size_t checked = 0;
+    for (const fs::path& file : sourceFiles(kRoot / "render")) {
+        if (file.filename().string().starts_with("renderer")) continue;
+        ++checked;
+        const std::string text = readText(file);
+        for (const char* name : {"render/renderer.h", "render/renderer_state.h"})
+            EXPECT_EQ(text.find("#include \"" + std::string(name) + '"'), std::string::npos)
+                << fs::relative(file, kRoot).string() << " includes " << name;
+    }
+    EXPECT_GT(checked, 40u);
+}
+
 TEST(IncludeRules, EveryRoomLinksWhatItMayInclude) {
     std::map<std::string, std::vector<std::string>> roomsOf;
     std::vector<std::pair<std::string, RoomTarget>> targets;

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "octree/content_hash.h"
 #include "octree/leaf_triangles.h"
 #include "tests/support/analytic_page.h"
 #include "tests/support/soup_page.h"

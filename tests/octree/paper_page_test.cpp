@@ -7,6 +7,7 @@
 
 #include "octree/paper_page.h"
 #include "octree/reference_caster.h"
+#include "octree/vcp_verify.h"
 #include "octree/vcp_writer.h"
 #include "tests/support/test_folder.h"
 

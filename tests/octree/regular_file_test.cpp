@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "octree/vcp_file.h"
+#include "octree/byte_reader.h"
 #include "tests/support/test_folder.h"
 
 namespace vcp {

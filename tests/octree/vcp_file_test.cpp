@@ -1,6 +1,5 @@
 // The .vcp file and its writer: golden bytes, every truncation, every bit flip, lies behind valid hashes, disks
 // that are full and folders that cannot be written.
-#include "octree/vcp_file.h"
 
 #include <atomic>
 #include <cmath>
@@ -19,6 +18,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "octree/content_hash.h"
+#include "octree/vcp_verify.h"
 #include "octree/vcp_writer.h"
 #include "tests/support/analytic_page.h"
 #include "tests/support/test_folder.h"

@@ -282,15 +282,15 @@ TEST_F(RendererTest, OnlyFramesThatMissPagesAskRaysWhatToRead) {
 class HoldingSource final : public PageSource {
 public:
     explicit HoldingSource(std::shared_ptr<const PageSource> source) : source_(std::move(source)) {}
-    Result<PageBytes> read(uint64_t page, bool withColour) const override {
-        if (page == 0) return source_->read(page, withColour);
+    Result<PageBytes> read(Request request, bool withColour) const override {
+        if (request == Request(0)) return source_->read(request, withColour);
         std::unique_lock lock(mutex_);
         ++held;
         freed_.wait(lock, [&] { return isFree_; });
         return Error{.code = ErrorCode::Cancelled, .message = "closed"};
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override {
-        return source_->bytesToRead(page, withColour);
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
+        return source_->bytesToRead(request, withColour);
     }
     void interrupt() const override {
         const std::lock_guard lock(mutex_);

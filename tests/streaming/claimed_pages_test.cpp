@@ -135,7 +135,7 @@ TEST(ClaimedPages, TheFirstPartAndWhatViewsMakeOfItTakeWhatCame) {
     SelectionView view = viewOfAll();
     for (int frame = 0; frame < 3; ++frame, view.eye.x += 0.01) {
         policy.look(view, frame);
-        for (const PageRequest& wish : policy.finish().wishes) policy.place(wish.page);
+        for (const Wish& wish : policy.finish().wishes) policy.place(wish.request.number);
     }
     EXPECT_EQ(policy.pagesResident(), 9u);
     const PageCache cache(nullptr, copy);

@@ -51,24 +51,24 @@ Settled settle(const std::shared_ptr<const Dataset>& dataset, const test::Counte
     ResidencyPolicy policy(dataset, colour, poolShapeFor(*dataset, colour, budget, chunkBytes));
     std::mt19937_64 random(seed);
     Settled settled;
-    std::vector<PageRequest> wishes;
+    std::vector<Wish> wishes;
     for (int round = 0; round < 3000; ++round) {
         std::shuffle(wishes.begin(), wishes.end(), random);
         if (wishes.size() > 5) wishes.resize(5);
         std::vector<uint64_t> pages;
-        for (const PageRequest& wish : wishes) {
-            if (!isBlock(wish.page))
-                pages.push_back(wish.page);
-            else if (source.read(wish.page, colour))
+        for (const Wish& wish : wishes) {
+            if (wish.request.isPage())
+                pages.push_back(wish.request.number);
+            else if (source.read(wish.request, colour))
                 ++settled.blocks;
-            else if (policy.giveUp(wish.page))
+            else if (policy.giveUp(wish.request))
                 ++settled.problems;
         }
         policy.look(view, round);
         for (const uint64_t page : pages) policy.place(page);
         const PolicyOutcome outcome = policy.finish();
-        for (const PageRequest& wish : outcome.wishes)
-            EXPECT_TRUE(isBlock(wish.page) || dataset->pages.knows(wish.page));
+        for (const Wish& wish : outcome.wishes)
+            EXPECT_TRUE(!wish.request.isPage() || dataset->pages.knows(wish.request.number));
         wishes = outcome.wishes;
         settled.cut = outcome.drawable;
         EXPECT_EQ(outcome.drawable.complete, outcome.missing == 0);
@@ -150,8 +150,8 @@ TEST(DirectoryParts, AMovingViewAsksForBlocksOfWhatComesLater) {
         const auto blocksWished = [&](double seconds, bool urgent) {
             policy.look(view, seconds);
             const auto wishes = policy.finish().wishes;
-            return std::count_if(wishes.begin(), wishes.end(), [&](const PageRequest& wish) {
-                return isBlock(wish.page) && (wish.priority > 1e6) == urgent;
+            return std::count_if(wishes.begin(), wishes.end(), [&](const Wish& wish) {
+                return !wish.request.isPage() && (wish.priority > 1e6) == urgent;
             });
         };
         blocksWished(0, true);
@@ -191,14 +191,17 @@ TEST(DirectoryParts, TheLoaderReadsBlocksTogetherAndTriesAgain) {
         std::make_shared<FilePageSource>(scan.file, start),
         {.threads = 1,
          .retry = {.attempts = 3, .damagedAttempts = 3, .firstDelaySeconds = 0.001, .longestDelaySeconds = 0.001}});
-    loader.request({{numberOfBlock(2), 1}, {numberOfBlock(3), 1}, {numberOfBlock(4), 1}, {numberOfBlock(5), 1}});
-    std::vector<LoadedPage> came;
+    loader.request({{Request::directoryBlock(2), 1},
+                    {Request::directoryBlock(3), 1},
+                    {Request::directoryBlock(4), 1},
+                    {Request::directoryBlock(5), 1}});
+    std::vector<Loaded> came;
     while (loader.pending() > 0) {
         loader.waitForPage(std::chrono::milliseconds(1000));
-        for (LoadedPage& page : loader.collect()) came.push_back(std::move(page));
+        for (Loaded& page : loader.collect()) came.push_back(std::move(page));
     }
     ASSERT_EQ(came.size(), 4u);
-    for (const LoadedPage& block : came) EXPECT_EQ(block.bytes.ok(), block.page != numberOfBlock(5));
+    for (const Loaded& block : came) EXPECT_EQ(block.bytes.ok(), block.request != Request::directoryBlock(5));
     EXPECT_NE(came.back().bytes.error().line().find("directory block 5"), std::string::npos)
         << came.back().bytes.error().line();
     EXPECT_EQ(scan.file->reads, 3u) << "four blocks together, then one twice more";

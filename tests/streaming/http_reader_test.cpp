@@ -92,7 +92,7 @@ TEST_F(HttpReaderTest, TheFirstViewOfALargeFileTakesTwoRequestsToo) {
     EXPECT_LT((*reader)->bytesReceived(), kLeadBytes + root.size() + 4096);
     // A block that comes later is a request of its own.
     const FilePageSource source(*reader, std::make_shared<const Dataset>(*dataset));
-    ASSERT_TRUE(source.read(numberOfBlock(dataset->pages.blocks() - 1), true));
+    ASSERT_TRUE(source.read(Request::directoryBlock(dataset->pages.blocks() - 1), true));
     EXPECT_EQ((*reader)->requests(), 3u);
     EXPECT_EQ(readDataset(**reader)->pages.blocksKnown(), tree.pages.blocks());
 }

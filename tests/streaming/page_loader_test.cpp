@@ -20,7 +20,8 @@ class FakeSource final : public PageSource {
 public:
     explicit FakeSource(size_t wordsPerPage = 1) : words_(wordsPerPage) {}
 
-    Result<PageBytes> read(uint64_t page, bool withColour) const override {
+    Result<PageBytes> read(Request request, bool withColour) const override {
+        const uint64_t page = request.number;
         {
             std::unique_lock lock(mutex_);
             begun_.push_back(page);
@@ -34,7 +35,7 @@ public:
         if (withColour) bytes.colour.assign(1, uint4(7));
         return bytes;
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t, bool withColour) const override {
+    [[nodiscard]] uint64_t bytesToRead(Request, bool withColour) const override {
         return (words_ + (withColour ? 1 : 0)) * sizeof(uint4);
     }
     void hold(bool held) {
@@ -84,25 +85,25 @@ LoaderOptions options(bool withColour, uint32_t threads, uint64_t heldBytes) {
     return made;
 }
 
-std::vector<LoadedPage> collectAll(PageLoader& loader, size_t pages) {
-    std::vector<LoadedPage> all;
+std::vector<Loaded> collectAll(PageLoader& loader, size_t pages) {
+    std::vector<Loaded> all;
     while (all.size() < pages && loader.waitForPage(kLong))
-        for (LoadedPage& page : loader.collect()) all.push_back(std::move(page));
+        for (Loaded& page : loader.collect()) all.push_back(std::move(page));
     return all;
 }
 
 TEST(PageLoader, DeliversEveryWishOnce) {
     const auto source = std::make_shared<FakeSource>();
     PageLoader loader(source, options(true, 3, 1 << 20));
-    std::vector<PageRequest> wishes;
+    std::vector<Wish> wishes;
     for (uint64_t page = 0; page < 100; ++page) wishes.push_back({page, double(page % 7)});
     loader.request(wishes);
     std::set<uint64_t> seen;
-    for (const LoadedPage& page : collectAll(loader, 100)) {
+    for (const Loaded& page : collectAll(loader, 100)) {
         ASSERT_TRUE(page.bytes) << page.bytes.error().line();
-        EXPECT_EQ(page.bytes->geometry[0].x, page.page);
+        EXPECT_EQ(page.bytes->geometry[0].x, page.request.number);
         EXPECT_EQ(page.bytes->colour.size(), 1u);
-        EXPECT_TRUE(seen.insert(page.page).second);
+        EXPECT_TRUE(seen.insert(page.request.number).second);
     }
     EXPECT_EQ(seen.size(), 100u);
     EXPECT_EQ(loader.pending(), 0u);
@@ -126,7 +127,7 @@ TEST(PageLoader, ItsThreadsGiveWayToThoseThatDraw) {
 
 TEST(PageLoader, ReadsNoFurtherThanTheNextUpdateTakesIn) {
     PageLoader loader(std::make_shared<FakeSource>(), options(false, 1, 1 << 20));
-    std::vector<PageRequest> wishes;
+    std::vector<Wish> wishes;
     for (uint64_t page = 0; page < 2000; ++page) wishes.push_back({page, 1});
     loader.request(wishes, 5 * sizeof(uint4));
     for (uint64_t round = 1; round <= 100; ++round) {
@@ -150,7 +151,7 @@ TEST(PageLoader, UrgentFirstOfEqualsInOrder) {
 TEST(PageLoader, AFrameTakesNoMoreThanItsShare) {
     const auto source = std::make_shared<FakeSource>();
     PageLoader loader(source, options(true, 2, 1 << 20));
-    std::vector<PageRequest> wishes;
+    std::vector<Wish> wishes;
     for (uint64_t page = 0; page < 30; ++page) wishes.push_back({page, 1});
     loader.request(wishes);
     // 32 bytes a page: three have 96, and one comes even where the share is less.
@@ -160,7 +161,7 @@ TEST(PageLoader, AFrameTakesNoMoreThanItsShare) {
         const auto pages = loader.collect(share);
         EXPECT_GE(pages.size(), 1u);
         EXPECT_LE(pages.size(), share == 100 ? 3u : 1u);
-        for (const LoadedPage& page : pages) EXPECT_TRUE(seen.insert(page.page).second);
+        for (const Loaded& page : pages) EXPECT_TRUE(seen.insert(page.request.number).second);
     }
 }
 
@@ -201,7 +202,7 @@ TEST(PageLoader, AnErrorIsDeliveredLikeAPage) {
 TEST(PageLoader, APageThatIsTooLargeIsRefusedWithItsFile) {
     const auto source = std::make_shared<FakeSource>(64);
     PageLoader loader(source, options(false, 1, 1000));
-    loader.request(std::vector<PageRequest>{{28, 0}});
+    loader.request(std::vector<Wish>{{28, 0}});
     ASSERT_TRUE(loader.waitForPage(kLong));
     const auto pages = loader.collect();
     ASSERT_EQ(pages.size(), 1u);
@@ -214,7 +215,7 @@ TEST(PageLoader, APageThatIsTooLargeIsRefusedWithItsFile) {
 TEST(PageLoader, MemoryIsNeverExceeded) {
     const auto source = std::make_shared<FakeSource>(64);  // 1 KiB a page
     PageLoader loader(source, options(false, 3, 4096 + 512));
-    std::vector<PageRequest> wishes;
+    std::vector<Wish> wishes;
     for (uint64_t page = 0; page < 64; ++page) wishes.push_back({page, 0});
     loader.request(wishes);
     size_t collected = 0;
@@ -249,7 +250,7 @@ TEST(PageLoader, APageLargerThanTheMemoryIsAnError) {
     const auto source = std::make_shared<FakeSource>(64);
     PageLoader loader(source, options(false, 2, 1023));
     loader.request({{0, 2}, {1, 1}});
-    for (const LoadedPage& page : collectAll(loader, 2)) {
+    for (const Loaded& page : collectAll(loader, 2)) {
         ASSERT_FALSE(page.bytes);
         EXPECT_EQ(page.bytes.error().code, ErrorCode::Limit);
     }
@@ -261,7 +262,7 @@ TEST(PageLoader, AStalledReadHoldsNobodyUp) {
     const auto source = std::make_shared<FakeSource>();
     source->stalling = 5;
     PageLoader loader(source, options(false, 2, 1 << 20));
-    std::vector<PageRequest> wishes{{5, 9}};
+    std::vector<Wish> wishes{{5, 9}};
     for (uint64_t page = 10; page < 40; ++page) wishes.push_back({page, 1});
     loader.request(wishes);
     EXPECT_EQ(collectAll(loader, 30).size(), 30u) << "while page 5 is being read";
@@ -300,7 +301,7 @@ TEST(PageLoader, StopsAtAnyMoment) {
     for (int i = 0; i < 200; ++i) {
         const auto source = std::make_shared<FakeSource>();
         PageLoader loader(source, options(false, 1 + i % 4, 1 << 20));
-        std::vector<PageRequest> wishes;
+        std::vector<Wish> wishes;
         for (uint64_t page = 0; page < 20; ++page) wishes.push_back({page, 0});
         loader.request(wishes);
         if (i % 3 == 0) loader.collect();

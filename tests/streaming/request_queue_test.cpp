@@ -14,8 +14,8 @@ uint64_t beginNext(RequestQueue& queue, double now = 0) {
     const auto wish = queue.next(now);
     EXPECT_TRUE(wish);
     if (!wish) return UINT64_MAX;
-    queue.begin(wish->page);
-    return wish->page;
+    queue.begin(wish->request);
+    return wish->request.number;
 }
 
 TEST(RequestQueue, UrgentFirstOfEqualsInOrder) {
@@ -107,7 +107,7 @@ TEST(RequestQueue, AnyHistoryEnds) {
         std::mt19937_64 random(seed);
         const RetryPolicy policy{.attempts = 4, .damagedAttempts = 2};
         RequestQueue queue(policy);
-        std::vector<PageRequest> wishes;
+        std::vector<Wish> wishes;
         for (uint64_t page = 0; page < 20; ++page) wishes.push_back({page, double(random() % 4)});
         std::map<uint64_t, int> attempts;
         std::vector<uint64_t> underWay;
@@ -116,14 +116,14 @@ TEST(RequestQueue, AnyHistoryEnds) {
         for (int step = 0; queue.pending() > 0 || step == 0; ++step) {
             ASSERT_LT(step, 10000);
             if (step % 7 == 0) {
-                std::erase_if(wishes, [&](const PageRequest& wish) { return over[wish.page] != 0; });
+                std::erase_if(wishes, [&](const Wish& wish) { return over[wish.request.number] != 0; });
                 queue.replace(wishes);
             }
             if (const auto wish = queue.next(now); wish && underWay.size() < 3) {
-                EXPECT_EQ(std::find(underWay.begin(), underWay.end(), wish->page), underWay.end());
-                queue.begin(wish->page);
-                underWay.push_back(wish->page);
-                EXPECT_LE(++attempts[wish->page], 4);
+                EXPECT_EQ(std::find(underWay.begin(), underWay.end(), wish->request.number), underWay.end());
+                queue.begin(wish->request.number);
+                underWay.push_back(wish->request.number);
+                EXPECT_LE(++attempts[wish->request.number], 4);
             }
             if (!underWay.empty() && random() % 2 == 0) {
                 const auto at = underWay.begin() + static_cast<std::ptrdiff_t>(random() % underWay.size());

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "streaming/request_queue.h"
 #include "tests/support/test_trees.h"
 
 namespace vcp {
@@ -87,7 +88,7 @@ public:
             EXPECT_TRUE(round(view));
             EXPECT_EQ(outcome.drawable.cut, cut);
         }
-        for (const PageRequest& wish : outcome.wishes) ADD_FAILURE() << "settled, and wishes for page " << wish.page;
+        for (const Wish& wish : outcome.wishes) ADD_FAILURE() << "settled, and wishes for page " << wish.request.number;
         EXPECT_GE(policy.counts().loads, loads);
     }
 
@@ -110,9 +111,9 @@ private:
         while (underWay_.size() < 4u) {
             const auto wish = queue_.next(now_);
             if (!wish) return;
-            EXPECT_FALSE(policy.isResident(wish->page)) << "what is there is not read";
-            queue_.begin(wish->page);
-            underWay_.push_back(wish->page);
+            EXPECT_FALSE(policy.isResident(wish->request.number)) << "what is there is not read";
+            queue_.begin(wish->request.number);
+            underWay_.push_back(wish->request.number);
         }
     }
 
@@ -475,7 +476,7 @@ TEST(ResidencyPolicy, WhatJustCameStaysForAWhileInSeconds) {
     const auto placeAll = [&](const SelectionView& view, double seconds) {
         policy.look(view, seconds);
         for (PolicyOutcome outcome = policy.finish(); !outcome.wishes.empty(); outcome = policy.finish())
-            for (const PageRequest& wish : outcome.wishes) policy.place(wish.page);
+            for (const Wish& wish : outcome.wishes) policy.place(wish.request.number);
     };
     placeAll(views[0], 10);
     const uint64_t before = policy.counts().evictions;

@@ -12,9 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "octree/morton.h"
 #include "octree/packing.h"
 #include "octree/page.h"
-#include "octree/vcp_file.h"
+#include "octree/page_reader.h"
 
 namespace vcp::test {
 

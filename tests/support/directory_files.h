@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-
-#include "octree/vcp_file.h"
+#include "octree/content_hash.h"
+#include "octree/dataset_reader.h"
 
 namespace vcp::test {
 

@@ -21,7 +21,8 @@ namespace vcp::test {
 class MemorySource final : public PageSource {
 public:
     explicit MemorySource(std::vector<PageBytes> pages) : pages_(std::move(pages)) {}
-    Result<PageBytes> read(uint64_t page, bool withColour) const override {
+    Result<PageBytes> read(Request request, bool withColour) const override {
+        const uint64_t page = request.number;
         if (broken.contains(page))
             return Error{
                 .code = ErrorCode::InvalidInput, .message = "broken", .element = "page " + std::to_string(page)};
@@ -29,8 +30,9 @@ public:
         if (!withColour) bytes.colour.clear();
         return bytes;
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool) const override {
-        return pages_[page].geometryBytes().size() + pages_[page].colourBytes().size();
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool) const override {
+        const PageBytes& page = pages_[request.number];
+        return page.geometryBytes().size() + page.colourBytes().size();
     }
     std::set<uint64_t> broken;
 
@@ -42,16 +44,16 @@ private:
 class TurnstileSource final : public PageSource {
 public:
     explicit TurnstileSource(std::shared_ptr<const PageSource> source) : source_(std::move(source)) {}
-    Result<PageBytes> read(uint64_t page, bool withColour) const override {
+    Result<PageBytes> read(Request request, bool withColour) const override {
         std::unique_lock lock(mutex_);
         turned_.wait(lock, [&] { return passes_ > 0 || open_; });
         if (open_) return Error{.code = ErrorCode::Cancelled, .message = "closed"};
         --passes_;
-        read_.push_back(page);
-        return source_->read(page, withColour);
+        read_.push_back(request.number);
+        return source_->read(request, withColour);
     }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t page, bool withColour) const override {
-        return source_->bytesToRead(page, withColour);
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
+        return source_->bytesToRead(request, withColour);
     }
     void interrupt() const override {
         const std::lock_guard lock(mutex_);

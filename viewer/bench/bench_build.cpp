@@ -9,12 +9,12 @@
 
 #include "builder/build.h"
 #include "builder/measure/indexed_mesh.h"
+#include "builder/measure/quantile.h"
 #include "builder/memory_plan.h"
 #include "viewer/bench/child_process.h"
 #include "viewer/bench/rays/bench_rays.h"
 #include "viewer/bench/rays/bench_tracer.h"
 #include "viewer/bench/report/bench_folder.h"
-#include "viewer/bench/report/quantile.h"
 
 namespace vcp {
 
@@ -104,8 +104,8 @@ Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject,
         row.errorCells = built.errorTarget / built.cell;
         row.certifiedCells = built.certifiedErrorMax / built.cell;
     }
-    row.seconds = quantile(seconds, 0.5);
-    row.cpuSeconds = quantile(cpuSeconds, 0.5);
+    row.seconds = upperQuantile(seconds, 0.5);
+    row.cpuSeconds = upperQuantile(cpuSeconds, 0.5);
     row.trianglesPerSecond = static_cast<double>(row.triangles) / row.seconds;
     return {};
 }
@@ -137,7 +137,7 @@ Result<std::string> judge(const BenchBuildOptions& options, const fs::path& mode
         if (!time) return time.error();
         embreeSeconds.push_back(*time);
     }
-    std::string value = bytesOf(quantile(embreeSeconds, 0.5));
+    std::string value = bytesOf(upperQuantile(embreeSeconds, 0.5));
     if (files.empty()) return value;
     if (!progress("sorting the mesh", 0.4)) return cancelled();
     const MeshBvh bvh(*mesh);

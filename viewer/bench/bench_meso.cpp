@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "builder/measure/quantile.h"
 #include "mesostructure/method.h"
 #include "render/meso_marcher.h"
-#include "viewer/bench/report/quantile.h"
 #include "viewer/scene/meso_scene.h"
 
 namespace vcp {
@@ -167,11 +167,11 @@ BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView
     BenchMesoRow row;
     row.asset = subject.asset.name, row.view = view.name, row.method = method.name, row.knob = method.knob;
     row.rays = rays.size(), row.bytes = method.marcher->bytes(), row.preprocessSeconds = method.preprocessSeconds;
-    row.nsPerRay = quantile(marched.nsPerRay, 0.5);
+    row.nsPerRay = upperQuantile(marched.nsPerRay, 0.5);
     std::vector<double> ratios;
     for (size_t i = 0; i < peer.size(); ++i) ratios.push_back(peer[i] > 0 ? marched.nsPerRay[i] / peer[i] : 0);
-    row.ratioToPeer = quantile(ratios, 0.5), row.ratioLow = quantile(ratios, 0.25),
-    row.ratioHigh = quantile(ratios, 0.75);
+    row.ratioToPeer = upperQuantile(ratios, 0.5), row.ratioLow = upperQuantile(ratios, 0.25),
+    row.ratioHigh = upperQuantile(ratios, 0.75);
     row.shape = judgeMeso(marched.results, truths, subject.texel);
     countWork(marched.results, row);
     if (method.method.field) {

@@ -5,8 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "builder/measure/quantile.h"
 #include "viewer/bench/bench_meso.h"
-#include "viewer/bench/report/quantile.h"
 
 namespace vcp {
 
@@ -38,9 +38,9 @@ MesoJudged judgeMeso(const std::vector<MarchResult>& results, const std::vector<
         ++counts[size_t(c)];
     }
     for (size_t i = 0; i < counts.size(); ++i) judged.fractions[i] = counted > 0 ? counts[i] / counted : 0;
-    judged.p50 = quantile(errors, 0.5), judged.p95 = quantile(errors, 0.95), judged.p99 = quantile(errors, 0.99),
-    judged.max = quantile(errors, 1);
-    judged.normalP50 = quantile(angles, 0.5), judged.normalP95 = quantile(angles, 0.95);
+    judged.p50 = upperQuantile(errors, 0.5), judged.p95 = upperQuantile(errors, 0.95),
+    judged.p99 = upperQuantile(errors, 0.99), judged.max = upperQuantile(errors, 1);
+    judged.normalP50 = upperQuantile(angles, 0.5), judged.normalP95 = upperQuantile(angles, 0.95);
     return judged;
 }
 
@@ -62,7 +62,7 @@ void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
         row.divergence8 += most / (sum / 8);
     }
     if (groups > 0) row.divergence8 /= groups;
-    row.iterationsP95 = quantile(iterations, 0.95);
+    row.iterationsP95 = upperQuantile(iterations, 0.95);
 }
 
 }  // namespace vcp

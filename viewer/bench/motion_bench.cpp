@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "builder/measure/quantile.h"
+
 namespace vcp {
 
 namespace {
@@ -62,13 +64,7 @@ private:
 
 }  // namespace
 
-double MotionReport::quantileMs(double part) const {
-    if (frameMs.empty()) return 0;
-    std::vector<double> sorted = frameMs;
-    std::sort(sorted.begin(), sorted.end());
-    const double rank = std::ceil(part * static_cast<double>(sorted.size()));
-    return sorted[static_cast<size_t>(std::clamp(rank, 1.0, static_cast<double>(sorted.size()))) - 1];
-}
+double MotionReport::quantileMs(double part) const { return quantile(frameMs, part); }
 
 Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
                                    const MotionOptions& options) {

@@ -1,7 +1,6 @@
 // vcp info: what is in a .vcp, from its header and directory alone.
 #include <fmt/format.h>
 
-#include "octree/vcp_file.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/source_arguments.h"

@@ -14,7 +14,7 @@
 #include <fmt/ranges.h>
 #include <glm/common.hpp>
 
-#include "viewer/bench/report/quantile.h"
+#include "builder/measure/quantile.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/scene/dataset_opening.h"
@@ -186,7 +186,7 @@ Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, i
         stats = *drawn;
         if (i > 0) times.push_back(stats.msFrame);
     }
-    if (!times.empty()) stats.msFrame = quantile(times, 0.5);
+    if (!times.empty()) stats.msFrame = upperQuantile(times, 0.5);
     return stats;
 }
 

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "builder/measure/quantile.h"
 #include "render/renderer.h"
-#include "viewer/bench/report/quantile.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
@@ -60,7 +60,7 @@ struct Drawing {
     std::vector<double> frameMs;
 
     /// Of the timed frames; of the first when none was timed.
-    [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : quantile(frameMs, 0.5); }
+    [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : upperQuantile(frameMs, 0.5); }
     [[nodiscard]] double raysPerSecond() const {
         return static_cast<double>(stats.rays) / std::max(1e-3 * medianMs(), 1e-9);
     }

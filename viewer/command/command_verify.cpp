@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "builder/measure/surface_distance.h"
-#include "octree/vcp_file.h"
+#include "octree/vcp_verify.h"
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
 #include "viewer/command/commands.h"
@@ -83,8 +83,6 @@ bool isWithin(const SurfaceDistance& distance) {
 }
 
 Json toJson(const Quantiles& q) { return {{"p50", q.p50}, {"p95", q.p95}, {"p99", q.p99}, {"max", q.max}}; }
-
-Quantiles inCells(const Quantiles& q, double cell) { return {q.p50 / cell, q.p95 / cell, q.p99 / cell, q.max / cell}; }
 
 void addDistances(Json& json, const SurfaceDistance& distance) {
     json["mesh_to_surface"] = toJson(distance.meshToSurface);

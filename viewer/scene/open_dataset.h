@@ -7,7 +7,6 @@
 #include <string>
 
 #include "octree/result.h"
-#include "octree/vcp_file.h"
 #include "streaming/page_source.h"
 #include "viewer/camera/orbit_camera.h"
 

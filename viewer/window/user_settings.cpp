@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <span>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -16,6 +17,8 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
+#include "octree/file_descriptor.h"
+#include "octree/output_file.h"
 #include "streaming/web_address.h"
 
 namespace vcp {
@@ -153,24 +156,6 @@ Error notSaved(const fs::path& path, const char* what, int error) {
     return notSaved(path, fmt::format("{}: {}", what, std::generic_category().message(error)));
 }
 
-class FileDescriptor {
-public:
-    explicit FileDescriptor(int number = -1) : number_(number) {}
-    FileDescriptor(FileDescriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-    FileDescriptor& operator=(FileDescriptor&& other) noexcept {
-        std::swap(number_, other.number_);
-        return *this;
-    }
-    ~FileDescriptor() {
-        if (isOpen()) ::close(number_);
-    }
-    [[nodiscard]] bool isOpen() const { return number_ >= 0; }
-    [[nodiscard]] int number() const { return number_; }
-
-private:
-    int number_;
-};
-
 struct FileText {
     bool exists = false;
     std::string text;
@@ -247,24 +232,15 @@ private:
     FileDescriptor file_;
 };
 
-/// Under a name that nobody else has, then renamed.
+/// A file that is made anew has `mode`; one that is replaced keeps its own.
 Result<void> replaceFile(const fs::path& path, const std::string& text, mode_t mode) {
-    std::string name = path.string() + ".XXXXXX";
-    FileDescriptor file(::mkostemp(name.data(), O_CLOEXEC));
-    if (!file.isOpen()) return notSaved(path, "no file can be made beside it", errno);
-    int failed = 0;
-    for (size_t done = 0; failed == 0 && done < text.size();) {
-        const ssize_t count = ::write(file.number(), text.data() + done, text.size() - done);
-        if (count > 0)
-            done += static_cast<size_t>(count);
-        else if (errno != EINTR)
-            failed = errno;
-    }
-    if (failed == 0 && (::fchmod(file.number(), mode) != 0 || ::fsync(file.number()) != 0)) failed = errno;
-    if (failed == 0 && ::rename(name.c_str(), path.c_str()) != 0) failed = errno;
-    if (failed == 0) return {};
-    ::unlink(name.c_str());
-    return notSaved(path, "cannot be written", failed);
+    const auto failed = [&](const Error& error) { return notSaved(path, error.message); };
+    auto file = OutputFile::create(path, OutputKind::JsonText, {.overwrite = true});
+    if (!file) return failed(file.error());
+    if (::fchmod(file->descriptor(), mode) != 0) return notSaved(path, "cannot be written", errno);
+    if (const auto written = file->append(std::as_bytes(std::span(text))); !written) return failed(written.error());
+    if (const auto committed = file->commit(); !committed) return failed(committed.error());
+    return {};
 }
 
 /// Returns the name that it has now.

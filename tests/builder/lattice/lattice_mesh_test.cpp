@@ -9,7 +9,6 @@
 
 #include "builder/measure/mesh_bvh.h"
 #include "octree/packing.h"
-#include "octree/vcp_file.h"
 #include "tests/support/lattice_meshes.h"
 #include "tests/support/test_meshes.h"
 

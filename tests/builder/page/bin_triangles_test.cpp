@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include "builder/lattice/triangle_geometry.h"
-#include "octree/vcp_file.h"
 #include "tests/support/lattice_meshes.h"
 #include "tests/support/test_meshes.h"
 

@@ -11,8 +11,8 @@ namespace {
 class OnePage final : public PageSource {
 public:
     explicit OnePage(PageBytes page) : page_(std::move(page)) {}
-    Result<PageBytes> read(uint64_t, bool) const override { return page_; }
-    [[nodiscard]] uint64_t bytesToRead(uint64_t, bool) const override { return page_.geometryBytes().size(); }
+    Result<PageBytes> read(Request, bool) const override { return page_; }
+    [[nodiscard]] uint64_t bytesToRead(Request, bool) const override { return page_.geometryBytes().size(); }
 
 private:
     PageBytes page_;

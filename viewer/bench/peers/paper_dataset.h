@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "builder/paper/paper_octree.h"
-#include "octree/vcp_file.h"
 #include "streaming/page_source.h"
 
 namespace vcp {

@@ -7,9 +7,9 @@
 
 #include <glm/geometric.hpp>
 
+#include "builder/measure/quantile.h"
 #include "builder/paper/parallel_rows.h"
 #include "viewer/bench/rays/bench_tracer.h"
-#include "viewer/bench/report/quantile.h"
 
 #ifdef VCP_HAVE_EMBREE
 #include <embree3/rtcore.h>
@@ -166,7 +166,7 @@ public:
             if (repetition > 0) seconds.push_back(secondsSince(start));
         }
         TracedPicture picture;
-        picture.seconds = quantile(seconds, 0.5);
+        picture.seconds = upperQuantile(seconds, 0.5);
         picture.hits.resize(hits.size());
         for (size_t i = 0; i < hits.size(); ++i) {
             if (!std::isfinite(hits[i].t)) continue;

@@ -9,10 +9,10 @@
 
 #include <fmt/format.h>
 
+#include "builder/measure/quantile.h"
 #include "builder/paper/parallel_rows.h"
 #include "render/renderer.h"
 #include "streaming/page_source.h"
-#include "viewer/bench/report/quantile.h"
 
 namespace vcp {
 
@@ -90,7 +90,7 @@ public:
             if (!frame) return frame.error();
             if (repetition > 0) seconds.push_back(frame->msFrame * 1e-3);
         }
-        picture.seconds = quantile(seconds, 0.5);
+        picture.seconds = upperQuantile(seconds, 0.5);
         VCP_TRY(readHits(camera, size, settled->errorPixels, picture));
         VCP_TRY(countWork(request, picture));
         return picture;

@@ -3,11 +3,11 @@
 
 #include <chrono>
 
+#include "builder/measure/quantile.h"
 #include "builder/paper/octree_walk.h"
 #include "builder/paper/parallel_rows.h"
 #include "viewer/bench/peers/grid_rays.h"
 #include "viewer/bench/rays/bench_tracer.h"
-#include "viewer/bench/report/quantile.h"
 
 namespace vcp {
 
@@ -37,7 +37,7 @@ public:
                 seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
         }
         TracedPicture picture;
-        picture.seconds = quantile(seconds, 0.5);
+        picture.seconds = upperQuantile(seconds, 0.5);
         picture.hits.resize(hits.size());
         std::vector<RaysWork> works(size.y);
         forEachRow(size.y, threads_, [&](int y) {

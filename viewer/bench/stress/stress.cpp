@@ -261,8 +261,8 @@ private:
             times.push_back(static_cast<float>(ms));
             // Twice: a still view looks at nothing ahead. Nothing is ever placed, so all it wants is wished for.
             for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
-            for (const PageRequest& wish : wants.finish().wishes)
-                if (!isBlock(wish.page)) needed.insert(wish.page);
+            for (const Wish& wish : wants.finish().wishes)
+                if (wish.request.isPage()) needed.insert(wish.request.number);
         }
         report_.frameMsNoLoads = quantilesOf(std::move(times));
         report_.bytesRead = counted_->bytes;

@@ -1,0 +1,13 @@
+// The hash that every header, block and page of a file carries.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace vcp {
+
+/// XXH3-64.
+uint64_t hashBytes(std::span<const std::byte> bytes);
+
+}  // namespace vcp

@@ -1,0 +1,42 @@
+// A .vcp file's header and directory, read and checked.
+#pragma once
+
+#include <cstdint>
+
+#include <glm/vec3.hpp>
+
+#include "octree/byte_reader.h"
+#include "octree/page_directory.h"
+#include "octree/result.h"
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+/// Header and directory of a .vcp file, checked. Copy it, share it, read from any thread.
+struct Dataset {
+    FileHeader header;
+    PageDirectory pages;
+
+    [[nodiscard]] bool hasColour() const { return (header.flags & kFlagColour) != 0; }
+    /// Edge of a cell of `level`, world units.
+    [[nodiscard]] double cellOf(uint32_t level) const;
+    /// World position of the lowest corner of a page.
+    [[nodiscard]] glm::dvec3 originOf(const PageEntry& page) const;
+    /// Edge of a page, world units.
+    [[nodiscard]] double edgeOf(const PageEntry& page) const;
+};
+
+/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header
+/// claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
+Result<Dataset> readDataset(const ByteReader& reader);
+
+inline constexpr uint64_t kLeadBytes = 64 << 10;
+
+/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so
+/// that what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of
+/// kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many
+/// pages.
+Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
+constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
+
+}  // namespace vcp

@@ -1,0 +1,30 @@
+// One page of a .vcp file, read and checked.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "octree/byte_reader.h"
+#include "octree/dataset_reader.h"
+#include "octree/page.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+/// A page's decoded bytes, 16-byte aligned.
+struct PageBytes {
+    std::vector<uint4> geometry;
+    std::vector<uint4> colour;  ///< empty when not asked for or absent
+
+    [[nodiscard]] std::span<const std::byte> geometryBytes() const { return std::as_bytes(std::span(geometry)); }
+    [[nodiscard]] std::span<const std::byte> colourBytes() const { return std::as_bytes(std::span(colour)); }
+};
+
+/// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page.
+/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded. The
+/// page's entry is known. Any thread.
+Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
+
+}  // namespace vcp

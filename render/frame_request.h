@@ -1,0 +1,82 @@
+// What a picture is to show, and how.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "octree/paper_page.h"
+#include "render/camera.h"
+
+namespace vcp {
+
+enum class ShadingMode {
+    Lit,      ///< vertex colours where there are any, else clay; light and hemisphere
+    Clay,     ///< one colour, with light
+    Unlit,    ///< vertex colours where there are any, else clay, as they are
+    Normals,  ///< normal as colour
+    // False colours, blue through green to red (Demir and Westermann 2015, Figures 8 and 9).
+    Steps,    ///< node visits of the ray, 0 to 64 (compiles the counting variant on first use)
+    Cells,    ///< leaves that the ray was intersected with, 0 to 16 (the same)
+    Fetches,  ///< 16-byte reads of the ray, 0 to 128 (the same)
+    Level,    ///< level of the page that was hit, coarsest to finest
+    Error,    ///< certified error of the page that was hit, 0 to 1 pixel
+};
+
+/// Cuts away what lies on the plane's far side: kept is where dot(normal, x) >= offset, world units.
+struct SectionPlane {
+    glm::dvec3 normal{1, 0, 0};  ///< of any length but 0
+    double offset = 0;
+
+    bool operator==(const SectionPlane&) const = default;
+};
+/// At most so many planes at once (kMaxSections in frame_layout.h).
+constexpr size_t kMostSections = 6;
+
+struct Shading {
+    ShadingMode mode = ShadingMode::Lit;
+    bool lightFollowsCamera = true;
+    glm::vec3 lightDirection{-0.35f, 0.55f, 0.75f};  ///< towards the light: in camera axes (right, up, back)
+                                                     ///< where it follows the camera, else in world axes
+    glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
+    glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; of cut solids
+    bool shadows = false;                            ///< hard shadows: a further ray a pixel
+    uint32_t occlusionRays = 0;  ///< ambient occlusion: so many further rays a pixel, at most 64; 0: off
+    double occlusionRadius = 0;  ///< how far they look, world units; 0: a tenth of the box's diagonal
+    glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
+    glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
+    bool transparent = false;  ///< background is black with alpha 0
+
+    bool operator==(const Shading&) const = default;
+};
+
+/// Where a picture lies in a larger one: its upper left pixel, and the size of the whole.
+struct PictureTile {
+    uint32_t x = 0, y = 0;
+    uint32_t fullWidth = 1, fullHeight = 1;  ///< 1 to 2^20 each
+
+    bool operator==(const PictureTile&) const = default;
+};
+
+/// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/paper_page.h) are drawn by
+/// their own march, from their one page; they have no beam pass, no shadows, no ambient occlusion and no caps: what a
+/// request asks of these is left out.
+struct FrameRequest {
+    Camera camera;                        ///< of the whole, where the picture is a tile
+    uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
+    std::optional<PictureTile> tile;      ///< absent: the picture is the whole
+    double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
+    Shading shading;
+    std::vector<SectionPlane> sections;  ///< at most kMostSections
+    bool sectionCaps = false;            ///< fills what the planes cut open; right for closed surfaces
+    bool beam = true;                    ///< beam pass; the picture is the same without it, only later
+    bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
+    PaperMarch march;                    ///< of datasets of the method `paper`
+
+    bool operator==(const FrameRequest&) const = default;
+};
+
+}  // namespace vcp

@@ -1,0 +1,33 @@
+// What a host draws over pictures in windows, and images of its own that take them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include <vulkan/vulkan_core.h>
+
+namespace vcp {
+
+/// What draws over the picture in the window (a user interface) needs to make its pipelines.
+struct WindowDrawing {
+    VkInstance instance;
+    VkPhysicalDevice physical;
+    VkDevice device;
+    VkQueue queue;  ///< idle between calls of the renderer
+    uint32_t queueFamily;
+    VkRenderPass renderPass;  ///< one colour attachment, one sample, the picture in it
+};
+/// Records draws of an image of the window, inside of WindowDrawing::renderPass.
+using DrawOver = std::function<void(VkCommandBuffer commands, VkExtent2D size)>;
+
+/// An image of the host's on the renderer's device: colour, not multisampled, a format of the kind UNORM, usage
+/// TRANSFER_DST.
+struct ImageTarget {
+    VkImage image = VK_NULL_HANDLE;
+    uint32_t width = 0, height = 0;
+    VkImageLayout layoutAfter = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
+    VkSemaphore wait = VK_NULL_HANDLE;    ///< where given: the image is written after it is signalled
+    VkSemaphore signal = VK_NULL_HANDLE;  ///< where given: signalled when the image is written
+};
+
+}  // namespace vcp
