@@ -70,13 +70,13 @@ Error broken(const ByteReader& reader, std::string element, uint64_t byte, std::
 
 constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock; }
 
-/// `field`: offset of what is wrong within the entry.
+/// `field`: byte offset of the wrong field within the entry.
 Error brokenEntry(const std::string& file, uint64_t index, std::string message, uint64_t field = 0) {
     const uint64_t byte = blockOffset(index / kEntriesPerBlock) + index % kEntriesPerBlock * sizeof(PageEntry) + field;
     return broken(file, fmt::format("directory entry {}", index), byte, std::move(message));
 }
 
-/// What an entry says for itself: sizes fit the file, offsets ascend from one entry to the next.
+/// Checks what an entry says by itself: sizes fit the file, offsets ascend from one entry to the next.
 class EntryCheck {
 public:
     EntryCheck(const std::string& file, const Dataset& dataset)
@@ -99,7 +99,7 @@ public:
                         "certified error is larger than its level's in the header");
         if (e.hardLeaves > e.leaves)
             return fail(offsetof(PageEntry, hardLeaves), "leaf counts: more hard leaves than leaves");
-        // The root's word stands in the page's header, each other leaf's among the nodes.
+        // The root's word stands in the page's header, the words of all other leaves among the nodes.
         if (e.leaves > e.pageBytes / sizeof(uint32_t))
             return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");
         if (e.childMask == 0 && e.firstChild != 0)
@@ -160,7 +160,7 @@ bool isChildAt(const PageEntry& child, const PageEntry& parent, uint32_t octant)
     return child.level == parent.level + 1 && child.morton == (parent.morton << 3 | octant);
 }
 
-/// A directory that is there as a whole: every entry, and that the tree is one.
+/// Checks a directory that is complete: every entry, and that the pages form a tree.
 Result<void> checkDirectory(const std::string& file, const Dataset& d) {
     EntryCheck entries(file, d);
     uint64_t next = d.header.levels > 1 ? d.header.level[1].firstEntry : d.header.pages;
@@ -183,7 +183,7 @@ Result<void> checkDirectory(const std::string& file, const Dataset& d) {
     return {};
 }
 
-/// A block that holds `entries` and a hash, and is zero between.
+/// Checks that a block holds `entries` and a hash, and is zero between.
 Result<void> checkBlock(const std::string& file, uint64_t block, uint64_t entries, std::span<const std::byte> bytes) {
     const auto fail = [&](uint64_t byte, std::string message) {
         return broken(file, fmt::format("directory block {}", block), blockOffset(block) + byte, std::move(message));
@@ -197,8 +197,8 @@ Result<void> checkBlock(const std::string& file, uint64_t block, uint64_t entrie
     return {};
 }
 
-/// Reads `bytes` in pieces, the first of at most kFirstPiece, each as large as all before it, so that a claim takes no
-/// more memory than a few times what came. take(piece) -> Result<void>.
+/// Reads `bytes` in pieces, the first of at most kFirstPiece, each as large as all before it, so that a false size
+/// takes at most a few times the memory of what came. take(piece) -> Result<void>.
 constexpr uint64_t kFirstPiece = 1 << 20;
 constexpr uint64_t kLargestPiece = 16 << 20;
 template <class Take>
@@ -212,7 +212,7 @@ Result<void> readInPieces(const ByteReader& reader, uint64_t offset, uint64_t by
     return {};
 }
 
-/// The stored bytes of a page, checked against their hash.
+/// Reads the stored bytes of a page and checks them against their hash.
 Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset,
                                           uint32_t stored, uint64_t hash) {
     std::vector<std::byte> packed;
@@ -230,7 +230,7 @@ Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::s
     return packed;
 }
 
-/// Held by one at a time; others wait.
+/// A lock that one thread holds at a time; others wait.
 class Turn {
 public:
     explicit Turn(std::atomic_flag& taken) : taken_(taken) {
@@ -255,9 +255,9 @@ struct PageDirectory::Parts {
     static constexpr uint32_t kNoPage = 0;
 
     std::atomic_flag admitting;
-    SparseArray<std::atomic<uint8_t>> known;  // by block; 1 after its entries were written
+    SparseArray<std::atomic<uint8_t>> known;  // for each block: 1 after its entries were written
     std::atomic<uint64_t> blocksKnown{0};
-    SparseArray<uint32_t> afterParents;  // 1 more than each page's parent, of which it has one, as known blocks say
+    SparseArray<uint32_t> afterParents;  // for each page 1 more than its parent; 0: not known yet
 };
 
 PageDirectory::PageDirectory() = default;
@@ -300,7 +300,7 @@ uint64_t PageDirectory::blocksKnown() const {
     return parts_ ? parts_->blocksKnown.load(std::memory_order_acquire) : blocks();
 }
 
-/// Takes one block in: its entries for themselves, then with the parents and children that are known. Each page has one
+/// Takes one block in: checks its entries by themselves, then against the known parents and children. Each page has one
 /// parent, on the level above: so what is known is a tree, whatever the rest will be.
 class BlockAdmission {
 public:
@@ -318,7 +318,7 @@ public:
         if (directory_.knowsBlock(block_)) return {};
         std::memcpy(&directory_.sparse_[first_], bytes.data(), count_ * sizeof(PageEntry));
         if (auto sound = check(); !sound) {
-            // Nobody is to come across what was refused.
+            // Entries that were refused are zeroed, so that nothing reads them.
             std::fill_n(&directory_.sparse_[first_], count_, PageEntry{});
             return sound;
         }
@@ -430,7 +430,7 @@ Result<FileHeader> readHeader(const ByteReader& reader) {
     return header;
 }
 
-/// `directoryHash`: of its bytes, where all of them are there.
+/// `directoryHash`: hash of the directory's bytes, where all of them are there.
 Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header,
                                std::optional<uint64_t> directoryHash) {
     CommitRecord commit;
@@ -448,7 +448,7 @@ Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& heade
     return {};
 }
 
-/// Takes over the entries of blocks that follow what is there, each checked against its hash.
+/// Appends the entries of the blocks that follow those already there, each block checked against its hash.
 Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<const std::byte> blocks) {
     for (uint64_t from = 0; from < blocks.size(); from += kBlockBytes) {
         const std::span block = blocks.subspan(from, kBlockBytes);
@@ -464,7 +464,7 @@ Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<c
     return {};
 }
 
-/// A file that only claims to have so many pages ends at the first block that does not match its hash.
+/// A file that claims more pages than it has fails at the first block that does not match its hash.
 Result<Dataset> readWhole(const ByteReader& reader, const FileHeader& header) {
     Dataset dataset{header, {}};
     XXH3_state_t hash;
@@ -508,7 +508,7 @@ Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes) {
     return dataset;
 }
 
-/// A page's header and its entry in the directory say the same.
+/// Checks that a page's header and its entry in the directory say the same.
 static Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset, uint64_t index,
                                       const PageHeader& page) {
     const PageEntry& e = dataset.pages[index];
@@ -519,7 +519,7 @@ static Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& d
     if (leaves != e.leaves || page.hardLeaves != e.hardLeaves)
         return fail(fmt::format("has {} leaves, {} of them hard; its directory entry says {} and {}", leaves,
                                 page.hardLeaves, e.leaves, e.hardLeaves));
-    // Both were rounded up to single precision, one in cells and one in world units.
+    // Both errors were rounded up to single precision, one in cells and one in world units.
     const double error = page.certifiedError * dataset.cellOf(e.level),
                  slack = 1e-6 * error + 4 * double(std::numeric_limits<float>::denorm_min());
     if (std::abs(error - e.certifiedError) > slack)

@@ -34,7 +34,7 @@
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 2;
-inline constexpr uint32_t kMethodFileVersion = 3;  ///< of files whose method is not Certified
+inline constexpr uint32_t kMethodFileVersion = 3;  ///< version of files whose method is not Certified
 inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
@@ -42,7 +42,7 @@ inline constexpr uint64_t kBlockBytes = 4096;
 inline constexpr uint32_t kEntriesPerBlock = 51;
 inline constexpr uint64_t kPageAlignment = 256;
 
-/// What pages hold.
+/// What the pages hold.
 enum class Method : uint32_t {
     Certified,  ///< octree/page.h
     Paper,      ///< octree/paper_page.h: one level, one page, no certificate and no colour
@@ -52,7 +52,7 @@ enum class Method : uint32_t {
 struct LevelRow {
     uint64_t firstEntry = 0;
     uint64_t pages = 0;
-    double certifiedError = 0;  ///< largest of its pages, world units
+    double certifiedError = 0;  ///< largest certified error of its pages, world units
 };
 
 /// First 4096 bytes of the file (the rest of them is zero).
@@ -65,8 +65,8 @@ struct FileHeader {
     double origin[3] = {};         ///< world position of the lowest corner of the root page
     double cell = 0;               ///< edge of a cell of the finest level, world units
     double errorTarget = 0;        ///< what the builder was asked for, world units
-    double certifiedErrorMax = 0;  ///< of the finest level, world units
-    double boundsMin[3] = {};      ///< of the mesh, world units
+    double certifiedErrorMax = 0;  ///< largest certified error of the finest level, world units
+    double boundsMin[3] = {};      ///< lowest corner of the mesh's bounds, world units
     double boundsMax[3] = {};
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
@@ -74,8 +74,8 @@ struct FileHeader {
     uint32_t flags = 0;  ///< bit 0: has colour
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
-    uint64_t leaves = 0;      ///< soft and hard, of the finest level
-    uint64_t hardLeaves = 0;  ///< of the finest level
+    uint64_t leaves = 0;      ///< soft and hard leaves of the finest level
+    uint64_t hardLeaves = 0;  ///< hard leaves of the finest level
     LevelRow level[kMaxLevels] = {};
     uint64_t hash = 0;      ///< XXH3-64 of the 4096 bytes with this field zero
     PaperParameters paper;  ///< zero where the method is another
@@ -89,16 +89,16 @@ static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) =
 /// One page in the directory.
 struct PageEntry {
     uint64_t morton = 0;  ///< position of the subvolume among those of its level, 21 bits an axis
-    uint64_t offset = 0;  ///< of the stored geometry in the file
+    uint64_t offset = 0;  ///< offset of the stored geometry in the file
     uint64_t hash = 0;    ///< XXH3-64 of the stored geometry
     uint64_t colourOffset = 0;
     uint64_t colourHash = 0;
-    uint32_t storedBytes = 0;  ///< in the file
-    uint32_t pageBytes = 0;    ///< decoded
+    uint32_t storedBytes = 0;  ///< bytes of the stored geometry in the file
+    uint32_t pageBytes = 0;    ///< bytes of the decoded page
     uint32_t colourStoredBytes = 0;
     uint32_t colourBytes = 0;
     uint32_t firstChild = 0;  ///< entry of the first child page; children are consecutive, in octant order
-    uint32_t leaves = 0;      ///< soft and hard
+    uint32_t leaves = 0;      ///< number of soft and hard leaves
     uint32_t hardLeaves = 0;
     float certifiedError = 0;  ///< world units, rounded up
     uint8_t childMask = 0;     ///< octants that have a page on the next level
@@ -107,7 +107,7 @@ struct PageEntry {
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 && offsetof(PageEntry, childMask) == 72);
 
-/// Numbers of entries that follow each other. (std::views::iota does not compile with clang 14.)
+/// A run of consecutive entry numbers. (std::views::iota does not compile with clang 14.)
 class EntryRange {
 public:
     class Iterator {
@@ -150,10 +150,10 @@ struct CommitRecord {
 };
 static_assert(sizeof(CommitRecord) == 64);
 
-/// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those
-/// of some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any
-/// thread may read it; the entry of a page that is not known must not be read. Entries that are not known take no
-/// memory.
+/// The entries of all pages, in the file's order: a vector of them. The directory of a large file comes in parts: at
+/// first the entries of some blocks are known (readDatasetStart), the others follow with admitBlock(). What is known
+/// stays as it is, and any thread may read it; the entry of a page that is not known must not be read. Entries that are
+/// not known take no memory.
 class PageDirectory {
 public:
     PageDirectory();
@@ -170,11 +170,11 @@ public:
     [[nodiscard]] const PageEntry* begin() const { return data(); }
     [[nodiscard]] const PageEntry* end() const { return data() + size(); }
     [[nodiscard]] const PageEntry* data() const { return parts_ ? sparse_.data() : entries_.data(); }
-    /// Of a directory that is known as a whole.
+    /// Appends an entry to a directory that is known as a whole.
     void push_back(const PageEntry& entry) { entries_.push_back(entry); }
     void resize(size_t pages) { entries_.resize(pages); }
 
-    /// So many pages, none of them known. Throws std::bad_alloc where there are no addresses for them.
+    /// Makes a directory of so many pages, none known yet. Throws std::bad_alloc where there are no addresses for them.
     void expect(size_t pages);
     [[nodiscard]] bool knows(uint64_t page) const { return !parts_ || knowsBlock(page / kEntriesPerBlock); }
     [[nodiscard]] bool knowsBlock(uint64_t block) const;
@@ -184,9 +184,9 @@ public:
 private:
     friend class BlockAdmission;
     struct Parts;
-    std::vector<PageEntry> entries_;         // where all is known
-    mutable SparseArray<PageEntry> sparse_;  // where it comes in parts
-    std::unique_ptr<Parts> parts_;           // nothing: all is known
+    std::vector<PageEntry> entries_;         // all entries, where the directory is known as a whole
+    mutable SparseArray<PageEntry> sparse_;  // entries where it comes in parts
+    std::unique_ptr<Parts> parts_;           // null: all is known
 };
 
 /// Header and directory of a .vcp file, checked. Copy it, share it, read from any thread.
@@ -213,7 +213,7 @@ public:
     [[nodiscard]] virtual const std::string& name() const = 0;
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
-    /// What read() gave for these bytes proved wrong: a copy of them is not used again.
+    /// Reports that what read() gave for these bytes proved wrong: a copy of them is not used again.
     virtual void distrust(uint64_t offset, uint64_t bytes) const {
         static_cast<void>(offset), static_cast<void>(bytes);
     }
@@ -222,22 +222,22 @@ public:
 /// Opens a local file for bounded reads (pread); a pipe or device in its place is not waited for. Errors: Io.
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path);
 
-/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header
-/// claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
+/// Reads and checks header, directory and commit record, but no page. Its memory depends on what has come, not on what
+/// the header claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
 inline constexpr uint64_t kLeadBytes = 64 << 10;
 
-/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so
-/// that what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of
-/// kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many
-/// pages.
+/// Does the same, but reads only the blocks within the first leadBytes of the file where the directory has more than 4
+/// * leadBytes, so that the bytes read do not depend on the file's size. The other blocks follow with admitBlock.
+/// `leadBytes`: a multiple of kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are
+/// no addresses for so many pages.
 Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
 constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
 
 /// Checks a block of the directory, by its hash and against the blocks that are known, and makes its entries known;
-/// nothing where they are. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`. Any thread. Errors:
-/// InvalidInput.
+/// does nothing where they are known already. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`.
+/// Any thread. Errors: InvalidInput.
 Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block,
                         std::span<const std::byte> bytes);
 constexpr uint64_t blockOffset(uint64_t block) { return kDirectoryOffset + block * kBlockBytes; }
@@ -252,15 +252,15 @@ struct PageBytes {
 };
 
 /// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page.
-/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded. The
-/// page's entry is known. Any thread.
+/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded.
+/// Precondition: the page's entry is known. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 
 /// Reads every byte of the file and checks it, also those between pages, and that header, directory and pages say the
 /// same. Calls `progress(bytes done)` now and then; it returns false to cancel. Errors: the first thing that is wrong.
 Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t) = nullptr, void* user = nullptr);
 
-/// XXH3-64.
+/// Returns the XXH3-64 of the bytes.
 uint64_t hashBytes(std::span<const std::byte> bytes);
 
 /// Interleaves three 21-bit coordinates, x lowest; and back.

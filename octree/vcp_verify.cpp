@@ -1,4 +1,4 @@
-// verifyFile: every byte of a .vcp, and that what it says of itself in several places is the same.
+// verifyFile: checks every byte of a .vcp, and that what the file says in several places is the same.
 #include <algorithm>
 #include <cmath>
 
@@ -15,7 +15,7 @@ public:
     FileVerification(const ByteReader& reader, const Dataset& dataset)
         : reader_(reader), d_(dataset), end_(blockOffset(dataset.pages.blocks())) {}
 
-    /// What the header says of all pages together.
+    /// Checks what the header says of all pages together.
     [[nodiscard]] Result<void> sums() const {
         const FileHeader& h = d_.header;
         for (uint32_t l = 0; l < h.levels; ++l) {
@@ -53,7 +53,7 @@ public:
         return {};
     }
 
-    /// The bytes up to `to` are zero.
+    /// Checks that the bytes up to `to` are zero.
     [[nodiscard]] Result<void> gap(uint64_t to) const {
         if (to < end_ || to - end_ > kBlockBytes) return broken("padding", end_, "unexpected bytes between pages");
         std::vector<std::byte> bytes(to - end_);
@@ -75,7 +75,7 @@ private:
                 .byte = byte};
     }
 
-    /// The mesh lies in the root page.
+    /// Checks that the mesh lies in the root page.
     [[nodiscard]] Result<void> bounds() const {
         const FileHeader& h = d_.header;
         const double edge = d_.edgeOf(d_.pages[0]);
@@ -94,7 +94,7 @@ private:
 
     const ByteReader& reader_;
     const Dataset& d_;
-    uint64_t end_;  ///< of what was checked
+    uint64_t end_;  ///< end of what was checked
 };
 
 }  // namespace
