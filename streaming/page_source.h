@@ -1,4 +1,4 @@
-// Where pages come from: a file, a server, a test.
+// Where pages come from: a file, a server or a test.
 #pragma once
 
 #include <cstdint>
@@ -10,41 +10,41 @@
 
 namespace vcp {
 
-/// A block of the directory (octree/vcp_file.h) is asked for as a page of this number or above; it takes no bytes when
-/// it has been read, but its entries are known then.
+/// A block of the directory (octree/vcp_file.h) is requested as a page of this number or above. Reading it returns no
+/// bytes, but afterwards its entries are known.
 inline constexpr uint64_t kFirstBlockNumber = uint64_t{1} << 63;
 constexpr bool isBlock(uint64_t number) { return number >= kFirstBlockNumber; }
 constexpr uint64_t numberOfBlock(uint64_t block) { return kFirstBlockNumber + block; }
 
-/// Delivers checked pages. Any thread may call, several at once. Entries of pages that are asked for are known.
+/// Delivers checked pages. Any thread may call, several at once. Precondition: the entries of the pages are known.
 class PageSource {
 public:
     virtual ~PageSource() = default;
-    /// Bytes of page `page` of the directory, verified, decompressed and parsed without complaint (readPage).
-    /// Colour is empty where the dataset has none or it is not asked for.
+    /// Returns the bytes of page `page` of the directory, verified, decompressed and parsed without complaint
+    /// (readPage). Colour is empty where the dataset has none or it is not asked for.
     virtual Result<PageBytes> read(uint64_t page, bool withColour) const = 0;
 
-    /// Pages `first` to `first + count - 1`, as read() would give each; where they lie together, in one read.
+    /// Returns pages `first` to `first + count - 1`, as read() would give each; where they lie together, in one read.
     virtual std::vector<Result<PageBytes>> readRun(uint64_t first, uint32_t count, bool withColour) const;
-    /// How many pages from `first` on are best read together, at most `most`; at least 1.
+    /// Returns how many pages from `first` on are best read together: at least 1, at most `most`.
     [[nodiscard]] virtual uint32_t runFrom(uint64_t first, uint32_t most, bool withColour) const;
 
-    /// Memory that reading a page takes: its stored bytes, twice, and what it returns.
+    /// Returns the memory that reading a page takes: its stored bytes, twice, and what it returns.
     [[nodiscard]] virtual uint64_t bytesToRead(uint64_t page, bool withColour) const = 0;
-    /// What pages take as they are stored may be kept in memory to be read again: at most `bytes` from now on, whatever
-    /// is being read. Returns how many are kept. For one PageLoader, which has the memory.
+    /// Allows the source to keep stored pages in memory, to be read again: from now on at most `bytes`, whatever is
+    /// being read. Returns how many bytes are kept. Only the PageLoader that owns the memory calls it.
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
-    /// The file that the pages are of, for errors; empty where there is none.
+    /// The name of the pages' file, for errors; empty where there is none.
     [[nodiscard]] virtual std::string name() const { return {}; }
 };
 
-/// Pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none unless it may (keepWithin).
+/// Reads the pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none but by keepWithin().
 class FilePageSource final : public PageSource {
 public:
-    /// `runBytes`: pages that lie together are read together up to so many stored bytes. Worth it where a
-    /// read takes long however short it is; 0: one page at a time.
+    /// `runBytes`: pages that lie together are read together up to so many stored bytes. This helps where a read takes
+    /// long however short it is; 0: one page at a time.
     FilePageSource(std::shared_ptr<const ByteReader> reader, std::shared_ptr<const Dataset> dataset,
                    uint64_t runBytes = 0)
         : reader_(std::move(reader)), dataset_(std::move(dataset)), runBytes_(runBytes) {}
