@@ -62,13 +62,13 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
             pool_ = std::move(*pool);
             return {};
         }
-        // Coarser pages of all are better than none.
+        // Coarser pages of all datasets are better than none.
         if (pool.error().code != ErrorCode::Device || budget / 2 < kPoolUnitBytes) return pool.error();
     }
 }
 
-/// Pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones in what
-/// is left.
+/// Returns pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones
+/// in the memory that is left.
 Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
     std::vector<CarriedPage> carried;
     uint64_t room = options_.loader.heldBytes;
@@ -95,7 +95,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
                      .file = source_->name()};
     options_.budgetBytes = budgetBytes;
     options_.loader.heldBytes = ramBytes;
-    startLoader();  // what the old one held is gone
+    startLoader();  // what the old loader held is gone
     for (const uint64_t page : std::exchange(tooLarge_, {})) policy_->restore(page);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
     auto carried = pool_ ? carryOut() : std::vector<CarriedPage>();
@@ -113,7 +113,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
 void Residency::releasePool() {
     pool_.reset();
     policy_->clear();
-    cuts_.clear();  // all is to be drawn again
+    cuts_.clear();  // all views are to be drawn again
     listens_ = false;
 }
 
@@ -201,7 +201,7 @@ Result<void> Residency::place(const LoadedPage& page) {
     if (!*slot) return {};
     const std::span geometry = page.bytes->geometryBytes();
     PageHeader& header = headers_[page.page];
-    // Pages of the other method say all in a header of their own, which the shader reads.
+    // Pages of the other method have all they need in a header of their own, which the shader reads.
     if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
     VCP_TRY(pool_->write(**slot, 0, geometry));
     if (!page.bytes->colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), page.bytes->colourBytes()));
