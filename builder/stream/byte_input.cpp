@@ -24,7 +24,7 @@ Result<size_t> FileInput::read(char* to, size_t capacity) {
 }
 
 Compression compressionOf(std::string_view start) {
-    // 8: deflate, the only method there is.
+    // 8 stands for deflate, the only method there is.
     if (start.starts_with("\x1F\x8B\x08")) return Compression::Gzip;
     if (start.starts_with("\x28\xB5\x2F\xFD")) return Compression::Zstd;
     // A skippable frame may come first.

@@ -71,7 +71,7 @@ Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path
         error.file = path.string();
         return error;
     };
-    // O_NONBLOCK: a named pipe must not hang the open; it has no effect on regular files.
+    // O_NONBLOCK keeps the open from waiting for a named pipe; it has no effect on regular files.
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (file < 0 && errno == ENOENT) return refuse({.code = ErrorCode::Io, .message = "no such file"});
     if (file < 0) return refuse(systemError("cannot be opened", errno));
@@ -133,7 +133,7 @@ Result<void> Spool::write(std::string_view bytes) {
     return {};
 }
 
-/// Notes what the file is to give back.
+/// Hashes the bytes that the file must return later.
 void Spool::hash(std::string_view bytes) {
     while (!bytes.empty()) {
         const size_t n = std::min<size_t>(bytes.size(), kPieceBytes - last_.size());
