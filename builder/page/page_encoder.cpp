@@ -121,7 +121,7 @@ private:
         }
     }
 
-    /// Packs a run. Leaves come in the octree's order, so nothing unpacked lies before `leaf` on most axes.
+    /// Leaves come in the octree's order: nothing unpacked lies before `leaf` on most axes, so runs start here.
     void packRun(uint32_t leaf) {
         std::vector<Link> best;
         int bestAxis = 0;
