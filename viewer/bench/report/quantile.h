@@ -1,11 +1,11 @@
-// The value that a part of many does not exceed.
+// Quantiles: the value that a part of many does not exceed.
 #pragma once
 
 #include <vector>
 
 namespace vcp {
 
-/// Of the values in order, that at `part` of their number: 0.5 is the median, 1 the greatest; 0 of none.
+/// Returns the value at `part` of the ascending values: 0.5 is the median, 1 the greatest; 0 where there are none.
 double quantile(std::vector<double> values, double part);
 
 }  // namespace vcp
