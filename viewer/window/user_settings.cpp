@@ -29,11 +29,11 @@ using Json = nlohmann::ordered_json;
 constexpr size_t kLargestFile = 1 << 20;
 constexpr int kMostLinks = 40;
 constexpr int kMostDamaged = 100;
-// Half a minute.
+// The tries take half a minute.
 constexpr int kLockTries = 3000;
 constexpr std::chrono::milliseconds kLockPause{10};
 
-/// Reads fields of an object; what is wrong leaves the value as it is.
+/// Reads fields of an object; a field that is wrong leaves the value as it is.
 class Fields {
 public:
     explicit Fields(const Json& json) : json_(json) {}
@@ -99,7 +99,7 @@ UserSettings settingsFrom(const Json& json) {
 
 Json colourJson(glm::vec3 c) { return Json::array({c.x, c.y, c.z}); }
 
-/// The last one first; what is no name stays behind them.
+/// Adds names, the last one first; values that are no names stay behind them.
 void addRecent(Json& json, const std::vector<std::string>& opened) {
     if (!json.is_array()) json = Json::array();
     for (const std::string& name : opened) {
@@ -112,7 +112,7 @@ void addRecent(Json& json, const std::vector<std::string>& opened) {
     }
 }
 
-/// Files whose bookmarks were kept longest ago go first where there are too many.
+/// Adds bookmarks; where there are too many, the files whose bookmarks were kept longest ago lose theirs.
 void addBookmarks(Json& json, const std::map<std::string, std::map<int, OrbitCamera>>& bookmarks) {
     if (!json.is_object()) json = Json::object();
     for (const auto& [file, views] : bookmarks) {
@@ -148,7 +148,7 @@ Error notSaved(const fs::path& path, const std::string& why) {
     return {ErrorCode::Io, "settings cannot be remembered: " + why, path.string()};
 }
 
-/// With what the system says.
+/// Makes an error that ends with what the system says.
 Error notSaved(const fs::path& path, const char* what, int error) {
     return notSaved(path, fmt::format("{}: {}", what, std::generic_category().message(error)));
 }
@@ -174,12 +174,12 @@ private:
 struct FileText {
     bool exists = false;
     std::string text;
-    mode_t mode = 0600;  // of a file that is made anew
+    mode_t mode = 0600;  // the mode of a file that did not exist
 };
 
-/// Errors: Io (is there and cannot be read), InvalidInput (too large).
+/// Reads the file. Errors: Io (it exists and cannot be read), InvalidInput (too large).
 Result<FileText> readText(const fs::path& path) {
-    // A pipe in its place does not wait for a writer.
+    // A pipe in its place must not wait for a writer.
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!file.isOpen() && errno == ENOENT) return FileText{};
     struct stat status {};
@@ -200,7 +200,7 @@ Result<FileText> readText(const fs::path& path) {
     }
 }
 
-/// The file at the end of the links, whether it is there or not.
+/// Returns the file at the end of the links, whether it exists or not.
 Result<fs::path> linkTarget(fs::path path) {
     std::error_code failed;
     for (int links = 0; fs::is_symlink(path, failed); ++links) {
@@ -212,8 +212,8 @@ Result<fs::path> linkTarget(fs::path path) {
     return path;
 }
 
-/// Holds the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
-/// nothing but files that are open for writing: there it is a file of our own beside them.
+/// Locks the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
+/// only files that are open for writing: there a file of our own beside them is locked.
 class FolderLock {
 public:
     static Result<FolderLock> of(const fs::path& settings) {
@@ -229,12 +229,12 @@ public:
             refused = lock.file_.isOpen() ? lock.hold() : errno;
         }
         if (refused == EWOULDBLOCK) return notSaved(settings, "another process holds them, and does not let go");
-        // What cannot be locked anywhere is written as well as it can be.
+        // Where nothing can be locked, the settings are written without a lock.
         return lock;
     }
 
 private:
-    /// 0, or why not. A process that hangs is not waited for for ever.
+    /// Returns 0, or why it is not locked. It does not wait for ever for a process that hangs.
     int hold() const {
         for (int tries = 0; ::flock(file_.number(), LOCK_EX | LOCK_NB) != 0; ++tries) {
             if (errno != EWOULDBLOCK && errno != EINTR) return errno;
@@ -247,7 +247,7 @@ private:
     FileDescriptor file_;
 };
 
-/// Under a name that nobody else has, then renamed.
+/// Writes under a name that is not taken, then renames.
 Result<void> replaceFile(const fs::path& path, const std::string& text, mode_t mode) {
     std::string name = path.string() + ".XXXXXX";
     FileDescriptor file(::mkostemp(name.data(), O_CLOEXEC));
@@ -267,7 +267,7 @@ Result<void> replaceFile(const fs::path& path, const std::string& text, mode_t m
     return notSaved(path, "cannot be written", failed);
 }
 
-/// Returns the name that it has now.
+/// Moves a file aside; returns the name that it has now.
 Result<fs::path> putAside(const fs::path& path) {
     fs::path aside = path;
     aside += ".damaged";
