@@ -25,7 +25,7 @@
 
 namespace vcp {
 
-/// By how much the triangles of hard leaves are widened, in cells of the page's level.
+/// The triangles of hard leaves are widened by so many cells of the page's level.
 inline constexpr double kTriangleSlack = 1e-4;
 /// How far outside of its leaf a hit with a triangle may lie along the ray, in cells of the page's level.
 inline constexpr double kIntervalSlack = 1e-4;
