@@ -29,7 +29,7 @@ enum class ColourChoice { Auto, Vertex, Texture, None };
 
 struct BuildProgress {
     std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
-    double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing; 1: done
+    double fraction = 0;     ///< fraction of the whole build, 0 to 1, never decreasing; 1: done
     uint64_t triangles = 0;  ///< read so far
     uint64_t tempBytes = 0;  ///< on the temporary disk now
     double seconds = 0;

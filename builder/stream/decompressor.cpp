@@ -14,7 +14,7 @@ namespace vcp {
 namespace {
 
 constexpr size_t kInputBytes = 64 * 1024;
-constexpr int kLargestWindowLog = 27;  // of zstd: 128 MiB
+constexpr int kLargestWindowLog = 27;  // zstd's largest window: 128 MiB
 constexpr uint64_t kMostRatio = 2000;
 constexpr uint64_t kFreeBytes = 256u << 20;  // any ratio up to here
 

@@ -36,8 +36,8 @@ struct MeshChunk {
     std::vector<glm::dvec3> positions;               ///< the next vertices, in file order, world units
     std::vector<Rgba8> colours;                      ///< as many as positions, or empty when the mesh has none
     std::vector<std::array<uint64_t, 3>> triangles;  ///< vertex numbers, 0-based over the whole mesh
-    /// As many as triangles, or both empty when the mesh has no materials. Texture coordinates of the corners: (0, 0)
-    /// is the upper left corner of the image, v grows downwards; they are finite, 0 where the file has none.
+    /// One for each triangle, or both are empty when the mesh has no materials. Texture coordinates of the corners: (0,
+    /// 0) is the upper left corner of the image, v grows downwards; finite, 0 where the file has none.
     std::vector<std::array<glm::vec2, 3>> uvs;
     std::vector<uint32_t> materials;  ///< indices into MeshStream::materials(), or kNoMaterial
 

@@ -9,7 +9,7 @@
 namespace vcp {
 namespace {
 
-constexpr size_t kSignatureBytes = 8, kFrameBytes = 12, kHeaderBytes = 13;  // of a chunk: length, name; checksum
+constexpr size_t kSignatureBytes = 8, kFrameBytes = 12, kHeaderBytes = 13;  // a chunk's frame: length, name; checksum
 constexpr uint64_t kMostOfDeflate = 1032;
 constexpr std::array<std::string_view, 7> kOfTexels{"tRNS", "gAMA", "cHRM", "sRGB", "sBIT", "iCCP", "bKGD"};
 
