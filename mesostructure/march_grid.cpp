@@ -16,7 +16,7 @@ struct Space {
     bool occupied = false;
     ivec3 further{0};
     float length = 0;
-    uint32_t marks = 0;  ///< of an occupied cell, as set by markSmallCells; 0: none
+    uint32_t marks = 0;  ///< small cells of an occupied cell, as set by markSmallCells; 0: none
 };
 
 struct SkipNothing {
