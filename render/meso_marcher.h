@@ -21,7 +21,7 @@ struct MesoMarcherOptions {
 
 struct MesoMarched {
     std::vector<meso::MarchResult> results;
-    std::vector<double> nsPerRay;  ///< of each round: the queue's time, or the call's where the queue has no clock; on
+    std::vector<double> nsPerRay;  ///< for each round: the queue's time, or the call's where the queue has no clock; on
                                    ///< a software device the time of the processor, of all threads
 };
 

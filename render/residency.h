@@ -63,7 +63,7 @@ public:
     [[nodiscard]] std::vector<glm::uvec4> table(ViewNumber number = 0);
     /// A number that changes whenever the page table may: with another cut, or with pages in other places.
     [[nodiscard]] uint64_t version() const { return policy_->version(); }
-    /// False after an error of setBudgets() or rebuild(): nothing but the destructor may be called then.
+    /// There is none after an error of setBudgets() or rebuild(): then only the destructor may be called.
     [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
     [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }

@@ -329,7 +329,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     Descent descent = Descent(rootGroup, kNoGroup, kNoGroup, rootBits, page.root);
 
     float found = -1.0;
-    vec3 lo = vec3(0.0), boxLo = vec3(0.0), boxHi = vec3(0.0);  // of the node, and what is to be left of it
+    vec3 lo = vec3(0.0), boxLo = vec3(0.0), boxHi = vec3(0.0);  // lowest corner of the node, and the box to leave
     float edge = 0.0;
     bool leave = false;
     LeafSegment segment;

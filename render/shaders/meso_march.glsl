@@ -11,7 +11,7 @@ struct Space {
     bool occupied;
     ivec3 further;
     float reach;
-    uint marks;  // of an occupied cell: which small cells the surface passes (meso::markSmallCells); 0: not known
+    uint marks;  // which small cells of an occupied cell the surface passes (meso::markSmallCells); 0: not known
 };
 
 // coneOf (mesostructure/distance_map.h): signs and products, which no device may round further off than it says there.
