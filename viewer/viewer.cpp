@@ -26,7 +26,7 @@ constexpr double kRefineFrames = 3;
 
 constexpr int kLargestReduction = 8;
 constexpr double kZoomPerNotch = 0.85;
-constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
+constexpr double kSectionPerNotch = 0.01;  // part of the bounding box's diagonal
 constexpr double kFarthestSection = 4;     // the most that a drag moves a plane, in diagonals
 constexpr double kFlySeconds = 4;          // time that flying over the dataset's diagonal takes, at speed 1
 constexpr double kLongestFlyStep = 0.1;    // in seconds: a delay must not become a leap

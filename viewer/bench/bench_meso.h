@@ -85,7 +85,7 @@ struct MesoPublished {
     std::string what, asset, of;  ///< `of`: what ours is counted in
     double least = 0, most = 0;
     double ours = 0;
-    double oursTime = 0;  ///< of times; 0: none
+    double oursTime = 0;  ///< our ratio of times; 0: none
 
     /// Whether ours is within 25 % of what the paper's models span.
     [[nodiscard]] bool isNear() const { return ours >= 0.75 * least && ours <= 1.25 * most; }

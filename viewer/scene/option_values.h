@@ -14,7 +14,7 @@ namespace vcp {
 /// A length: world units ("0.25", "1e-3"), or a part of the bounding box's diagonal ("0.01%").
 struct Length {
     double value = 0;         ///< world units, or a fraction (0.01% is 1e-4)
-    bool isRelative = false;  ///< of the diagonal
+    bool isRelative = false;  ///< `value` is a part of the diagonal
 };
 
 /// Parses a length. Returns nothing when the text is not a positive, finite length.

@@ -36,7 +36,7 @@ struct vcp_context {
     std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
     bool hasWindows = false;
     uint64_t gpuBytes = 0, ramBytes = 0;
-    std::unique_ptr<vcp::Renderer> renderer;  // of a view that is never shown; all others are added to it
+    std::unique_ptr<vcp::Renderer> renderer;  // the renderer of a view that is never shown; all others are added to it
     std::vector<vcp_view*> views;
     std::optional<vcp::OpenedScene> open;
     std::string name;
