@@ -243,7 +243,7 @@ private:
         const double* const rgb = numbers.colour();
         Rgba8 colour = 0xFF000000;
         for (int channel = 0; channel < 3; ++channel) {
-            // Not std::clamp: the order of the comparisons makes NaN 0.
+            // std::clamp is not used: here the order of the comparisons makes NaN 0.
             const double value = std::min(std::max(0.0, rgb[channel] * colourScale_ + 0.5), 255.0);
             colour |= static_cast<Rgba8>(value) << (8 * channel);
         }

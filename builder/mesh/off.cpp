@@ -147,7 +147,7 @@ private:
         Rgba8 colour = 0xFF000000;
         for (size_t channel = 0; header_.hasColour && before + channel < count; ++channel) {
             const double scaled = fractions ? numbers[before + channel] * 255 + 0.5 : numbers[before + channel];
-            // Not std::clamp: the order of the comparisons makes NaN 0.
+            // std::clamp is not used: here the order of the comparisons makes NaN 0.
             const double value = std::min(std::max(0.0, scaled), 255.0);
             colour &= ~(0xFFu << (8 * channel));
             colour |= static_cast<Rgba8>(value) << (8 * channel);

@@ -62,7 +62,7 @@ public:
     void filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around,
                 std::vector<uint32_t>& inside) const;
 
-    /// The same for the eight children of a box.
+    /// Holds the triangles of the eight children of a box.
     struct ChildTriangles {
         std::array<std::vector<uint32_t>, 8> around, inside;
     };

@@ -15,7 +15,7 @@ Result<size_t> FileInput::read(char* to, size_t capacity) {
     while (true) {
         const ssize_t got = ::read(file_, to, capacity);
         if (got < 0 && errno == EINTR) continue;
-        // Not strerror: it may share its buffer between threads.
+        // strerror is not used: it may share its buffer between threads.
         if (got < 0)
             return Error{.code = ErrorCode::Io, .message = "cannot be read: " + std::generic_category().message(errno)};
         taken_ += static_cast<uint64_t>(got);

@@ -16,7 +16,7 @@
 namespace vcp {
 namespace {
 
-// Not strerror: it may share its buffer between threads.
+// strerror is not used: it may share its buffer between threads.
 std::string systemMessage(int code) { return std::generic_category().message(code); }
 
 struct OpenFile {

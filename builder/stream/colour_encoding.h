@@ -31,7 +31,7 @@ inline double linearToSrgb(double light) {
 
 /// Converts 0..1 to 8 bits; values outside are clamped, NaN becomes 0.
 inline uint8_t toByte(double value) {
-    // Not std::clamp: the order of the comparisons makes NaN 0.
+    // std::clamp is not used: here the order of the comparisons makes NaN 0.
     return static_cast<uint8_t>(std::min(std::max(0.0, value), 1.0) * 255 + 0.5);
 }
 

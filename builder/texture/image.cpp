@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 #include <jpeglib.h>
-// After what it needs.
+// This header comes after those that it needs.
 #include <jerror.h>
 #include <png.h>
 
