@@ -1,4 +1,4 @@
-// In which order missing pages are read: what the rays ask for first. Pure: no threads, no clock, no GPU.
+// Decides in which order missing pages are read: what the rays ask for first. Pure: no threads, no clock, no GPU.
 //
 // A frame that misses pages traces 24 x 16 of its rays through the page tree (render/passes/feedback.h) and reports
 // what they met. From that follows, for each page that could be refined (its children be drawn in its place):
