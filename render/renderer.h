@@ -140,7 +140,7 @@ struct SectionPlane {
 
     bool operator==(const SectionPlane&) const = default;
 };
-/// At most so many planes at once (kMaxSections in frame_layout.h).
+/// A request has at most so many planes (kMaxSections in frame_layout.h).
 constexpr size_t kMostSections = 6;
 
 struct Shading {

@@ -35,7 +35,7 @@ vec3 encodedColour(vec3 light) { return mix(1.055 * pow(light, vec3(1.0 / 2.4)) 
 // Returns the tile's axes in the world, made orthonormal: z out of the slab, x and y along it.
 mat3 tileFrame(mat3 gradients) {
     vec3 z = normalize(gradients[2]), x = normalize(gradients[0] - dot(gradients[0], z) * z);
-    // On a mirrored map y is on the other side.
+    // A mirrored map has y on the other side.
     return mat3(x, cross(z, x) * (determinant(gradients) < 0.0 ? -1.0 : 1.0), z);
 }
 

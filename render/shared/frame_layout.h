@@ -55,7 +55,7 @@ struct FrameConstants {
     uvec4 extra;
     vec4 march;     // x: of the method `paper`: epsilon, finest cells. y: world units a finest cell
     vec4 rotation;  // quaternion: world from the dataset's axes
-    // Kept is where dot(xyz, p) + w >= 0, p in finest cells relative to originLattice.
+    // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];
 };
 
