@@ -10,7 +10,7 @@
 
 namespace vcp {
 
-/// About 2 world units across; measured with cells of this edge, 128 of them go across the sphere.
+/// The shapes are about 2 world units across; with cells of this edge, 128 of them go across the sphere.
 inline constexpr double kAnalyticModelCell = 1.0 / 64;
 
 struct AnalyticModel {

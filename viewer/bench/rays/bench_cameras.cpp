@@ -55,7 +55,7 @@ Camera latticeCamera(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
     const CameraBasis basis = cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
     const glm::dvec3 corner = nearestCorner(grid, 0.5 * (mesh.low() + mesh.high()));
     const auto steps = std::ceil(1.5 * radius / (grid.cell * glm::length(d)));
-    // The middle of a pixel goes through the corner.
+    // The ray through the middle of a pixel goes through the corner.
     camera.eye = corner - steps * grid.cell * d +
                  0.5 * pixel * ((size.x % 2 == 0 ? 1.0 : 0.0) * basis.right + (size.y % 2 == 0 ? 1.0 : 0.0) * basis.up);
     return camera;
