@@ -141,7 +141,7 @@ struct Renderer::State {
     [[nodiscard]] bool composes() const { return layers.size() > 1 || shared->meso; }
     /// Whether each dataset has its layer; false where the device failed half-way.
     [[nodiscard]] bool isComplete() const;
-    /// Lets the shaders of all views see no pool, then the residency's; where it has none, the dataset is closed.
+    /// hidePool: all views' shaders see no pool. showPool: the residencies'; where one has none, datasets are closed.
     void hidePool();
     Result<void> showPool();
     void clearPipelines();
