@@ -28,7 +28,7 @@ namespace vcp {
 
 namespace {
 
-// Parts of the whole, in time: what is left after reading, dealing and the vertices is shared by the levels.
+// Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
 
 class Builder {
@@ -39,7 +39,7 @@ public:
           meter_(options.progress),
           space_(tempFolderOf(options), plan.tempBytes),
           arena_(static_cast<int>(threads)) {
-        // Without it TBB gives no more threads than processors, and says so.
+        // Without this TBB gives no more threads than processors, and warns about it.
         if (threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))
             more_.emplace(tbb::global_control::max_allowed_parallelism, threads);
     }
@@ -56,7 +56,7 @@ public:
                    needsMore = error.code == ErrorCode::Limit && files_.current;
         const bool hasWork = journal_.active() || isResumed_;
         if (hasWork && isOfTempFiles(error)) {
-            // A disk that is mended may give back what was written after all.
+            // Once the disk is repaired, it may give back what was written after all.
             error.message += fmt::format(" (until then what there is stays in {})", space_.folder().path().string());
         } else if (!hasWork || !(mayPass || needsMore)) {
             if (error.code != ErrorCode::Usage) space_.folder().remove();
@@ -122,14 +122,14 @@ private:
         return {.code = ErrorCode::Cancelled, .message = "cancelled", .file = options_.output.string()};
     }
 
-    /// What the output may replace: nothing that is read.
+    /// Returns what the output may replace: no file that is read.
     [[nodiscard]] OutputRules rules() const {
         OutputRules rules{.overwrite = options_.overwrite, .inputs = options_.inputs};
         for (const SideFile& each : report_.sideFiles) rules.inputs.push_back(each.path);
         return rules;
     }
 
-    /// Temporary files are removed by their names, so that no input may lie among them.
+    /// Checks that no input lies among the temporary files, which are removed by their names.
     [[nodiscard]] Result<void> checkTempFolder() const {
         for (const auto& input : options_.inputs)
             if (isSameFile(input.parent_path().empty() ? "." : input.parent_path(), space_.folder().path()))
@@ -149,7 +149,7 @@ private:
         if (options_.resume) {
             const auto journal = Journal::read(folder);
             if (!journal) return journal.error();
-            // Whatever it says, there is work of before.
+            // Whatever the journal says, it shows earlier work.
             isResumed_ = !journal->is_null();
             auto done = recordedFrom(*journal, folder.path() / kJournalName);
             if (!done) return done.error();
@@ -168,8 +168,8 @@ private:
         return {};
     }
 
-    /// Makes what is done durable, and says so in the journal: everything up to bin `bin` of the pass.
-    /// `always`: even if the last time was a moment ago.
+    /// Makes what is done durable, and records it in the journal: everything up to bin `bin` of the pass. `always`:
+    /// even if the last checkpoint was a moment ago.
     Result<void> checkpoint(const char* stage, size_t bin, bool always = false) {
         if (!always && meter_.seconds() - lastCheckpoint_ < options_.checkpointSeconds) return {};
         VCP_TRY(space_.folder().take());
@@ -195,7 +195,7 @@ private:
         return reactivate();
     }
 
-    /// The journal goes on in the same file; what it says stays true.
+    /// Continues the journal in the same file; what it says stays true.
     Result<void> reactivate() { return journal_.record(space_.folder(), {{"resumed", true}}); }
 
     Result<void> resumeBins() {
@@ -230,16 +230,16 @@ private:
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         releaseMemory();
         VCP_TRY(checkFreeSpace());
-        // Images are not kept: what has them is dealt before it is safe.
+        // Images are not kept, so a soup that needs them is dealt before its checkpoint.
         return files_.soup->materials.empty() ? checkpoint("read", 0) : Result<void>();
     }
 
-    /// A disk that is too small is found now, not after hours.
+    /// Checks the free space now: a disk that is too small would be noticed only after hours.
     Result<void> checkFreeSpace() const {
         const auto check = [&](const std::filesystem::path& at, uint64_t needed, const char* option) -> Result<void> {
             const uint64_t free = freeBytesAt(at);
             if (needed <= free) return {};
-            // Rounded apart, so that the two are never the same number.
+            // The two numbers are rounded apart, so that they never read the same.
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("about {} MB are needed in the folder {} and {} MB are free there; "
                                                 "free some space or choose another folder{}",
@@ -301,7 +301,7 @@ private:
 
     // Levels
 
-    /// Makes the bins of a pass and of the one after it.
+    /// Makes the bins of a pass and of the pass after it.
     void openPass() {
         const auto bins = [&](int pass) {
             return std::make_unique<RecordBins<LatticeTriangle>>(space_, fmt::format("level{}", pass),
@@ -316,7 +316,7 @@ private:
                                                                        memory_.bufferBytes / 4);
     }
 
-    /// Of the pass's pages.
+    /// Returns the settings of the pass's pages.
     [[nodiscard]] LevelSettings settings() {
         LevelSettings settings = plan_.settingsOf(pass_);
         settings.roomBytes = memory_.tempBytes;
@@ -324,7 +324,7 @@ private:
         return settings;
     }
 
-    /// Fraction of the whole at which a pass begins.
+    /// Returns the fraction of the whole at which a pass begins.
     [[nodiscard]] double passBegins(int pass) const {
         const double first = kReadingShare + kDealingShare;
         if (pass == plan_.levels()) return first;
@@ -370,7 +370,7 @@ private:
         if (!progress(stage, at(0))) return cancelled();
         auto soup = files_.current->load(bin);
         if (!soup) return soup.error();
-        // A bin without triangles still passes on what waits for it: nothing does, there is no corner in it.
+        // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
         if (soup->empty()) return {};
         Result<void> result;
         arena_.execute([&] {
@@ -386,7 +386,7 @@ private:
         return result;
     }
 
-    /// Slivers and crumbs that vanish on the lattice.
+    /// Keeps slivers and crumbs that would vanish on the lattice.
     void keepThin(std::vector<LatticeTriangle>& soup, size_t bin) const {
         const PageGrid grid = plan_.gridOf(plan_.levelOf(pass_));
         keepCollapsed(
@@ -408,7 +408,7 @@ private:
         return {};
     }
 
-    /// The allocator keeps what the threads gave back, more with every bin.
+    /// Returns memory to the system: the allocator keeps what the threads freed, more with every bin.
     static void releaseMemory() {
 #if defined(__GLIBC__)
         malloc_trim(0);
@@ -451,7 +451,7 @@ private:
     ProgressMeter meter_;
     TempSpace space_;
     Journal journal_;
-    Recorded done_;  ///< by an interrupted build
+    Recorded done_;  ///< what an interrupted build recorded
     bool isResumed_ = false, partitionRecorded_ = false;
     double lastCheckpoint_ = 0;  ///< seconds
     std::optional<tbb::global_control> more_;
@@ -462,7 +462,7 @@ private:
     BuildReport report_;
     WorkFiles files_;
     int pass_ = 0;
-    size_t firstBin_ = 0;  ///< of the pass that is resumed
+    size_t firstBin_ = 0;  ///< where the pass that is resumed begins
 };
 
 }  // namespace

@@ -24,12 +24,12 @@
 
 namespace vcp {
 
-/// Auto: all there is. Texture: materials and their images, not the vertices' colours.
+/// Auto: all colours there are. Texture: materials and their images, not the vertices' colours.
 enum class ColourChoice { Auto, Vertex, Texture, None };
 
 struct BuildProgress {
     std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
-    double fraction = 0;     ///< of the whole build, 0 to 1, never decreasing; 1: done
+    double fraction = 0;     ///< fraction of the whole build, 0 to 1, never decreasing; 1: done
     uint64_t triangles = 0;  ///< read so far
     uint64_t tempBytes = 0;  ///< on the temporary disk now
     double seconds = 0;
@@ -37,10 +37,10 @@ struct BuildProgress {
 
 struct BuildOptions {
     std::vector<std::filesystem::path>
-        inputs;          ///< files, folders of them, "-" for standard input; joined into one dataset
-    std::string format;  ///< of inputs whose content does not tell it (meshFormats())
+        inputs;          ///< inputs: files, folders of them, "-" for standard input; joined into one dataset
+    std::string format;  ///< format of inputs whose content does not tell it (meshFormats())
     std::filesystem::path output;
-    bool overwrite = false;  ///< replaces also an output that is no dataset (octree/output_file.h); never an input
+    bool overwrite = false;  ///< also replaces an output that is no dataset (octree/output_file.h); never an input
     double cell = 0;         ///< finest cell edge, world units; 0: chosen from the mesh
     double error = 0;        ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
     bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal
@@ -48,10 +48,10 @@ struct BuildOptions {
     uint64_t memoryBytes = 0;      ///< cap on what the build allocates; 0: defaultMemoryBytes()
     std::filesystem::path temp;    ///< folder for temporary files; empty: beside the output
     bool resume = false;           ///< go on where an interrupted build of the same output was
-    double checkpointSeconds = 5;  ///< what is done is made durable at most so often
+    double checkpointSeconds = 5;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
-    /// Called from one thread at a time, about ten times a second and whenever a stage begins; false cancels, and then
-    /// it is not called again. May be empty.
+    /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;
+    /// then it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;
 };
 
@@ -59,8 +59,8 @@ struct BuildOptions {
 inline constexpr double kDefaultErrorCells = 0.08;
 
 struct BuildFigures {
-    uint64_t triangles = 0;            ///< read
-    uint64_t degenerateTriangles = 0;  ///< of them, without area
+    uint64_t triangles = 0;            ///< triangles read
+    uint64_t degenerateTriangles = 0;  ///< those among them without area
     uint64_t vertices = 0;
     double seconds = 0;
     uint64_t peakRssBytes = 0;
@@ -68,27 +68,27 @@ struct BuildFigures {
     uint64_t fileBytes = 0;
     uint32_t levels = 0;
     uint64_t subvolumes = 0;
-    uint64_t leaves = 0;           ///< of the finest level, soft and hard
-    uint64_t hardLeaves = 0;       ///< of the finest level
+    uint64_t leaves = 0;           ///< soft and hard leaves of the finest level
+    uint64_t hardLeaves = 0;       ///< hard leaves of the finest level
     double cell = 0;               ///< finest cell edge, world units
     double errorTarget = 0;        ///< world units
-    double certifiedErrorMax = 0;  ///< of the finest level, world units
+    double certifiedErrorMax = 0;  ///< largest certified error of the finest level, world units
 };
 
 struct BuildReport : BuildFigures {
-    std::vector<std::string> warnings;  ///< what was left out of the inputs, one line each
+    std::vector<std::string> warnings;  ///< one line for each thing that was left out of the inputs
     std::vector<SideFile>
-        sideFiles;  ///< that the inputs name, each once; of a build that was resumed they may not be known
+        sideFiles;  ///< files that the inputs name, each once; a build that was resumed may not know them
 };
 
-/// Where a build keeps its temporary files.
+/// Returns the folder where a build keeps its temporary files.
 std::filesystem::path tempFolderOf(const BuildOptions& options);
 
-/// Builds. Blocks; uses options.threads threads. On error or cancellation nothing is left of the output, and
-/// nothing of the temporary files, unless they hold work that resume can use: then the message says so.
-/// Errors: what the readers report; InvalidInput (no triangle with area, nothing finite); Limit (cell too
-/// small for the mesh's extent, too many pages, too little memory); Io (output not writable, disk full);
-/// Usage (what is there to resume is of other inputs or options); Cancelled.
+/// Builds. Blocks; uses options.threads threads. On error or cancellation nothing is left of the output, and nothing of
+/// the temporary files, unless they hold work that resume can use: then the message says so. Errors: what the readers
+/// report; InvalidInput (no triangle with area, nothing finite); Limit (cell too small for the mesh's extent, too many
+/// pages, too little memory); Io (output not writable, disk full); Usage (the build to resume had other inputs or
+/// options); Cancelled.
 Result<BuildReport> buildOctree(const BuildOptions& options);
 
 }  // namespace vcp

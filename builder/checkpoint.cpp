@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-// What the temporary files look like; a build does not go on where one of another version was.
+// Version of the temporary files; a build does not continue from another version's.
 constexpr int kTempVersion = 2;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
@@ -104,7 +104,7 @@ Recorded::Files filesFrom(Fields& all) {
     return files;
 }
 
-/// What only the stage "levels" has.
+/// Reads the fields that only the stage "levels" has.
 void readLevels(Fields& all, Recorded& recorded) {
     for (const json& first : all.list("partition")) recorded.partition.push_back(all.countOf(first));
     const auto& bins = recorded.partition;
@@ -118,7 +118,7 @@ void readLevels(Fields& all, Recorded& recorded) {
     all.require(recorded.bin < bins.size());
 }
 
-/// Those bins that there are, by the names that the journal gives them.
+/// Lists the bins that exist, by the names that the journal gives them.
 std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
     std::vector<std::pair<const char*, RawBins*>> bins;
     if (files.soup) bins = {{"floats", &files.soup->floats.raw()}, {"doubles", &files.soup->doubles.raw()}};

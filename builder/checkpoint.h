@@ -1,4 +1,4 @@
-// What a build can go on from: the files that pass between its stages, and what the journal says about them.
+// What a build can continue from: the files that pass between its stages, and what the journal says about them.
 #pragma once
 
 #include <cstdint>
@@ -20,14 +20,14 @@
 
 namespace vcp {
 
-/// What must be the same for a build to go on where another was.
+/// Returns what must be the same for a build to continue from an interrupted one.
 std::string buildFingerprint(const BuildOptions& options);
 
 nlohmann::json jsonOf(const SoupMeasures& measures);
 
 /// What the journal's lines say together.
 struct Recorded {
-    /// How long the files of bins were, and each level's pages: bytes and entries.
+    /// Lengths of the files of bins, and of each level's pages in bytes and entries.
     struct Files {
         std::map<std::string, uint64_t> bins;
         std::vector<std::pair<uint64_t, uint64_t>> spools;
@@ -42,22 +42,22 @@ struct Recorded {
     size_t bin = 0;
 };
 
-/// `journal`: null when there is none. What is said is complete, of the right types and possible in itself, whoever
-/// wrote it. Errors: InvalidInput, naming `file`.
+/// Reads `journal`, or null when there is none. The result is complete, of the right types and consistent, whoever
+/// wrote the journal. Errors: InvalidInput, naming `file`.
 Result<Recorded> recordedFrom(const nlohmann::json& journal, const std::filesystem::path& file);
 
-/// The files of a build at one moment; those that are not needed are null. One thread.
+/// The files of a build at one moment; those that are not needed are null. Used by one thread.
 struct WorkFiles {
     std::unique_ptr<Soup> soup;
-    std::unique_ptr<RecordBins<LatticeTriangle>> current, next;  ///< of the pass that runs and of the one after it
+    std::unique_ptr<RecordBins<LatticeTriangle>> current, next;  ///< bins of this pass and of the pass after it
     std::unique_ptr<RecordBins<WaitingTriangle>> waiting;
     std::deque<PageSpool> spools;  ///< finished pages of each level, coarse first
 
     /// Makes all of them durable. Returns the fields to record. Errors: Io.
     Result<nlohmann::json> sync();
-    /// Takes over what was recorded, cut to it, where the files were made as they were then. What else an
-    /// interrupted build left in `space` is removed. Errors: Io; InvalidInput (a file is not recorded, shorter than
-    /// recorded, or damaged).
+    /// Reopens the files as they were recorded, each cut to its recorded length. Removes whatever else an
+    /// interrupted build left in `space`. Errors: Io; InvalidInput (a file is not recorded, shorter than recorded,
+    /// or damaged).
     Result<void> reopen(const Recorded& recorded, TempSpace& space);
 };
 

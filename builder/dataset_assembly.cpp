@@ -10,7 +10,7 @@ namespace vcp {
 
 namespace {
 
-/// A page that only leads to finer ones: the surface moved out of it when the level was made.
+/// Makes a page that only leads to finer ones: the surface moved out of it when the level was made.
 StoredPage passagePage(uint32_t log2Cells) {
     PageHeader header;
     header.log2Cells = log2Cells;
@@ -18,7 +18,7 @@ StoredPage passagePage(uint32_t log2Cells) {
     return compressPage(std::as_bytes(std::span(&header, 1)), {});
 }
 
-/// Every page gets a parent. A passage's entry has no leaves.
+/// Gives every page a parent. The entry of a passage has no leaves.
 void addPassages(std::deque<PageSpool>& levels) {
     const auto byMorton = [](const PageEntry& a, const PageEntry& b) { return a.morton < b.morton; };
     for (size_t level = levels.size() - 1; level > 0; --level) {
@@ -36,7 +36,7 @@ void addPassages(std::deque<PageSpool>& levels) {
     }
 }
 
-/// Every parent knows its children.
+/// Lets every parent name its children.
 void linkChildren(std::deque<PageSpool>& levels) {
     uint64_t first = levels[0].entries().size();
     for (size_t level = 0; level + 1 < levels.size(); ++level) {

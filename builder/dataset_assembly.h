@@ -13,13 +13,13 @@
 
 namespace vcp {
 
-/// What the mesh and the grid say about a dataset. `errorTarget`: world units.
+/// Returns what the mesh and the grid say about a dataset. `errorTarget`: world units.
 FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double errorTarget, bool hasColour);
 
-/// Links parents and children, where a page without a parent gets one that only leads on, and writes the file.
-/// `levels`: pages of each level, coarse first, in Morton order; entries are completed. `header`: that of headerOf;
-/// levels, pages, leaves and certified errors are filled in. `progress` is given the part done; false cancels.
-/// Returns the file's bytes. Errors: Io, Cancelled.
+/// Links parents and children, and writes the file. A page without a parent gets one that only leads to it. `levels`:
+/// pages of each level, coarse first, in Morton order; entries are completed. `header`: that of headerOf; levels,
+/// pages, leaves and certified errors are filled in. `progress` is given the part done; false cancels. Returns the
+/// file's bytes. Errors: Io, Cancelled.
 Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output,
                                  const OutputRules& rules, const std::function<bool(double)>& progress);
 

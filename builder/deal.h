@@ -11,21 +11,21 @@
 
 namespace vcp {
 
-/// What is dealt. The calling arena's threads work.
+/// What is dealt. The calling arena's threads do the work.
 struct Dealing {
     const Soup& soup;
     const LatticeSnapper& snapper;
-    PageGrid grid;  ///< of the finest level
-    /// Given the part of the soup that is read; false cancels. Called from any of the threads.
+    PageGrid grid;  ///< grid of the finest level
+    /// Called with the part of the soup that is read; false cancels. Any of the threads calls it.
     std::function<bool(double)> progress;
 };
 
-/// The bins: one where all triangles are at most `limit`, else by how many of them each page needs, and what lies
-/// around it. Errors: Io, Cancelled.
+/// Chooses the bins: a single one where there are at most `limit` triangles, else by how many of them each page and its
+/// surroundings need. Errors: Io, Cancelled.
 Result<PagePartition> choosePartition(const Dealing& dealing, uint64_t limit);
 
-/// Deals each triangle to the bins that its corners lie in: that is where their normals are found. `bins` are flushed.
-/// Errors: Io, Cancelled.
+/// Deals each triangle to the bins that its corners lie in, where their normals are found. `bins` are flushed. Errors:
+/// Io, Cancelled.
 Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partition, RecordBins<LatticeTriangle>& bins);
 
 }  // namespace vcp

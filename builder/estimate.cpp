@@ -15,9 +15,9 @@ namespace vcp {
 
 namespace {
 
-// A triangle on the temporary disk: the soup while it is dealt, then the finest level's bins with what has
-// been built of it. A triangle in the file (8 to 10 for scans, 16 for crumpled ones with colour), and the time for
-// one on one thread.
+// Bytes of a triangle on the temporary disk (the soup while it is dealt, then the finest level's bins with what has
+// been built of it) and in the file (8 to 10 for scans, 16 for crumpled ones with colour), and its time on one
+// thread.
 constexpr double kTempBytesPerTriangle = 75, kFileBytesPerTriangle = 16, kSecondsPerTriangle = 25e-6;
 
 /// Measures one input's triangles as far as their vertices fit memory.

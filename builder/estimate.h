@@ -1,5 +1,5 @@
-// What a build will need, before it begins: counts and bounds are read off the input, bytes and time are
-// estimates from builds of scans (docs/building.md).
+// What a build will need, before it begins: counts and bounds are read from the input, bytes and time are estimated
+// from builds of scans (docs/building.md).
 #pragma once
 
 #include <functional>
@@ -10,21 +10,21 @@
 namespace vcp {
 
 struct BuildEstimate {
-    SoupMeasures measures;  ///< area from the triangles whose vertices fit memory
+    SoupMeasures measures;  ///< area counts only triangles whose vertices fit memory
     bool isAreaComplete = true;
     GridFrame frame;
-    uint64_t memoryBytes = 0;  ///< the cap that would hold
-    uint64_t tempBytes = 0;    ///< most on the temporary disk at one time; 0: everything fits memory
+    uint64_t memoryBytes = 0;  ///< a sufficient memory cap
+    uint64_t tempBytes = 0;    ///< most bytes on the temporary disk at one time; 0: everything fits memory
     uint64_t fileBytes = 0;
     double seconds = 0;
-    uint64_t freeTempBytes = 0, freeOutputBytes = 0;  ///< on the disks they would go to
+    uint64_t freeTempBytes = 0, freeOutputBytes = 0;  ///< free bytes on the disks they would go to
 };
 
-/// Bytes on the temporary disk at most, and of the file, for so many triangles.
+/// Returns the most bytes on the temporary disk, and the bytes of the file, for so many triangles.
 uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory);
 uint64_t expectedFileBytes(uint64_t triangles);
 
-/// Free bytes where `path`, or the folder it will be in, lies; the largest number when that is unknown.
+/// Returns the free bytes where `path`, or the folder it will be in, lies; the largest number when that is unknown.
 uint64_t freeBytesAt(const std::filesystem::path& path);
 
 /// Reads the inputs and writes nothing. Errors: as buildOctree's while reading.

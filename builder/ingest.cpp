@@ -135,7 +135,7 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             hasVertexColours |= !chunk.colours.empty();
             VCP_TRY(join.add(chunk, materialBase));
             const uint64_t bytes = doneBytes + (*stream)->bytesRead();
-            // A pipe does not say how much is to come.
+            // A pipe does not say how many bytes will come.
             const double fraction = totalBytes > 0 ? std::min(double(bytes) / double(totalBytes), 1.0) : 0;
             if (!progress(fraction, writer.triangles()))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};

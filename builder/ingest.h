@@ -1,4 +1,4 @@
-// Ingest: mesh files -> a soup of triangles in world space, measured; and the grid that will hold it.
+// Ingest: mesh files become a soup of triangles in world space, measured; and the grid that will hold it.
 #pragma once
 
 #include <functional>
@@ -23,42 +23,42 @@ struct GridFrame {
     uint32_t log2Cells = 5;  ///< cells an edge of a page
 };
 
-/// What reading found out. Does not depend on the order of the triangles.
+/// What reading found out. It does not depend on the order of the triangles.
 struct SoupMeasures {
-    glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the vertices that triangles use
+    glm::dvec3 boundsMin{0}, boundsMax{0};  ///< bounds of the vertices that triangles use
     double area = 0;
     uint64_t triangles = 0;
-    uint64_t degenerateTriangles = 0;  ///< of them, without area in the file's own coordinates
+    uint64_t degenerateTriangles = 0;  ///< those among them without area in the file's own coordinates
     uint64_t vertices = 0;
     bool hasVertexColours = false;
-    bool hasMaterials = false;  ///< of another colour than white, or with an image
+    bool hasMaterials = false;  ///< some have a colour other than white, or an image
 };
 
-/// The triangles of all inputs. Most files hold floats: those take half the room.
+/// The triangles of all inputs. Most files hold floats, which take half the room.
 struct Soup {
     Soup(TempSpace& space, uint64_t bufferBytes)
         : floats(space, "floats", 1, bufferBytes / 2), doubles(space, "doubles", 1, bufferBytes / 2) {}
 
     RecordBins<WorldTriangle<float>> floats;
     RecordBins<WorldTriangle<double>> doubles;
-    std::vector<Material> materials;  ///< of all inputs
+    std::vector<Material> materials;  ///< materials of all inputs
 };
 
-/// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is
-/// given the fraction read; false cancels. Triangles without area are counted and left out. `warnings`: what the
-/// readers left out. `sideFiles`: what the inputs name, each once.
+/// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is given the
+/// fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
+/// left out, `sideFiles` the files that the inputs name, each once.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
                                 const std::function<bool(double fraction, uint64_t triangles)>& progress,
                                 std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
 
-/// How the inputs are opened.
+/// Returns how the inputs are opened.
 MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 
-/// `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
+/// Chooses the grid; `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures);
 
-/// The tolerance of the finest level in world units; `options.error` 0 chooses it. Errors: Limit (finer than the
-/// lattice can tell).
+/// Returns the tolerance of the finest level in world units; `options.error` 0 chooses it. Errors: Limit (finer than
+/// the lattice can resolve).
 Result<double> chooseError(const BuildOptions& options, const SoupMeasures& measures, const GridFrame& frame);
 
 }  // namespace vcp

@@ -12,14 +12,14 @@ namespace vcp {
 
 namespace {
 
-/// Middle of two colours, channel by channel.
+/// Returns the middle of two colours, channel by channel.
 uint32_t middleColour(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); }
 
 glm::i32vec3 middle(glm::i32vec3 a, glm::i32vec3 b) {
     return {(int64_t{a.x} + b.x) >> 1, (int64_t{a.y} + b.y) >> 1, (int64_t{a.z} + b.z) >> 1};
 }
 
-/// Edge of a cell in texture coordinates: by how the triangle's areas compare.
+/// Returns the edge of a cell in texture coordinates, from the ratio of the triangle's areas.
 float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
     const glm::dvec3 u = glm::dvec3(t.corner[1] - t.corner[0]), v = glm::dvec3(t.corner[2] - t.corner[0]);
     const double area = glm::length(glm::cross(u, v)) / (double(kLatticePerCell) * kLatticePerCell);
@@ -48,12 +48,12 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
                             tooLong(corner[2], corner[0])};
     const int cuts = isLong[0] + isLong[1] + isLong[2];
     if (cuts == 0) return 0;
-    // Turned so that the cut edges come first: (01), (01, 12) or all.
+    // The triangle is turned so that the cut edges come first: (01), (01, 12) or all.
     int turn = 0;
     if (cuts == 1) turn = isLong[0] ? 0 : isLong[1] ? 1 : 2;
     if (cuts == 2) turn = !isLong[2] ? 0 : !isLong[0] ? 1 : 2;
     int count = 0;
-    // 0 to 2: corners; 3 to 5: middles of the edges from them.
+    // Points 0 to 2 are corners; 3 to 5 are middles of the edges from them.
     const auto add = [&](int a, int b, int c) {
         Piece& p = pieces[count++] = piece;
         p.triangle.stray = piece.triangle.stray + static_cast<float>(kLatticeRounding);

@@ -1,4 +1,4 @@
-// Soup in world space -> soup on the finest level's lattice: snapped, long edges cut, colours settled.
+// Brings the soup from world space to the finest level's lattice: snapped, long edges cut, colours settled.
 #pragma once
 
 #include <vector>
@@ -11,25 +11,25 @@
 
 namespace vcp {
 
-/// Where images give the colour, vertices are at most so far apart, in cells: they carry it.
+/// Where images give the colour, vertices are at most so many cells apart, since they carry it.
 inline constexpr double kPaintedEdgeCells = 1.5;
 
 /// Snaps triangles to a frame's lattice. Any thread.
 class LatticeSnapper {
 public:
-    /// `colours`: of the soup's materials; null: vertices keep their own. `vertexColours`: whether these count.
+    /// `colours`: those of the soup's materials; null: vertices keep their own. `vertexColours`: whether these count.
     explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true);
 
-    /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; some may have no area on the
-    /// lattice (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no
-    /// crack opens. `painted`: with the materials' colours.
+    /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; some may have no area on the lattice
+    /// (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no crack
+    /// opens. `painted`: with the materials' colours.
     template <class Real, class Sink>
     void add(const WorldTriangle<Real>& triangle, Sink&& sink, bool painted = true) const {
         cutInto(snap(triangle), sink, painted && colours_);
     }
 
 private:
-    /// A triangle on the way, with what its colours are found by.
+    /// A triangle on its way, with what its colours are computed from.
     struct Piece {
         LatticeTriangle triangle;
         glm::vec2 uv[3];
@@ -40,7 +40,7 @@ private:
     template <class Real>
     Piece snap(const WorldTriangle<Real>& triangle) const;
     [[nodiscard]] bool tooLong(glm::i32vec3 a, glm::i32vec3 b) const;
-    /// Cuts each edge that is too long in its middle; returns the number of pieces, 0 when there is none to cut.
+    /// Cuts each edge that is too long in its middle. Returns the number of pieces, 0 when none is too long.
     int cut(const Piece& piece, Piece (&pieces)[4]) const;
     void paint(Piece& piece) const;
 

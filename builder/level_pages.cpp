@@ -25,7 +25,7 @@ struct BuiltPage {
     StoredPage stored;
 };
 
-/// A page's bytes; what they were made of is gone when they are coded.
+/// Builds a page's bytes; what they were made of is freed before they are coded.
 EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
                           std::span<const uint32_t> triangles) {
     PageGeometry geometry(mesh, triangles, mortonDecode(code), settings.grid.log2Cells);
@@ -37,7 +37,7 @@ EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh
 Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
                             std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
-    // A page that cannot be read back must not cost the whole file.
+    // A page that cannot be read back must not spoil the whole file.
     if (const auto view = parsePage(encoded.geometry); encoded.leaves > 0 && !view)
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format(
@@ -59,13 +59,13 @@ uint64_t bytesOf(const LatticeMesh& mesh) {
            mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float));
 }
 
-/// Memory to build a page of these triangles.
+/// Returns the memory to build a page of these triangles.
 uint64_t workOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
     double touched = 0;
     for (const uint32_t k : triangles) {
         glm::dvec3 p[3];
         for (int i = 0; i < 3; ++i) p[i] = glm::dvec3(mesh.positions[mesh.triangles[k][i]]) / double(kLatticePerCell);
-        // Cells that a flat shape touches: its area over three axes, its rim, and those of its corners.
+        // The cells that a flat shape touches: its area over three axes, its rim, and those of its corners.
         const double perimeter = glm::distance(p[0], p[1]) + glm::distance(p[1], p[2]) + glm::distance(p[2], p[0]);
         touched += 0.875 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) + 1.5 * perimeter + 4;
     }
@@ -124,7 +124,7 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
     const uint64_t held = bytesOf(mesh) + bins.triangles.size() * sizeof(uint32_t);
     const auto left = [&](uint64_t bytes) { return bytes - std::min(held, bytes); };
     InOrder inOrder(spool);
-    // Pages that need more than all have together come first, alone, while nothing else takes memory.
+    // Pages that need more than all have together are built first, each alone, while nothing else takes memory.
     std::vector<bool> isBuilt(work.size(), false);
     for (size_t i = 0; i < work.size(); ++i) {
         if (work[i] <= left(settings.pageBytes)) continue;
@@ -156,7 +156,7 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
             return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         return put;
     };
-    // Pages differ in weight, so they are taken one by one, in order: few have to wait for one before them.
+    // Pages differ in weight, so they are taken one by one, in order: few must wait for an earlier one.
     tbb::parallel_for(
         0, tbb::this_task_arena::max_concurrency(),
         [&](int) {

@@ -10,20 +10,20 @@
 
 namespace vcp {
 
-/// What all pages of a level share.
+/// The settings that all pages of a level share.
 struct LevelSettings {
     PageGrid grid;
     double cell = 0;       ///< world units
-    double tolerance = 0;  ///< cells, for soft leaves; the finest level's includes the stray
+    double tolerance = 0;  ///< in cells, for soft leaves; the finest level's includes the stray
     bool finest = false;
     uint64_t pageBytes = 0;  ///< memory for the mesh and pages under construction
-    uint64_t roomBytes = 0;  ///< what makeRoom frees besides, for a page that is built alone
+    uint64_t roomBytes = 0;  ///< memory that makeRoom frees besides, for a page that is built alone
     std::function<Result<void>()> makeRoom;
 };
 
-/// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface
-/// to `spool`. `progress` is given the part done; false stops. Uses the calling arena's threads.
-/// Errors: Limit (a page alone needs more memory than pageBytes and roomBytes, or holds more than a page can name), Io,
+/// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface to
+/// `spool`. `progress` is given the part done; false stops. Uses the calling arena's threads. Errors: Limit (a
+/// single page needs more memory than pageBytes and roomBytes, or holds more than a page can name), Io,
 /// Cancelled.
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
                         PageSpool& spool, const std::function<bool(double)>& progress);

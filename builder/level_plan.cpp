@@ -6,8 +6,8 @@ namespace vcp {
 
 namespace {
 
-// Soft leaves of coarser levels may err by this many of their cells; they are looked at where a cell is
-// about a pixel.
+// Soft leaves of coarser levels may err by this many of their cells; they are seen where a cell is about a
+// pixel.
 constexpr double kCoarseErrorCells = 0.12;
 
 }  // namespace

@@ -13,21 +13,21 @@ namespace vcp {
 struct LevelPlan {
     GridFrame frame;
     PagePartition finest;    ///< bins of the finest level
-    double errorTarget = 0;  ///< of the finest level, world units
+    double errorTarget = 0;  ///< tolerance of the finest level, world units
     uint64_t pageBytes = 0;  ///< memory for a bin's mesh and its pages
 
     [[nodiscard]] int levels() const { return static_cast<int>(frame.levels); }
-    /// Level whose grid and bins a pass works on.
+    /// Returns the level whose grid and bins a pass works on.
     [[nodiscard]] int levelOf(int pass) const { return pass < levels() ? pass : levels() - 1; }
     [[nodiscard]] PageGrid gridOf(int level) const { return {frame.log2Cells, static_cast<uint32_t>(level)}; }
     [[nodiscard]] PagePartition partitionOf(int level) const;
-    /// But for the room that temporary files can make.
+    /// Returns a level's settings, without the room that temporary files can make.
     [[nodiscard]] LevelSettings settingsOf(int level) const;
-    /// First code after the pages of bin `bin` of a level's partition.
+    /// Returns the first code after the pages of bin `bin` of a level's partition.
     [[nodiscard]] static uint64_t endOf(const PagePartition& partition, size_t bin, int level) {
         return bin + 1 < partition.bins() ? partition.first()[bin + 1] : uint64_t{1} << 3 * level;
     }
-    /// Part of all passes' time before this one, but for the first: each takes about a third of the one before.
+    /// Share of all passes' time before this one, the first not counted: each takes about a third of the one before.
     [[nodiscard]] double timeBefore(int pass) const;
 };
 

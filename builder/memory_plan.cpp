@@ -13,17 +13,17 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// The program itself, readers' windows, and what each thread keeps for coding and compressing.
+// The program itself, the readers' windows, and what each thread keeps for coding and compressing.
 constexpr uint64_t kBaseBytes = 40 * kMiB;
 constexpr uint64_t kThreadBytes = 6 * kMiB;
 
-// Below it, blocks and bins become so small that the disk does nothing but seek.
+// With less memory, blocks and bins become so small that the disk does nothing but seek.
 constexpr uint64_t kLeastUsable = 96 * kMiB;
 
-// A bin's records, its mesh, and what the step to the coarser level needs, measured with room to spare.
+// A bin's records, its mesh, and what the step to the coarser level needs; measured, with some room to spare.
 constexpr uint64_t kBinTriangleBytes = 260;
 
-/// Bytes that a control group allows, or the largest number.
+/// Returns the bytes that a control group allows, or the largest number.
 uint64_t groupLimit() {
     std::ifstream file("/sys/fs/cgroup/memory.max");
     uint64_t bytes = 0;
@@ -49,7 +49,7 @@ Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
     plan.vertexBytes = usable / 2;
     plan.tempBytes = usable / 6;
     plan.bufferBytes = usable / 16;
-    // All that temporary files, the next level's blocks and those of waiting triangles leave.
+    // Pages get what temporary files, the next level's blocks and those of waiting triangles leave.
     plan.pageBytes = usable - plan.tempBytes - plan.bufferBytes * 5 / 4;
     plan.binTriangles = usable / 3 / kBinTriangleBytes;
     return plan;

@@ -10,16 +10,16 @@ namespace vcp {
 
 struct MemoryPlan {
     uint64_t vertexBytes = 0;   ///< reading: vertices of one input that stay in memory
-    uint64_t tempBytes = 0;     ///< temporary files' bytes that have not gone to the disk
+    uint64_t tempBytes = 0;     ///< bytes of temporary files that have not gone to the disk
     uint64_t bufferBytes = 0;   ///< open blocks of one set of bins
     uint64_t binTriangles = 0;  ///< triangles of a bin
     uint64_t pageBytes = 0;     ///< a bin's mesh and its pages under construction, all threads together
 };
 
-/// Half of the machine's memory, or of the control group's limit when that is less.
+/// Returns half of the machine's memory, or of the control group's limit when that is less.
 uint64_t defaultMemoryBytes();
 
-/// Errors: Limit (too little to work with; the message says how much is needed).
+/// Divides the memory. Errors: Limit (too little to work with; the message says how much is needed).
 Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads);
 
 }  // namespace vcp

@@ -12,7 +12,7 @@
 
 namespace vcp {
 
-/// Any thread; the callback is called by one at a time.
+/// Any thread may report; the callback is called by one thread at a time.
 class ProgressMeter {
 public:
     explicit ProgressMeter(const std::function<bool(const BuildProgress&)>& callback) : callback_(callback) {}
@@ -32,7 +32,7 @@ public:
         return !cancelled_;
     }
 
-    /// Since the build began.
+    /// Seconds since the build began.
     [[nodiscard]] double seconds() const {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     }
@@ -41,7 +41,7 @@ private:
     const std::function<bool(const BuildProgress&)>& callback_;
     const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::mutex mutex_;
-    std::string stage_;  // told last
+    std::string stage_;  // the stage that was reported last
     double lastSeconds_ = -1, fraction_ = 0;
     bool cancelled_ = false;
 };

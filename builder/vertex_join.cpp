@@ -8,7 +8,7 @@ namespace vcp {
 
 namespace {
 
-// Beyond it a vertex number is a broken one; numbers below it make a bounded number of bins.
+// A vertex number beyond this is broken; numbers below it make a bounded number of bins.
 constexpr uint64_t kMaxVertices = uint64_t{1} << 40;
 
 constexpr uint64_t kMinChunkVertices = uint64_t{1} << 16;
@@ -30,7 +30,7 @@ Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
     for (size_t i = 0; i < chunk.positions.size(); ++i) {
         const Vertex vertex{chunk.positions[i], chunk.colours.empty() ? kWhite : chunk.colours[i]};
         if (resident_.size() < chunkVertices_) {
-            // Doubling would overshoot the memory by half.
+            // Doubling would exceed the memory by half.
             if (resident_.size() == resident_.capacity())
                 resident_.reserve(
                     std::min<uint64_t>(chunkVertices_, std::max<size_t>(resident_.capacity() * 3 / 2, 1 << 16)));
@@ -43,7 +43,7 @@ Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
     return append(rest);
 }
 
-/// Appends to the chunks on the disk, each with a hash of what it was before it went there.
+/// Appends vertices to the chunks on the disk, each with a hash made before it went there.
 Result<void> VertexJoin::append(std::span<const Vertex> vertices) {
     while (!vertices.empty()) {
         const uint64_t inChunk = later_.size() / sizeof(Vertex) % chunkVertices_;
@@ -58,7 +58,7 @@ Result<void> VertexJoin::append(std::span<const Vertex> vertices) {
     return {};
 }
 
-/// Makes a chunk after the first the one in memory.
+/// Loads a chunk after the first, in place of the one in memory.
 Result<void> VertexJoin::load(uint64_t chunk) {
     residentFirst_ = chunk * chunkVertices_;
     resident_.resize(std::min(chunkVertices_, vertices_ - residentFirst_));
@@ -134,10 +134,10 @@ Result<void> VertexJoin::finish(const std::string& file) {
         const uint64_t before = waiting_.count(chunk);
         VCP_TRY(process(chunk));
         VCP_TRY(waiting_.raw().flush());
-        // What waits for a vertex of this chunk that is not there was sent back to it.
+        // A triangle that waits for a vertex of this chunk that is not there was sent back to it.
         if (waiting_.count(chunk) > before) return missing();
     }
-    // What was there was taken from it; the rest names chunks that never came.
+    // Vertices that exist were taken from their chunks; the rest names chunks that never came.
     if (anyBeyond()) return missing();
     later_.remove();
     waiting_.raw().remove();

@@ -1,10 +1,10 @@
 // Joins indexed triangles with their vertices, whatever the memory and the order in the file.
 //
-// The first vertices stay in memory, as many as fit; the rest go to temporary files, in chunks of as many.
-// A triangle whose corners are in memory is done at once. Another takes along the corners that are there and
-// waits with the chunk of the lowest of the others. After the last vertex the chunks are loaded one after the
-// other; each resolves the triangles that wait for it and sends the unfinished ones on to a higher chunk. So
-// every vertex is written and read at most once, every triangle at most three times.
+// The first vertices stay in memory, as many as fit; the rest go to temporary files, in chunks of the same number. A
+// triangle whose corners are in memory is done at once. Any other takes along the corners that are there and waits for
+// the chunk of its lowest missing corner. After the last vertex the chunks are loaded one after the other; each
+// resolves the triangles that wait for it and sends the unfinished ones on to a higher chunk. So every vertex is
+// written and read at most once, every triangle at most three times.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@
 
 namespace vcp {
 
-/// One input file's join. One thread.
+/// The join of one input file. One thread.
 class VertexJoin {
 public:
     using Emit = std::function<Result<void>(const WorldTriangle<double>&)>;
@@ -27,9 +27,9 @@ public:
     /// `vertexBytes`: memory for vertices, with their colours.
     VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit);
 
-    /// Takes a chunk of the stream, in order. `materialBase`: materials of the inputs before this one.
+    /// Takes a chunk of the stream, in order. `materialBase`: number of materials of the inputs before this one.
     Result<void> add(const MeshChunk& chunk, uint32_t materialBase);
-    /// After the last chunk. `file` for errors. Errors: InvalidInput (a triangle names a vertex that never
+    /// Finishes after the last chunk. `file` is for errors. Errors: InvalidInput (a triangle names a vertex that never
     /// came), Io.
     Result<void> finish(const std::string& file);
 
@@ -63,8 +63,8 @@ private:
     uint64_t vertices_ = 0;
     bool hasColour_ = false;
     TempFile later_;                ///< the vertices from chunk 1 on
-    std::vector<uint64_t> hashes_;  ///< of those chunks that are whole, then of the last one
-    ChunkHash hash_;                ///< of the chunk that is being appended
+    std::vector<uint64_t> hashes_;  ///< hashes of the chunks that are whole, then of the last one
+    ChunkHash hash_;                ///< hash of the chunk that is being appended
     RecordBins<Waiting> waiting_;
 };
 

@@ -14,9 +14,9 @@ namespace {
 
 using glm::dvec2, glm::dvec3, glm::ivec3;
 
-// Square metres; surface nets have 3 triangles for each square of the grid's edge of surface, on average.
+// Surface in square metres; surface nets have 3 triangles for each square of the grid's edge of surface, on average.
 constexpr double kSurface = 2.64, kTrianglesASquare = 3.0;
-constexpr double kUnit = 0.1;      // of texture coordinates
+constexpr double kUnit = 0.1;      // unit of texture coordinates, metres
 constexpr double kFlatEnd = 0.72;  // cosine to the axis from which on a limb's end is mapped flat
 constexpr double kMargin = 0.06;
 constexpr size_t kPiece = 1 << 16;
@@ -99,7 +99,7 @@ private:
     std::vector<Limb> limbs_ = makeLimbs();
 };
 
-/// A vertex in each cell that the surface passes through, a quad round each grid edge that crosses it.
+/// Makes a vertex in each cell that the surface passes through, and a quad round each grid edge that crosses it.
 class SurfaceNet {
 public:
     SurfaceNet(const Body& body, double edge) : body_(body), edge_(edge) {
@@ -174,7 +174,7 @@ private:
     std::vector<uint32_t> vertexOf_;
 };
 
-/// Vertices to the middle of their neighbours, and back to the surface: triangles of like size.
+/// Moves vertices to the middle of their neighbours, and back to the surface: triangles become of like size.
 void even(const Body& body, DogMesh& mesh) {
     for (int round = 0; round < 3; ++round) {
         std::vector<dvec3> sums(mesh.positions.size(), dvec3(0));
@@ -188,7 +188,7 @@ void even(const Body& body, DogMesh& mesh) {
     }
 }
 
-/// A frame with z along a limb; x is as near as can be to straight down, where seams are seen least.
+/// A frame with z along a limb; x is as near as possible to straight down, where seams are seen least.
 struct Chart {
     dvec3 from, x, y, z;
     double turns;  ///< units round it
@@ -198,7 +198,7 @@ struct Chart {
         y = glm::normalize(glm::cross(z, down)), x = glm::cross(y, z);
         turns = std::max(1.0, std::round(std::numbers::pi * (limb.fromRadius + limb.toRadius) / kUnit));
     }
-    /// From -1/2 to 1/2, the seam where x is.
+    /// Returns the turn from -1/2 to 1/2; the seam is where x is.
     [[nodiscard]] double turnOf(dvec3 p) const {
         return std::atan2(-glm::dot(p - from, y), -glm::dot(p - from, x)) / (2 * std::numbers::pi);
     }

@@ -28,10 +28,10 @@ struct DogMesh {
 
 constexpr uint64_t kMostDogTriangles = 200'000;
 
-/// About so many triangles, within a tenth: 10 thousand to kMostDogTriangles.
+/// Makes a dog of about so many triangles, within a tenth: 10 thousand to kMostDogTriangles.
 DogMesh dog(uint64_t triangles);
 
-/// v, vt and f of an OBJ, handed to `write` in pieces; returns its first error.
+/// Hands the v, vt and f of an OBJ to `write` in pieces; returns its first error.
 Result<void> writeObj(const DogMesh& mesh, const std::function<Result<void>(std::string_view)>& write);
 
 }  // namespace vcp::scan

@@ -135,7 +135,7 @@ public:
         return file_ ? file_->append(bytes) : appendAll(descriptor_, bytes, path_);
     }
 
-    /// Gives the file its name.
+    /// Gives the finished file its name.
     Result<void> finish() const {
         if (file_) return file_->commit();
         if (::close(descriptor_) != 0) return ioError(path_, "close failed");

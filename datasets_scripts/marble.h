@@ -14,7 +14,7 @@ struct Marble {
     Noise noise;
     double finest;  ///< shortest wavelength that the tessellation can carry
 
-    /// Height of weathering, chisel marks and pits; metres.
+    /// Returns the height of weathering, chisel marks and pits, in metres.
     [[nodiscard]] double roughness(const glm::dvec3& p) const {
         const double pits = std::max(0.0, noise(p * 19.0 + 7.0) - 0.35);
         return 0.0035 * noise.fractal(p, 0.16, finest) - 0.016 * pits * pits;

@@ -37,7 +37,7 @@ inline double sinTurns(double turns) {
 
 inline double cosTurns(double turns) { return sinTurns(turns + 0.25); }
 
-/// 0 up to `from`, 1 beyond `to`, smooth between.
+/// Returns 0 up to `from`, 1 beyond `to`, smooth between.
 inline double smoothStep(double from, double to, double x) {
     const double t = (x - from) / (to - from);
     if (t <= 0) return 0;
@@ -45,7 +45,7 @@ inline double smoothStep(double from, double to, double x) {
     return t * t * (3 - 2 * t);
 }
 
-/// 1 at 0, 0 from |x| = 1 on, smooth.
+/// Returns 1 at 0, 0 from |x| = 1 on, smooth.
 inline double bump(double x) {
     const double q = 1 - x * x;
     return q > 0 ? q * q : 0;
@@ -71,7 +71,7 @@ public:
         return near + s.z * (far - near);
     }
 
-    /// Octaves from `wavelength` down to `finest`, each half as high as the one before.
+    /// Sums octaves from `wavelength` down to `finest`, each half as high as the one before.
     [[nodiscard]] double fractal(const glm::dvec3& p, double wavelength, double finest) const {
         double sum = 0, height = 1;
         for (glm::dvec3 offset(0); wavelength >= finest; wavelength *= 0.5, height *= 0.5, offset += 17.3)

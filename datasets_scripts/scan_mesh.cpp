@@ -12,7 +12,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the PLY is written in the host's byte order");
 
-// Square metres of the statue, roughly; gives the mean edge of a triangle.
+// Surface of the statue in square metres, roughly; gives the mean edge of a triangle.
 constexpr double kSurface = 13.0;
 constexpr double kScannerNoise = 0.00025;
 constexpr glm::dvec3 kUtmOrigin(448'262.25, 5'411'932.5, 312.0);
@@ -56,7 +56,7 @@ uint64_t sheetTriangles(const GridPart& grid) {
     return 2 * quads;
 }
 
-/// The largest grid of the part's aspect with at most `budget` triangles.
+/// Makes the largest grid of the part's aspect with at most `budget` triangles.
 void fitGrid(GridPart& grid, uint64_t budget) {
     const uint64_t quads = budget / 2;
     if (grid.part.topology == Topology::Strip) {
@@ -79,7 +79,7 @@ class Buffer {
 public:
     explicit Buffer(const ScanMesh::Write& write) : write_(write) { bytes_.reserve(ScanMesh::kBufferBytes); }
 
-    /// Room for `size` bytes, valid until the next call; null after an error.
+    /// Returns room for `size` bytes, valid until the next call; null after an error.
     std::byte* claim(size_t size) {
         if (bytes_.size() + size > ScanMesh::kBufferBytes) flush();
         if (!result_) return nullptr;
@@ -216,7 +216,7 @@ ScanMesh::ScanMesh(const ScanOptions& options) : options_(options) {
     for (Part& part : statue(options.seed, edge())) {
         GridPart grid;
         grid.part = std::move(part);
-        // What earlier parts left over goes to the next one; the strip, last, takes the exact rest.
+        // What earlier parts left over goes to the next part; the strip, which is last, takes the exact rest.
         share += grid.part.weight;
         const bool last = grid.part.topology == Topology::Strip;
         const auto wanted = last ? options.triangles : uint64_t(share * double(options.triangles));

@@ -114,13 +114,13 @@ public:
                         0.012 * feature(0.32, 0.13, 0.22, 0.13) + 0.006 * feature(0.32, 0.11, 0.13, 0.07) +
                         0.005 * feature(0.30, 0.28, 0.30, 0.08) + 0.007 * feature(0, -0.47, 0.20, 0.06) +
                         0.006 * feature(0, -0.57, 0.16, 0.06) + 0.012 * feature(0, -0.80, 0.30, 0.22);
-        // Hair in combed strands from the parting to the bun.
+        // The hair is combed in strands from the parting to the bun.
         const double comb = fold(26 * (d.y + 0.35 * d.z * d.z + 0.10 * marble_.noise(d * 3.0)));
         height = face * height + (1 - face) * (0.010 + 0.007 * comb) * smoothStep(-0.75, -0.35, d.y - 0.4 * d.z);
         const double jaw = 1 - 0.22 * smoothStep(0.1, -0.9, d.y);
         const dvec3 radii(0.082 * jaw, 0.118, 0.100 * (0.86 + 0.14 * jaw));
         const dvec3 local = 1.13 * (d * radii + d * height);
-        // Turned to the raised arm and slightly down.
+        // The head is turned to the raised arm and slightly down.
         const double c = cosTurns(0.055), s = sinTurns(0.055);
         SurfacePoint point;
         point.position =
@@ -204,7 +204,7 @@ public:
         const dvec3 rough = dvec3(u * 3, v, phase_);
         const double wave = 0.5 * sinTurns(9 * u + 0.5 * marble_.noise(rough * 2.0) + 0.08 * sinTurns(9 * u));
         const double small = marble_.noise(dvec3(u * 26, v * 3, 4.5));
-        // Blown backwards and outwards towards its lower border.
+        // The cloth is blown backwards and outwards towards its lower border.
         const double flare = 0.03 + 0.17 * v * v + v * (0.085 * wave + 0.012 * small) + 0.010 * wave;
         SurfacePoint point;
         point.position = start + out * flare + dvec3(-0.05 * v * v, -drop, -0.08 * v * v);
@@ -219,7 +219,7 @@ public:
         const double ring = sinTurns(0.5 * v);
         const dvec3 d(ring * cosTurns(u), -cosTurns(0.5 * v), -ring * sinTurns(u));
         const dvec3 base = dvec3(0.01, -0.015, 0.02) + d * dvec3(0.48, 0.105, 0.45);
-        // Broken facets: the crests of folded noise, then fine weathering.
+        // Broken facets come first, the crests of folded noise, then fine weathering.
         const double facets = std::abs(marble_.noise(base * 7.0)) + 0.5 * std::abs(marble_.noise(base * 15.0 + 3.0));
         const double height = 0.06 * (0.45 - facets) + 2.2 * marble_.roughness(base);
         SurfacePoint point;
@@ -381,7 +381,7 @@ void Statue::addWings(std::vector<Part>& parts, double weight) const {
                 const uint64_t h = hash(seed_ ^ uint64_t(1000 * layer + i));
                 const dvec3 root =
                     arm.at(0.12 + 0.88 * t) + plane * (0.016 * layer - 0.004 + 0.006 * (i % 2)) - dvec3(0, 0.01, 0);
-                // From hanging down at the body to reaching out at the tip.
+                // The feathers turn from hanging down at the body to reaching out at the tip.
                 const double lean = 0.02 + 0.165 * t * t + 0.004 * signedUnit(h);
                 dvec3 along(sinTurns(lean), -cosTurns(lean), 0);
                 along = glm::normalize(along - plane * glm::dot(along, plane));

@@ -15,7 +15,7 @@ using glm::dvec2, glm::dvec3;
 
 constexpr double kPi = std::numbers::pi;
 constexpr int kShadowRays = 2;
-constexpr double kLift = 1e-4;  // of shadow rays, tile units
+constexpr double kLift = 1e-4;  // by which shadow rays start above a hit, tile units
 using Harmonics = std::array<double, 9>;
 
 /// Real spherical harmonics of bands 0 to 2: 1; x, y, z; xy, yz, xz, 3 z^2 - 1; x^2 - y^2.
@@ -31,7 +31,7 @@ Harmonics harmonicsOf(dvec3 d) {
             0.546274 * (d.x * d.x - d.y * d.y)};
 }
 
-/// Of a clamped cosine, by band.
+/// Coefficient of a clamped cosine, by band.
 double cosineBand(int i) { return i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4; }
 
 /// The unit vector of a view.
@@ -42,13 +42,13 @@ dvec3 viewOf(uint32_t i, uint32_t j) {
     return glm::normalize(dvec3(d.x, d.y, std::max(d.z, std::sin(kPi / 60))));
 }
 
-/// The i-th point of a sequence that fills the unit square evenly (Roberts 2018).
+/// Returns the i-th point of a sequence that fills the unit square evenly (Roberts 2018).
 dvec2 spread(uint64_t i) {
     const dvec2 p = 0.5 + double(i) * dvec2(0.7548776662466927, 0.5698402909980532);
     return p - glm::floor(p);
 }
 
-/// About z by the cosine, turned to n (Duff et al. 2017).
+/// Turns a point of the square to a direction about n, distributed by the cosine (Duff et al. 2017).
 dvec3 byCosine(dvec3 n, dvec2 p) {
     const double sign = n.z >= 0 ? 1 : -1, a = -1 / (sign + n.z), b = n.x * n.y * a, r = std::sqrt(p.x),
                  turn = 2 * kPi * p.y;
@@ -61,10 +61,10 @@ public:
     Caster(const Shape& shape, double heightScale) : shape_(shape), extent_(shape.extent()), scale_(heightScale) {}
 
     struct Seen {
-        dvec3 at, normal;  ///< tile space; the world's
+        dvec3 at, normal;  ///< place in tile space; normal in the world
         bool isBottom = false, isResolved = true;
     };
-    /// Where the ray against `view` meets the slab's top at `place` of the tile.
+    /// Returns where the ray against `view` meets the slab's top at `place` of the tile.
     [[nodiscard]] Seen see(dvec3 view, dvec2 place) const {
         const dvec3 origin(place.x * extent_.x, place.y * extent_.y, extent_.z), d = inTile(-view);
         const double through = extent_.z / -d.z;
@@ -101,7 +101,7 @@ struct Sums {
         const Harmonics at = harmonicsOf(seen.normal);
         for (int i = 0; i < 9; ++i)
             plain[size_t(i)] += cosineBand(i) * at[size_t(i)], shadowed[size_t(i)] += cosineBand(i) * at[size_t(i)];
-        // What is lost, which is less than what is left, so its noise is less.
+        // The light that shadows take is summed: it is less than what is left, so its noise is less.
         for (int k = 0; k < kShadowRays; ++k) {
             const dvec3 light = byCosine(seen.normal, spread(number * kShadowRays + uint64_t(k)));
             if (caster.isLit(seen, light)) continue;

@@ -44,7 +44,7 @@ private:
     }
 };
 
-/// Reads what must fit exactly; after the first thing that does not, nothing more.
+/// Reads values whose sizes must fit exactly; after the first error nothing more is read.
 class In {
 public:
     explicit In(std::span<const std::byte> bytes) : left_(bytes) {}
@@ -143,7 +143,7 @@ bool arePatchesSound(const PatchSet& p) {
     return true;
 }
 
-/// False: the chunk is not what its kind says.
+/// Reads one chunk. Returns false when the chunk is not what its kind says.
 bool readChunk(ChunkKind kind, In& in, Asset& a) {
     const auto extent = a.extent;
     switch (kind) {
@@ -220,7 +220,7 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
     return in.done();
 }
 
-/// Chunks that belong together: one source, grids that divide each other, maps that agree on the occupied cells.
+/// Whether the chunks belong together: one source, grids that divide each other, maps that agree on the occupied cells.
 bool belongTogether(Asset& a) {
     if (a.heights.has_value() + !a.solid.empty() + !a.triangles.empty() != 1) return false;
     if (!a.solid.empty() && makeSolid(a.solid, a.seed)->extent != a.extent) return false;
@@ -260,7 +260,7 @@ glm::ivec3 gridFor(const Asset& asset, glm::ivec3 asked) {
     if (asked.x > 0) return asked;
     int x = 64, y = std::max(1, int(std::lround(64 * asset.extent.y)));
     if (asset.heights) {
-        // The most cells up to 64 that divide the texels.
+        // Returns the largest number of cells up to `most` that divides the texels.
         const auto part = [](int texels, int most) {
             for (int n = std::min(texels, most);; --n)
                 if (texels % n == 0) return n;
@@ -346,7 +346,7 @@ Result<Asset> readAsset(const std::filesystem::path& path) {
     if ((*reader)->size() > kMaxFileBytes)
         return Error{
             .code = ErrorCode::Limit, .message = "is larger than any mesostructure asset", .file = path.string()};
-    // A header first, so that a large file of another kind is not read.
+    // The header is read first, so that a large file of another kind is not read.
     if ((*reader)->size() >= sizeof(AssetHeader)) {
         AssetHeader header;
         VCP_TRY((*reader)->read(0, std::as_writable_bytes(std::span(&header, 1))));

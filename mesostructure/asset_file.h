@@ -35,7 +35,7 @@ enum class ChunkKind : uint32_t {
     Distances = 6,   ///< DistanceMap: grid, 2 x i32 cones, f32 unit, u8 steps
     Boxes = 7,       ///< OctantBoxes: grid, u16 boxes
     Patches = 8,     ///< PatchSet: grid, 3 x u32 counts, u32 cells without, ranks, rows, patches
-    Compressed = 9,  ///< i32 number of factors and the factors; made again from Distances when read
+    Compressed = 9,  ///< i32 number of factors and the factors; made again from Distances on reading
 };
 
 struct AssetHeader {
@@ -45,7 +45,7 @@ struct AssetHeader {
     uint64_t fileBytes = 0;
     double extent[3] = {};  ///< tile units
     uint64_t tableHash = 0;
-    char name[64] = {};  ///< of what it was made of, ends with 0
+    char name[64] = {};  ///< name of what it was made of, ends with 0
     uint8_t reserved[120] = {};
     uint64_t hash = 0;     ///< XXH3-64 of the bytes before
     uint64_t padding = 0;  ///< 0
@@ -79,7 +79,7 @@ struct Asset {
     std::vector<TileTriangle> triangles;
     glm::dvec3 extent{0};
 
-    std::optional<SampledField> field;  ///< of solids and meshes
+    std::optional<SampledField> field;  ///< samples of a solid or a mesh
     std::optional<Occupancy> occupancy;
     std::optional<DistanceMap> distances;
     std::vector<int> factors;  ///< blocks of the compressed map; empty: none
@@ -88,12 +88,12 @@ struct Asset {
     std::optional<PatchSet> patches;
 };
 
-/// The asset's shape; refers to the asset. Errors: as the shapes'.
+/// Returns the asset's shape, which refers to the asset. Errors: as the shapes'.
 Result<std::unique_ptr<Shape>> shapeOf(const Asset& asset);
 
 struct AssetOptions {
     glm::ivec3 cells{
-        0};           ///< of the grid; 0: 64 along x (a height map's edge or a half, third... of it), cubes otherwise
+        0};           ///< grid cells; 0: 64 along x (a height map's edge or a half, third... of it), cubes otherwise
     int samples = 2;  ///< samples of a solid's field a cell, along each axis: 1 to 16
     DistanceOptions distances = {.cones = {4, 2}};
     std::vector<int> factors = {4};
@@ -101,17 +101,17 @@ struct AssetOptions {
     bool withBoxes = true, withPatches = true;
 };
 
-/// Cells that suit an asset where `asked` is 0.
+/// Returns cells that suit an asset, where `asked` is 0.
 glm::ivec3 gridFor(const Asset& asset, glm::ivec3 asked);
 
-/// Fills in what was built from the source. Errors: as the builders'.
+/// Fills in what is built from the source. Errors: as the builders'.
 Result<void> buildAsset(Asset& asset, const AssetOptions& options);
 
-/// Returns the file's bytes. Errors: Io.
+/// Writes an asset and returns the file's bytes. Errors: Io.
 Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset, const OutputRules& rules = {});
-/// Errors: Io; InvalidInput, Unsupported with file, element and byte.
+/// Reads an asset. Errors: Io; InvalidInput, Unsupported with file, element and byte.
 Result<Asset> readAsset(const std::filesystem::path& path);
-/// The same from bytes that may be hostile; `name` is that of the file in errors.
+/// Reads an asset from bytes that may be hostile; `name` is the file's name in errors.
 Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace vcp::meso

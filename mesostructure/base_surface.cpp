@@ -18,7 +18,7 @@ using glm::dvec2, glm::dvec3;
 constexpr double kPi = std::numbers::pi;
 constexpr std::array<std::string_view, 6> kNames = {"quad", "box", "cylinder", "sphere", "torus", "teapot"};
 
-/// A grid of columns x rows cells over [0, 1]^2. `uv` maps the parameters to tiles.
+/// Adds a grid of columns x rows cells over [0, 1]^2. `uv` maps the parameters to tiles.
 void addSheet(BaseSurface& to, int columns, int rows, const std::function<dvec3(double, double)>& at,
               const std::function<dvec2(double, double)>& uv) {
     const auto first = uint32_t(to.positions.size());
@@ -41,7 +41,7 @@ void addSheet(BaseSurface& to, int columns, int rows, const std::function<dvec3(
         }
 }
 
-/// The six sides of a cube, or of the sphere about it by equal angles.
+/// Makes the six sides of a cube, or of the sphere about it by equal angles.
 BaseSurface cube(int cells, bool isSphere, double tiles) {
     BaseSurface made;
     for (int side = 0; side < 6; ++side) {
@@ -126,7 +126,7 @@ const std::array<BicubicPatch, 2> kSpout = {
        {{{2.9, 0, 2.475}, {2.9, -0.15, 2.475}, {3.45, -0.15, 2.5125}, {3.45, 0, 2.5125}}},
        {{{2.8, 0, 2.4}, {2.8, -0.15, 2.4}, {3.2, -0.15, 2.4}, {3.2, 0, 2.4}}}}}}};
 
-/// A quarter of a turn of the body is one unit of the map.
+/// Adds the round parts; a quarter of a turn of the body is one unit of the map.
 void addRound(BaseSurface& to, std::span<const Profile> profiles, double tiles) {
     double length = 0;
     for (const Profile& profile : profiles) {
@@ -136,7 +136,7 @@ void addRound(BaseSurface& to, std::span<const Profile> profiles, double tiles) 
             to, 48, 8,
             [&](double u, double v) {
                 const dvec2 p = bezier(profile, v);
-                // Turned so that v, which goes down, and u are counter-clockwise from outside.
+                // The turn is reversed, so that v, which goes down, and u are counter-clockwise from outside.
                 return dvec3(p.x * std::cos(2 * kPi * u), -p.x * std::sin(2 * kPi * u), p.y);
             },
             [&](double u, double v) { return tiles * dvec2(4 * u, (length + v * span) / kPi); });
@@ -190,7 +190,7 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
         return Error{
             .code = ErrorCode::Usage,
             .message = fmt::format("there is no base surface \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
-    // The two ends of a turn differ in their last bits.
+    // The two ends of a turn would differ in their last bits.
     for (dvec3& p : made.positions)
         for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;
     joinPositions(made);
@@ -202,7 +202,7 @@ void joinPositions(BaseSurface& surface) {
     std::vector<dvec3> kept;
     std::vector<uint32_t> renumbered;
     for (const dvec3 p : surface.positions) {
-        // -0 is 0.
+        // Adding 0 turns -0 into 0.
         const auto [at, isNew] = numbers.try_emplace({p.x + 0.0, p.y + 0.0, p.z + 0.0}, uint32_t(kept.size()));
         if (isNew) kept.push_back(p);
         renumbered.push_back(at->second);

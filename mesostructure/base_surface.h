@@ -19,11 +19,11 @@ struct BaseSurface {
     std::vector<glm::dvec3> positions;  ///< world
     std::vector<std::array<uint32_t, 3>>
         triangles;  ///< counter-clockwise from outside; corners at one place share the number
-    std::vector<std::array<glm::dvec2, 3>> uvs;  ///< of the triangles' corners, tile units
+    std::vector<std::array<glm::dvec2, 3>> uvs;  ///< of the triangles' corners, in tile units
 };
 
-/// "quad", "box", "cylinder", "sphere", "torus", "teapot". All but the teapot, which is in its traditional units, fit
-/// [-1, 1]^3 or are a little larger; z is up.
+/// The names are "quad", "box", "cylinder", "sphere", "torus" and "teapot". All but the teapot, which is in its
+/// traditional units, fit [-1, 1]^3 or are a little larger; z is up.
 std::span<const std::string_view> baseSurfaceNames();
 
 /// `tiles`: tile edges along the edge of the quad, of a side of the box, of a sixth of the sphere, of the cylinder's
@@ -34,7 +34,7 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles);
 /// Gives equal positions one number.
 void joinPositions(BaseSurface& surface);
 
-/// World units of a tile's edge, on average over the area; 0 where the map has no area.
+/// Returns the world units of a tile's edge, averaged over the area; 0 where the map has no area.
 double tileEdge(const BaseSurface& surface);
 
 }  // namespace vcp::meso

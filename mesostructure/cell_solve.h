@@ -1,8 +1,8 @@
-// Where a ray first enters the solid inside one cell: closed forms for the bilinear height field and, piece by monotone
-// piece, for the trilinear field. The function f along the ray is above 0 outside the solid.
+// Finds where a ray first enters the solid inside one cell: closed forms for the bilinear height field and, one
+// monotone piece after the other, for the trilinear field. The function f along the ray is above 0 outside the solid.
 //
-// What is known of the side travels with the ray: `outside` says on which side it came to the cell. A ray that was
-// outside and finds f <= 0 at the wall enters there, so nothing slips between cells whose values round differently.
+// The side travels with the ray: `outside` says on which side it came to the cell. A ray that was outside and finds f
+// <= 0 at the wall enters there, so nothing slips between cells whose values round differently.
 // (DESIGN: no epsilon; Hansson-Soderlund et al. 2022 and Marmitt et al. 2004 for splitting the cubic.)
 #pragma once
 
@@ -18,11 +18,11 @@ namespace vcp::meso {
 template <class Real>
 struct CellHit {
     bool hit = false;
-    Real t = 0;            ///< of the entry
+    Real t = 0;            ///< time of the entry
     bool outside = false;  ///< side at the end of the interval, when there was no hit
 };
 
-/// The first u in [0, 1] where a cubic c0 + c1 u + c2 u^2 + c3 u^3 falls to 0 from above.
+/// Returns the first u in [0, 1] where a cubic c0 + c1 u + c2 u^2 + c3 u^3 falls to 0 from above.
 template <class Real>
 CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
     const auto f = [&](Real u) { return ((c3 * u + c2) * u + c1) * u + c0; };
@@ -30,7 +30,7 @@ CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
         outside = true;
     else if (outside)
         return {true, 0, false};
-    // Monotone between 0, the roots of the derivative in [0, 1], and 1.
+    // The cubic is monotone between 0, the roots of the derivative in [0, 1], and 1.
     Real r0 = 1, r1 = 1;
     const Real a = 3 * c3, b = 2 * c2, disc = b * b - 4 * a * c1;
     if (disc > 0) {
@@ -48,7 +48,7 @@ CellHit<Real> firstFall(Real c0, Real c1, Real c2, Real c3, bool outside) {
         else
             return {false, 0, f2 > 0};
     }
-    // Newton, or a bisection where that leaves the bracket.
+    // A step is Newton's, or a bisection where that leaves the bracket.
     Real u = low + (high - low) * (fLow / (fLow - fHigh));
     for (int k = 0; k < 24; ++k) {
         if (!(u > low && u < high)) u = Real(0.5) * (low + high);
@@ -69,7 +69,7 @@ template <class Real>
 struct BilinearCell {
     Real h00, h10, h01, h11;
 
-    /// `o` and `d` in cell units along x and y, from the cell's lower corner. Between ta <= tb.
+    /// `o` and `d` are in cell units along x and y, from the cell's lower corner. The search is between ta <= tb.
     CellHit<Real> firstEntry(glm::vec<3, Real> o, glm::vec<3, Real> d, Real ta, Real tb, bool outside) const {
         const Real hx = h10 - h00, hy = h01 - h00, hxy = h11 - h10 - h01 + h00;
         const Real x = o.x + ta * d.x, y = o.y + ta * d.y, z = o.z + ta * d.z, span = tb - ta;
@@ -81,8 +81,8 @@ struct BilinearCell {
         const Real b = d.z - hx * d.x - hy * d.y - hxy * (x * d.y + y * d.x), a = -hxy * d.x * d.y;
         const Real end = (a * span + b) * span + c;
         if (!outside) return {false, 0, end > 0};
-        // The first root, without cancellation; behind the interval's end there is none unless the parabola opens
-        // upwards.
+        // The first root, computed without cancellation; there is none behind the interval's end unless the parabola
+        // opens upwards.
         if (end > 0 && !(a > 0 && b < 0 && -b < 2 * a * span)) return {false, 0, true};
         const Real disc = b * b - 4 * a * c;
         if (disc < 0) return end > 0 ? CellHit<Real>{false, 0, true} : CellHit<Real>{true, tb, false};
@@ -105,7 +105,7 @@ struct TrilinearCell {
         return inside == 0 ? 1 : inside == 8 ? -1 : 0;
     }
 
-    /// `o` and `d` in cell units from the cell's lower corner.
+    /// `o` and `d` are in cell units from the cell's lower corner.
     CellHit<Real> firstEntry(glm::vec<3, Real> o, glm::vec<3, Real> d, Real ta, Real tb, bool outside) const {
         const Real* v = value;
         const Real k = v[0], kx = v[1] - k, ky = v[2] - k, kz = v[4] - k;

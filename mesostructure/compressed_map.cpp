@@ -8,7 +8,8 @@ namespace vcp::meso {
 
 namespace {
 
-/// What covers `edge` cells from `lower`: the least length of a cone, or kOccupied where a cell is occupied.
+/// Returns the value that covers `edge` cells from `lower`: the least length of a cone, or kOccupied where a cell is
+/// occupied.
 uint8_t leastOf(const DistanceMap& map, int cone, glm::ivec3 lower, int edge) {
     uint8_t least = kMostSteps;
     const glm::ivec3 upper = glm::min(lower + edge, map.grid.cells);
@@ -22,7 +23,7 @@ uint8_t leastOf(const DistanceMap& map, int cone, glm::ivec3 lower, int edge) {
     return least;
 }
 
-/// Lowest cells of the entries of a level, bricks in the order of the entries above that have surface.
+/// Returns the lowest cells of a level's entries; bricks come in the order of the entries above that have surface.
 std::vector<glm::ivec3> cornersOfBricks(const std::vector<glm::ivec3>& above, const CompressedMap::Level& upper,
                                         int edge, int factor) {
     std::vector<glm::ivec3> corners;

@@ -3,8 +3,8 @@
 // the tree its hierarchical extension. The blocks and the places of bricks are the same for all cones and are stored
 // once.
 //
-// "Lossless" is what is rendered: lengths away from the surface become shorter, steps stay safe, hits stay the same.
-// Texels are fetched by integer coordinates; nothing is filtered, so bricks have no apron.
+// "Lossless" is said of what is rendered: lengths away from the surface become shorter, steps stay safe, hits stay the
+// same. Texels are fetched by integer coordinates; nothing is filtered, so bricks have no apron.
 #pragma once
 
 #include <span>
@@ -15,7 +15,7 @@
 namespace vcp::meso {
 
 struct CompressedMap {
-    /// Entries of one size. Level 0 is a grid over the tile; entries of a lower level are in bricks of factor^3, a
+    /// Entries of one size. Level 0 is a grid over the tile; entries of a lower level are in bricks of factor^3, one
     /// brick after the other, x fastest.
     struct Level {
         int edge = 1;    ///< cells an entry is wide; the last level's is 1
@@ -40,11 +40,11 @@ struct CompressedMap {
     [[nodiscard]] Found lookUp(int cone, glm::ivec3 cell) const;
 
     [[nodiscard]] uint64_t bytes() const;
-    /// The paper's Table 3: texels of the map over texels of lookup and atlases, whatever their bytes.
+    /// The ratio of the paper's Table 3: texels of the map over texels of lookup and atlases, whatever their bytes.
     [[nodiscard]] double texelRatio() const;
 };
 
-/// `factors`: of the levels below the grid, coarse first; {4} is the paper's way with blocks of 4^3. Errors: Usage
+/// `factors`: one for each level below the grid, coarse first; {4} is the paper's way with blocks of 4^3. Errors: Usage
 /// (no factor, one below 2 or above 16, or blocks above 64 cells).
 Result<CompressedMap> compressMap(const DistanceMap& map, std::span<const int> factors);
 

@@ -15,9 +15,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = std::numbers::pi;
 
-/// One line of cells along an axis: the least of base[j] + (edge * gap(j - u))^2 over j >= u, for every u. gap(k) is k
-/// between centres, else max(0, k - 1). A lower envelope of parabolas, built and asked from high u to low: of two
-/// parabolas, that of the lower j wins for all lower u once it wins.
+/// Works on one line of cells along an axis: finds the least of base[j] + (edge * gap(j - u))^2 over j >= u, for every
+/// u. gap(k) is k between centres, else max(0, k - 1). It is a lower envelope of parabolas, built and queried from high
+/// u to low: of two parabolas, that of the lower j wins for all lower u once it wins.
 class OneSidedEnvelope {
 public:
     OneSidedEnvelope(double edge, bool betweenCentres) : square_(edge * edge), shift_(betweenCentres ? 0 : 1) {}
@@ -31,7 +31,7 @@ public:
             const int at = ascending ? u % n : n - 1 - u % n;
             if (base[at] < kInfinity) push(u, base[at], front);
             if (u >= n) continue;
-            // The gap of j = u is 0 as well as that of j = u + 1.
+            // The gap of j = u is 0, as is that of j = u + 1.
             double best = std::min(least[at], base[at]);
             while (front + 1 < queue_.size() && value(queue_[front + 1], u) <= value(queue_[front], u)) ++front;
             if (front < queue_.size()) best = std::min(best, value(queue_[front], u));
@@ -48,7 +48,7 @@ private:
         const double gap = std::max(0, p.j - u - shift_);
         return p.base + square_ * gap * gap;
     }
-    /// The u below which b (of the lower j) is less than a.
+    /// Returns the u below which b (of the lower j) is less than a.
     double meeting(const Parabola& a, const Parabola& b) const {
         // base_a + s (j_a - shift - u)^2 = base_b + s (j_b - shift - u)^2
         return 0.5 * (a.j + b.j - 2 * shift_) + (a.base - b.base) / (2 * square_ * (a.j - b.j));
@@ -58,7 +58,7 @@ private:
         while (queue_.size() > front + 1 &&
                meeting(queue_[queue_.size() - 2], queue_.back()) <= meeting(queue_.back(), p))
             queue_.pop_back();
-        // One that is never the least: it starts to win no later than it would be passed.
+        // A parabola that starts to win no later than it would be passed is never the least.
         if (queue_.size() == front + 1 && meeting(queue_.back(), p) >= u) queue_.pop_back();
         queue_.push_back(p);
     }
@@ -97,7 +97,7 @@ Result<Occupancy> occupy(const Shape& shape, glm::ivec3 cells) {
 
 namespace {
 
-/// Cosine and sine of a part of a turn; exact at quarters, and alike but for signs from quarter to quarter.
+/// Returns cosine and sine of a part of a turn; exact at quarters, and alike but for signs from quarter to quarter.
 glm::dvec2 onCircle(int part, int parts) {
     const int quarter = 4 * part / parts, rest = 4 * part % parts;
     const double angle = 0.5 * kPi * rest / parts;
@@ -120,7 +120,7 @@ ConeBorders::ConeBorders(Cones of) : cones(of) {
 int coneOf(const ConeBorders& borders, glm::vec3 d) {
     const int azimuths = borders.cones.azimuth;
     int azimuth = 0, elevation = 0;
-    // A direction of the lower half turn is past all borders of the upper one.
+    // A direction in the lower half turn is past all borders of the upper one.
     const bool isLower = d.y < 0;
     for (int k = 1; k < azimuths; ++k) {
         const float along = borders.azimuths[k].x * d.y, across = borders.azimuths[k].y * d.x;
@@ -157,7 +157,7 @@ std::vector<float> signedConeDistances(const Occupancy& occupancy, glm::ivec3 si
 
 namespace {
 
-/// Signs of a cone's axes; 0 for both.
+/// Returns the signs of a cone's axes; 0 for both.
 glm::ivec3 signOf(Cones cones, int cone) {
     const int azimuth = cone % cones.azimuth, elevation = cone / cones.azimuth;
     glm::ivec3 sign(0);
@@ -167,11 +167,12 @@ glm::ivec3 signOf(Cones cones, int cone) {
     return sign;
 }
 
-/// The rectangle of differences in x and y, cut to a wedge of azimuths: its corners. Empty when they do not meet.
+/// Cuts the rectangle of differences in x and y to a wedge of azimuths; returns the corners, none when they do not
+/// meet.
 std::vector<glm::dvec2> cutToWedge(glm::dvec2 lower, glm::dvec2 upper, double from, double to) {
     std::vector<glm::dvec2> polygon{{lower.x, lower.y}, {upper.x, lower.y}, {upper.x, upper.y}, {lower.x, upper.y}};
     if (to - from >= 2 * kPi) return polygon;
-    // Kept is the left of the first edge and the right of the second; wedges are at most half planes.
+    // The left of the first edge and the right of the second are kept; wedges are at most half planes.
     for (const auto& [angle, side] : {std::pair(from, 1.0), std::pair(to, -1.0)}) {
         const glm::dvec2 normal = side * glm::dvec2(-std::sin(angle), std::cos(angle));
         std::vector<glm::dvec2> kept;
@@ -186,7 +187,7 @@ std::vector<glm::dvec2> cutToWedge(glm::dvec2 lower, glm::dvec2 upper, double fr
     return polygon;
 }
 
-/// Least distance from the origin to a convex polygon, which may be a point or a line.
+/// Returns the least distance from the origin to a convex polygon, which may be a point or a line.
 double leastRadius(const std::vector<glm::dvec2>& polygon) {
     double least = kInfinity;
     bool left = polygon.size() > 2, right = polygon.size() > 2;
@@ -205,11 +206,11 @@ struct Offset {
     float length;
 };
 
-/// Offsets of cells that hold a point in the cone from some point of the cell at 0, nearest first, up to `cap`.
+/// Returns offsets of cells that hold a point in the cone from some point of the cell at 0, nearest first, up to `cap`.
 std::vector<Offset> offsetsInCone(const TileGrid& grid, Cones cones, int cone, double cap) {
     const double wedge = 2 * kPi / cones.azimuth, band = kPi / cones.elevation;
     const int azimuth = cone % cones.azimuth, elevation = cone / cones.azimuth;
-    // At the axes signs decide, and a ray's cone is exact.
+    // At the axes the signs decide, so a ray's cone is exact there.
     const auto slackAt = [&](int border) {
         return cones.azimuth == 2 || (cones.azimuth % 4 == 0 && border % (cones.azimuth / 4) == 0) ? 0 : kConeSlack;
     };
@@ -259,7 +260,7 @@ std::vector<float> searchedDistances(const Occupancy& occupancy, Cones cones, in
     return lengths;
 }
 
-/// The paper's way: distances between centres of fine cells, and the least of each coarse cell.
+/// Computes distances in the paper's way: between centres of fine cells, and the least of each coarse cell.
 std::vector<float> leastOfFine(const TileGrid& grid, const Occupancy& fine, glm::ivec3 sign, int refine,
                                double subtract) {
     const std::vector<float> lengths = signedConeDistances(fine, sign, true);
@@ -271,7 +272,7 @@ std::vector<float> leastOfFine(const TileGrid& grid, const Occupancy& fine, glm:
     return least;
 }
 
-/// Bytes that stand for no more than the lengths.
+/// Rounds lengths to bytes that stand for no more than the lengths.
 void roundDown(const std::vector<float>& lengths, const Occupancy& occupancy, float cap, float unit, uint8_t* steps) {
     for (size_t i = 0; i < lengths.size(); ++i) {
         const float length = std::min(lengths[i], cap);
@@ -317,7 +318,7 @@ Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceO
     for (int cone = 0; cone < options.cones.count(); ++cone) {
         std::vector<float> lengths;
         if (options.rule != DistanceRule::AnyPoint) {
-            // Centres are off by half a diagonal at either end.
+            // Both centres are off by half a diagonal.
             const double subtract = options.rule == DistanceRule::PaperSafe ? glm::length(fine.grid.cell) : 0;
             lengths = leastOfFine(grid, fine, signOf(options.cones, cone), options.refine, subtract);
         } else if (options.cones.areSigns() && !options.search) {

@@ -52,8 +52,8 @@ struct Cones {
     /// Whether each cone is a sign for each of some axes.
     [[nodiscard]] bool areSigns() const { return (azimuth == 1 || azimuth == 2 || azimuth == 4) && elevation <= 2; }
 };
-/// Where cones meet, for coneOf. Of azimuth k from 0, a half turn at most: cosine and sine. Of elevation k from -90
-/// degrees: the cosine's square and the sine's with the sine's sign. On the axes both are exact.
+/// Where cones meet, for coneOf. For azimuth k from 0, at most half a turn: cosine and sine. For elevation k from -90
+/// degrees: the cosine's square and the sine's, with the sine's sign. On the axes both are exact.
 struct ConeBorders {
     explicit ConeBorders(Cones cones);
 
@@ -62,20 +62,20 @@ struct ConeBorders {
     std::array<glm::vec2, kMostElevations> elevations{};
 };
 
-/// The cone of a direction: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as shaders find it.
+/// Returns a direction's cone: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as in shaders.
 ///
-/// By signs and products only, which every device rounds correctly; an atan may be off by 4096 units of the last place
-/// there. Let u be 2^-23, the most that a product or a sum is off, whichever way it is rounded. Against a border of
-/// azimuth the comparison is off by 1.5 u of the direction's length, of elevation by 1.5 u as well (6 u of the
-/// tangent's square), and a shader's direction by 1.5 u: a direction is within 3 u, 4e-7 radians, of the cone that is
-/// found. kConeSlack is more.
+/// It uses only signs and products, which every device rounds correctly; an atan may be off by 4096 units of the last
+/// place there. Let u be 2^-23, the most that a product or a sum is off, whichever way it is rounded. The comparison
+/// with a border of azimuth is off by 1.5 u of the direction's length, that with a border of elevation by 1.5 u as well
+/// (6 u of the tangent's square), and a shader's direction by 1.5 u: a direction is within 3 u, 4e-7 radians, of the
+/// cone that is found. kConeSlack is more.
 int coneOf(const ConeBorders& borders, glm::vec3 direction);
 inline constexpr double kConeSlack = 1e-6;  ///< radians
 
 enum class DistanceRule {
     AnyPoint,  ///< from any point of the cell to any point of an occupied cell: conservative
     Paper,     ///< between centres on a grid `refine` times as fine, then the least of each cell: oversteps
-    PaperSafe  ///< the same less the diagonal of a fine cell: conservative, at the paper's price
+    PaperSafe  ///< as Paper, less the diagonal of a fine cell: conservative, at the paper's price
 };
 
 inline constexpr uint8_t kOccupied = 255;  ///< in place of a length
@@ -90,7 +90,7 @@ struct DistanceMap {
     [[nodiscard]] size_t slot(int cone, glm::ivec3 cell) const {
         return size_t(cone) * grid.count() + grid.index(cell);
     }
-    /// Of a cell that is not occupied.
+    /// Returns the length of a cell that is not occupied.
     [[nodiscard]] float length(int cone, glm::ivec3 cell) const { return float(steps[slot(cone, cell)]) * unit; }
     [[nodiscard]] uint64_t bytes() const { return steps.size(); }
 };
@@ -99,17 +99,17 @@ struct DistanceOptions {
     Cones cones;
     DistanceRule rule = DistanceRule::AnyPoint;
     double cap = 0.25;    ///< tile units; longer ones are cut to it
-    int refine = 2;       ///< of the paper's rules: 2 to 8
+    int refine = 2;       ///< for the paper's rules: 2 to 8
     bool search = false;  ///< also search cones that are signs (for tests)
 };
 
-/// The maps of all cones. The paper's rules need the shape, for the finer grid. Errors: Usage (cones, cap, refine out
-/// of range), Limit.
+/// Builds the maps of all cones. The paper's rules need the shape, for the finer grid. Errors: Usage (cones, cap,
+/// refine out of range), Limit.
 Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceOptions& options,
                                      const Shape* shape = nullptr);
 
-/// Lengths in tile units before they are cut and rounded; infinity where the cone has no occupied cell. One cone of
-/// signs: `sign` is +1, -1 or 0 (both) for each axis.
+/// Returns lengths in tile units before they are cut and rounded; infinity where the cone has no occupied cell. The
+/// cone is one of signs: `sign` is +1, -1 or 0 (both) for each axis.
 std::vector<float> signedConeDistances(const Occupancy& occupancy, glm::ivec3 sign, bool betweenCentres = false);
 
 }  // namespace vcp::meso

@@ -14,7 +14,7 @@ namespace vcp::meso {
 
 inline constexpr float kFar = 1e30f;  ///< in place of a wall that a parallel ray never meets
 
-/// The origin in the tile at 0, exactly: rays of far tiles lose nothing to their place.
+/// Moves the origin into the tile at 0, exactly: rays of far tiles lose no precision to their place.
 inline glm::dvec3 inFirstTile(glm::dvec3 origin, glm::dvec3 extent) {
     origin.x -= extent.x * std::floor(origin.x / extent.x);
     origin.y -= extent.y * std::floor(origin.y / extent.y);
@@ -22,7 +22,7 @@ inline glm::dvec3 inFirstTile(glm::dvec3 origin, glm::dvec3 extent) {
 }
 
 struct GridWalk {
-    glm::vec3 o, d, inverse;  ///< cells; 1 / d, where d is not 0
+    glm::vec3 o, d, inverse;  ///< in cells; 1 / d, where d is not 0
     float t = 0, tMax = 0;
     glm::ivec3 cell;
     glm::ivec3 sign;  ///< +1, -1 or 0
@@ -45,14 +45,14 @@ struct GridWalk {
 
     [[nodiscard]] glm::vec3 at(float time) const { return o + time * d; }
     [[nodiscard]] float wall(int axis, int coordinate) const { return (float(coordinate) - o[axis]) * inverse[axis]; }
-    /// When the ray comes through the walls of the cell that it is in.
+    /// Returns when the ray comes through the walls of the cell that it is in.
     [[nodiscard]] float entry() const {
         float latest = 0;
         for (int axis = 0; axis < 3; ++axis)
             if (sign[axis] != 0) latest = std::max(latest, wall(axis, cell[axis] + (sign[axis] < 0)));
         return latest;
     }
-    /// When it leaves a box of `further` more cells, and by which axis; tMax where it never does.
+    /// Returns when it leaves a box of `further` more cells, and by which axis; tMax where it never does.
     [[nodiscard]] float exit(glm::ivec3 further, int& axisOut) const {
         float first = kFar;
         for (int axis = 0; axis < 3; ++axis) {
@@ -62,7 +62,7 @@ struct GridWalk {
         }
         return first;
     }
-    /// Out of the box, by whole cells along the axis of its exit; along the others within the box.
+    /// Leaves the box by whole cells along the axis of its exit; along the others it stays within the box.
     void leave(glm::ivec3 further, float time, int axisOut) {
         t = std::max(t, time);
         const glm::vec3 p = at(t);
@@ -73,7 +73,7 @@ struct GridWalk {
                 moveTo(axis, p[axis], further[axis]);
         }
     }
-    /// To a point of the ray that needs not be on a wall.
+    /// Moves to a point of the ray that need not be on a wall.
     void jump(float time) {
         t = time;
         const glm::vec3 p = at(t);
@@ -81,7 +81,7 @@ struct GridWalk {
     }
 
 private:
-    /// Never backwards, and at most `further` cells.
+    /// Moves never backwards, and by at most `further` cells.
     void moveTo(int axis, float p, int further) {
         const int target = int(std::floor(p));
         if (sign[axis] > 0) cell[axis] = std::clamp(target, cell[axis], cell[axis] + further);

@@ -106,11 +106,11 @@ constexpr std::array<Named, 8> kFormulas{{{"fbm", 0.15, fbm},
 constexpr std::array<std::string_view, 11> kNames{"fbm",    "ridged", "hemispheres", "maze", "blocks", "bricks",
                                                   "ripple", "needle", "edge",        "bark", "cobble"};
 
-/// Recursive backtracker on a torus of 8 x 8 rooms; walls are an eighth of a room, or one texel.
+/// Carves a maze by recursive backtracking on a torus of 8 x 8 rooms; walls are an eighth of a room, or one texel.
 void carveMaze(HeightMap& map, uint32_t seed) {
     constexpr int rooms = 8;
     const int n = map.size.x, thick = std::max(1, n / (8 * rooms));
-    std::array<std::array<bool, 2>, rooms * rooms> open{};  // towards +x, +y
+    std::array<std::array<bool, 2>, rooms * rooms> open{};  // whether a room is open towards +x, +y
     std::array<bool, rooms * rooms> seen{};
     std::vector<int> path{0};
     seen[0] = true;

@@ -48,7 +48,7 @@ public:
         double least = std::numeric_limits<double>::infinity(), most = -least;
         for (int j = first.y; j <= last.y; ++j)
             for (int i = first.x; i <= last.x; ++i) {
-                // Bilinear: its extremes over a rectangle are at the corners.
+                // A bilinear function has its extremes over a rectangle at the corners.
                 const double x0 = std::max(lower.x * scale_.x - i, 0.0), x1 = std::min(upper.x * scale_.x - i, 1.0);
                 const double y0 = std::max(lower.y * scale_.y - j, 0.0), y1 = std::min(upper.y * scale_.y - j, 1.0);
                 for (const double x : {x0, x1})
@@ -61,7 +61,7 @@ public:
     }
 
     TruthHit trace(glm::dvec3 origin, glm::dvec3 direction, double tMax) const override {
-        // In texels along x and y; heights stay in tile units.
+        // The ray is in texels along x and y; heights stay in tile units.
         const glm::dvec3 o(origin.x * scale_.x, origin.y * scale_.y, origin.z),
             d(direction.x * scale_.x, direction.y * scale_.y, direction.z);
         glm::ivec2 cell(int(std::floor(o.x)), int(std::floor(o.y)));
@@ -108,7 +108,8 @@ private:
                           (map_.height(c.x + 1, c.y + 1) - map_.height(c.x + 1, c.y)) * x;
         return glm::normalize(glm::dvec3(-dx * scale_.x, -dy * scale_.y, 1));
     }
-    /// Distance to the nearest of a cell's points on a 4 x 4 lattice: the cell's surface up to a quarter of a texel.
+    /// Returns the distance to the nearest of a cell's points on a 4 x 4 lattice: the cell's surface to a quarter of a
+    /// texel.
     double cellDistance(glm::dvec3 p, glm::ivec2 c, double best) const {
         for (int j = 0; j <= 4; ++j)
             for (int i = 0; i <= 4; ++i) {

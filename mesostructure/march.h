@@ -38,19 +38,19 @@ enum class MarchState : uint8_t { Hit, Miss, Unresolved };
 
 struct MarchResult {
     MarchState state = MarchState::Miss;
-    double t = 0;             ///< of a hit
-    glm::vec3 normal{0};      ///< unit, of a hit where the method knows it
+    double t = 0;             ///< time of a hit
+    glm::vec3 normal{0};      ///< unit normal of a hit, where the method knows it
     uint32_t iterations = 0;  ///< steps, refinements included
     uint32_t fetches = 0;
-    uint32_t surfaceTests = 0;  ///< cells, texels or patches that were solved; of relief mapping the refinements
+    uint32_t surfaceTests = 0;  ///< cells, texels or patches that were solved; for relief mapping the refinements
 };
 
 class Marcher {
 public:
     virtual ~Marcher() = default;
-    /// Any thread. The ray's numbers must be finite.
+    /// Marches one ray. Any thread. The ray's numbers must be finite.
     [[nodiscard]] virtual MarchResult march(const MarchRay& ray) const = 0;
-    /// Of all arrays that a ray may read.
+    /// Bytes of all arrays that a ray may read.
     [[nodiscard]] virtual uint64_t bytes() const = 0;
     /// Whether no ray may pass the method's own stored surface unseen.
     [[nodiscard]] virtual bool isConservative() const = 0;
@@ -58,7 +58,7 @@ public:
 
 inline constexpr uint32_t kMostIterations = 8192;
 
-/// How a walk skips empty cells. All refer to what must outlive the marcher.
+/// How a walk skips empty cells. What the pointers refer to must outlive the marcher.
 struct Skipping {
     const Occupancy* occupancy = nullptr;  ///< cell by cell
     const DistanceMap* distances = nullptr;
@@ -73,8 +73,8 @@ struct Surface {
     const SampledField* field = nullptr;  ///< trilinear samples; the grid's cells must divide the field's
 };
 
-/// A walk over a grid: one of Skipping, at most one of Surface. Errors: Usage (none or several, grids that do not
-/// match).
+/// Makes a walk over a grid: with one of Skipping, and at most one of Surface. Errors: Usage (none or several, grids
+/// that do not match).
 Result<std::unique_ptr<Marcher>> gridMarcher(const Skipping& skipping, const Surface& surface);
 
 enum class Refinement { None, Binary, Secant, SecantAsPrinted, Illinois };
@@ -86,21 +86,21 @@ struct ReliefOptions {
     int steps = 32;  ///< between the top and the bottom of the slab, 1 to 4096
     Refinement refinement = Refinement::Binary;
     int refinements = 10;     ///< at most
-    float tolerance = 0.01f;  ///< of |f| over the slab's height, as in the listing; 0: only by count
+    float tolerance = 0.01f;  ///< tolerance of |f| over the slab's height, as in the listing; 0: only the count ends it
 };
 std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options);
 
-/// Maxima of a height map's bilinear cells, halved until one is left (Tevs et al. 2008).
+/// The maxima of a height map's bilinear cells, halved until one is left (Tevs et al. 2008).
 struct MaxPyramid {
     struct Level {
         glm::ivec2 size{0};
         std::vector<uint16_t> most;  ///< x fastest
     };
-    std::vector<Level> levels;  ///< level 0: an entry a texel, of the cell from it to the next
+    std::vector<Level> levels;  ///< level 0: an entry a texel, for the cell from it to the next
 };
 MaxPyramid buildMaxPyramid(const HeightMap& map);
 
-/// Skips by the pyramid; each texel cell is solved in closed form.
+/// Makes a marcher that skips by the pyramid; each texel cell is solved in closed form.
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map);
 
 /// Sphere tracing on a plain distance map: signed distances at the cells' centres, 16 bits each, trilinear between them
@@ -118,11 +118,11 @@ struct SphereMap {
     float threshold = 0;  ///< tile units
     std::vector<int16_t> steps;
 };
-/// Errors: Usage (no cells, too many).
+/// Builds the map. Errors: Usage (no cells, too many).
 Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options);
 std::unique_ptr<Marcher> sphereMarcher(SphereMap map);
 
-/// Double precision, no skipping, every cell solved: what the stored data itself say (truth of a method's own data).
+/// Traces in double precision, with no skipping and every cell solved: the truth about a method's own stored data.
 TruthHit traceField(const SampledField& field, const MarchRay& ray);
 
 }  // namespace vcp::meso

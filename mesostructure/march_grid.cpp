@@ -10,12 +10,13 @@ namespace {
 
 using glm::ivec3, glm::vec3;
 
-/// Of a cell: occupied, or what may be skipped: `further` empty cells towards the ray, and a length from where it is.
+/// What is known of a cell: occupied, or what may be skipped: `further` empty cells towards the ray, and a length from
+/// where it is.
 struct Space {
     bool occupied = false;
     ivec3 further{0};
     float length = 0;
-    uint32_t marks = 0;  ///< of an occupied cell, as markSmallCells; 0: none
+    uint32_t marks = 0;  ///< small cells of an occupied cell, as set by markSmallCells; 0: none
 };
 
 struct SkipNothing {
@@ -73,7 +74,7 @@ struct SkipBoxes {
 /// What a surface remembers of a ray from cell to cell.
 struct Side {
     bool outside = false;
-    bool inRun = true;  ///< of occupied cells since the ray's start
+    bool inRun = true;  ///< all cells since the ray's start were occupied
 };
 
 /// The interval of a ray in a cell.
@@ -107,7 +108,7 @@ struct PatchSurface {
         const Patch* nearest = nullptr;
         float best = kFar;
         for (const Patch& patch : patches) {
-            // Words in fours: ten coefficients, two linear forms.
+            // A patch is read in groups of four words: ten coefficients, two linear forms.
             result.fetches += 5;
             ++result.surfaceTests;
             const float s = crossPatch(patch, o, piece.walk.d, piece.to - piece.from);
@@ -122,13 +123,13 @@ struct PatchSurface {
     }
 };
 
-/// The small cells of finer data within a cell of the grid, from wall to wall; where `marks` say so, only those that
-/// the surface passes. `Axes`: 2 or 3.
+/// Meets the small cells of finer data within a cell of the grid, from wall to wall; where `marks` say so, only those
+/// that the surface passes. `Axes`: 2 or 3.
 template <int Axes, class Solve>
 bool eachSmallCell(const Piece& piece, ivec3 ratio, uint32_t marks, Side& side, MarchResult& result,
                    const Solve& solve) {
     const vec3 scale(ratio);
-    // From the piece's start, where numbers are small.
+    // The ray starts at the piece's start, where numbers are small.
     const vec3 o = (piece.walk.at(piece.from) - vec3(piece.walk.cell)) * scale, d = piece.walk.d * scale;
     const float span = piece.to - piece.from;
     ivec3 at = glm::clamp(ivec3(glm::floor(o)), ivec3(0), ratio - 1);

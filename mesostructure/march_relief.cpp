@@ -91,10 +91,11 @@ private:
         return t;
     }
 
-    /// The listing, with depths from the top: the branch replaces the upper bound by what is below the surface.
+    /// Refines as the listing does, with depths from the top: the branch replaces the upper bound by what is below the
+    /// surface.
     float asPrinted(const Line& line, float low, float fLow, float high, float fHigh, MarchResult& result) const {
         const float slope = -line.d.z, depth0 = 1 - line.o.z;
-        // depth of the surface = depth of the ray + f
+        // The depth of the surface is the depth of the ray + f.
         float upperD = low, upperH = depth0 + slope * low + fLow, lowerD = high, lowerH = depth0 + slope * high + fHigh,
               best = upperH;
         for (int i = 0; i < options_.refinements; ++i) {
@@ -148,7 +149,8 @@ public:
             const float most =
                 float(maxima.most[size_t(home.y >> level) * size_t(maxima.size.x) + size_t(home.x >> level)]) *
                 (1.0f / 65535);
-            // Where the ray leaves by the slab's bottom it is at 0, however that rounds: ground at 0 is a tie there.
+            // Where the ray leaves by the slab's bottom its height is 0, however that rounds: ground at 0 is a tie
+            // there.
             const float atEnd = axisOut == 2 && end == exit ? float(walk.sign.z > 0) : walk.at(end).z,
                         lowest = std::min(walk.at(walk.t).z, atEnd);
             const bool isAbove = lowest > most && (outside || level > 0 || walk.t > 0);
@@ -202,7 +204,7 @@ private:
     }
 
     const HeightMap& map_;
-    std::vector<Level> levels_;  ///< level 0: of a texel's bilinear cell
+    std::vector<Level> levels_;  ///< level 0: maxima of the texels' bilinear cells
 };
 
 MaxPyramid::Level halved(const MaxPyramid::Level& fine) {

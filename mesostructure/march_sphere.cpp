@@ -30,7 +30,7 @@ public:
                 return result;
             }
             const float length = sample(p, result);
-            // Inside and on the start's own surface, on by a part of a cell until the distance grows.
+            // Inside, and on the start's own surface, it moves on by a part of a cell until the distance grows.
             if (length >= map_.threshold)
                 outside = true;
             else if (outside || t == 0) {

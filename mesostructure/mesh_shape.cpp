@@ -38,7 +38,7 @@ double distanceTo(const TileTriangle& tri, dvec3 p) {
     return glm::length(ap - ab * (vb / sum) - ac * (vc / sum));
 }
 
-/// Separating axes of a triangle and a closed box (Akenine-Moller 2001); touching counts.
+/// Whether a triangle and a closed box overlap, by separating axes (Akenine-Moller 2001); touching counts.
 bool overlaps(const TileTriangle& tri, dvec3 centre, dvec3 half) {
     const dvec3 v[3] = {tri[0] - centre, tri[1] - centre, tri[2] - centre};
     const auto apart = [&](dvec3 axis) {
@@ -56,7 +56,7 @@ bool overlaps(const TileTriangle& tri, dvec3 centre, dvec3 half) {
     return !apart(glm::cross(v[1] - v[0], v[2] - v[0]));
 }
 
-/// Twice the signed area of (a, b, p), the same but for its sign from either side of the edge.
+/// Returns twice the signed area of (a, b, p), the same but for its sign from either side of the edge.
 double edgeSide(dvec2 a, dvec2 b, dvec2 p) {
     const bool swap = b.x < a.x || (b.x == a.x && b.y < a.y);
     if (swap) std::swap(a, b);
@@ -141,7 +141,7 @@ public:
         return best;
     }
 
-    /// Entered minus left below the point, along the vertical line through it.
+    /// Returns how often the vertical line through a point enters less how often it leaves, below the point.
     int windingAt(dvec3 p, bool upToTop = false) const {
         int winding = 0;
         const ivec3 cell = cellOf(p);
@@ -162,11 +162,11 @@ public:
 private:
     struct Item {
         uint32_t triangle;
-        int16_t tileX, tileY;  ///< tile, from that of the triangle, in which the cell is
+        int16_t tileX, tileY;  ///< the tile, counted from the triangle's, in which the cell is
     };
 
     ivec3 cellOf(dvec3 p) const { return ivec3(glm::floor(p / grid_.cell)); }
-    /// What moves an item's triangle to a cell in any tile.
+    /// Returns what moves an item's triangle to a cell in any tile.
     dvec3 shiftOf(const Item& item, ivec3 cell) const {
         const int tx = int(std::floor(double(cell.x) / grid_.cells.x)),
                   ty = int(std::floor(double(cell.y) / grid_.cells.y));
@@ -180,7 +180,7 @@ private:
     }
 
     static void meet(const TileTriangle& tri, dvec3 o, dvec3 d, double tMax, TruthHit& best) {
-        // Moller and Trumbore 1997, entries only (from the side of the normal).
+        // Moller and Trumbore 1997; only entries count (from the side of the normal).
         const dvec3 e1 = tri[1] - tri[0], e2 = tri[2] - tri[0], p = glm::cross(d, e2);
         const double det = glm::dot(e1, p);
         if (!(det > 0)) return;
@@ -192,7 +192,7 @@ private:
         best = {true, true, t, glm::normalize(glm::cross(e1, e2))};
     }
 
-    /// Lists by counting twice: sizes, then places.
+    /// Fills the lists by counting twice: sizes, then places.
     void fillLists() {
         lists_.assign(grid_.count() + 1, 0);
         columns_.assign(size_t(grid_.cells.x) * size_t(grid_.cells.y) + 1, 0);
@@ -239,8 +239,8 @@ private:
     std::vector<Item> items_, columnItems_;
 };
 
-/// Entered minus left by a horizontal line along x (or y) in one period: each triangle counts once for every tile
-/// across in which the line meets it.
+/// Returns how often a horizontal line along x (or y) enters less how often it leaves in one period: each triangle
+/// counts once for every tile across in which the line meets it.
 int crossingsAlong(int axis, const std::vector<TileTriangle>& triangles, double across, double z, double period) {
     const int other = 1 - axis;
     int sum = 0;
@@ -270,7 +270,8 @@ Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triang
                              .element = fmt::format("triangle {}", i)};
         }
     auto shape = std::make_unique<MeshShape>(triangles, extent);
-    // Lines enter as often as they leave where the mesh is closed; at odd places, off its symmetries.
+    // Lines enter as often as they leave where the mesh is closed. The lines lie at odd places, off the mesh's
+    // symmetries.
     constexpr int kLines = 61;
     int open = 0, inverted = 0;
     for (int j = 0; j < kLines; ++j)

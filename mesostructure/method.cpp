@@ -33,7 +33,7 @@ glm::ivec3 cellsOf(const Asset& asset, glm::dvec3 extent, int n) {
     return cubes;
 }
 
-/// The grid, its occupied cells, and for solids the samples that the exact cells solve.
+/// Adds the grid, its occupied cells, and for solids the samples that the exact cells solve.
 Result<void> addCells(Method& method, const Asset& asset, const Shape& shape, glm::ivec3 cells, bool isExact) {
     const bool isOwn = asset.occupancy && asset.occupancy->grid.cells == cells;
     if (isOwn)

@@ -1,5 +1,5 @@
-// A method by name: which marcher, with the arrays that it reads. The reference marchers (march.h) and the shaders
-// (render/meso_arrays.h) are made from the same.
+// A method by name: which marcher it is, with the arrays that it reads. The reference marchers (march.h) and the
+// shaders (render/meso_arrays.h) are made from the same arrays.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ struct Method {
     WalkKind kind = WalkKind::Grid;
     const HeightMap* heights = nullptr;  ///< the asset's, where the method reads it; must outlive the method
     ReliefOptions relief;
-    // Of a walk over a grid the first of boxes, compressed, distances, occupancy that there is skips; the others are
+    // In a walk over a grid, the first that exists of boxes, compressed, distances and occupancy skips; the others are
     // not read.
     std::unique_ptr<Occupancy> occupancy;
     std::unique_ptr<DistanceMap> distances;
@@ -31,26 +31,26 @@ struct Method {
     [[nodiscard]] Surface surface() const {
         return {patches.get(), kind == WalkKind::Grid ? heights : nullptr, field.get()};
     }
-    /// Refers to the method. Errors: as gridMarcher's.
+    /// Makes the marcher, which refers to the method. Errors: as gridMarcher's.
     [[nodiscard]] Result<std::unique_ptr<Marcher>> marcher() const;
 };
 
 struct MethodOptions {
     std::string name = "boxes";
-    int cells = 0;      ///< of the grid along x; 0: the asset's own grid, or 64
-    Cones cones{4, 1};  ///< of ddm, ddm-quadric and ddm-quadric-fitted
-    int steps = 32;     ///< of relief mapping
+    int cells = 0;      ///< cells of the grid along x; 0: the asset's own grid, or 64
+    Cones cones{4, 1};  ///< cones of ddm, ddm-quadric and ddm-quadric-fitted
+    int steps = 32;     ///< steps of relief mapping
     int refinements = 10;
 };
 
-/// For height fields alone: "relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois", "pyramid".
-/// For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells".
+/// The names for height fields only: "relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois",
+/// "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells".
 std::span<const std::string_view> methodNames();
-/// Whether a method of that name marches the asset: some are of height fields alone.
+/// Whether a method of that name marches the asset: some march only height fields.
 bool methodFits(std::string_view name, const Asset& asset);
 
-/// What the asset holds already is copied, the rest is built. `shape` is the asset's. Errors: Usage (no such method, or
-/// not of this asset); the builders'.
+/// Copies what the asset holds already, and builds the rest. `shape` is the asset's. Errors: Usage (no such method, or
+/// it does not fit this asset); the builders'.
 Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodOptions& options);
 
 }  // namespace vcp::meso

@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kMost = OctantBoxes::kMost;
 
-/// Occupied cells of any box that starts in the tile and reaches up to kMost + 1 cells beyond it: a summed volume.
+/// Counts the occupied cells of any box that starts in the tile and reaches up to kMost + 1 cells beyond it: a summed
+/// volume.
 class BoxCount {
 public:
     explicit BoxCount(const Occupancy& occupancy)
@@ -23,7 +24,7 @@ public:
                         sums_[slot(x, y - 1, z)] + sums_[slot(x, y, z - 1)] - sums_[slot(x - 1, y - 1, z)] -
                         sums_[slot(x, y - 1, z - 1)] - sums_[slot(x - 1, y, z - 1)] + sums_[slot(x - 1, y - 1, z - 1)];
     }
-    /// Of the cells from `a` to `b`, both included, in either order.
+    /// Whether the cells from `a` to `b`, both included, in either order, are empty.
     bool isEmpty(glm::ivec3 a, glm::ivec3 b) const {
         const glm::ivec3 low = glm::min(a, b) + kMargin, high = glm::max(a, b) + kMargin + 1;
         return sums_[slot(high.x, high.y, high.z)] - sums_[slot(low.x, high.y, high.z)] -
@@ -42,7 +43,7 @@ private:
     std::vector<uint32_t> sums_;  ///< modulo 2^32: differences are exact
 };
 
-/// The largest cube, then each axis in turn by one cell while the box stays empty.
+/// Grows the largest cube, then each axis in turn by one cell while the box stays empty.
 glm::ivec3 grow(const BoxCount& count, glm::ivec3 at, glm::ivec3 sign) {
     int low = 0, high = kMost;
     while (low < high) {

@@ -28,9 +28,9 @@ struct OctantBoxes {
 
 OctantBoxes buildOctantBoxes(const Occupancy& occupancy);
 
-/// Says of each occupied cell which of its 2 x 2 x 2 small cells the field's surface passes, so that the others need
-/// not be read: kSmallCells, and bits 0 to 7, x lowest. Takes all marks away where the field has another number of
-/// cells in a cell.
+/// Marks for each occupied cell which of its 2 x 2 x 2 small cells the field's surface passes, so that the others need
+/// not be read: kSmallCells, and bits 0 to 7, x lowest. Removes all marks where the field has another number of cells
+/// in a cell.
 void markSmallCells(const SampledField& field, OctantBoxes& boxes);
 
 }  // namespace vcp::meso

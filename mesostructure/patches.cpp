@@ -26,7 +26,7 @@ struct CellFace {
     std::array<int, 4> edges;
 };
 
-/// Edge number of the edge along `axis` with the given place along the other two axes, in ascending order.
+/// Returns the number of the edge along `axis` with the given place along the other two axes, in ascending order.
 int edgeNumber(int axis, int low, int high) { return axis * 4 + low + 2 * high; }
 
 CellEdge edgeOf(int number) {
@@ -113,7 +113,7 @@ void appendBilinear(dvec3 p1, dvec3 p2, dvec3 p3, dvec3 p4, std::vector<Patch>& 
     patches.push_back(patch);
 }
 
-/// The points on the grid's edges: edge along `axis` from a grid point.
+/// The points on the grid's edges; an edge runs along `axis` from a grid point.
 class EdgePoints {
 public:
     explicit EdgePoints(const TileGrid& grid)
@@ -126,7 +126,7 @@ public:
         ++counts_[at];
     }
     [[nodiscard]] bool has(CellEdge edge, ivec3 cell) const { return counts_[slot(edge, cell)] != 0; }
-    /// The mean of what was added, in the cell's coordinates.
+    /// Returns the mean of the points that were added, in the cell's coordinates.
     [[nodiscard]] dvec3 point(CellEdge edge, ivec3 cell) const {
         const size_t at = slot(edge, cell);
         dvec3 p(edge.from);
@@ -143,7 +143,7 @@ private:
     std::vector<uint16_t> counts_;
 };
 
-/// Builds cell by cell; corners' values are asked once.
+/// Builds cell by cell; the values at corners are computed once.
 class PatchBuilder {
 public:
     PatchBuilder(const Shape& shape, const Occupancy& occupancy)
@@ -221,7 +221,7 @@ private:
         return 0.5 * (low + high);
     }
 
-    /// Points of the surface in the cell and half a cell around it: a lattice moved along the gradient.
+    /// Returns points of the surface in the cell and half a cell around it: a lattice moved along the gradient.
     std::vector<dvec3> samplesAround(ivec3 cell) const {
         constexpr int n = 6;
         std::vector<dvec3> samples;
@@ -252,7 +252,7 @@ private:
             return q[0] * p.x * p.x + q[1] * p.y * p.y + q[2] * p.z * p.z + q[3] * p.x * p.y + q[4] * p.y * p.z +
                    q[5] * p.z * p.x + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
         };
-        // A quadratic along the edge, from three values.
+        // The function along the edge is taken as a quadratic through three values.
         const double f0 = at(0), fh = at(0.5), f1 = at(1), a = 2 * (f1 - 2 * fh + f0), b = f1 - f0 - a,
                      disc = b * b - 4 * a * f0;
         if (disc < 0) return;
@@ -262,7 +262,7 @@ private:
             if (s >= 0 && s <= 1) return edges_.add(edge, cell, s);
     }
 
-    /// Loops over the faces; each point has one line on either of its edge's faces.
+    /// Appends the loops over the faces; each point has one line on either of its edge's faces.
     void appendLoops(ivec3 cell, std::vector<Patch>& patches) {
         std::array<std::array<int, 2>, 12> next;
         std::array<int, 12> lines{};
@@ -351,7 +351,7 @@ float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span) {
                     q[5] * o.z * o.x + q[6] * o.x + q[7] * o.y + q[8] * o.z + q[9];
     const float disc = b * b - 4 * a * c;
     if (disc < 0) return -1;
-    // Without cancellation; for a = 0, the linear branch, the second root is that of the plane.
+    // Computed without cancellation; for a = 0, the linear branch, the second root is that of the plane.
     const float r = -0.5f * (b + (b >= 0 ? std::sqrt(disc) : -std::sqrt(disc)));
     float near = a != 0 ? r / a : -1e30f, far = r != 0 ? c / r : -1e30f;
     if (near > far) std::swap(near, far);
@@ -376,7 +376,7 @@ glm::vec3 patchGradient(const Patch& patch, glm::vec3 p) {
 
 Result<PatchSet> buildPatches(const Shape& shape, const Occupancy& occupancy, CrossingRule rule) {
     PatchBuilder builder(shape, occupancy);
-    // Corner values decide nothing in the paper's way.
+    // In the paper's way, corner values decide nothing.
     if (rule == CrossingRule::Direct)
         builder.findDirect();
     else

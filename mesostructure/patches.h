@@ -62,17 +62,17 @@ struct PatchSet {
     }
 };
 
-/// Errors: Limit (2^28 patches).
+/// Builds the patches. Errors: Limit (2^28 patches).
 Result<PatchSet> buildPatches(const Shape& shape, const Occupancy& occupancy, CrossingRule rule);
 
-/// The patches through a loop of 3 to 12 points in a cell's coordinates; none where they have no area.
+/// Appends the patches through a loop of 3 to 12 points in a cell's coordinates; none where they have no area.
 void appendPatches(std::span<const glm::dvec3> loop, std::vector<Patch>& patches);
 
-/// The crossing of a ray with a patch at 0 <= s <= span, `o` and `d` in the cell's coordinates; below 0: none.
+/// Returns the crossing of a ray with a patch at 0 <= s <= span, `o` and `d` in the cell's coordinates; below 0: none.
 float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span);
 glm::vec3 patchGradient(const Patch& patch, glm::vec3 p);
 
-/// The quadric A..J of least Taubin distance to points, or a plane where they lie in one. At least 3 points.
+/// Returns the quadric A..J of least Taubin distance to points, or a plane where they lie in one. At least 3 points.
 std::array<double, 10> fitQuadric(std::span<const glm::dvec3> points);
 
 }  // namespace vcp::meso

@@ -9,7 +9,7 @@
 
 namespace vcp::meso {
 
-/// In [0, 1).
+/// Returns a hash of the lattice point, in [0, 1).
 inline double hashUnit(int x, int y, uint32_t seed) {
     uint32_t h = seed * 0x9e3779b9u ^ uint32_t(x) * 0x85ebca6bu ^ uint32_t(y) * 0xc2b2ae35u;
     h = (h ^ h >> 16) * 0x7feb352du;
@@ -17,7 +17,7 @@ inline double hashUnit(int x, int y, uint32_t seed) {
     return (h ^ h >> 16) * 0x1p-32;
 }
 
-/// Gradient noise in about [-0.7, 0.7], of period (nx, ny).
+/// Returns gradient noise in about [-0.7, 0.7], of period (nx, ny).
 inline double gradientNoise(double x, double y, int nx, int ny, uint32_t seed) {
     const int i = int(std::floor(x)), j = int(std::floor(y));
     const double u = x - i, v = y - j;

@@ -30,7 +30,7 @@ void addOuter(Matrix& to, const Vector& v, double weight) {
         for (int j = 0; j < kSize; ++j) to[i][j] += weight * v[i] * v[j];
 }
 
-/// Lower triangle L with L L^T = a; `a` must be positive definite.
+/// Returns the lower triangle L with L L^T = a; `a` must be positive definite.
 Matrix cholesky(const Matrix& a) {
     Matrix l{};
     for (int i = 0; i < kSize; ++i)
@@ -42,7 +42,7 @@ Matrix cholesky(const Matrix& a) {
     return l;
 }
 
-/// Eigenvalues on the diagonal of `a`, eigenvectors in the columns of `v`: Jacobi's rotations.
+/// Leaves the eigenvalues on the diagonal of `a`, the eigenvectors in the columns of `v`: Jacobi's rotations.
 void diagonalise(Matrix& a, Matrix& v) {
     for (int i = 0; i < kSize; ++i)
         for (int j = 0; j < kSize; ++j) v[i][j] = i == j;
@@ -88,7 +88,7 @@ std::array<double, 10> fitQuadric(std::span<const glm::dvec3> points) {
         addOuter(values, m, weight);
         for (const Vector& g : gradients(p - centre)) addOuter(slopes, g, weight);
     }
-    // Points of a plane leave the second order undecided: a little weight on it makes the plane the answer.
+    // Points of a plane leave the second order undecided: a small weight on it makes the plane the answer.
     for (int i = 0; i < kSize; ++i) slopes[i][i] += 1e-9, values[i][i] += i < 6 ? 1e-10 : 0;
     // values a = lambda slopes a, with slopes = L L^T: the symmetric L^-1 values L^-T.
     const Matrix l = cholesky(slopes);
@@ -117,7 +117,7 @@ std::array<double, 10> fitQuadric(std::span<const glm::dvec3> points) {
         for (int k = i + 1; k < kSize; ++k) a[i] -= l[k][i] * a[k];
         a[i] /= l[i][i];
     }
-    // Back from the centre: q(x - centre).
+    // Moves the quadric back from the centre: q(x - centre).
     double constant = 0;
     for (int i = 0; i < kSize; ++i) constant -= mean[i] * a[i];
     const glm::dvec3 c = centre;

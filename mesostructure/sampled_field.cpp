@@ -10,7 +10,7 @@ namespace vcp::meso {
 
 namespace {
 
-/// A shape's values at the grid points, plane by plane: five are kept.
+/// A shape's values at the grid points, plane by plane: five planes are kept.
 class Planes {
 public:
     Planes(const Shape& shape, const TileGrid& grid) : shape_(shape), grid_(grid) {}
@@ -21,7 +21,8 @@ public:
         return plane
             .values[size_t(wrapped(p.x, grid_.cells.x)) + size_t(grid_.cells.x) * size_t(wrapped(p.y, grid_.cells.y))];
     }
-    /// Summed over the axes; at the slab's top and bottom that along z is that of the next plane.
+    /// Sums the second differences over the axes; at the slab's top and bottom, that along z is taken from the next
+    /// plane.
     double secondDifferences(glm::ivec3 p) {
         const double twice = 2 * at(p);
         const double sum = at(p + glm::ivec3(1, 0, 0)) + at(p - glm::ivec3(1, 0, 0)) + at(p + glm::ivec3(0, 1, 0)) +
@@ -69,7 +70,7 @@ Result<SampledField> sampleField(const Shape& shape, glm::ivec3 cells) {
         for (int y = 0; y < cells.y; ++y)
             for (int x = 0; x < cells.x; ++x) {
                 const double value = planes.at({x, y, z}) - planes.secondDifferences({x, y, z}) / 12;
-                // A sample outside stays outside: only 0 and less is solid.
+                // A sample outside stays outside: only 0 and below is solid.
                 const double step = std::round(value / double(field.unit));
                 field.steps.push_back(int16_t(std::clamp(value > 0 ? std::max(step, 1.0) : step, -32767.0, 32767.0)));
             }

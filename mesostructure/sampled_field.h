@@ -28,10 +28,10 @@ struct SampledField {
 
 inline constexpr int kBandCells = 4;  ///< distances are cut to so many of the largest edge of a cell
 
-/// Errors: Usage (no cells), Limit.
+/// Samples a shape. Errors: Usage (no cells), Limit.
 Result<SampledField> sampleField(const Shape& shape, glm::ivec3 cells);
 
-/// Marks also the cells that the trilinear surface of the samples passes, which may stray from the shape's. The grid's
+/// Also marks the cells that the trilinear surface of the samples passes, which may stray from the shape's. The grid's
 /// cells must divide the field's.
 void occupyField(const SampledField& field, Occupancy& occupancy);
 

@@ -30,13 +30,13 @@ public:
     virtual ~Shape() = default;
 
     [[nodiscard]] glm::dvec3 extent() const { return extent_; }
-    /// Above 0 outside, below 0 inside, 0 on the surface; its size is at most the distance to the surface.
+    /// A value above 0 outside, below 0 inside, 0 on the surface; its size is at most the distance to the surface.
     [[nodiscard]] virtual double field(glm::dvec3 point) const = 0;
-    /// Distance to the surface, at most `cap`; for height fields and meshes up to a quarter of a texel above it.
+    /// The distance to the surface, at most `cap`; for height fields and meshes up to a quarter of a texel above it.
     [[nodiscard]] virtual double distance(glm::dvec3 point, double cap) const = 0;
     /// Whether the surface may touch the closed box; never false where it does.
     [[nodiscard]] virtual bool mayTouch(glm::dvec3 lower, glm::dvec3 upper) const = 0;
-    /// The first crossing from outside to inside at 0 <= t <= tMax; the direction is a unit vector.
+    /// Returns the first crossing from outside to inside at 0 <= t <= tMax; the direction is a unit vector.
     [[nodiscard]] virtual TruthHit trace(glm::dvec3 origin, glm::dvec3 direction, double tMax) const = 0;
 
 private:
@@ -59,13 +59,13 @@ struct HeightMap {
 
 using TileTriangle = std::array<glm::dvec3, 3>;  ///< tile space; it may reach into neighbouring tiles
 
-/// Errors of the three: InvalidInput, without a file. The height map must outlive its shape.
+/// Errors of all three functions: InvalidInput, without a file. The height map must outlive its shape.
 Result<std::unique_ptr<Shape>> heightShape(const HeightMap& map);
-/// mesostructure/solids.h has the names.
+/// mesostructure/solids.h lists the names.
 Result<std::unique_ptr<Shape>> solidShape(const std::string& name, uint32_t seed);
-/// The repeated triangles must enclose solids: lines enter them as often as they leave them, which a few thousand
-/// lines are asked (nonzero winding along the vertical counts as inside, so parts may overlap). Normals point outwards
-/// by the right-hand rule.
+/// The repeated triangles must enclose solids: lines enter them as often as they leave them, which is checked with a
+/// few thousand lines (nonzero winding along the vertical counts as inside, so parts may overlap). Normals point
+/// outwards by the right-hand rule.
 Result<std::unique_ptr<Shape>> meshShape(const std::vector<TileTriangle>& triangles, glm::dvec3 extent);
 
 }  // namespace vcp::meso

@@ -18,7 +18,7 @@ namespace {
 using glm::dvec2, glm::dvec3;
 
 constexpr size_t kMostPieces = size_t{1} << 24;  // numbers of pieces are stored as floats
-constexpr double kLongest = 3;                   // of a direction at an edge, in heights
+constexpr double kLongest = 3;                   // longest direction at an edge, in heights
 
 struct Piece {
     std::array<dvec3, 4> corners, tile;
@@ -66,18 +66,18 @@ std::vector<dvec3> directionsOf(const BaseSurface& surface) {
     return sums;
 }
 
-/// Which edges of which triangles have a neighbour that goes on with the same map, whole tiles apart.
+/// Which edges of which triangles have a neighbour that continues the same map, whole tiles apart.
 class Joins {
 public:
     Joins(const BaseSurface& surface, dvec2 tile) : tile_(tile) {
         for (size_t i = 0; i < surface.triangles.size(); ++i)
             for (int k = 0; k < 3; ++k) {
                 const Edge edge = edgeOf(surface, i, k);
-                // More than a few on one edge are no surface: the others are cut.
+                // An edge with more than a few triangles is no surface: the others are cut.
                 if (auto& uses = uses_[edge.corners]; uses.size() < 16) uses.push_back(edge.map);
             }
     }
-    /// The edge from corner k to the next.
+    /// Whether the edge from corner k to the next is joined.
     [[nodiscard]] bool isJoined(const BaseSurface& surface, size_t triangle, int k) const {
         const Edge edge = edgeOf(surface, triangle, k);
         const auto& uses = uses_.at(edge.corners);
@@ -97,7 +97,7 @@ private:
         const int next = (k + 1) % 3;
         return t[k] < t[next] ? Edge{{t[k], t[next]}, {map[k], map[next]}} : Edge{{t[next], t[k]}, {map[next], map[k]}};
     }
-    /// A part of a millionth of a tile is not seen.
+    /// Whether two places are whole tiles apart; a millionth of a tile is not seen.
     bool isWhole(dvec2 a, dvec2 b) const {
         const dvec2 tiles = a / tile_, off = glm::abs(tiles - glm::round(tiles)), turned = glm::abs(a - b) / tile_;
         return std::max({off.x, off.y, turned.x, turned.y}) < 1e-6;
@@ -144,7 +144,7 @@ private:
             world[k + 3] = world[k] + height_ * directions_[t[order[k]]];
             tile[k] = dvec3(map[order[k]], 0), tile[k + 3] = dvec3(map[order[k]], tileHeight_);
         }
-        // Of the sides, by the column that they are opposite to.
+        // The sides, by the column that they are opposite to.
         std::array<bool, 3> isCut{};
         for (int k = 0; k < 3; ++k) {
             const int from = order[(k + 1) % 3], to = order[(k + 2) % 3];
@@ -167,7 +167,7 @@ private:
         }
     }
 
-    /// Of the prism's corners: base, then top; column i is corners i and i + 3.
+    /// The corners of the prism: base, then top; column i is corners i and i + 3.
     static constexpr int kCorners[3][4] = {{0, 1, 2, 5}, {0, 1, 4, 5}, {0, 3, 4, 5}};
 
     static uint32_t bitsOf(const int (&corners)[4], const std::array<bool, 3>& isCut) {
@@ -176,7 +176,7 @@ private:
             uint32_t columns = 0;
             for (int k = 0; k < 4; ++k)
                 if (k != face) columns |= 1u << corners[k] % 3;
-            // A side has two columns, the base, the top and faces within have three.
+            // A side has two columns; the base, the top and faces within have three.
             for (int opposite = 0; opposite < 3; ++opposite)
                 if (columns == (7u & ~(1u << opposite)) && isCut[opposite]) bits |= 1u << face;
         }
@@ -190,7 +190,7 @@ private:
     Shell& shell_;
 };
 
-/// Halves at the median of the middles, along the longest axis.
+/// Halves the pieces at the median of their middles, along the longest axis.
 class TreeMaker {
 public:
     TreeMaker(const std::vector<Piece>& pieces, std::vector<uint32_t>& order) : pieces_(pieces), order_(order) {}
@@ -209,7 +209,7 @@ private:
             low = glm::min(low, piece.low()), high = glm::max(high, piece.high());
             lowMiddle = glm::min(lowMiddle, middle(piece)), highMiddle = glm::max(highMiddle, middle(piece));
         }
-        // Wider than single precision rounds.
+        // Boxes are widened by more than single precision rounds.
         const dvec3 slack = 1e-6 * (glm::abs(low) + glm::abs(high)) + 1e-5 * (high - low);
         low -= slack, high += slack;
         const bool isLeaf = last - first <= Shell::kMostInLeaf;
@@ -238,7 +238,7 @@ void append(const Piece& piece, dvec3 extent, std::vector<glm::vec4>& texels) {
     const glm::dmat3 weights = glm::inverse(edges(piece.corners)), map = edges(piece.tile) * weights;
     dvec3 q0 = piece.tile[0];
     for (int axis = 0; axis < 2; ++axis) q0[axis] -= extent[axis] * std::floor(q0[axis] / extent[axis]);
-    // Rows of a matrix that is stored by columns.
+    // The rows are those of a matrix that is stored by columns.
     const glm::dmat3 r = glm::transpose(weights), t = glm::transpose(map);
     texels.push_back(glm::vec4(piece.corners[0], float(piece.bits)));
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(r[row], q0[row]));

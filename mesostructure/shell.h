@@ -26,7 +26,7 @@ struct Shell {
     static constexpr uint32_t kNodeTexels = 2, kPieceTexels = 7, kMostInLeaf = 4, kDepth = 32;
 
     glm::dvec3 origin{0};        ///< what all coordinates are relative to: the middle of the base
-    glm::dvec3 low{0}, high{0};  ///< of the shell, world
+    glm::dvec3 low{0}, high{0};  ///< box of the shell, world
     uint32_t nodes = 0, pieces = 0;
     uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0, inverted = 0,
              flat = 0;  ///< triangles; the last two: pieces
@@ -37,14 +37,14 @@ struct Shell {
     ///   the base)
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
     ///           3 x (row of T, 0)                   tile space is q0 + T (p - v0); q0 is in the first tile
-    /// Cut is what is on a border of the base, or where the map goes on elsewhere: solid shows its cut there.
+    /// A face is cut where it is on a border of the base, or where the map jumps: solid shows its cut there.
     static constexpr uint32_t kBase = 16;
     std::vector<glm::vec4> texels;
 };
 
-/// `height`: of the shell over flat parts, world units; `extent`: of the tile, tile units. Errors: Usage (heights not
-/// above 0, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not finite, also in
-/// single precision); Limit (2^24 pieces).
+/// `height`: height of the shell over flat parts, world units; `extent`: extent of the tile, tile units. Errors: Usage
+/// (heights not above 0, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not
+/// finite, also in single precision); Limit (2^24 pieces).
 Result<Shell> buildShell(const BaseSurface& surface, double height, glm::dvec3 extent);
 
 }  // namespace vcp::meso

@@ -30,7 +30,7 @@ double box(dvec3 p, dvec3 half) {
     return glm::length(glm::max(q, dvec3(0))) + std::min(0.0, std::max({q.x, q.y, q.z}));
 }
 
-/// A disc with its axis along z.
+/// Returns the distance to a disc with its axis along z.
 double disc(dvec3 p, double radius, double half) {
     const dvec2 q(std::hypot(p.x, p.y) - radius, std::abs(p.z) - half);
     return glm::length(glm::max(q, dvec2(0))) + std::min(0.0, std::max(q.x, q.y));
@@ -40,8 +40,8 @@ double torus(double across, double other, double along, double major, double min
     return std::hypot(std::hypot(across, other) - major, along) - minor;
 }
 
-/// Least of `element(offset from the element's place, i, j)` over a lattice of nx x ny places in the tile. Elements
-/// may reach `leak` out of their cells; what lies two cells away bounds the result.
+/// Returns the least of `element(offset from the element's place, i, j)` over a lattice of nx x ny places in the tile.
+/// Elements may reach `leak` out of their cells; a bound stands for what lies two cells away.
 template <class Element>
 double lattice(dvec3 p, int nx, int ny, double leak, const Element& element) {
     const int i = int(std::floor(p.x * nx)), j = int(std::floor(p.y * ny));
@@ -94,7 +94,7 @@ double bars(dvec3 p) {
 
 double scales(dvec3 p) {
     const double c = std::cos(0.3), s = std::sin(0.3);
-    // Two lattices, the second half a place on.
+    // There are two lattices, the second shifted by half a place.
     double least = 1;
     for (const double shift : {0.0, 0.5}) {
         const dvec3 moved = p - dvec3(shift / 4, shift / 4, 0);
@@ -106,7 +106,7 @@ double scales(dvec3 p) {
     return std::min(least, floorBelow(p, 0.02));
 }
 
-/// Polynomial smooth minimum: its gradient is a mean of the two.
+/// Returns a polynomial smooth minimum: its gradient is a mean of the two.
 double smoothMin(double a, double b, double k) {
     const double h = std::max(k - std::abs(a - b), 0.0) / k;
     return std::min(a, b) - h * h * k * 0.25;
@@ -197,7 +197,8 @@ public:
     bool mayTouch(dvec3 lower, dvec3 upper) const override { return mayTouch(lower, upper, 4); }
 
     TruthHit trace(dvec3 origin, dvec3 direction, double tMax) const override {
-        // Sphere tracing: steps of the field never pass the surface. Inside, on to the way out first.
+        // Sphere tracing: steps by the field never pass the surface. A ray that starts inside first goes on to the way
+        // out.
         bool outside = field_(origin) > -kNear;
         double t = 0, step = 0;
         for (int steps = 0; t <= tMax; t += step, ++steps) {

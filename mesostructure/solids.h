@@ -10,12 +10,12 @@
 
 namespace vcp::meso {
 
-/// "fbm", "ridged", "hemispheres", "maze", "blocks", "bricks", "ripple", "needle", "edge", "bark", "cobble".
+/// Names: "fbm", "ridged", "hemispheres", "maze", "blocks", "bricks", "ripple", "needle", "edge", "bark", "cobble".
 std::span<const std::string_view> heightFieldNames();
-/// A square map of `texels` an edge, from 8 to kMaxGridEdge. Errors: Usage (no such name, bad size).
+/// Makes a square map of `texels` an edge, from 8 to kMaxGridEdge. Errors: Usage (no such name, bad size).
 Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t seed);
 
-/// "beads", "ball", "chain", "weave", "bars", "scales", "kitten", "flakes", "gyroid", "sponge", "blades".
+/// The names are "beads", "ball", "chain", "weave", "bars", "scales", "kitten", "flakes", "gyroid", "sponge", "blades".
 std::span<const std::string_view> solidNames();
 
 /// A solid by a formula. `field` is above 0 outside and changes by at most 1 a unit of length.
@@ -23,7 +23,7 @@ struct Solid {
     glm::dvec3 extent{1};
     std::function<double(glm::dvec3)> field;
 };
-/// Errors: Usage (no such name).
+/// Makes a solid by name. Errors: Usage (no such name).
 Result<Solid> makeSolid(std::string_view name, uint32_t seed);
 
 }  // namespace vcp::meso

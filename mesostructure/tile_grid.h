@@ -14,7 +14,7 @@
 
 namespace vcp::meso {
 
-/// Least and greatest number of cells along an axis of any grid or map, and cells of a grid in all.
+/// Least and greatest number of cells along an axis of any grid or map, and the most cells of a grid in all.
 inline constexpr int kMaxGridEdge = 4096;
 inline constexpr size_t kMaxGridCells = size_t{1} << 28;
 
@@ -36,7 +36,7 @@ struct TileGrid {
 
     [[nodiscard]] size_t count() const { return size_t(cells.x) * size_t(cells.y) * size_t(cells.z); }
     [[nodiscard]] glm::dvec3 extent() const { return cell * glm::dvec3(cells); }
-    /// x fastest; x and y wrap, z must lie in the grid.
+    /// Returns a cell's index; x is fastest, x and y wrap, z must lie in the grid.
     [[nodiscard]] size_t index(glm::ivec3 at) const {
         return size_t(wrapped(at.x, cells.x)) +
                size_t(cells.x) * (size_t(wrapped(at.y, cells.y)) + size_t(cells.y) * size_t(at.z));

@@ -8,7 +8,7 @@
 
 namespace vcp {
 
-/// Cells of a page that are occupied, and the same grown by 1, 2, ... cells. Up to 64 cells an edge.
+/// The occupied cells of a page, and the same cells grown by 1, 2, ... cells. A page has up to 64 cells an edge.
 class Clearance {
 public:
     explicit Clearance(int cells);
@@ -16,8 +16,8 @@ public:
     /// Marks the cells of a box (page space, whole cells, within the page).
     void occupy(glm::ivec3 lower, int edge);
 
-    /// By how many whole cells the box can grow on every side, clamped to the page, and hold no occupied cell.
-    /// The page's edge in cells when no cell is occupied. No occupy after the first call.
+    /// Returns by how many whole cells the box can grow on every side, clamped to the page, without meeting an occupied
+    /// cell; the page's edge in cells when no cell is occupied. occupy() may not be called after the first call.
     int of(glm::ivec3 lower, int edge);
 
 private:

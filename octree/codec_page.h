@@ -27,7 +27,7 @@ struct NodePlace {
 
 inline constexpr int kSubcellsPerCell = 1 << kMaxSubcellDepth;
 
-/// Places of a checked page's nodes.
+/// The places of a checked page's nodes.
 inline std::vector<NodePlace> placesOf(const PageView& page) {
     std::vector<NodePlace> places(page.nodes.size());
     const auto fill = [&](uint32_t word, NodePlace place) {
@@ -46,14 +46,14 @@ struct CodecPage {
     std::span<uint4> faces;
     std::span<glm::u32vec2> triangles, vertices;
     std::span<uint32_t> normals;
-    std::vector<NodePlace> places;  ///< of `nodes`
+    std::vector<NodePlace> places;  ///< places of the nodes in `nodes`
 
-    const PageView* source = nullptr;                             ///< what the encoder codes
-    std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: from where in `source`
+    const PageView* source = nullptr;                             ///< the page that the encoder codes
+    std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: which element of `source` each one is
 
     bool wrong = false;  ///< decoder: the bytes are no page; encoder: the page needs the plain form
 
-    /// Makes room for what the header says.
+    /// Makes room for as much as the header says.
     void allocate() {
         const PageSections s = pageSections(header);
         block.resize(s.end / 16);
@@ -64,7 +64,7 @@ struct CodecPage {
         vertices = {reinterpret_cast<glm::u32vec2*>(bytes + s.vertices), header.vertices};
         normals = {reinterpret_cast<uint32_t*>(bytes + s.normals), header.vertices};
     }
-    /// The word of node i where the page comes from; 0 for the decoder.
+    /// The word of node i in the page that the encoder codes; 0 for the decoder.
     [[nodiscard]] uint32_t sourceWord(size_t i) const {
         return source != nullptr ? source->nodes[size_t{8} * groupSource[i / 8] + i % 8] : 0u;
     }

@@ -1,5 +1,5 @@
-// Codes the colours of a page: each corner's once, predicted from its neighbours, each vertex' from those of its
-// triangle. Part of page_codec.
+// Codes the colours of a page: each corner's colour once, predicted from its neighbours, and each vertex' colour,
+// predicted from those of its triangle. Part of page_codec.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace vcp {
 template <class Coder>
 class ColourCodec {
 public:
-    /// `faces`, `vertices`: of `page`; read by the encoder, filled by the decoder.
+    /// `faces` and `vertices` are colours of `page`; the encoder reads them, the decoder fills them.
     ColourCodec(Coder& coder, const PageView& page, std::span<uint4> faces, std::span<uint32_t> vertices)
         : coder_(coder),
           page_(page),
@@ -25,7 +25,7 @@ public:
           faceDone_(faces.size(), 0),
           vertexDone_(vertices.size(), 0) {}
 
-    /// False when the page has faces or vertices that no leaf uses: their colours would be lost.
+    /// Returns false when the page has faces or vertices that no leaf uses: their colours would be lost.
     bool run() {
         const std::vector<NodePlace> places = placesOf(page_);
         const auto visit = [&](uint32_t word, const NodePlace& place) {
@@ -104,7 +104,7 @@ private:
         return colour;
     }
 
-    /// Channels move together: green first, the others by how they differ from it.
+    /// The channels are coded together: green first, then red and blue by how their change differs from green's.
     void codeColour(uint32_t& colour, uint32_t foretold, size_t kind) {
         bool equal = colour == foretold;
         coder_.bit(equal_[kind], equal);

@@ -1,5 +1,5 @@
-// What is known of the corners of a page's leaves, by position in subcells: an array for corners of cells, a map
-// for those within.
+// What the codec knows of the corners of a page's leaves, by position in subcells: an array for the corners of cells, a
+// map for those inside of cells.
 #pragma once
 
 #include <algorithm>
@@ -16,18 +16,18 @@ inline uint64_t positionKey(glm::ivec3 p) {
     return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << 16 | uint64_t(uint32_t(p.z)) << 32;
 }
 
-/// Positions from 0 to the page's edge. `Value` is default for a corner not met before.
+/// Positions range from 0 to the page's edge. A corner that was not met before has a default `Value`.
 template <class Value>
 class CornerStore {
 public:
-    /// `cells`: of the page's edge.
+    /// `cells`: the page's edge in cells.
     explicit CornerStore(int cells)
         : side_(cells + 1),
           number_(cells <= kMaxArrayCells ? static_cast<size_t>(side_) * side_ * side_ : 0, 0),
           within_(16),
           values_(1) {}
 
-    /// Valid until the next at().
+    /// The reference is valid until the next at().
     Value& at(glm::ivec3 p) {
         uint32_t& number = inArray(p) ? number_[index(p)] : within_.findOrAdd(positionKey(p));
         if (number == 0) {
@@ -36,7 +36,7 @@ public:
         }
         return values_[number];
     }
-    /// A default value where nothing was met. Positions may be beyond the page's edge.
+    /// Returns a default value where nothing was met. Positions may be beyond the page's edge.
     const Value& find(glm::ivec3 p) {
         if (std::min(p.x, std::min(p.y, p.z)) < 0 || std::max(p.x, std::max(p.y, p.z)) >= kSubcellsPerCell * side_)
             return values_[0];
@@ -45,7 +45,7 @@ public:
         return values_[number == nullptr ? 0 : *number];
     }
 
-    /// What was met one edge below and above along each axis; Value{} where nothing was.
+    /// Sets what was met one edge below and above along each axis; Value{} where nothing was.
     void neighbours(glm::ivec3 p, int edge, const Value* (&beside)[3][2]) {
         if (!inArray(p) || (edge & (kSubcellsPerCell - 1)) != 0) {
             for (int axis = 0; axis < 3; ++axis)
@@ -76,7 +76,7 @@ private:
     }
 
     int side_;
-    std::vector<uint32_t> number_;  ///< in values_; 0: not met
+    std::vector<uint32_t> number_;  ///< index in values_; 0: not met
     PositionMap<uint32_t> within_;
     std::vector<Value> values_;
 };

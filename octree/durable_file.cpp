@@ -27,7 +27,7 @@ Result<void> untilAllAreTaken(std::span<const std::byte> bytes, const std::files
 }  // namespace
 
 Error systemError(const std::filesystem::path& file, const char* what, int code, const char* whenFull) {
-    // Not strerror: it may share its buffer between threads.
+    // strerror is not used: it may share its buffer between threads.
     std::string message = std::string(what) + ": " + std::generic_category().message(code);
     if (code == ENOSPC || code == EDQUOT) message += std::string("; ") + whenFull;
     return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()};

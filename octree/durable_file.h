@@ -14,15 +14,15 @@ namespace vcp {
 /// What to do about a full disk, where the caller knows nothing better.
 inline constexpr const char* kWhenFull = "free some space or choose another folder";
 
-/// An Io error of `file`: `what`, then the system's words for `code` (an errno), then `whenFull` where the disk or
-/// the quota is full.
+/// Returns an Io error of `file` that says `what`, then the system's words for `code` (an errno), then `whenFull` where
+/// the disk or the quota is full.
 Error systemError(const std::filesystem::path& file, const char* what, int code, const char* whenFull = kWhenFull);
 
 /// Writes all of `bytes` at `offset` of a descriptor, however often it is interrupted. Errors: Io, naming `file`.
 Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte> bytes,
                       const std::filesystem::path& file, const char* whenFull = kWhenFull);
 
-/// The same where the descriptor stands: a file opened with O_APPEND, a pipe.
+/// Writes all of `bytes` where the descriptor stands: for a file opened with O_APPEND, or a pipe.
 Result<void> appendAll(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& file,
                        const char* whenFull = kWhenFull);
 

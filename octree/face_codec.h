@@ -50,11 +50,11 @@ private:
         NodePlace place;
     };
     struct Corner {
-        uint32_t code = 0;       ///< its side turned as flip_ said
-        int edge = 0;            ///< of the leaf it was coded for; 0: not coded
-        glm::i16vec3 normal{0};  ///< of `code`, on the side of the corner or the other; in 1/4096
+        uint32_t code = 0;       ///< the packed vector, its side turned as flip_ said
+        int edge = 0;            ///< edge of the leaf that it was coded for; 0: not coded
+        glm::i16vec3 normal{0};  ///< direction of `code` in 1/4096, on the side of the corner or the other
     };
-    /// A direction in 1/4096.
+    /// A direction; its unit is 1/4096.
     using Direction = glm::ivec3;
 
     static uint64_t leafKey(glm::ivec3 lower, int edge) {
@@ -111,7 +111,7 @@ private:
             known[c] = corner.edge != 0;
             if (known[c]) expected[c] = rescaled(corner, place.edge) ^ flip_ << 31;
         }
-        // Corners come up to 8 times, mostly all as they were.
+        // A corner comes up in up to 8 leaves, mostly with the same vector each time.
         bool asExpected = true;
         if (known[0] || known[1] || known[2] || known[3]) {
             for (int c = 0; c < 4; ++c) asExpected = asExpected && (!known[c] || face[c] == expected[c]);
@@ -127,8 +127,8 @@ private:
         }
     }
 
-    /// Corners are on one side of their leaf's surface or the other: a leaf has no outside. flip_ says whether
-    /// the leaves at hand see it as those before did.
+    /// A leaf has no outside, so a corner's side is relative to its leaf's surface. flip_ says whether the leaf at hand
+    /// names the sides as the leaves before it did.
     void codeCorner(glm::ivec3 position, int edge, uint32_t& code) {
         const Corner known = corners_.find(position);
         if (known.edge == 0) return codeNew(code, foretell(position, edge), position, edge);
@@ -148,13 +148,13 @@ private:
         codeNew(code, foretold, position, edge);
     }
 
-    /// What the neighbours say about a corner: oriented normal (of any length) and signed distance, in steps of
+    /// What the neighbours say about a corner: its oriented normal (of any length) and its signed distance, in steps of
     /// the packed distance.
     struct Foretold {
         Direction normal{0};
         int distance = 0;
         int neighbours = 0;
-        int along = 0;         ///< sum over neighbours of distance without the corner's own normal
+        int along = 0;         ///< sum, over the neighbours, of the distance without the corner's own normal
         glm::ivec3 offset{0};  ///< sum of the offsets from the neighbours, in leaf edges
         bool same = false;     ///< the corner itself is known, but for rounding
     };
@@ -168,7 +168,7 @@ private:
             for (int end = 0; end < 2; ++end) {
                 const Corner& corner = *beside[axis][end];
                 if (corner.edge == 0) continue;
-                const int along = end != 0 ? -1 : 1;  // from there to here
+                const int along = end != 0 ? -1 : 1;  // direction from the neighbour to the corner
                 const int d = signedDistance(rescaled(corner, edge)), slope = steps(along * corner.normal[axis]);
                 ++f.neighbours;
                 f.normal += Direction(corner.normal);
@@ -181,7 +181,7 @@ private:
     }
 
     void codeNew(uint32_t& code, const Foretold& f, glm::ivec3 position, int edge) {
-        // The side, then the direction, then the distance: each helps with the next.
+        // The side is coded first, then the direction, then the distance: each helps to predict the next.
         const int certainty =
             f.neighbours == 0
                 ? 0
@@ -209,7 +209,7 @@ private:
         corners_.at(position) = {code ^ flip_ << 31, edge, glm::i16vec3(n)};
     }
 
-    /// `code`'s side in bit 31 or 0; expected: the side before flip_.
+    /// `code`: the side, in bit 31 where `known`, else in bit 0. `expected`: the side before flip_.
     template <class Model>
     void codeSide(uint32_t& code, uint32_t expected, Model& model, bool known) {
         const int shift = known ? 31 : 0;
@@ -248,7 +248,7 @@ private:
             p = {1023 - p.x, 2046 - p.y};
         return p;
     }
-    /// The nearest of a point's places beyond the edges.
+    /// Finds the nearest of a point's places beyond the edges.
     static void unfold(int32_t u, int32_t v, glm::ivec2 from, int32_t& du, int32_t& dv) {
         const glm::ivec2 images[] = {{-u, 1023 - v}, {2046 - u, 1023 - v}, {1023 - u, -v}, {1023 - u, 2046 - v}};
         for (const glm::ivec2 image : images) {
@@ -271,8 +271,8 @@ private:
         const Direction n = unpacked(code);
         return code >> 31 ? -n : n;
     }
-    /// The direction of a code. Square root, division and product are correctly rounded wherever doubles are,
-    /// and nothing is left to be fused.
+    /// Decodes the direction of a code. Square root, division and product are correctly rounded wherever doubles are,
+    /// and no product can be fused with a sum.
     static Direction unpacked(uint32_t code) {
         int x = 2 * static_cast<int>(code >> 11 & 1023u) - 1023, y = 2 * static_cast<int>(code >> 21 & 1023u) - 1023;
         const int z = 1023 - std::abs(x) - std::abs(y);
@@ -294,7 +294,7 @@ private:
         }
         return {(x + 1023) / 2, (y + 1023) / 2};
     }
-    /// A corner's vector in the unit of another leaf.
+    /// Converts a corner's vector to the unit of another leaf.
     static uint32_t rescaled(const Corner& corner, int edge) {
         if (corner.edge == edge) return corner.code;
         const uint32_t d =

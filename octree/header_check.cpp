@@ -43,7 +43,7 @@ private:
         return {.code = code, .message = std::move(message), .file = file_, .element = "header", .byte = byte};
     }
 
-    /// It is a .vcp of a version that is known, and all of it has come.
+    /// Checks that it is a .vcp of a known version, and that the file is complete.
     [[nodiscard]] Result<void> identity() const {
         if (std::memcmp(h_.magic, FileHeader{}.magic, sizeof h_.magic) != 0) return fail(0, "not a .vcp file");
         if (h_.version < kFileVersion || h_.version > kMethodFileVersion)
@@ -161,7 +161,7 @@ private:
         return {};
     }
 
-    /// What has no meaning yet is zero, so that a later version may give it one.
+    /// Checks that bytes without a meaning are zero, so that a later version may give them one.
     [[nodiscard]] Result<void> rest() const {
         VCP_TRY(zero(byteOf(h_.levels), offsetof(FileHeader, hash), "rows behind the level table"));
         return zero(offsetof(FileHeader, paper) + (isPaper_ ? offsetof(PaperParameters, reserved) : 0),

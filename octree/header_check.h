@@ -1,4 +1,4 @@
-// What the header of a .vcp file says for itself, checked before anything is read or allocated by it.
+// Checks what the header of a .vcp file says, before anything is read or allocated by it.
 #pragma once
 
 #include <span>

@@ -21,7 +21,7 @@ void CubeTest::prepare() {
     int n = 0;
     for (size_t i = 0; i < 3; ++i) {
         const glm::dvec3 d(e[i]), a(corners_[i]), c(corners_[(i + 2) % 3]);
-        // The ends of the edge itself project to the same point.
+        // Both ends of the edge itself project to the same point.
         const auto set = [&](double x, double y, double z) {
             const double pa = 2 * (x * a.x + y * a.y + z * a.z), pc = 2 * (x * c.x + y * c.y + z * c.z);
             along_[0][n] = x;
@@ -44,7 +44,7 @@ bool CubeTest::touches(glm::i32vec3 lower, int edge) {
         if (std::min(d.x, std::min(d.y, d.z)) >= 0 && std::max(d.x, std::max(d.y, d.z)) <= edge) return true;
     }
     if (!prepared_) prepare();
-    // All times two, so that the cube's centre is whole.
+    // All values are doubled, so that the cube's centre is whole.
     const int64_t cx = 2 * int64_t{lower.x} + edge, cy = 2 * int64_t{lower.y} + edge, cz = 2 * int64_t{lower.z} + edge;
     const int64_t plane = 2 * offset_ - (normal_.x * cx + normal_.y * cy + normal_.z * cz);
     if ((plane < 0 ? -plane : plane) > edge * normalSize_) return false;

@@ -1,5 +1,5 @@
-// Which triangles each hard leaf of a page holds: all that touch it. Found from the triangles and the nodes
-// alone, in integers, so that a page need not store the lists.
+// Finds which triangles each hard leaf of a page holds: all that touch it. The triangles and the nodes alone decide it,
+// in integers, so that a page need not store the lists.
 #pragma once
 
 #include <algorithm>
@@ -33,22 +33,22 @@ private:
     std::array<glm::i32vec3, 3> corners_;
     glm::i64vec3 normal_;
     int64_t offset_, normalSize_;
-    bool prepared_ = false;  ///< a corner in the cube spares the rest
-    // The nine axes e x (x, y, z), times two: all values are integers below 2^53, so doubles are exact.
+    bool prepared_ = false;  ///< some corner is in the cube, so the other tests are not needed
+    // Products with the nine axes e x (x, y, z), doubled: all values are integers below 2^53, so doubles are exact.
     double along_[3][kAxes], least_[kAxes], most_[kAxes], size_[kAxes];
 };
 
-/// Longest edge of a triangle in a page, along an axis: 256 cells. Keeps products within 64 bits.
+/// Longest edge of a triangle in a page, along an axis: 256 cells. The limit keeps products within 64 bits.
 inline constexpr int kMaxEdgeSteps = 256 * kLatticePerCell;
 
-/// The nodes of a page to find places in; lattice coordinates from the page's lowest corner.
+/// The nodes of a page, to find places in. Lattice coordinates count from the page's lowest corner.
 class NodePlaces {
 public:
     /// `nodes`: node words whose internal nodes form a tree (groups after their parents' groups). They must
     /// outlive this.
     NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells);
 
-    /// Type of the leaf at a point; points outside the page are in kNodeEmpty.
+    /// Returns the type of the leaf at a point; points outside the page are in kNodeEmpty.
     [[nodiscard]] uint32_t typeAt(glm::i32vec3 point) const;
 
     /// Calls `found(node word)` for every hard leaf that the closed triangle touches, in a fixed order. Returns
@@ -78,7 +78,7 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
     const auto least = [&](int i) { return std::min(t[0][i], std::min(t[1][i], t[2][i])); };
     const auto most = [&](int i) { return std::max(t[0][i], std::max(t[1][i], t[2][i])); };
     const glm::i32vec3 low(least(0), least(1), least(2)), high(most(0), most(1), most(2));
-    // Cells that the closed bounding box touches.
+    // The cells that the closed bounding box touches.
     glm::i32vec3 first, last;
     for (int i = 0; i < 3; ++i) {
         first[i] = std::max((low[i] - 1) >> kCellShift, 0);
@@ -92,7 +92,7 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
                 ++visits;
                 const uint32_t word = word_[cell(x, y, z)], type = word >> kNodeTypeShift;
                 if (type == kNodeHard) {
-                    // A larger leaf is looked at in the first of its cells that come up.
+                    // A leaf larger than a cell is looked at only in the first of its cells that comes up.
                     const int size = size_[cell(x, y, z)], rest = (1 << size) - 1;
                     if ((x > first.x && (x & rest) != 0) || (y > first.y && (y & rest) != 0) ||
                         (z > first.z && (z & rest) != 0))
@@ -130,7 +130,7 @@ uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 h
         const uint32_t group = v.word & kNodePayloadMask;
         const int half = v.edge / 2;
         const glm::i32vec3 middle = v.lower + half;
-        // Octants whose boxes the bounding box touches, as bits: x and then 2 y and 4 z.
+        // The octants whose boxes the bounding box touches, as bits: octant x + 2 y + 4 z.
         const uint32_t x = (low.x <= middle.x ? 0x55u : 0u) | (high.x >= middle.x ? 0xaau : 0u);
         const uint32_t y = (low.y <= middle.y ? 0x33u : 0u) | (high.y >= middle.y ? 0xccu : 0u);
         const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);

@@ -49,7 +49,7 @@ private:
     using Index3 = std::array<uint32_t, 3>;
     static constexpr uint32_t kNone = TriangleFront::kNone;
 
-    /// Hard leaves get their numbers into their words, so that places_ tells them apart.
+    /// Writes each hard leaf's number into its word, so that places_ tells the leaves apart.
     static uint32_t numberLeaves(CodecPage& page) {
         uint32_t count = 0;
         page.forEachNode([&](uint32_t& word, uint32_t, const NodePlace&) {
@@ -62,7 +62,7 @@ private:
         const uint32_t g = front_.first();
         if (g == kNone) return codeSeed();
         const TriangleFront::Gate gate = front_.gate(g);
-        uint32_t behind = kNone;  // encoder: number in source_
+        uint32_t behind = kNone;  // encoder: the triangle's number in source_
         if constexpr (Coder::kEncodes) behind = source_.across(gate.from, gate.to);
         bool none = behind == kNone;
         coder_.bit(border_[inHard(gate)][lastBorder_], none);
@@ -76,7 +76,7 @@ private:
         add(gate.to, gate.from, c, behind);
     }
 
-    /// Codes vertex c of the triangle behind a gate; kNone in the encoder when it is new.
+    /// Codes vertex c of the triangle behind a gate; in the encoder c is kNone when the vertex is new.
     void codeThird(uint32_t g, const TriangleFront::Gate& gate, uint32_t& c) {
         const uint32_t next = front_.nextVertex(g), previous = front_.previousVertex(g);
         const uint32_t from = degreeClass(gate.from), to = degreeClass(gate.to);
@@ -107,7 +107,7 @@ private:
         if (c == gate.from || c == gate.to) page_.wrong = true;
     }
 
-    /// A vertex by number, counted from the latest.
+    /// Codes a vertex by its number, counted from the latest.
     void codeKnown(uint32_t& c) {
         const uint32_t latest = static_cast<uint32_t>(positions_.size());
         uint32_t back = latest - 1 - c;
@@ -116,7 +116,7 @@ private:
         if (back >= latest) page_.wrong = true;
     }
 
-    /// A triangle that nothing leads to.
+    /// Codes a triangle that no edge leads to.
     void codeSeed() {
         Index3 t{kNone, kNone, kNone}, old{};
         uint32_t number = kNone;
@@ -170,7 +170,7 @@ private:
         const uint32_t spread = category(more[i], scale);
         if (!known[static_cast<size_t>(j)]) vertex_[scale][1 + spread].code(coder_, more[j]);
         if (!known[static_cast<size_t>(k)]) {
-            // Where the surface goes on flat, the third coordinate follows from the two.
+            // Where the surface continues flat, the third coordinate follows from the other two.
             int32_t flat = 0;
             if (size <= kFlatSteps && n[k] != 0)
                 flat = static_cast<int32_t>(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) +
@@ -183,10 +183,10 @@ private:
         place(foretold + more);
     }
 
-    /// Walls and isosurfaces: coordinates that are just those of a corner of the gate's triangle. Sets their `more`.
+    /// For walls and isosurfaces: codes which coordinates are those of a corner of the gate's triangle. Sets `more`.
     std::array<bool, 3> codeLevel(const TriangleFront::Gate& gate, glm::i32vec3 foretold, glm::i32vec3& more) {
         const glm::i32vec3 corner[3] = {positions_[gate.from], positions_[gate.to], positions_[gate.opposite]};
-        uint32_t which[3] = {0, 0, 0};  // 1 + number of the corner, 0: none
+        uint32_t which[3] = {0, 0, 0};  // 1 + the corner's number, 0: none
         if constexpr (Coder::kEncodes)
             for (int axis = 0; axis < 3; ++axis)
                 for (uint32_t c = 3; c-- > 0;)
@@ -208,7 +208,7 @@ private:
         return known;
     }
 
-    /// How far off a prediction was, 0 to 3, against the edges' size.
+    /// Classes how far off a prediction was, against the edges' size: 0 to 3.
     static uint32_t category(int32_t more, uint32_t scale) {
         const int bits =
             static_cast<int>(std::bit_width(static_cast<uint32_t>(std::abs(more)))) - static_cast<int>(scale) - 3;
@@ -237,7 +237,7 @@ private:
         if (std::max(largest(u), std::max(largest(v), largest(u - v))) > kMaxEdgeSteps) page_.wrong = true;
     }
 
-    /// All triangles at a vertex in a hard leaf are in the page, and both at an edge through one.
+    /// The page has all triangles at a vertex inside a hard leaf, and both triangles at an edge through one.
     uint32_t inHard(const TriangleFront::Gate& gate) const {
         const uint32_t ends = uint32_t{inHard_[gate.from]} + inHard_[gate.to];
         if (ends > 0) return 1 + ends;
@@ -246,15 +246,15 @@ private:
     }
     uint32_t degreeClass(uint32_t vertex) const { return std::min(front_.degree(vertex), 7u); }
 
-    /// Hard leaves' records, in the order of the leaves; their words.
+    /// Makes the hard leaves' records, in the order of the leaves, and their words.
     void fillLeaves() {
-        std::vector<uint32_t> begin(size_t{hardLeaves_} + 1, 0);  // by leaf
+        std::vector<uint32_t> begin(size_t{hardLeaves_} + 1, 0);  // for each leaf
         struct Entry {
             uint32_t leaf, triangle;
         };
         std::vector<Entry> entries;
         entries.reserve(page_.header.triangles);
-        // No page asks for more work than its size allows.
+        // A page may not ask for more work than its size allows.
         uint64_t work = uint64_t{256} * page_.header.triangles + 65536;
         for (uint32_t t = 0; t < triangles_.size(); ++t) {
             const auto& [a, b, c] = triangles_[t];
@@ -272,7 +272,7 @@ private:
         uint32_t records = 0;
         page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace&) {
             if (nodeType(word) != kNodeHard || page_.wrong) return;
-            uint32_t& at = begin[word & kNodePayloadMask];  // from now on: of the leaf's first record
+            uint32_t& at = begin[word & kNodePayloadMask];  // from now on the leaf's first record
             const uint32_t count = begin[(word & kNodePayloadMask) + 1];
             const bool isLong = count >= kHardCountLong;
             const uint64_t end = uint64_t{records} + count + (isLong ? 1 : 0);
@@ -296,7 +296,7 @@ private:
 
     template <class Entries>
     void verify(const Entries& entries) {
-        // As many as the source has, leaf by leaf; so it is enough that each of them is the source's, too.
+        // Each leaf has as many records as in the source, so it is enough that each of them is one of the source's.
         std::vector<uint32_t> leafOf, words;
         page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace&) {
             if (nodeType(word) == kNodeHard) words.push_back(source);
@@ -374,9 +374,9 @@ private:
     uint32_t hardLeaves_;
     NodePlaces places_;
     TriangleFront front_;
-    MeshSource source_;                    ///< the encoder's
-    std::vector<glm::i32vec3> positions_;  ///< of vertices, lattice, from the page's lowest corner
-    std::vector<uint8_t> inHard_;          ///< vertices in hard leaves
+    MeshSource source_;                    ///< the triangles that the encoder codes
+    std::vector<glm::i32vec3> positions_;  ///< the vertices' positions on the lattice, from the page's lowest corner
+    std::vector<uint8_t> inHard_;          ///< whether a vertex is in a hard leaf
     std::vector<Index3> triangles_;
     uint32_t lastBorder_ = 0, lastLevel_ = 0;
     NumberModel count_, known_;

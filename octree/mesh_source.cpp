@@ -26,7 +26,7 @@ void MeshSource::collect(const PageView& page) {
                            f64::decodeIndex2(record.y)};
             if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) wrong_ = true;
             const uint64_t key = uint64_t{t[0]} << 42 | uint64_t{t[1]} << 21 | t[2];
-            uint32_t& number = numbers.findOrAdd(key);  // plus 1
+            uint32_t& number = numbers.findOrAdd(key);  // the number plus 1
             if (number == 0) {
                 vertices_.push_back(t);
                 number = static_cast<uint32_t>(vertices_.size());

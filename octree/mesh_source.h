@@ -20,26 +20,26 @@ public:
     MeshSource() = default;
     explicit MeshSource(const PageView& page);
 
-    /// Whether the page has triangles that name a vertex twice, or too long edges.
+    /// Whether the page has triangles that name a vertex twice, or edges that are too long.
     [[nodiscard]] bool wrong() const { return wrong_; }
     [[nodiscard]] uint32_t triangles() const { return static_cast<uint32_t>(vertices_.size()); }
-    /// Vertices as the page numbers them.
+    /// The vertices of a triangle, as the page numbers them.
     [[nodiscard]] const Index3& vertices(uint32_t triangle) const { return vertices_[triangle]; }
     /// The new number of a vertex of the page, or kNone.
     [[nodiscard]] uint32_t numberOf(uint32_t vertex) const { return newVertex_[vertex]; }
-    /// The page's numbers of the vertices in their new order.
+    /// The page's numbers of the vertices, in their new order.
     [[nodiscard]] const std::vector<uint32_t>& vertexOrder() const { return oldVertex_; }
-    /// The new number of the triangle of a record of the page.
+    /// The new number of the triangle that a record of the page stands for.
     [[nodiscard]] uint32_t newNumber(uint32_t record) const { return newTriangle_[triangleOf_[record]]; }
 
-    /// A triangle that has not been coded, at the edge between two vertices (new numbers), or kNone.
+    /// Returns a triangle that has not been coded, at the edge between two vertices (new numbers), or kNone.
     [[nodiscard]] uint32_t across(uint32_t from, uint32_t to) const;
-    /// New number of the vertex that completes it, or kNone: then takeThird takes it.
+    /// Returns the new number of the vertex that completes the triangle, or kNone: then takeThird() numbers it.
     uint32_t thirdVertex(uint32_t triangle, uint32_t from, uint32_t to);
     glm::i32vec3 takeThird(uint32_t number) { return take(third_, number); }
-    /// Numbers a vertex; its position on the lattice from the page's lowest corner.
+    /// Gives a vertex its number; returns its position on the lattice, from the page's lowest corner.
     glm::i32vec3 take(uint32_t vertex, uint32_t number);
-    /// The first triangle that has not been coded.
+    /// Returns the first triangle that has not been coded.
     uint32_t nextSeed();
     void done(uint32_t triangle, uint32_t number) { newTriangle_[triangle] = number; }
 
@@ -50,7 +50,7 @@ private:
     bool wrong_ = false;
     std::span<const glm::u32vec2> positions_;
     std::vector<Index3> vertices_;
-    std::vector<uint32_t> triangleOf_;  ///< by record
+    std::vector<uint32_t> triangleOf_;  ///< for each record, its triangle
     std::vector<uint32_t> newTriangle_, newVertex_, oldVertex_;
     std::vector<uint32_t> begin_, around_;  ///< triangles around each vertex
     uint32_t third_ = kNone, seed_ = 0;

@@ -14,8 +14,8 @@ class NodeCodec {
 public:
     NodeCodec(Coder& coder, CodecPage& page) : coder_(coder), page_(page), depth_(page.header.groups, 0) {}
 
-    /// Types first, breadth first, so that what is known of a node's surroundings foretells it; then clearances.
-    /// Soft leaves' words lack axis and faces, hard leaves' their triangles.
+    /// Codes types breadth first, so that what is known of a node's surroundings predicts it; then clearances.
+    /// Soft leaves' words still lack axis and faces, hard leaves' words their triangles.
     void run() {
         const int log2Cells = static_cast<int>(page_.header.log2Cells);
         grid_.resize(static_cast<size_t>(log2Cells) + 1);
@@ -38,8 +38,8 @@ private:
         }
         const NodePlace parent = parents_[g];
         const int depth = depth_[g];
-        uint32_t known = 0;  // octants that are not empty
-        // The parent's neighbours that are not empty: lower and upper by axis.
+        uint32_t known = 0;  // which octants are not empty
+        // Which of the parent's neighbours are not empty: lower and upper by axis.
         uint32_t beside[3][2];
         for (int axis = 0; axis < 3; ++axis)
             for (int end = 0; end < 2; ++end)
@@ -47,7 +47,7 @@ private:
         for (uint32_t o = 0; o < 8; ++o) {
             const size_t i = size_t{8} * g + o;
             page_.places[i] = parent.child(o);
-            // Face neighbours: siblings before this one, and the parent's neighbours on this octant's side.
+            // The face neighbours are siblings before this one, and the parent's neighbours on this octant's side.
             uint32_t before = 0, full = 0, outside = 0;
             for (int axis = 0; axis < 3; ++axis) {
                 const uint32_t bit = 1u << axis;
@@ -64,8 +64,8 @@ private:
         }
     }
 
-    /// Type of the node of the same depth beside a node; kNodeEmpty outside the page and, deeper than the cells,
-    /// kNodeInternal.
+    /// Returns the type of the node of the same depth beside a node; kNodeEmpty outside of the page and, at depths
+    /// below the cells, kNodeInternal.
     [[nodiscard]] uint32_t typeBeside(const NodePlace& place, int depth, int axis, bool upper) const {
         if (static_cast<size_t>(depth) >= grid_.size()) return kNodeInternal;
         const int n = 1 << depth;
@@ -103,7 +103,7 @@ private:
         return word;
     }
 
-    /// A leaf covers the nodes below it, too.
+    /// Marks a node; a leaf covers the nodes below it, too.
     void mark(const NodePlace& place, int depth, uint32_t type) {
         const int last = type == kNodeInternal ? depth : static_cast<int>(grid_.size()) - 1;
         for (int d = depth; d <= last; ++d) {
@@ -130,7 +130,7 @@ private:
         return wall << kSoftWallShift | dip << kSoftDipShift;
     }
 
-    /// The clearance is near what the occupied cells allow.
+    /// Codes clearances as differences from what the occupied cells allow.
     void clearances() {
         const int cells = 1 << page_.header.log2Cells;
         Clearance clearance(std::min(cells, 64));
@@ -158,9 +158,9 @@ private:
 
     Coder& coder_;
     CodecPage& page_;
-    std::vector<uint8_t> depth_;              ///< by group: of its nodes
-    std::vector<NodePlace> parents_;          ///< by group
-    std::vector<std::vector<uint8_t>> grid_;  ///< by depth: types of the nodes, leaves repeated below
+    std::vector<uint8_t> depth_;              ///< for each group, the depth of its nodes
+    std::vector<NodePlace> parents_;          ///< for each group, its parent
+    std::vector<std::vector<uint8_t>> grid_;  ///< for each depth, the types of the nodes; leaves are repeated below
     uint32_t groupsMade_ = 0, last_ = 0, lastWall_ = 0, lastDip_ = 0;
     BitModel occupied_[3][64];
     SymbolModel typeModel_[3][4][16];

@@ -41,14 +41,14 @@ const char* wordsFor(OutputKind kind) {
         ->words;
 }
 
-/// Datasets and assets: their header is written last, so that a mark can stand in its place until then.
+/// Datasets and assets are marked: their header is written last, so that a mark can stand in its place until then.
 bool isMarked(OutputKind kind) { return kind == OutputKind::Dataset || kind == OutputKind::Asset; }
 
 Error ioError(const fs::path& file, std::string message) {
     return {.code = ErrorCode::Io, .message = std::move(message), .file = file.string()};
 }
 
-/// The first bytes of a file that is open.
+/// Reads the first bytes of a file that is open.
 std::vector<std::byte> startOf(int descriptor) {
     std::vector<std::byte> start(kStartBytes);
     size_t got = 0;
@@ -62,7 +62,7 @@ std::vector<std::byte> startOf(int descriptor) {
     return start;
 }
 
-/// What a chain of links ends at, whether that is there or not. Errors: Io (a circle).
+/// Follows a chain of links to its end, whether a file is there or not. Errors: Io (a circle).
 Result<fs::path> followed(const fs::path& path) {
     fs::path at = path;
     for (int links = 0; links < kMostLinks; ++links) {
@@ -83,7 +83,7 @@ const char* wordsFor(mode_t mode) {
                                             : "no regular file";
 }
 
-/// Whether what lies at `target` may be replaced.
+/// Checks that what lies at `target` may be replaced.
 Result<void> checkReplaced(const fs::path& output, const fs::path& target, OutputKind kind, const OutputRules& rules) {
     struct stat there {};
     if (::lstat(target.c_str(), &there) != 0)
@@ -112,7 +112,7 @@ Result<void> checkReplaced(const fs::path& output, const fs::path& target, Outpu
                    fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
 }
 
-/// Removes what an interrupted writer left under that name. Errors: Io (another writer is at it).
+/// Removes what an interrupted writer left under that name. Errors: Io (another writer holds it).
 Result<bool> removeLeftover(const fs::path& output, const fs::path& partial) {
     const int file = ::open(partial.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (file < 0) return false;
@@ -133,7 +133,7 @@ struct Partial {
     int file;
 };
 
-/// A new file beside `target`, held by this process.
+/// Creates a new file beside `target`, held by this process.
 Result<Partial> createPartial(const fs::path& output, const fs::path& target, bool isMarked) {
     for (int number = 1; number <= kMostPartials; ++number) {
         fs::path name = target;
@@ -266,7 +266,7 @@ Result<void> OutputFile::commit() {
         return {};
     }
     VCP_TRY(checkReplaced(output_, target_, kind_, rules_));
-    // A file that is replaced keeps its permissions.
+    // The new file takes over the permissions of the file that it replaces.
     struct stat there {};
     if (::stat(target_.c_str(), &there) == 0) (void)::fchmod(file_, there.st_mode & 0777);
     if (::rename(partial_.c_str(), target_.c_str()) != 0)

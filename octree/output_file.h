@@ -30,7 +30,7 @@ enum class OutputKind { Dataset, Asset, Png, Pfm, JsonText, Svg, Text, Ply, Obj 
 
 struct OutputRules {
     bool overwrite = false;  ///< also files of another kind, and write-protected ones, may be replaced
-    /// Files that the caller reads, which are never replaced. Those that are not there count for nothing.
+    /// Files that the caller reads: they are never replaced. Files that do not exist are ignored.
     std::vector<std::filesystem::path> inputs = {};
 };
 
@@ -43,22 +43,22 @@ bool beginsLike(OutputKind kind, std::span<const std::byte> start);
 /// Whether two names stand for one file: through links, hard links and any spelling. False where one is missing.
 bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Says what OutputFile::create would refuse, and leaves nothing behind. Errors: Io (with the output's name).
+/// Checks what OutputFile::create would refuse, and leaves nothing behind. Errors: Io (with the output's name).
 Result<void> checkOutput(const std::filesystem::path& output, OutputKind kind, const OutputRules& rules);
 
-/// One thread. Without commit() nothing is left and nothing is replaced.
+/// An output while it is written, by one thread. Without commit() nothing is left and nothing is replaced.
 class OutputFile {
 public:
-    /// "-" is standard output, but for datasets and assets, which are not written front to back. Errors: Io.
+    /// "-" is standard output, except for datasets and assets, which are not written front to back. Errors: Io.
     static Result<OutputFile> create(const std::filesystem::path& output, OutputKind kind,
                                      const OutputRules& rules = {});
     ~OutputFile();
     OutputFile(OutputFile&& other) noexcept;
     OutputFile& operator=(OutputFile&&) = delete;
 
-    /// Open for reading and writing, and owned by this object; of standard output for writing only.
+    /// The descriptor is open for reading and writing (standard output for writing only), and owned by this object.
     [[nodiscard]] int descriptor() const { return file_; }
-    /// The name as it was given.
+    /// The output's name as it was given.
     [[nodiscard]] const std::filesystem::path& path() const { return output_; }
 
     /// Writes at an offset. Errors: Io.
@@ -67,7 +67,7 @@ public:
     Result<void> append(std::span<const std::byte> bytes);
     /// Makes what is written so far durable. Errors: Io.
     Result<void> sync();
-    /// sync, then the name, durably; what is there now is looked at once more. Errors: Io.
+    /// Syncs, checks once more what is there now, and renames durably. Errors: Io.
     Result<void> commit();
 
 private:
@@ -88,7 +88,7 @@ Result<void> writeFile(const std::filesystem::path& output, OutputKind kind, std
 Result<void> writeFile(const std::filesystem::path& output, OutputKind kind, std::string_view text,
                        const OutputRules& rules = {});
 
-/// What a dataset or an asset begins with until it is complete.
+/// The bytes that a dataset or an asset begins with until it is complete.
 inline constexpr std::string_view kPartialMark = "vcp-part";
 
 }  // namespace vcp

@@ -18,7 +18,7 @@ namespace vcp {
 /// the distance is 0. Precondition: |direction| = 1 +- 1e-6.
 uint32_t packVector(double distance, glm::dvec3 direction, bool negative);
 
-/// The same vector on the other side.
+/// The same vector with the corner on the other side.
 inline uint32_t flipSide(uint32_t code) { return code ^ 0x80000000u; }
 
 /// The paper's packing of v = closest point - corner, with |v| clamped to `range`. A zero vector loses its

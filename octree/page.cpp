@@ -29,7 +29,7 @@ Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     return {};
 }
 
-/// Walks the node groups in order. A group may be named once, by an earlier group; so the nodes form a tree.
+/// Walks the node groups in order. Each group may be named only once, by an earlier group; so the nodes form a tree.
 class NodeCheck {
 public:
     explicit NodeCheck(const PageView& page) : page_(page), depth_(page.header.groups, 0xff) {}
@@ -71,7 +71,7 @@ private:
                 const TriangleRange range = hardLeafTriangles(page_, word);
                 if (range.count == 0 || range.count > page_.header.triangles - range.first)
                     return broken(byte, "hard leaf names too many triangles");
-                // Leaves share no records: so a small page cannot ask for endless work, here or of a ray.
+                // Leaves share no records, so a small page cannot ask for endless work, here or of a ray.
                 named_ += range.count;
                 if (named_ > page_.header.triangles) return broken(byte, "hard leaves name too many triangles");
                 for (uint32_t t = range.first; t < range.first + range.count; ++t) VCP_TRY(triangle(t));
@@ -93,7 +93,7 @@ private:
     const PageView& page_;
     std::vector<uint8_t> depth_;
     uint32_t soft_ = 0, hard_ = 0;
-    uint64_t named_ = 0;  ///< triangle records of all hard leaves
+    uint64_t named_ = 0;  ///< triangle records of all hard leaves so far
 };
 
 template <class T>

@@ -19,8 +19,8 @@ struct PageHeader {
     uint32_t magic = kMagic;
     uint32_t log2Cells = 0;   ///< S = 2^log2Cells cells an edge, 1 to 7
     uint32_t root = 0;        ///< node word of the whole page
-    uint32_t groups = 0;      ///< of 8 node words
-    uint32_t faces = 0;       ///< of 16 bytes; at most 2^22
+    uint32_t groups = 0;      ///< groups of 8 node words
+    uint32_t faces = 0;       ///< faces of 16 bytes; at most 2^22
     uint32_t triangles = 0;   ///< records of 8 bytes; at most 2^22
     uint32_t vertices = 0;    ///< at most 2^21
     uint32_t softLeaves = 0;  ///< counts, checked against the nodes
@@ -33,13 +33,13 @@ struct PageHeader {
 static_assert(sizeof(PageHeader) == kPageHeaderBytes);
 static_assert(offsetof(PageHeader, groups) == 12 && offsetof(PageHeader, certifiedError) == 36);
 
-/// Byte offsets of a page's sections, from its counts.
+/// Byte offsets of a page's sections, computed from its counts.
 struct PageSections {
     uint64_t nodes, faces, triangles, vertices, normals, end;
 };
 PageSections pageSections(const PageHeader& header);
 
-/// Bytes of the colour page that belongs to a page.
+/// Returns the bytes of the colour page that belongs to a page.
 uint64_t colourPageBytes(const PageHeader& header);
 
 /// A checked page. Spans point into the bytes it was parsed from, which must outlive it.
@@ -59,14 +59,14 @@ struct PageView {
 /// hostile. `colours` is empty or a colour page. Errors: InvalidInput, with the byte within the page.
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
 
-/// Reads of a node word.
+/// The parts of a node word.
 inline uint32_t nodeType(uint32_t node) { return node >> kNodeTypeShift; }
 inline uint32_t emptyNode(double clearanceCells) {
     return kNodeEmpty << kNodeTypeShift | static_cast<uint32_t>(clearanceCells * double(kClearancePerCell));
 }
 inline double nodeClearance(uint32_t node) { return (node & kNodePayloadMask) / double(kClearancePerCell); }
 
-/// Where a hard leaf's triangles are: first record and count, the long form resolved.
+/// Where a hard leaf's triangles are: the first record and the count, with the long form resolved.
 struct TriangleRange {
     uint32_t first, count;
 };

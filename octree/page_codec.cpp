@@ -54,7 +54,7 @@ void codeHeader(Coder& coder, PageHeader& header) {
     header.certifiedError = std::bit_cast<float>(low | high << 16);
 }
 
-/// The counts of a header, before anything is allocated by them.
+/// Checks the counts of a header, before anything is allocated by them.
 bool plausible(const PageHeader& h, uint64_t pageBytes) {
     return h.log2Cells >= 1 && h.log2Cells <= 7 && h.groups <= 1u << 27 && h.faces <= kLeafIndexMask &&
            h.triangles <= kLeafIndexMask && h.vertices <= kField21Mask && h.softLeaves <= h.faces &&
@@ -63,14 +63,14 @@ bool plausible(const PageHeader& h, uint64_t pageBytes) {
 
 template <class Coder>
 void codePage(Coder& coder, CodecPage& page) {
-    // The models are some tens of kilobytes: not for the stack of a small thread.
+    // The models take some tens of kilobytes, too much for the stack of a small thread.
     std::make_unique<NodeCodec<Coder>>(coder, page)->run();
     if (!page.wrong) std::make_unique<FaceCodec<Coder>>(coder, page)->run();
     if (!page.wrong) std::make_unique<MeshCodec<Coder>>(coder, page)->run();
     std::memcpy(page.block.data(), &page.header, sizeof page.header);
 }
 
-/// The colour page of a page in canonical order.
+/// Returns the colour page of a page in canonical order.
 std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& page) {
     std::vector<uint4> block(colour.size() / 16);
     const size_t faces = page.faceSource.size();
@@ -82,7 +82,7 @@ std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& p
     return block;
 }
 
-/// Codes a colour page, or reads it into `block`. False when not all of it has a place in the page.
+/// Codes a colour page, or reads it into `block`. Returns false when some of it has no place in the page.
 template <class Coder>
 bool codeColour(Coder& coder, const PageView& page, std::span<uint4> block) {
     const std::span vertices(reinterpret_cast<uint32_t*>(block.data() + page.header.faces), page.header.vertices);
@@ -112,7 +112,7 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
     codePage(coder, page);
     if (page.wrong) return plainly();
     PackedPage packed{coded(coder), {}};
-    // What does not come back as it was is not written: a day's build is worth more than the time to look.
+    // A page whose coded form does not decode to it is stored plainly: a lost page costs more than this check.
     if (!isBlock(unpackGeometry(packed.geometry, geometry.size()), page.block)) return plainly();
     if (colour.empty()) return packed;
     const auto view = parsePage(std::as_bytes(std::span(page.block)));

@@ -1,11 +1,11 @@
-// Pages in the file: a form of their bytes from which all that follows from the rest is left out, range coded.
+// How pages are stored in the file: all that follows from the rest is left out, and what remains is range coded.
 //
 //   byte 0     0: plain: a zstd frame of the page follows; 1: coded, two streams (range_coder.h) follow
 //   nodes      types, breadth first; wall and dip codes; clearances as differences from what the types allow
 //   faces      runs of soft leaves; the vector of each of their corners once, foretold by its neighbours
 //   mesh       the distinct triangles of the hard leaves, growing across their edges; vertices by the parallelogram
 //              rule; normals as differences from those of the triangles
-//   colour     on its own: of each corner and vertex once, foretold by its neighbours
+//   colour     coded on its own: the colour of each corner and vertex once, foretold by its neighbours
 //
 // The numbers of children, faces and records and the leaves' lists of triangles are derived.
 //
@@ -28,15 +28,15 @@ struct PackedPage {
     std::vector<std::byte> geometry, colour;
 };
 
-/// `geometry` and `colour` (or nothing) are a page and its colour page, 16-byte aligned. The same bytes for the same
-/// page everywhere. Any thread.
+/// Packs `geometry`, a page, and `colour`, its colour page or nothing; both 16-byte aligned. The same page gives the
+/// same bytes everywhere. Any thread.
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
 
-/// The page, `pageBytes` long. `packed` may be hostile: nothing is allocated before its counts match pageBytes, then
-/// a few times that at most, and what comes back still has to be checked by parsePage. Errors: InvalidInput.
+/// Returns the page, `pageBytes` long. `packed` may be hostile: nothing is allocated before its counts match pageBytes,
+/// then at most a few times that much, and the result still has to be checked by parsePage. Errors: InvalidInput.
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes);
 
-/// The colour page of a checked page; as safe. Errors: InvalidInput.
+/// Returns the colour page of a checked page; as safe on hostile bytes. Errors: InvalidInput.
 Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page);
 
 }  // namespace vcp

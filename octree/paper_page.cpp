@@ -10,7 +10,7 @@ namespace vcp {
 
 namespace {
 
-constexpr uint32_t kMaxRoots = 64;  // along an axis
+constexpr uint32_t kMaxRoots = 64;  // roots along an axis
 constexpr uint32_t kMaxLevel = 20;
 
 Error broken(uint64_t byte, std::string what) {
@@ -41,7 +41,7 @@ Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2
     return {};
 }
 
-/// Walks the nodes in order. A group of children may be named once, by an earlier node; so the nodes form trees.
+/// Walks the nodes in order. A group of children may be named only once, by an earlier node; so the nodes form trees.
 class NodeCheck {
 public:
     explicit NodeCheck(const PaperPageView& page)
@@ -85,7 +85,7 @@ private:
 
     const PaperPageView& page_;
     uint32_t roots_;
-    std::vector<uint8_t> level_;  // of groups
+    std::vector<uint8_t> level_;  // the level of each group
     uint32_t leaves_ = 0, empties_ = 0;
 };
 

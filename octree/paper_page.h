@@ -2,8 +2,8 @@
 //
 //   offset   bytes            section
 //   0        64               PaperPageHeader
-//   64       4 * nodes        node words: roots first (x lowest), then groups of eight children (x lowest); padded to
-//   16
+//   64       4 * nodes        node words: roots first (x lowest), then groups of eight children (x lowest);
+//                             padded to 16 bytes
 //   ...      16 * slices      corners of leaves: four codes each, y lowest, then z
 //
 // Node word: inner [0, 2^30): number of its first child, greater than its own; empty [2^30, 2^31): 2^30 plus the
@@ -38,12 +38,12 @@ using uint = uint32_t;
 
 enum class PaperScheme : uint8_t { Trilinear, MinPlane, Longer };
 enum class PaperStep : uint8_t { Distance, Planar };
-/// Octahedral: 13 bits of length as before, 10 + 9 of direction, for comparison.
+/// Octahedral: 13 bits of length as in Spherical, and 10 + 9 of direction; for comparison.
 enum class PaperPacking : uint8_t { Spherical, Octahedral };
 
 /// The rules of the march; they may change from ray to ray.
 struct PaperMarch {
-    float epsilon = 0.25f;  ///< a ray hits nearer than this, finest cells
+    float epsilon = 0.25f;  ///< a ray hits where the distance is below this, in finest cells
     PaperScheme scheme = PaperScheme::Longer;
     PaperStep step = PaperStep::Planar;
     bool back = true;    ///< a hit is moved back to where the distance is epsilon
@@ -52,10 +52,10 @@ struct PaperMarch {
     bool operator==(const PaperMarch&) const = default;
 };
 
-/// What a file was built with.
+/// The parameters that a file was built with.
 struct PaperParameters {
-    float band = 0, mergeThreshold = 0;  ///< finest cells
-    int32_t growRounds = 0;              ///< -1: exact closest points
+    float band = 0, mergeThreshold = 0;  ///< lengths in finest cells
+    int32_t growRounds = 0;              ///< rounds of region growing; -1: exact closest points
     uint32_t packing = 0, mergeScheme = 0;
     uint32_t safeEmpty = 0;
     uint32_t reserved[2] = {};
@@ -69,7 +69,7 @@ struct PaperPageHeader {
     uint32_t nodes = 0;
     uint32_t roots[3] = {};  ///< along x, y and z
     uint32_t slices = 0;
-    float cutoff = 0, longest = 0;  ///< farthest that an empty node says; length of the longest vector
+    float cutoff = 0, longest = 0;  ///< largest distance that an empty node states; length of the longest vector
     uint32_t leaves = 0, emptyNodes = 0;
     uint32_t reserved[4] = {};
 
@@ -78,7 +78,7 @@ struct PaperPageHeader {
 static_assert(sizeof(PaperPageHeader) == paper::kPaperHeaderBytes && offsetof(PaperPageHeader, roots) == 16 &&
               offsetof(PaperPageHeader, cutoff) == 32);
 
-/// Where the slices begin, and bytes of the page.
+/// Byte offsets of the slices and of the page's end.
 struct PaperSections {
     uint64_t slices, end;
 };

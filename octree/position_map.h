@@ -15,12 +15,12 @@ public:
         while (size < 2 * expected) size *= 2;
         slots_.resize(size);
     }
-    /// The value of `key` (below 2^64 - 1), or null. Valid until the next findOrAdd.
+    /// Returns the value of `key` (below 2^64 - 1), or null. The pointer is valid until the next findOrAdd.
     [[nodiscard]] Value* find(uint64_t key) {
         Slot& slot = slotOf(key);
         return slot.key == key + 1 ? &slot.value : nullptr;
     }
-    /// The value of `key`; a fresh one when it is new.
+    /// Returns the value of `key`; a default value when the key is new.
     Value& findOrAdd(uint64_t key) {
         Slot* slot = &slotOf(key);
         if (slot->key == 0) {
@@ -35,7 +35,7 @@ public:
 
 private:
     struct Slot {
-        uint64_t key = 0;  ///< plus 1; 0: free
+        uint64_t key = 0;  ///< the key plus 1; 0: free
         Value value{};
     };
     Slot& slotOf(uint64_t key) {

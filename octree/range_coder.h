@@ -1,5 +1,5 @@
-// Adaptive range coding: bits with adaptive probabilities (after Martin 1979 and the LZMA coder), symbols of up to
-// 16 values (after Giesen's LZNA models), and numbers as such a symbol and raw bits, which go to a stream of their
+// Adaptive range coding: bits with adaptive probabilities (after Martin 1979 and the LZMA coder), symbols of up
+// to
 // own. Encoder and decoder have the same interface, so that a format is written down once, as a template over the
 // coder: `bit(model, value)` reads `value` in the one and sets it in the other. Integers alone decide, so every
 // machine decodes the same.
@@ -20,10 +20,10 @@ struct BitModel {
     uint16_t seen = 0;
 
     void learn(bool bit) {
-        // Rates 1/2, 1/4, ... down to 1/64, each for twice as many bits as the one before.
+        // The rates are 1/2, 1/4, ... down to 1/64, each for twice as many bits as the one before.
         const int shift = seen >= 63 ? 6 : std::bit_width(static_cast<unsigned>(seen) + 1u);
         if (seen < 63) ++seen;
-        // Ends a little short of certainty: the coder needs room for either bit.
+        // The probability ends a little short of certainty: the coder needs room for either bit.
         zero = static_cast<uint16_t>(zero + (((bit ? 48 : 65488) - zero) >> shift));
     }
 };
@@ -32,10 +32,10 @@ struct BitModel {
 struct SymbolModel {
     static constexpr int kSymbols = 16, kBits = 15;
 
-    alignas(32) int16_t before[kSymbols];  ///< probability of the symbols below each
+    alignas(32) int16_t before[kSymbols];  ///< total probability of the symbols below each
     uint16_t seen = 0;
 
-    /// `used`: symbols from it on hardly ever come.
+    /// `used`: symbols from this number on hardly ever come.
     explicit SymbolModel(int used = kSymbols) {
         for (int i = 0; i < kSymbols; ++i)
             before[i] =
@@ -45,7 +45,7 @@ struct SymbolModel {
     [[nodiscard]] uint32_t end(uint32_t symbol) const {
         return symbol + 1 < kSymbols ? static_cast<uint32_t>(before[symbol + 1]) : 1u << kBits;
     }
-    /// The symbol within whose share `target` lies.
+    /// Returns the symbol within whose share `target` lies.
     [[nodiscard]] uint32_t find(uint32_t target) const {
         int16_t count = 0;
         for (int i = 0; i < kSymbols; ++i)
@@ -64,7 +64,7 @@ struct SymbolModel {
     }
 };
 
-/// Zero bytes at the end that are not stored, at most.
+/// So many zero bytes at the end are not stored, at most.
 inline constexpr size_t kSparedZeros = 8;
 
 class RangeEncoder {
@@ -85,7 +85,7 @@ public:
         model.learn(value);
         normalize();
     }
-    /// The lowest `count` bits of `value`, 0 to 32 of them.
+    /// Appends the lowest `count` bits of `value`, 0 to 32 of them.
     void raw(uint32_t value, int count) {
         rawBits_ |= (uint64_t{value} & ((uint64_t{1} << count) - 1)) << rawCount_;
         for (rawCount_ += count; rawCount_ >= 8; rawCount_ -= 8) {
@@ -97,7 +97,7 @@ public:
     void finish(std::vector<std::byte>& out) {
         if (rawCount_ > 0) raw_.push_back(static_cast<std::byte>(rawBits_ & 255u));
         for (int i = 0; i < 5; ++i) shiftLow();
-        // The decoder takes some bytes past the end for zero.
+        // The decoder takes bytes past the end, up to kSparedZeros, for zero.
         for (size_t i = 0; i < kSparedZeros && !bytes_.empty() && bytes_.back() == std::byte{0}; ++i) bytes_.pop_back();
         for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::byte>(raw_.size() >> shift & 255u));
         out.insert(out.end(), raw_.begin(), raw_.end());
@@ -111,7 +111,7 @@ private:
             shiftLow();
         }
     }
-    /// Bytes wait while a carry could still change them.
+    /// Bytes are held back while a carry could still change them.
     void shiftLow() {
         if (low_ < 0xff000000u || low_ > 0xffffffffu) {
             const uint8_t carry = static_cast<uint8_t>(low_ >> 32);
@@ -201,7 +201,7 @@ private:
     bool torn_ = false;
 };
 
-/// A number below 2^30: its bit length, the rest raw.
+/// Codes a number below 2^30: its bit length, then the rest as raw bits.
 struct NumberModel {
     SymbolModel length;
 
@@ -228,7 +228,7 @@ struct NumberModel {
     }
 };
 
-/// A signed number, mostly large; magnitude below 2^30.
+/// Codes a signed number that is mostly large; its magnitude is below 2^30.
 struct SignedModel {
     NumberModel magnitude;
 
@@ -242,7 +242,7 @@ struct SignedModel {
     }
 };
 
-/// A signed number, mostly below 256, more finely modelled: half octaves of its magnitude, the rest raw.
+/// Codes a signed number, mostly below 256, more finely: half octaves of its magnitude, then raw bits.
 struct SmallModel {
     SymbolModel half;
     NumberModel beyond;
@@ -250,7 +250,7 @@ struct SmallModel {
     template <class Coder>
     void code(Coder& coder, int32_t& value) {
         constexpr uint32_t kBeyond = 15;
-        // 0, 1, 2, 3, 4..5, 6..7, 8..11, 12..15, ... 96..127, 128..191; from 192 on: beyond.
+        // The classes are 0, 1, 2, 3, 4..5, 6..7, 8..11, 12..15, ... 96..127, 128..191, and all from 192 on.
         const uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value);
         uint32_t symbol = size;
         if (size >= 4) {

@@ -16,7 +16,7 @@ struct Interval {
     double first, last;
 };
 
-/// Where a line is inside a closed cube. A line within a face of the cube is inside.
+/// Returns where a line is inside a closed cube. A line within a face of the cube is inside.
 Interval clipToCube(glm::dvec3 origin, glm::dvec3 direction, glm::dvec3 lowest, double edge) {
     Interval in{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     for (int axis = 0; axis < 3; ++axis) {
@@ -51,13 +51,13 @@ struct EnteredChildren {
     }
 };
 
-/// The ray in the space of one page: cells of its level, from its lowest corner.
+/// The ray in the space of one page: in cells of the page's level, from its lowest corner.
 struct PageRay {
     const PageView* view;
     uint64_t page;
     double cell;  ///< world units
     glm::dvec3 origin, direction;
-    double slack;  ///< rounding of the transformation, in cells: neighbouring pages must not part
+    double slack;  ///< rounding of the transformation, in cells: no gap may open between neighbouring pages
 };
 
 struct LeafHit {
@@ -96,7 +96,7 @@ std::array<uint32_t, 3> triangleVertices(const PageView& view, uint32_t triangle
     return {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y), f64::decodeIndex2(r.y)};
 }
 
-/// x = s, y and z the weights of the second and third vertex; x = 1e30 for a miss.
+/// Returns s as x, and the weights of the second and third vertex as y and z; x = 1e30 for a miss.
 glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dvec3 q, glm::dvec3 d, bool single) {
     const glm::u32vec2 a = view.vertices[v[0]], b = view.vertices[v[1]], c = view.vertices[v[2]];
     if (single)
@@ -107,8 +107,8 @@ glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dv
                                   f64::decodeVertex(c.x, c.y), kTriangleSlack);
 }
 
-/// Vertex normals blended, each on the side of the triangle that the ray comes from; at a crease the
-/// triangle's own.
+/// Returns the blend of the vertex normals, each on the side of the triangle that the ray comes from; at a crease the
+/// triangle's own normal.
 glm::dvec3 triangleNormal(const PageView& view, std::array<uint32_t, 3> v, double weight1, double weight2,
                           glm::dvec3 direction) {
     glm::dvec3 p[3];
@@ -209,7 +209,7 @@ private:
         const glm::dvec3 p = (in.origin - lowest + segment.first * in.direction) / edge;
         const glm::dvec3 d = (segment.last - segment.first) * in.direction / edge;
         const double wall = f64::wallTolerance(node);
-        // An end of the ray inside the leaf is no wall.
+        // Where the ray starts or ends inside the leaf, that end is no wall.
         const double wallIn = segment.first > ray_.tMin / in.cell ? wall : 0;
         const double wallOut = segment.last < ray_.tMax / in.cell ? wall : 0;
         const CastOptions& o = caster_.options_;
@@ -366,10 +366,10 @@ Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::spa
                          .element = fmt::format("page {}", page)};
         (*marks)[page] = Mark::Chosen;
     }
-    // Children come after their parents in the directory: backwards, every mark below a page is known.
+    // Children come after their parents in the directory: backwards, all marks below a page are made before it.
     for (uint64_t page = pages.size(); page-- > 0;) {
         if (!pages.knows(page)) {
-            page -= page % kEntriesPerBlock;  // nor is any other of its block
+            page -= page % kEntriesPerBlock;  // no other page of its block is marked either
             continue;
         }
         for (const uint64_t child : childrenOf(pages[page])) {

@@ -24,7 +24,7 @@
 
 namespace vcp {
 
-/// By how much the triangles of hard leaves are widened, in cells of the page's level.
+/// The triangles of hard leaves are widened by so many cells of the page's level.
 inline constexpr double kTriangleSlack = 1e-4;
 /// How far outside of its leaf a hit with a triangle may lie along the ray, in cells of the page's level.
 inline constexpr double kIntervalSlack = 1e-4;
@@ -33,23 +33,23 @@ inline constexpr double kIntervalSlack = 1e-4;
 class PageCache {
 public:
     PageCache(std::shared_ptr<const ByteReader> reader, Dataset dataset);
-    /// Pages that are in memory already, one for each entry of `dataset.pages`; for tests and builders.
+    /// Takes pages that are in memory already, one for each entry of `dataset.pages`; for tests and builders.
     /// Errors: what parsePage says.
     static Result<PageCache> fromPages(Dataset dataset, std::vector<PageBytes> pages);
     /// Opens a .vcp file without loading a page. Errors: what openFile and readDataset say; Unsupported where the file
     /// is not of the certified method.
     static Result<PageCache> open(const std::filesystem::path& path);
 
-    /// Loads what is not loaded yet. Errors: what readPage says; Usage for a page that does not exist.
+    /// Loads a page unless it is loaded. Errors: what readPage says; Usage for a page that does not exist.
     Result<void> load(uint64_t page);
     Result<void> load(std::span<const uint64_t> pages);
     Result<void> loadLevel(uint32_t level);
     Result<void> loadAll();
 
     [[nodiscard]] const Dataset& dataset() const { return dataset_; }
-    /// A loaded page, or null. Valid as long as the cache.
+    /// Returns a loaded page, or null. It is valid as long as the cache.
     [[nodiscard]] const PageView* view(uint64_t page) const;
-    /// Decompressed bytes held.
+    /// Returns the decompressed bytes that are held.
     [[nodiscard]] uint64_t bytes() const;
 
 private:
@@ -61,11 +61,11 @@ private:
 
     std::shared_ptr<const ByteReader> reader_;
     Dataset dataset_;
-    SparseArray<const Loaded*> pages_;  // of loaded_; null: not loaded
+    SparseArray<const Loaded*> pages_;  // elements of loaded_; null: not loaded
     std::vector<std::unique_ptr<const Loaded>> loaded_;
 };
 
-/// All pages of a level: each level holds the whole surface. levels - 1 (or anything larger) is the finest.
+/// Returns all pages of a level: each level holds the whole surface. levels - 1 (or anything larger) is the finest.
 std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level);
 
 struct Ray {
@@ -82,14 +82,14 @@ struct RayHit {
     uint64_t page = 0;       ///< number in the directory
     uint32_t level = 0;
     uint32_t node = 0;          ///< the leaf's node word; nodeType(node) is kNodeSoft or kNodeHard
-    uint32_t triangle = 0;      ///< of a hard leaf: its record's number in the page
+    uint32_t triangle = 0;      ///< in a hard leaf: number of the hit triangle's record in the page
     bool onWall = false;        ///< accepted by the wall tolerance, not by a crossing
     glm::dvec3 leafMin{0};      ///< the leaf's lowest corner, in cells from the page's
     double leafEdge = 0;        ///< in cells
-    double certifiedError = 0;  ///< of the page, world units
+    double certifiedError = 0;  ///< certified error of the page, world units
 };
 
-/// Exact counts of the work of rays; add up over calls.
+/// Exact counts of the work of rays; they add up over calls.
 struct CastCounters {
     uint64_t rays = 0, pages = 0, nodes = 0, softLeaves = 0, hardLeaves = 0, triangles = 0;
 };
@@ -106,10 +106,10 @@ public:
     static Result<ReferenceCaster> create(const PageCache& cache, std::span<const uint64_t> cut,
                                           CastOptions options = {});
 
-    /// First hit with tMin <= t <= tMax. Any thread; counters belong to the caller.
+    /// Returns the first hit with tMin <= t <= tMax. Any thread; counters belong to the caller.
     [[nodiscard]] std::optional<RayHit> cast(const Ray& ray, CastCounters* counters = nullptr) const;
 
-    /// First hit in each leaf the ray meets, sorted by t; for verification.
+    /// Returns the first hit in each leaf that the ray meets, sorted by t; for verification.
     [[nodiscard]] std::vector<RayHit> castAll(const Ray& ray, CastCounters* counters = nullptr) const;
 
     [[nodiscard]] const PageCache& cache() const { return *cache_; }
@@ -120,7 +120,7 @@ private:
 
     const PageCache* cache_;
     CastOptions options_;
-    std::shared_ptr<const SparseArray<Mark>> marks_;  ///< of each page: in the cut, above one that is, or neither
+    std::shared_ptr<const SparseArray<Mark>> marks_;  ///< for each page: in the cut, above a page that is, or neither
 
     friend class CastWalk;
 };

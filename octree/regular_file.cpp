@@ -11,7 +11,7 @@ namespace vcp {
 
 namespace {
 
-/// What stands there instead of a file; nothing: a file does.
+/// Names what stands there instead of a file; null for a regular file.
 const char* otherThanFile(mode_t mode) {
     if (S_ISREG(mode)) return nullptr;
     if (S_ISDIR(mode)) return "is a folder, not a file";
@@ -27,10 +27,10 @@ Result<int> openRegular(const std::filesystem::path& path) {
         return Error{.code = ErrorCode::Io, .message = what, .file = path.string()};
     };
     struct stat status {};
-    // Asked before as well, since to open a device can do something already.
+    // The type is checked before opening too, since opening a device can already have effects.
     if (::stat(path.c_str(), &status) != 0) return systemError(path, "cannot open", errno);
     if (const char* other = otherThanFile(status.st_mode)) return refuse(other);
-    // Not to wait, should it have become a pipe since; for files this changes nothing.
+    // O_NONBLOCK: should it have become a pipe since, open() must not wait; it changes nothing for files.
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (file < 0) return systemError(path, "cannot open", errno);
     const char* other = ::fstat(file, &status) != 0 ? "cannot be asked what it is" : otherThanFile(status.st_mode);

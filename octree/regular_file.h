@@ -1,4 +1,4 @@
-// Opening what must be a file: a pipe would be waited for, perhaps for ever, and a device might do anything.
+// Opens what must be a regular file: a pipe could block for ever, and a device might do anything.
 #pragma once
 
 #include <cstdio>
@@ -9,15 +9,15 @@
 
 namespace vcp {
 
-/// Opens a regular file for reading, at once; its descriptor, which the caller closes. Errors: Io, also of a folder, a
-/// pipe, a socket and a device.
+/// Opens a regular file for reading without waiting; returns its descriptor, which the caller closes. Errors: Io, also
+/// where it is a folder, a pipe, a socket or a device.
 Result<int> openRegular(const std::filesystem::path& path);
 
 struct FileCloser {
     void operator()(std::FILE* file) const { std::fclose(file); }
 };
 
-/// The same as a stream of bytes.
+/// Opens a regular file in the same way, as a stream of bytes.
 Result<std::unique_ptr<std::FILE, FileCloser>> openRegularStream(const std::filesystem::path& path);
 
 }  // namespace vcp

@@ -1,7 +1,7 @@
-// An array whose elements are zero until they are written, and take memory from then on only.
+// An array whose elements are zero until they are written, and only then take memory.
 //
-// For what has an element for each page that a file claims to have: the claim costs addresses, not memory. Large arrays
-// are mapped without being reserved; the system gives memory by the 4 KiB where something is written.
+// It serves what has an element for each page that a file claims to have: the claim costs addresses, not memory. Large
+// arrays are mapped without being reserved; the system gives memory in pieces of 4 KiB where something is written.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,8 @@
 
 namespace vcp {
 
-/// T: all its bytes zero is a value. Move it; whoever copies knows which elements count. One thread writes an element
-/// at a time, as in a vector. Throws std::bad_alloc where there are no more addresses.
+/// T: all bytes zero must be a valid value. It can only be moved: whoever copies knows which elements count. As in a
+/// vector, only one thread may write an element at a time. Throws std::bad_alloc where no addresses are left.
 template <class T>
 class SparseArray {
 public:
@@ -59,7 +59,7 @@ public:
     [[nodiscard]] const T& operator[](size_t i) const { return data_[i]; }
     operator std::span<T>() { return {data_, size_}; }
     operator std::span<const T>() const { return {data_, size_}; }
-    /// With what is not written, and so takes none.
+    /// The bytes of all elements, with those that are not written and so take no memory.
     [[nodiscard]] size_t bytes() const { return size_ * sizeof(T); }
 
 private:

@@ -43,7 +43,7 @@ void TriangleFront::attach(uint32_t g, uint32_t c) {
         link(made, next);
         return zip(made);
     }
-    // A new vertex, or one elsewhere on the front: then the front parts there.
+    // The vertex is new, or elsewhere on the front: then the front splits there.
     const uint32_t there = gateFrom_[c];
     const uint32_t in = add(a, c, b), out = add(c, b, a);
     link(previous, in);
@@ -62,7 +62,7 @@ void TriangleFront::begin(uint32_t a, uint32_t b, uint32_t c) {
     link(ca, ab);
 }
 
-/// Where the front returns along the edge it came, both sides have met.
+/// Where the front returns along the edge that it came by, the two sides have met and are joined.
 void TriangleFront::zip(uint32_t g) {
     const Gate made = gates_[g];
     const auto meets = [&](uint32_t other) {

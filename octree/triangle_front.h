@@ -15,7 +15,7 @@ class TriangleFront {
 public:
     static constexpr uint32_t kNone = 0xffffffff;
 
-    /// An open edge: of the triangle (from, to, opposite).
+    /// An open edge of the triangle (from, to, opposite).
     struct Gate {
         uint32_t from, to, opposite;
         uint32_t previous, next;  ///< gates along the front, or kNone
@@ -24,27 +24,27 @@ public:
 
     explicit TriangleFront(uint32_t vertices) : gateFrom_(vertices, kNone), degree_(vertices, 0) {}
 
-    /// The next open gate, or kNone when the front is closed.
+    /// Returns the next open gate, or kNone when the front is closed.
     [[nodiscard]] uint32_t first() {
         while (head_ < gates_.size() && !gates_[head_].open) ++head_;
         return head_ < gates_.size() ? static_cast<uint32_t>(head_) : kNone;
     }
     [[nodiscard]] const Gate& gate(uint32_t g) const { return gates_[g]; }
-    /// The vertex that closes the corner with the next or previous gate, or kNone.
+    /// Returns the vertex that closes the corner with the next or previous gate, or kNone.
     [[nodiscard]] uint32_t nextVertex(uint32_t g) const {
         return gates_[g].next == kNone ? kNone : gates_[gates_[g].next].to;
     }
     [[nodiscard]] uint32_t previousVertex(uint32_t g) const {
         return gates_[g].previous == kNone ? kNone : gates_[gates_[g].previous].from;
     }
-    /// Triangles so far at a vertex, up to 255.
+    /// Returns the number of triangles so far at a vertex, up to 255.
     [[nodiscard]] uint32_t degree(uint32_t vertex) const { return degree_[vertex]; }
 
-    /// There is no triangle behind the gate.
+    /// Records that there is no triangle behind the gate.
     void closeGate(uint32_t g);
-    /// The triangle (to, from, c) lies behind the gate.
+    /// Adds the triangle (to, from, c) behind the gate.
     void attach(uint32_t g, uint32_t c);
-    /// A triangle that the front does not lead to.
+    /// Adds a triangle that the front does not lead to.
     void begin(uint32_t a, uint32_t b, uint32_t c);
 
 private:
@@ -55,7 +55,7 @@ private:
 
     std::vector<Gate> gates_;
     size_t head_ = 0;
-    std::vector<uint32_t> gateFrom_;  ///< by vertex: the latest gate from it
+    std::vector<uint32_t> gateFrom_;  ///< for each vertex: the latest gate from it
     std::vector<uint8_t> degree_;
 };
 

@@ -26,7 +26,7 @@
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 2;
-inline constexpr uint32_t kMethodFileVersion = 3;  ///< of files whose method is not Certified
+inline constexpr uint32_t kMethodFileVersion = 3;  ///< version of files whose method is not Certified
 inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
@@ -49,7 +49,7 @@ enum class Method : uint32_t {
 struct LevelRow {
     uint64_t firstEntry = 0;
     uint64_t pages = 0;
-    double certifiedError = 0;  ///< largest of its pages, world units
+    double certifiedError = 0;  ///< largest certified error of its pages, world units
 };
 
 /// First 4096 bytes of the file (the rest of them is zero).
@@ -62,8 +62,8 @@ struct FileHeader {
     double origin[3] = {};         ///< world position of the lowest corner of the root page
     double cell = 0;               ///< edge of a cell of the finest level, world units
     double errorTarget = 0;        ///< what the builder was asked for, world units
-    double certifiedErrorMax = 0;  ///< of the finest level, world units
-    double boundsMin[3] = {};      ///< of the mesh, world units
+    double certifiedErrorMax = 0;  ///< largest certified error of the finest level, world units
+    double boundsMin[3] = {};      ///< lowest corner of the mesh's bounds, world units
     double boundsMax[3] = {};
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
@@ -71,8 +71,8 @@ struct FileHeader {
     uint32_t flags = 0;  ///< bit 0: has colour
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
-    uint64_t leaves = 0;      ///< soft and hard, of the finest level
-    uint64_t hardLeaves = 0;  ///< of the finest level
+    uint64_t leaves = 0;      ///< soft and hard leaves of the finest level
+    uint64_t hardLeaves = 0;  ///< hard leaves of the finest level
     LevelRow level[kMaxLevels] = {};
     uint64_t hash = 0;      ///< XXH3-64 of the 4096 bytes with this field zero
     PaperParameters paper;  ///< zero where the method is another
@@ -86,16 +86,16 @@ static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) =
 /// One page in the directory.
 struct PageEntry {
     uint64_t morton = 0;  ///< position of the subvolume among those of its level, 21 bits an axis
-    uint64_t offset = 0;  ///< of the stored geometry in the file
+    uint64_t offset = 0;  ///< offset of the stored geometry in the file
     uint64_t hash = 0;    ///< XXH3-64 of the stored geometry
     uint64_t colourOffset = 0;
     uint64_t colourHash = 0;
-    uint32_t storedBytes = 0;  ///< in the file
-    uint32_t pageBytes = 0;    ///< decoded
+    uint32_t storedBytes = 0;  ///< bytes of the stored geometry in the file
+    uint32_t pageBytes = 0;    ///< bytes of the decoded page
     uint32_t colourStoredBytes = 0;
     uint32_t colourBytes = 0;
     uint32_t firstChild = 0;  ///< entry of the first child page; children are consecutive, in octant order
-    uint32_t leaves = 0;      ///< soft and hard
+    uint32_t leaves = 0;      ///< number of soft and hard leaves
     uint32_t hardLeaves = 0;
     float certifiedError = 0;  ///< world units, rounded up
     uint8_t childMask = 0;     ///< octants that have a page on the next level
@@ -104,7 +104,7 @@ struct PageEntry {
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 && offsetof(PageEntry, childMask) == 72);
 
-/// Numbers of entries that follow each other. (std::views::iota does not compile with clang 14.)
+/// A run of consecutive entry numbers. (std::views::iota does not compile with clang 14.)
 class EntryRange {
 public:
     class Iterator {

@@ -16,7 +16,7 @@ public:
     FileVerification(const ByteReader& reader, const Dataset& dataset)
         : reader_(reader), d_(dataset), end_(blockOffset(dataset.pages.blocks())) {}
 
-    /// What the header says of all pages together.
+    /// Checks what the header says of all pages together.
     [[nodiscard]] Result<void> sums() const {
         const FileHeader& h = d_.header;
         for (uint32_t l = 0; l < h.levels; ++l) {
@@ -54,7 +54,7 @@ public:
         return {};
     }
 
-    /// The bytes up to `to` are zero.
+    /// Checks that the bytes up to `to` are zero.
     [[nodiscard]] Result<void> gap(uint64_t to) const {
         if (to < end_ || to - end_ > kBlockBytes) return broken("padding", end_, "unexpected bytes between pages");
         std::vector<std::byte> bytes(to - end_);
@@ -72,7 +72,7 @@ private:
         return brokenBytes(reader_.name(), std::move(element), byte, std::move(message));
     }
 
-    /// The mesh lies in the root page.
+    /// Checks that the mesh lies in the root page.
     [[nodiscard]] Result<void> bounds() const {
         const FileHeader& h = d_.header;
         const double edge = d_.edgeOf(d_.pages[0]);
@@ -91,7 +91,7 @@ private:
 
     const ByteReader& reader_;
     const Dataset& d_;
-    uint64_t end_;  ///< of what was checked
+    uint64_t end_;  ///< end of what was checked
 };
 
 }  // namespace

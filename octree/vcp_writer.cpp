@@ -78,7 +78,7 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
     commit.headerHash = header.hash;
     commit.directoryHash = hashBytes(directory);
     commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash)));
-    // Header and record are the promise that all else is there: they go out after the rest is durable.
+    // Header and record promise that all else is there, so they are written after the rest is durable.
     VCP_TRY(file_.sync());
     VCP_TRY(file_.write(0, first));
     VCP_TRY(file_.write(end_, std::as_bytes(std::span(&commit, 1))));

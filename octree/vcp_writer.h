@@ -1,4 +1,4 @@
-// Writes a .vcp file by way of OUT.vcp.partial (octree/output_file.h): OUT.vcp is whole or absent.
+// Writes a .vcp file through OUT.vcp.partial (octree/output_file.h): OUT.vcp is whole or absent.
 #pragma once
 
 #include <filesystem>
@@ -14,14 +14,14 @@ namespace vcp {
 struct StoredPage {
     std::vector<std::byte> geometry;
     std::vector<std::byte> colour;
-    uint32_t geometryBytes = 0;  ///< decoded
+    uint32_t geometryBytes = 0;  ///< bytes of the decoded geometry
     uint32_t colourBytes = 0;
 };
 
-/// By octree/page_codec.h; the same bytes for the same page everywhere.
+/// Packs a page with octree/page_codec.h; the same page gives the same bytes everywhere.
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
 
-/// One thread. Removes the partial file when destroyed before commit.
+/// Writes one file, in one thread. Removes the partial file when destroyed before commit.
 class VcpWriter {
 public:
     /// `pages` is the final number of pages: it fixes the directory's size. Errors: Io.

@@ -12,7 +12,7 @@ namespace {
 int64_t magnitude(int64_t v) { return v < 0 ? -v : v; }
 int64_t largest(WideVector v) { return std::max(magnitude(v.x), std::max(magnitude(v.y), magnitude(v.z))); }
 
-/// The vector with components of at most `bits` bits.
+/// Returns the vector, scaled down to components of at most `bits` bits.
 WideVector shortened(WideVector v, int bits) {
     const int shift = std::max(0, static_cast<int>(std::bit_width(static_cast<uint64_t>(largest(v)))) - bits);
     return {v.x >> shift, v.y >> shift, v.z >> shift};
@@ -32,7 +32,7 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
 
 void addNormal(WideVector& sum, WideVector normal) {
     const int64_t most = std::max(largest(sum), largest(normal));
-    if (most >= int64_t{1} << 61) return;  // only a page made to overflow gets here
+    if (most >= int64_t{1} << 61) return;  // only a page that was made to overflow gets here
     const bool opposed =
         most < int64_t{1} << 30 ? product(sum, normal) < 0 : product(shortened(sum, 30), shortened(normal, 30)) < 0;
     if (opposed)
@@ -60,7 +60,7 @@ std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<cons
 
 NormalGridPoint normalGridPoint(WideVector sum) {
     WideVector n = shortened(sum, 40);
-    // Of the two directions the one with z > 0; on the rim, where the map folds, with y > 0, then x > 0.
+    // Takes the one of the two directions with z > 0; on the rim, where the map folds, with y > 0, then x > 0.
     const bool turned = n.z != 0 ? n.z < 0 : n.y != 0 ? n.y < 0 : n.x < 0;
     if (turned) n = -n;
     const int64_t norm = magnitude(n.x) + magnitude(n.y) + n.z;

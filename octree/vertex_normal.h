@@ -17,23 +17,23 @@ using WideVector = glm::i64vec3;
 /// Cross product of two edges of a triangle: its normal, twice its area long. Components of edges below 2^21.
 WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 
-/// Adds a triangle's normal to a vertex' sum, without orientation: turned to the side of the sum.
+/// Adds a triangle's normal to a vertex' sum, without orientation: the normal is turned to the side of the sum.
 void addNormal(WideVector& sum, WideVector normal);
 
-/// By vertex: whether the normal of one of its triangles turns away from its own by more than 40 degrees.
+/// Returns for each vertex whether the normal of one of its triangles turns away from its own by more than 40 degrees.
 std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums,
                              std::span<const std::array<uint32_t, 3>> triangles);
 
 /// Normals are kept to 12 + 12 bits of the octahedron's upper half (z >= 0), 0.07 degrees: they have no side.
 inline constexpr uint32_t kNormalSteps = 4095;
 
-/// Grid point of a normal, 0 to kNormalSteps on both axes. A sum without length: the z axis.
+/// Grid point of a normal, 0 to kNormalSteps on both axes. A sum of length 0 gets the z axis.
 struct NormalGridPoint {
     uint32_t u, v;
 };
 NormalGridPoint normalGridPoint(WideVector sum);
 
-/// Packed normal (page_layout.h) of a grid point; and back: false where the code is not one of the grid.
+/// Packs a normal (page_layout.h) from its grid point, and back: false where the code is not one of the grid.
 uint32_t packGridNormal(NormalGridPoint point, bool crease);
 bool gridPointOf(uint32_t code, NormalGridPoint& point);
 

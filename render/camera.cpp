@@ -33,7 +33,7 @@ Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::
     camera.up = up;
     camera.verticalFov = verticalFov;
     const glm::dvec3 middle = (boxMin + boxMax) * 0.5;
-    // Far enough that every corner is inside both pairs of the frustum's planes.
+    // The camera stands far enough that every corner is inside both pairs of the frustum's planes.
     const CameraBasis basis = cameraBasis(camera, 1, 1);
     const double tanY = basis.halfHeight, tanX = tanY * aspect;
     double distance = 0;

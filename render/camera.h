@@ -22,22 +22,22 @@ struct Camera {
     bool operator==(const Camera&) const = default;
 };
 
-/// Orthonormal axes of a camera: right, up, forward; and the half extents of the picture in its plane at
-/// distance 1 (perspective) or anywhere (orthographic, world units).
+/// A camera's orthonormal axes (right, up, forward) and the half extents of the picture in its plane, at distance 1
+/// (perspective) or anywhere (orthographic, world units).
 struct CameraBasis {
     glm::dvec3 right, up, forward;
     double halfWidth, halfHeight;
 };
 CameraBasis cameraBasis(const Camera& camera, uint32_t width, uint32_t height);
 
-/// Ray through a point of the picture in pixels (0, 0 is the upper left corner of the upper left pixel;
-/// pixel centres are at + 0.5). `direction` has unit length.
+/// The ray through a point of the picture in pixels (0, 0 is the upper left corner of the upper left pixel; pixel
+/// centres are at + 0.5). `direction` has unit length.
 struct CameraRay {
     glm::dvec3 origin, direction;
 };
 CameraRay cameraRay(const Camera& camera, uint32_t width, uint32_t height, double x, double y);
 
-/// Looks along `forward` at the middle of a box, from where all of the box is in the picture.
+/// Returns a camera that looks along `forward` at the middle of a box, from where all of the box is in the picture.
 Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::dvec3 up, double verticalFov,
                  double aspect);
 

@@ -17,7 +17,7 @@ constexpr uint32_t kMostOcclusionRays = 64;
 
 glm::vec4 toVec4(glm::dvec3 v) { return glm::vec4(glm::vec3(v), 0); }
 
-/// For the screen: a plain power, as in shade.comp.
+/// Encodes a colour for the screen with a plain power, as in shade.comp.
 glm::vec4 encoded(glm::vec3 linear) { return glm::vec4(glm::pow(glm::max(linear, 0.0f), glm::vec3(1 / 2.2f)), 0); }
 
 frame::uint shadingMode(ShadingMode mode) {
@@ -44,7 +44,7 @@ frame::uint shadingMode(ShadingMode mode) {
     return frame::kShadeLit;
 }
 
-/// Directions of the picture's corner and of a step of a pixel.
+/// The directions of the picture's corner and of a step of a pixel.
 struct PicturePlane {
     glm::dvec3 corner, stepX, stepY;
 };
@@ -86,7 +86,7 @@ void setSections(frame::FrameConstants& c, const FrameRequest& request, const Fi
     }
 }
 
-// Rays of light begin so many pixels above the surface, beside the error of what is drawn.
+// Rays of light begin so many pixels above the surface, in addition to the error of what is drawn.
 constexpr double kLiftPixels = 0.5;
 
 void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header, const CameraBasis& basis,
@@ -190,7 +190,7 @@ SelectionView selectionView(const FrameRequest& request) {
     view.orthographic = request.camera.projection == Projection::Orthographic;
     view.pixelsPerUnit = whole.fullHeight / (2 * basis.halfHeight);
     view.errorPixels = request.errorPixels;
-    // The picture's edges: tangents, or world units where the projection is orthographic.
+    // The picture's edges are tangents, or world units where the projection is orthographic.
     const auto across = [&](double x) { return basis.halfWidth * (2 * x / whole.fullWidth - 1); };
     const auto upward = [&](double y) { return basis.halfHeight * (1 - 2 * y / whole.fullHeight); };
     const double left = across(whole.x), right = across(double(whole.x) + request.width);

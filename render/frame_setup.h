@@ -1,4 +1,4 @@
-// From a request to what shaders and selection need: computed in double, rounded once. Pure.
+// Computes from a request what shaders and selection need: in double, rounded once. Pure.
 #pragma once
 
 #include "render/frame.h"
@@ -8,13 +8,13 @@
 
 namespace vcp {
 
-/// `request` as seen from the dataset (requestIn); what shows the world's axes or units is told by `placement`.
-/// `dataset` may be null: a picture of the background. `stripes`: see stripedIndex in tiles.glsl.
-/// `colour`: whether hits have colours. `errorPixels`: of what is drawn (UpdateResult).
+/// `request` is as seen from the dataset (requestIn); `placement` gives what shows the world's axes or units. `dataset`
+/// may be null: a picture of the background. `stripes`: see stripedIndex in tiles.glsl. `colour`: whether hits have
+/// colours. `errorPixels`: error of what is drawn (UpdateResult).
 frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour,
                                      double errorPixels, const Similarity& placement = {});
 
-/// Towards the light and towards the middle of the sky, unit, in the axes of the request's camera.
+/// Unit directions towards the light and towards the middle of the sky, in the axes of the request's camera.
 struct LightDirections {
     glm::dvec3 light, sky;
 };
@@ -26,18 +26,18 @@ bool hasLight(const Shading& shading);
 /// Whether pixels show a number of their ray.
 bool isFalseColour(ShadingMode mode);
 
-/// Words that a pixel's hit takes: depth, normal, and where wanted colour and light or the value of a false colour.
+/// Words that a pixel's hit takes: depth, normal, and where wanted colour, and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 
-/// The tile that a request draws; of a whole picture the whole.
+/// Returns the tile that a request draws; the whole picture where it names none.
 PictureTile wholePicture(const FrameRequest& request);
 
-/// The picture's background, one RGBA8 word a row.
+/// Returns the picture's background, one RGBA8 word a row.
 std::vector<uint32_t> backgroundRows(const FrameRequest& request);
 
 SelectionView selectionView(const FrameRequest& request);
 
-/// Errors: Usage, where a size, an angle or an axis makes no picture.
+/// Checks that sizes, angles and axes make a picture. Errors: Usage.
 Result<void> checkRequest(const FrameRequest& request);
 
 }  // namespace vcp

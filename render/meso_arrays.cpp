@@ -10,7 +10,7 @@ using namespace frame;
 
 class Packer {
 public:
-    /// Returns the first word. Whatever the type, low bytes first.
+    /// Appends values of any type, low bytes first, and returns the first word's number.
     template <class T>
     uint32_t add(const std::vector<T>& values) {
         const size_t first = words.size();
@@ -79,7 +79,7 @@ void addSkipping(const meso::Skipping& skipping, Packer& packer, MesoArrays& arr
     }
 }
 
-/// A patch is five fours: the quadric, the forms u and v, whether it is a triangle.
+/// A patch is five groups of four words: the quadric, the forms u and v, whether it is a triangle.
 void addPatches(const meso::PatchSet& set, Packer& packer, MesoRecord& record) {
     record.at.y = packer.add(set.ranks);
     record.at.z = packer.add(set.rows);

@@ -35,8 +35,8 @@ struct MesoArrays {
     std::vector<uint32_t> words;          ///< a multiple of 4
 };
 
-/// Pure; the method is not referred to afterwards. Errors: Usage (a method without its arrays), Limit (2^32 words, or
-/// cells of more than kMesoMaxLevels levels).
+/// Packs a method's arrays. Pure; the method is not referred to afterwards. Errors: Usage (a method without its
+/// arrays), Limit (2^32 words, or cells of more than kMesoMaxLevels levels).
 Result<MesoArrays> packMesoArrays(const meso::Method& method);
 
 }  // namespace vcp

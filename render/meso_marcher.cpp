@@ -12,7 +12,7 @@ namespace vcp {
 
 namespace {
 
-constexpr uint64_t kMostRays = 65535 * 64;  // of one dispatch, on every device
+constexpr uint64_t kMostRays = 65535 * 64;  // rays of one dispatch, on every device
 
 }  // namespace
 
@@ -22,7 +22,7 @@ struct MesoMarcher::State {
     std::unique_ptr<MesoResources> resources;
     PassTimer timer;
 
-    /// Of what is recorded: of the queue's clock, or without one of the call's.
+    /// Returns the time of what is recorded, by the queue's clock, or where it has none, the time of the call.
     Result<double> milliseconds(const MesoRaysPass& pass) {
         const auto start = std::chrono::steady_clock::now();
         VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) {

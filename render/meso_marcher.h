@@ -1,5 +1,5 @@
-// Lists of rays through one mesostructure method, on a device of its own: for measuring, and for comparing with the
-// reference. Pictures of surfaces are Renderer::setSurfaces.
+// Marches lists of rays through one mesostructure method, on a device of its own: for measuring, and for comparing with
+// the reference. Renderer::setSurfaces draws pictures of surfaces.
 //
 // One thread at a time.
 #pragma once
@@ -21,8 +21,8 @@ struct MesoMarcherOptions {
 
 struct MesoMarched {
     std::vector<meso::MarchResult> results;
-    std::vector<double> nsPerRay;  ///< of each round: the queue's time, or without its clock the call's; on a software
-                                   ///< device the processor's, of all threads
+    std::vector<double> nsPerRay;  ///< for each round: the queue's time, or the call's where the queue has no clock; on
+                                   ///< a software device the time of the processor, of all threads
 };
 
 class MesoMarcher {
@@ -35,8 +35,8 @@ public:
 
     [[nodiscard]] const DeviceInfo& device() const;
 
-    /// All rays by each method: a round over the methods to warm up and then `rounds` rounds, so that what else the
-    /// machine does falls on all alike. Errors: those of packMesoArrays; Device; Limit.
+    /// Marches all rays by each method: one round over the methods to warm up and then `rounds` rounds, so that what
+    /// else the machine does falls on all alike. Errors: those of packMesoArrays; Device; Limit.
     Result<std::vector<MesoMarched>> march(std::span<const meso::Method* const> methods,
                                            std::span<const meso::MarchRay> rays, int rounds);
 

@@ -10,7 +10,7 @@ namespace vcp {
 
 namespace {
 
-/// What one texel of half as many covers of the finer ones: three at most, by parts that add up to 1.
+/// Which finer texels one texel of half as many covers: three at most, by parts that add up to 1.
 struct Cover {
     uint32_t first = 0;
     std::array<float, 3> parts{};

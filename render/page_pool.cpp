@@ -15,10 +15,10 @@ namespace vcp {
 
 namespace {
 
-// Of the staging buffer, where there is one: what an update brings, in one submission; more where a page is larger.
+// Size of the staging buffer: what an update brings, in one submission; more where a page is larger.
 constexpr uint64_t kStagingBytes = 16ull << 20;
 
-/// Copies before it are done before copies after it begin; also on queues that can do nothing else.
+/// Copies before it are done before copies after it begin; it works on queues for copies only, too.
 void keepOrder(VkCommandBuffer commands) {
     VkMemoryBarrier memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER};
     memory.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
@@ -90,7 +90,7 @@ Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::by
         std::memcpy(mapped + to, bytes.data(), bytes.size());
         return {};
     }
-    // Copies of one submission have no order among them.
+    // Copies of one submission have no order among each other.
     if (stagedBytes_ + bytes.size() > staging_.bytes() || overlapsWaiting(chunk, to, bytes.size())) {
         VCP_TRY(flush());
         VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));

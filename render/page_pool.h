@@ -1,8 +1,8 @@
-// Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that
-// shaders see as texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into
-// their slots; elsewhere through a staging buffer, many with one submission, on the queue for copies where there is
-// one. A slot is written only while no frame that could read it is in flight: the renderer waits for each frame. Who is
-// in which slot is not known here (streaming/residency_policy.h).
+// Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that shaders see as
+// texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into their slots; elsewhere they
+// go through a staging buffer, many with one submission, on the queue for copies where there is one. A slot is written
+// only while no frame that could read it is in flight: the renderer waits for each frame. Which page has which slot is
+// decided elsewhere (streaming/residency_policy.h).
 #pragma once
 
 #include <memory>
@@ -16,22 +16,22 @@ namespace vcp {
 
 class PagePool {
 public:
-    /// At most `bytes`, rounded down to units. Errors: Device; Limit, where shaders could not address it.
+    /// Takes at most `bytes`, rounded down to units. Errors: Device; Limit, where shaders could not address it.
     static Result<std::unique_ptr<PagePool>> create(Device& device, uint64_t bytes, PageAccess access);
     ~PagePool();
 
-    /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: they fit into the slot and are
+    /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: the bytes fit into the slot and are
     /// multiples of 16. Errors: Device.
     Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes);
-    /// What was written is there for all that is submitted later; nothing waits for it here. Errors: Device.
+    /// Makes what was written visible to all that is submitted later, and waits for nothing. Errors: Device.
     Result<void> flush();
-    /// Reads from byte `at` of a slot; as write(). Errors: Device.
+    /// Reads from byte `at` of a slot; preconditions as for write(). Errors: Device.
     Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes);
-    /// Copies a slot's bytes, at the latest with flush(), in order with what is written; the two are of one chunk and
-    /// may overlap. Errors: Device.
+    /// Copies a slot's bytes, at the latest with flush(), in order with what is written; both slots are in one chunk
+    /// and may overlap. Errors: Device.
     Result<void> move(PoolSlot from, PoolSlot to);
 
-    /// Number of the slot's first texel, over all chunks.
+    /// Returns the number of the slot's first texel, over all chunks.
     [[nodiscard]] uint32_t texel(PoolSlot slot) const {
         return static_cast<uint32_t>(slot.firstUnit * (kPoolUnitBytes / 16));
     }
@@ -49,7 +49,7 @@ private:
     };
     PagePool(Device& device, uint64_t bytes) : device_(device), bytes_(bytes) {}
     [[nodiscard]] uint64_t chunkBytes() const { return uint64_t{16} << chunkShift_; }
-    /// From the staging buffer to a chunk, or within a chunk by way of the scratch buffer.
+    /// A copy from the staging buffer to a chunk, or within a chunk through the scratch buffer.
     struct StagedCopy {
         uint64_t chunk = 0;
         VkBufferCopy region{};
@@ -69,7 +69,7 @@ private:
     std::vector<StagedCopy> waiting_;  // in order; not submitted yet
 };
 
-/// Largest chunk that shaders of this device can address whole, a power of two of at most 1 GiB.
+/// Returns the largest chunk that shaders of this device can address whole, a power of two of at most 1 GiB.
 uint64_t poolChunkBytes(const VkPhysicalDeviceLimits& limits, PageAccess access);
 
 }  // namespace vcp

@@ -19,7 +19,7 @@ Part partOf(const Parts& parts, uint64_t page) {
     return found != parts.end() ? found->second : Part::None;
 }
 
-/// Looks at the pages above the cut alone, and at nothing behind the last page of it.
+/// Finds the parts of the cut; reads only the pages above the cut, and nothing behind its last page.
 Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
     Parts parts;
     parts.reserve(2 * cut.size());
@@ -53,7 +53,7 @@ std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64
                                   const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf) {
     if (cut.empty()) return std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
     const Parts parts = partsOf(dataset, cut);
-    // Breadth first, so that the children of a page stand together.
+    // The order is breadth first, so that the children of a page stand together.
     std::vector<uint64_t> order{0};
     std::vector<glm::uvec4> table;
     for (size_t next = 0; next < order.size(); ++next) {

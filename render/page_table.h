@@ -17,12 +17,12 @@ namespace vcp {
 /// Where a resident page is, and what the shader must know of its header.
 struct ResidentPage {
     PageHeader header;
-    uint32_t texel = 0;        ///< in the page pool
-    uint32_t colourTexel = 0;  ///< in the same pool; 0 without colour
+    uint32_t texel = 0;        ///< first texel in the page pool
+    uint32_t colourTexel = 0;  ///< first texel of its colour in the same pool; 0 without colour
 };
 
-/// Texels of the table, three a record, the root's first. `cut`: numbers of pages, none above another;
-/// `pageOf(page)`: of a page of the cut, or of one above it if it is resident. An empty cut gives a root without
+/// Returns the texels of the table, three a record, the root's first. `cut`: numbers of pages, none above another;
+/// `pageOf(page)`: gives a page of the cut, or one above it if it is resident. An empty cut gives a root without
 /// children.
 std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
                                   const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf);

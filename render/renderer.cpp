@@ -19,13 +19,13 @@ namespace {
 constexpr uint64_t kLeastBudget = 1ull << 20;
 constexpr uint64_t kMoreThanAnyBudget = 1ull << 60;
 
-/// The largest pool that it can make use of, as far as is known.
+/// Returns the largest pool that the dataset can use, as far as is known.
 uint64_t bytesOf(const Dataset& dataset, bool withColour) {
     return poolShapeFor(dataset, withColour && dataset.hasColour(), kMoreThanAnyBudget, kMoreThanAnyBudget).units *
            kPoolUnitBytes;
 }
 
-/// Of another dataset in the same picture.
+/// Adds the result of another dataset in the same picture.
 void add(UpdateResult& all, const UpdateResult& one) {
     all.changed = all.changed || one.changed;
     all.settled = all.settled && one.settled;
@@ -211,7 +211,7 @@ Result<void> Renderer::State::rebuild() {
     device.reset();
     DeviceFaults faults = options.faults;
     faults.lostAtSubmission = 0;
-    // A window decides which queue there has to be.
+    // A view with a window decides which queue the device must have.
     const auto windowed = std::find_if(shared->views.begin(), shared->views.end(),
                                        [](const State* view) { return view->surface.has_value(); });
     State* const first = windowed != shared->views.end() ? *windowed : this;
@@ -230,7 +230,7 @@ bool Renderer::State::recover(bool mayRebuild) {
     if (device->isLost()) return mayRebuild && rebuild().ok();
     if (!device->takeOutOfMemory() || datasets.empty()) return false;
     hidePool();
-    // One whose coarsest page has all of its pool already stays as it is.
+    // A dataset whose coarsest page has all of its pool already stays as it is.
     bool halved = false;
     for (const Shared::Placed& placed : datasets) {
         if (!placed.residency->hasPool()) continue;
@@ -308,7 +308,7 @@ Result<void> Renderer::State::setShares(uint64_t budgetBytes, uint64_t ramBytes)
     for (const Shared::Placed& placed : datasets)
         bytes.push_back(bytesOf(placed.residency->dataset(), placed.residency->hasColour()));
     const std::vector<uint64_t> shares = budgetShares(budgetBytes, bytes);
-    // What shrinks goes first, so that all together are never more than they may be.
+    // Pools that shrink are changed first, so that all together never exceed the budget.
     for (const bool shrinks : {true, false})
         for (size_t i = 0; i < datasets.size(); ++i) {
             Residency& residency = *datasets[i].residency;
@@ -328,7 +328,7 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     if (!s.datasets.empty()) {
         s.hidePool();
         const auto done = s.setShares(budgetBytes, ramBytes);
-        // Some may have the new one by now.
+        // Some datasets may have their new share by now.
         if (!done && s.datasets.size() > 1) static_cast<void>(s.setShares(s.options.budgetBytes, s.options.ramBytes));
         VCP_TRY(s.showPool());
         if (!done) return done;
@@ -378,7 +378,7 @@ void Renderer::close() {
     s.datasets.clear();
     for (State* view : s.shared->views) {
         view->drawn.reset();
-        static_cast<void>(view->makeLayers());  // fewer: nothing to go wrong
+        static_cast<void>(view->makeLayers());  // there are fewer layers: nothing can fail
         for (State::Layer& layer : view->layers) layer.tableStale = true;
     }
 }
@@ -433,7 +433,7 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
 void Renderer::waitForPage(std::chrono::milliseconds timeout) {
     std::vector<Shared::Placed>& datasets = state_->datasets;
     if (datasets.size() == 1) return static_cast<void>(datasets.front().residency->waitForPage(timeout));
-    // One after the other, until one has pages.
+    // The datasets take turns until one has pages.
     constexpr std::chrono::milliseconds kTurn(5);
     const auto until = std::chrono::steady_clock::now() + timeout;
     for (const Shared::Placed& placed : datasets) {

@@ -16,9 +16,9 @@
 // same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
 //
 // Several views of one dataset, such as the widgets of one program, share device, pool, budgets and loader:
-// renderer->addView() is a Renderer with camera, pictures and window of its own. What all of them want is read once; a
+// renderer->addView() is a Renderer with camera, pictures and window of its own. What any of them wants is read once; a
 // budget too small for all relaxes all together. Each is updated and drawn by itself; update() of one may change what
-// another draws next, which that one's update() then says. One thread at a time may call any of them.
+// another draws next, which update() of that one then reports. One thread at a time may call any of them.
 #pragma once
 
 #include <chrono>
@@ -47,24 +47,24 @@ namespace vcp {
 /// A dataset and where it lies in the world.
 struct PlacedDataset {
     std::shared_ptr<const Dataset> dataset;
-    std::shared_ptr<const PageSource> source;  ///< of this one alone
+    std::shared_ptr<const PageSource> source;  ///< source of this dataset only
     Similarity placement;
-    uint32_t loaderThreads = 2;  ///< that keep its source busy
+    uint32_t loaderThreads = 2;  ///< threads that keep its source busy
 };
 
 struct MesoSurface;  // render/passes/meso_surface.h
 
 class Renderer {
 public:
-    /// Errors: Device (no such device, no memory for the pool), Usage (options contradict each other).
+    /// Makes all anew. Errors: Device (no such device, no memory for the pool), Usage (options contradict each other).
     static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
     ~Renderer();
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
-    /// Another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for a
-    /// window: the options of create() must have had one too, or windowExtensions, or the host's device what it takes.
-    /// Errors: Device.
+    /// Makes another view, which shares all but the picture and the window; it may outlive this one. `surface` asks for
+    /// a window: then the options of create() must have had one too, or windowExtensions, or the host's device must
+    /// meet what windows need. Errors: Device.
     Result<std::unique_ptr<Renderer>> addView(const std::optional<SurfaceSource>& surface = {});
 
     [[nodiscard]] const DeviceInfo& device() const;
@@ -72,76 +72,76 @@ public:
 
     /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
-    /// Shows several, each drawn by itself and the nearest surface seen; shadows and occlusion are within each. Budgets
-    /// are shared out (budgetShares). `surfaces`: as setSurfaces. Errors: those of open of one and of setSurfaces; then
-    /// nothing is shown.
+    /// Shows several datasets, each drawn by itself, and the nearest surface is seen; shadows and occlusion act within
+    /// each dataset. Budgets are shared out (budgetShares). `surfaces`: as in setSurfaces. Errors: those of open for
+    /// one dataset and of setSurfaces; then nothing is shown.
     Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces = {});
     /// Stops the loader and forgets all pages.
     void close();
 
-    /// Surfaces with mesostructure, in all views, in place of those before: drawn over the datasets that are open, the
-    /// nearer is seen at each pixel. They take light, shadows, normals, unlit colours and steps (their iterations, 0 to
-    /// 100) from the request; what strays less than the request's errorPixels from its mean height is shown by its
-    /// light from far; they and the datasets cast no shadow on each other, and no section plane cuts them. Kept, to be
-    /// uploaded again to a device that is made anew. Without any, nothing is made for them. On an error there are none.
-    /// Errors: Device, Limit.
+    /// Shows surfaces with mesostructure, in all views, in place of those before. They are drawn over the open
+    /// datasets; the nearer surface is seen at each pixel. They take light, shadows, normals, unlit colours and steps
+    /// (their iterations, 0 to 100) from the request; a surface that strays less than the request's errorPixels from
+    /// its mean height is shown by its light from far. They and the datasets cast no shadow on each other, and no
+    /// section plane cuts them. The renderer keeps them to upload them again to a device that is made anew. Without
+    /// any, nothing is made for them. After an error there are none. Errors: Device, Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
 
-    /// Other budgets than the options', from now on: what has no room goes at once, what is kept is not read again
-    /// where `ramBytes` has room to carry it over. Waits for the copies. To be followed by update(). Errors: Usage;
+    /// Sets other budgets than the options', from now on: pages without room go at once, and kept pages are not read
+    /// again where `ramBytes` has room to carry them over. Waits for the copies. update() must follow. Errors: Usage;
     /// Limit, where the coarsest page has no room: the budgets stay as they were; Device: the dataset is closed.
     Result<void> setBudgets(uint64_t budgetBytes, uint64_t ramBytes);
 
-    /// `gone` is called before a lost device is given up: what was made with windowDrawing() is destroyed then, and
-    /// windowDrawing() asked again. Called by update() and render().
+    /// `gone` is called by update() and render() before a lost device is given up. What was made with windowDrawing()
+    /// must be destroyed then, and windowDrawing() called again.
     void onDeviceLoss(std::function<void()> gone);
 
-    /// See the top of this file. Where the device runs out of memory, here or in render(), the pool is halved; where
-    /// the device was lost, all is made anew, once a call, and read again. Errors: Device. Problems of single pages are
-    /// in the result.
+    /// Takes in pages and chooses the cut; see the top of this file. Where the device runs out of memory, here or in
+    /// render(), the pool is halved; where the device was lost, all is made anew, at most once a call, and read again.
+    /// Errors: Device. The result lists problems of single pages.
     Result<UpdateResult> update(const FrameRequest& request);
-    /// update() until settled, waiting for the loader between. Stops early with Cancelled where `cancel`
-    /// returns true (asked several times a second).
+    /// Calls update() until settled, and waits for the loader in between. Stops early with Cancelled where `cancel`
+    /// returns true (it is called several times a second).
     Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
 
-    /// Waits until the loader has read a page, has nothing to do, or the time is over: between updates, where a
-    /// host has nothing else to do. Other calls never wait for reads.
+    /// Waits until the loader has read a page, has nothing to do, or the time is over. A host calls it between updates
+    /// when it has nothing else to do. Other calls never wait for reads.
     void waitForPage(std::chrono::milliseconds timeout);
 
-    /// Draws the cut of the last update and waits for the GPU. Without a dataset: background.
+    /// Draws the cut of the last update and waits for the GPU. Without a dataset it draws the background.
     Result<FrameStats> render(const FrameRequest& request);
 
-    /// Of the last render(). Errors: Usage, where nothing was drawn yet; Device.
+    /// Returns the picture of the last render(). Errors: Usage, where nothing was drawn yet; Device.
     Result<Picture> readPicture();
-    /// World units along the unit ray; infinity where no hit, not a number where the ray gave up.
+    /// Distances in world units along the unit ray; infinity where nothing is hit, not a number where the ray gave up.
     Result<std::vector<float>> readDepth();
     Result<std::vector<glm::vec3>> readNormals();  ///< unit, towards the viewer; 0 where no hit
-    /// The number behind the false colour of each pixel: steps, cells or fetches of its ray. Precondition: the last
-    /// render() was shaded so.
+    /// Returns the number behind the false colour of each pixel: steps, cells or fetches of its ray. Precondition: the
+    /// last render() was shaded so.
     Result<std::vector<uint32_t>> readWork();
-    /// Iterations of each pixel's ray in mesostructure, in all pieces that it passed; all 0 without surfaces.
+    /// Returns each pixel's iterations in mesostructure, over all pieces that its ray passed; all 0 without surfaces.
     Result<std::vector<uint32_t>> readIterations();
-    /// One pixel of the last render(); nothing where the ray hit nothing or the pixel is outside.
+    /// Returns what one pixel of the last render() shows; nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
 
     /// Copies the last picture into the host's image, scaled to it, sRGB-encoded; what was in the image is lost. Waits
     /// for the GPU. Errors: Usage, where nothing was drawn yet or the queue has no graphics; Device.
     Result<void> copyPicture(const ImageTarget& target);
-    /// All pages in the pool; takes time for each.
+    /// Returns all pages in the pool; takes time for each.
     [[nodiscard]] std::vector<PageBox> residentPages() const;
-    /// Whether frames keep what their feedback pass met for feedbackPicture(), from now on. Off, it costs nothing.
+    /// Says whether frames keep what their feedback pass met for feedbackPicture(); switched off, it costs nothing.
     void keepFeedback(bool keep);
-    /// Nothing, where no frame missed pages since keepFeedback(true).
+    /// Returns the kept feedback; nothing where no frame missed pages since keepFeedback(true).
     [[nodiscard]] const std::optional<FeedbackPicture>& feedbackPicture() const;
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.
     /// `drawOver` (may be empty) draws over it. Precondition: options.surface. Errors: Device.
     Result<void> present(uint32_t width, uint32_t height, const DrawOver& drawOver = {});
-    /// The same as long as the renderer. Precondition: options.surface. Errors: Device.
+    /// Returns the same as long as the renderer lives. Precondition: options.surface. Errors: Device.
     Result<WindowDrawing> windowDrawing();
 
-    /// Validation messages (warnings and errors) since create(); always empty without options.validation.
+    /// Returns validation messages (warnings and errors) since create(); always empty without options.validation.
     [[nodiscard]] std::vector<std::string> validationMessages() const;
 
 private:

@@ -13,7 +13,7 @@ namespace vcp {
 
 namespace {
 
-/// Pixels that are hit are counted where pictures meet.
+/// Adds the counts of another dataset; pixels that are hit are counted where pictures are composed.
 void add(FrameStats& all, const FrameStats& one) {
     all.tracedRays += one.tracedRays;
     all.msBeam += one.msBeam;

@@ -1,4 +1,4 @@
-// Renderer: what was drawn, for the CPU, the host's images and the window.
+// Renderer: brings what was drawn to the CPU, the host's images and the window.
 #include <algorithm>
 #include <bit>
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a Renderer is made of: what its views share, and a view. For renderer.cpp (its life), renderer_frame.cpp
+// What a Renderer is made of: what its views share, and a view. Included by renderer.cpp (its life), renderer_frame.cpp
 // (drawing) and renderer_readback.cpp (what was drawn).
 #pragma once
 
@@ -21,7 +21,7 @@
 
 namespace vcp {
 
-/// Marks of a layer's frame: before the beam pass, and after each pass.
+/// Number of time marks in a layer's frame: one before the beam pass, and one after each pass.
 constexpr uint32_t kPassMarks = 6;
 
 /// What the views share: device, passes, and the datasets with their pages.
@@ -32,14 +32,14 @@ struct Renderer::Shared {
     };
     RendererOptions options;
     std::unique_ptr<Instance> instance;
-    std::unique_ptr<Device> device;  // null after a loss that could not be made good
+    std::unique_ptr<Device> device;  // null after a loss that could not be repaired
     DeviceInfo info;
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
     std::vector<Placed> datasets;
-    std::vector<std::pair<uint32_t, uint32_t>> poolLayouts;  // of the datasets that the pipelines were made for
+    std::vector<std::pair<uint32_t, uint32_t>> poolLayouts;  // layouts of the datasets that the pipelines were made for
     uint32_t losses = 0;
-    // Views draw one after the other: one set of pipelines does for all.
+    // Views draw one after the other, so one set of pipelines is enough for all.
     BeamPass beam;
     TracePass trace;
     PaperTracePass paperTrace;
@@ -47,9 +47,9 @@ struct Renderer::Shared {
     ShadePass shade;
     FeedbackPass feedback;
     ComposePass compose;
-    /// Surfaces with mesostructure, and what draws them.
+    /// The surfaces with mesostructure, and what draws them.
     struct Meso {
-        std::vector<MesoSurface> surfaces;  // to be uploaded again
+        std::vector<MesoSurface> surfaces;  // kept to be uploaded again
         std::unique_ptr<MesoResources> resources;
         std::unique_ptr<MesoSurfacePass> pass;
         PassTimer timer;
@@ -59,7 +59,7 @@ struct Renderer::Shared {
     std::vector<State*> views;
     ViewNumber nextNumber = 0;
 
-    /// From the copies of the surfaces to the device. On an error there are none.
+    /// Uploads the copies of the surfaces to the device. After an error there are none.
     Result<void> uploadSurfaces();
 };
 
@@ -96,17 +96,17 @@ struct Renderer::State {
     const ViewNumber number;
     std::function<void()> gone;
     std::unique_ptr<Swapchain> swapchain;
-    std::unique_ptr<PictureScaling> scaling;  // to the host's images; made on first use
+    std::unique_ptr<PictureScaling> scaling;  // scales to the host's images; made on first use
     /// This view's part of drawing one dataset.
     struct Layer {
         std::unique_ptr<FrameResources> resources;
         Residency* residency = nullptr;  // null: nothing but the background is drawn
         Similarity placement;
-        PassConstants constants;  // of the last frame
+        PassConstants constants;  // those of the last frame
         bool tableStale = true;
         uint64_t tableVersion = 0;
-        std::vector<glm::uvec4> table;  // of the last frame
-        double errorPixels = 0;         // of the cut
+        std::vector<glm::uvec4> table;  // the table of the last frame
+        double errorPixels = 0;         // largest error in the cut
         FrameRequest drawn;
 
         [[nodiscard]] bool isPaper() const {
@@ -114,42 +114,42 @@ struct Renderer::State {
         }
         /// Whether the next frame has a feedback pass.
         [[nodiscard]] bool listens() const { return residency != nullptr && residency->listens() && !isPaper(); }
-        /// World units a unit of the hits' depths.
+        /// World units per unit of the hits' depths.
         [[nodiscard]] double unit() const {
             return (residency != nullptr ? residency->dataset().header.cell : 1) * placement.scale;
         }
-        /// The request from the dataset's own space, without what its method cannot draw.
+        /// The request as seen from the dataset's own space, without what its method cannot draw.
         [[nodiscard]] FrameRequest drawable(const FrameRequest& request) const;
     };
-    std::vector<Layer> layers;  // one a dataset, and at least one; the first one's picture is the view's
+    std::vector<Layer> layers;  // one for each dataset, and at least one; the first one's picture is the view's
     PassTimer timer;
-    ComposeTarget target;  // where pictures are composed
+    ComposeTarget target;  // pictures are composed into it
     MesoTarget mesoTarget;
     uint64_t mesoSeen = 0;  // Shared::mesoVersion of the last update
     std::optional<FrameRequest> drawn;
     bool keepsFeedback = false;
     std::optional<FeedbackPicture> feedbackPicture;
-    /// The device, and this view's part of it.
+    /// Makes the device, and this view's part of it.
     Result<void> createDevice(const DeviceFaults& faults);
     Result<VkSurfaceKHR> createSurface() const;
     Result<void> attach(VkSurfaceKHR window);
     Result<void> attachToDevice();
     void release();
-    /// As many layers as there are datasets.
+    /// Makes as many layers as there are datasets.
     Result<void> makeLayers();
-    /// Whether more than one dataset makes the picture.
+    /// Whether the picture is composed of more than one dataset, or has surfaces.
     [[nodiscard]] bool composes() const { return layers.size() > 1 || shared->meso; }
-    /// Whether each dataset has its layer: not, where the device gave out half-way.
+    /// Whether each dataset has its layer; false where the device failed half-way.
     [[nodiscard]] bool isComplete() const;
-    /// Shaders of all views see no pool; see the residency's, or the dataset is closed where it has none.
+    /// hidePool: all views' shaders see no pool. showPool: the residencies'; where one has none, datasets are closed.
     void hidePool();
     Result<void> showPool();
     void clearPipelines();
-    /// The budgets, shared out among the datasets.
+    /// Shares the budgets out among the datasets.
     Result<void> setShares(uint64_t budgetBytes, uint64_t ramBytes);
-    /// Makes all anew that the device held.
+    /// Makes anew all that the device held.
     Result<void> rebuild();
-    /// Does it; after an error that something can be done about, once more.
+    /// Calls `doIt`; after an error that can be recovered from, once more.
     template <class Do>
     auto tryAgain(Do doIt) -> decltype(doIt());
     bool recover(bool mayRebuild);
@@ -162,14 +162,14 @@ struct Renderer::State {
     Result<void> prepareTable(Layer& layer);
     Result<void> prepare(Layer& layer, const FrameRequest& request);
     void recordFrame(VkCommandBuffer commands, const Layer& layer, const FrameRequest& request);
-    /// Surfaces over the datasets' picture.
+    /// Draws the surfaces over the datasets' picture.
     Result<void> drawSurfaces(const FrameRequest& request, FrameStats& stats);
     Result<FrameStats> collectStats(const Layer& layer, const FrameRequest& request) const;
-    /// Words of a plane of the last frame: pixels of empty tiles were not written.
+    /// Returns the words of a plane of the last frame; pixels of empty tiles, which were not written, get `missing`.
     Result<std::vector<uint32_t>> hitPlane(const Layer& layer, uint32_t plane, uint32_t missing) const;
-    /// Distances of the last frame in one layer, as readDepth() gives them.
+    /// Returns the distances of the last frame in one layer, as readDepth() gives them.
     Result<std::vector<float>> depthOf(const Layer& layer) const;
-    /// Words of a plane of the surfaces' hits; empty where there are none.
+    /// Returns the words of a plane of the surfaces' hits; empty where there are none.
     [[nodiscard]] Result<std::vector<uint32_t>> mesoPlane(uint32_t plane) const;
     Result<std::optional<PixelHit>> pick(const Layer& layer, uint32_t x, uint32_t y) const;
     Result<std::optional<PixelHit>> pickSurfaces(uint32_t x, uint32_t y) const;
@@ -180,7 +180,7 @@ template <class Do>
 auto Renderer::State::tryAgain(Do doIt) -> decltype(doIt()) {
     const uint32_t before = losses;
     auto done = doIt();
-    // A device that is lost each time it does this is of no use; the pool can be halved a few times only.
+    // A device that is lost each time is given up; the pool can be halved only a few times.
     while (!done && recover(losses == before)) done = doIt();
     return done;
 }

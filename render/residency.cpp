@@ -62,13 +62,13 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
             pool_ = std::move(*pool);
             return {};
         }
-        // Coarser pages of all are better than none.
+        // Coarser pages of all datasets are better than none.
         if (pool.error().code != ErrorCode::Device || budget / 2 < kPoolUnitBytes) return pool.error();
     }
 }
 
-/// Pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones in what
-/// is left.
+/// Returns pages of the pool, coarse ones first, as many as fit into the memory for pages; the source keeps stored ones
+/// in the memory that is left.
 Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
     std::vector<CarriedPage> carried;
     uint64_t room = options_.loader.heldBytes;
@@ -113,7 +113,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
 void Residency::releasePool() {
     pool_.reset();
     policy_->clear();
-    cuts_.clear();  // all is to be drawn again
+    cuts_.clear();  // all views are to be drawn again
     listens_ = false;
 }
 

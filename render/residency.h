@@ -1,9 +1,9 @@
 // Which pages of one dataset are in the pool: carries out what the policy (streaming/residency_policy.h) decides,
 // between the loader's threads and the pool in the device's memory.
 //
-// A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while views
-// want it, evicted when its slot is needed. What an update takes in is capped, so that no frame waits for
-// many pages. All in the caller's thread but the loader's reads. Several views may share the pool, each with a number
+// A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while views want it,
+// evicted when its slot is needed. One update takes in a limited number of bytes, so that no frame waits for many
+// pages. All but the loader's reads runs in the caller's thread. Several views may share the pool, each with a number
 // of its own and a cut of its own; an update of one may change the others' cuts.
 #pragma once
 
@@ -22,48 +22,48 @@
 namespace vcp {
 
 struct ResidencyOptions {
-    uint64_t budgetBytes = 512ull << 20;  ///< of the pool
-    uint64_t uploadBytes = 16ull << 20;  ///< that one update takes in, half of it while a view moves; one page at least
+    uint64_t budgetBytes = 512ull << 20;  ///< bytes of the pool
+    uint64_t uploadBytes = 16ull << 20;   ///< taken in by one update, half of it while a view moves; one page at least
     LoadOrder order = LoadOrder::Feedback;
     LoaderOptions loader;
 };
 
 class Residency {
 public:
-    /// Allocates the pool: never more than budgetBytes, and no more than the dataset can fill. Where the device
-    /// has not so much, half of it, and so on. Errors: Device; Limit, where the coarsest page has no room.
+    /// Allocates the pool: never more than budgetBytes, and no more than the dataset can fill. Where the device has
+    /// less memory, takes half of it, and so on. Errors: Device; Limit, where the coarsest page has no room.
     static Result<std::unique_ptr<Residency>> create(Device& device, PageAccess access, const ResidencyOptions& options,
                                                      std::shared_ptr<const Dataset> dataset,
                                                      std::shared_ptr<const PageSource> source);
 
-    /// Other budgets, from now on; no frame is in flight. The pool is made anew without there ever being more than one:
-    /// pages go from the old one to the new by way of the memory that `ramBytes` allows, coarse ones first; others are
-    /// read again. Ends reads that are under way. Errors: Device; Limit, where the coarsest page would have no room:
-    /// nothing changes then.
+    /// Sets other budgets, from now on. Precondition: no frame is in flight. The pool is made anew without there ever
+    /// being more than one: pages go from the old one to the new through the memory that `ramBytes` allows, coarse ones
+    /// first; others are read again. Ends reads that are under way. Errors: Device; Limit, where the coarsest page
+    /// would have no room: nothing changes then.
     Result<void> setBudgets(Device& device, PageAccess access, uint64_t budgetBytes, uint64_t ramBytes);
 
-    /// The device and all that was in it were lost: releases what there was of it, then begins anew on another.
+    /// After the device and all that was in it were lost: releases what there was of it, then begins anew on another.
     void releasePool();
     Result<void> rebuild(Device& device, PageAccess access);
 
-    /// Precondition: no frame is in flight. Never waits for the loader. Errors: Device.
+    /// Takes in pages; never waits for the loader. Precondition: no frame is in flight. Errors: Device.
     Result<UpdateResult> update(const SelectionView& view, ViewNumber number = 0);
     void forgetView(ViewNumber number);
 
-    /// Whether what rays meet would be of use: pages are missing, and are read in the order that rays ask for them.
+    /// Whether the rays' feedback would be used: pages are missing, and are read in the order that rays ask for them.
     [[nodiscard]] bool listens() const { return listens_; }
     void hear(const RayFeedback& feedback, const SelectionView& view) { policy_->hear(feedback, view); }
 
-    /// Waits until the loader has something, or the time is over.
+    /// Waits until the loader has a page, or the time is over.
     bool waitForPage(std::chrono::milliseconds timeout) { return loader_->waitForPage(timeout); }
 
     [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
-    /// What the view can draw now, in directory order.
+    /// The pages that the view can draw now, in directory order.
     [[nodiscard]] const std::vector<uint64_t>& cut(ViewNumber number = 0);
     [[nodiscard]] std::vector<glm::uvec4> table(ViewNumber number = 0);
-    /// Another table may follow where this is another number: of another cut, or of pages in other places.
+    /// A number that changes whenever the page table may: with another cut, or with pages in other places.
     [[nodiscard]] uint64_t version() const { return policy_->version(); }
-    /// False after an error of setBudgets() or rebuild(): nothing but the destructor may be called then.
+    /// There is none after an error of setBudgets() or rebuild(): then only the destructor may be called.
     [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
     [[nodiscard]] const PagePool& pages() const { return *pool_; }
     [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
@@ -71,28 +71,28 @@ public:
     void forEachResident(Visit&& visit) const {
         policy_->forEachResident(visit);
     }
-    /// Of the pages in the pool.
+    /// Bytes of colour of the pages in the pool.
     [[nodiscard]] uint64_t colourBytes() const;
 
 private:
     explicit Residency(const ResidencyOptions& options) : options_(options) {}
     struct CarriedPage {
         uint64_t page = 0;
-        std::vector<std::byte> bytes;  // geometry and, behind it, colour
+        std::vector<std::byte> bytes;  // geometry followed by colour
     };
     Result<void> createPool(Device& device, PageAccess access);
     void startLoader();
     Result<std::vector<CarriedPage>> carryOut();
     [[nodiscard]] bool hasRoomIn(PoolShape shape) const;
-    /// A slot for the page, with pages moved out of its way; nothing where there is none.
+    /// Returns a slot for the page, with pages moved out of its way; nothing where there is none.
     Result<std::optional<PoolSlot>> slotFor(uint64_t page);
     Result<void> place(uint64_t page, const PageBytes& bytes);
     struct ViewCut {
         std::vector<uint64_t> pages;
         uint64_t version = UINT64_MAX;
-        std::vector<uint64_t> reported;  // as of its last update
+        std::vector<uint64_t> reported;  // as reported by its last update
     };
-    /// What one update takes in, and the loader reads before it.
+    /// Bytes that one update takes in, and that the loader reads before it.
     [[nodiscard]] uint64_t uploadBytes() const {
         return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes);
     }
@@ -104,8 +104,8 @@ private:
     std::unique_ptr<PagePool> pool_;
     std::shared_ptr<const PageSource> source_;
     std::unique_ptr<PageLoader> loader_;
-    LoaderStats past_;                                  // of the loaders before this one
-    std::unordered_map<uint64_t, PageHeader> headers_;  // of pages that are or were resident
+    LoaderStats past_;                                  // counts of the loaders before this one
+    std::unordered_map<uint64_t, PageHeader> headers_;  // headers of pages that are or were resident
     std::map<ViewNumber, ViewCut> cuts_;
     std::vector<Error> problems_;    // not reported yet
     std::vector<Request> tooLarge_;  // given up because reading them takes more memory than there is

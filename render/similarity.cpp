@@ -14,7 +14,7 @@ namespace vcp {
 namespace {
 
 constexpr double kSimilar = 1e-6;
-// Slots waste some of a pool.
+// Slots waste some bytes of a pool.
 constexpr uint64_t kSlack = 1 << 20;
 
 }  // namespace

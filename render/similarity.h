@@ -29,24 +29,24 @@ struct Similarity {
     [[nodiscard]] glm::dvec3 fromWorld(glm::dvec3 point) const {
         return glm::conjugate(rotation) * ((point - translation) / scale);
     }
-    /// Of a direction; its length stays.
+    /// Turns a direction; its length stays.
     [[nodiscard]] glm::dvec3 turnedFromWorld(glm::dvec3 direction) const {
         return glm::conjugate(rotation) * direction;
     }
 };
 
-/// Of a 4 x 4 matrix, row by row, that takes columns (x, y, z, 1) to the world. Errors: Usage, where it is no
-/// similarity: not affine, mirrored, or with other scales along other axes (to 1e-6).
+/// Makes a similarity from a 4 x 4 matrix, row by row, that takes columns (x, y, z, 1) to the world. Errors: Usage,
+/// where it is no similarity: not affine, mirrored, or with other scales along other axes (to 1e-6).
 Result<Similarity> similarityFromMatrix(std::span<const double, 16> rows);
 
-/// A plane of the world in a dataset's own space.
+/// Returns a plane of the world in a dataset's own space.
 SectionPlane planeIn(const Similarity& placement, const SectionPlane& plane);
 
-/// The request as it is seen from a dataset's own space. Pixels, tiles and errors in pixels stay.
+/// Returns the request as it is seen from a dataset's own space. Pixels, tiles and errors in pixels stay.
 FrameRequest requestIn(const Similarity& placement, const FrameRequest& request);
 
-/// A share of `budgetBytes` each for datasets of so many bytes: equal ones, but what a small one does not need goes to
-/// the larger ones. The sum is at most the budget.
+/// Returns the share of `budgetBytes` of each dataset, by the bytes of the datasets: equal shares, but what a small one
+/// does not need goes to the larger ones. The sum is at most the budget.
 std::vector<uint64_t> budgetShares(uint64_t budgetBytes, std::span<const uint64_t> datasetBytes);
 
 }  // namespace vcp

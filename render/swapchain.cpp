@@ -33,7 +33,7 @@ Result<void> Swapchain::chooseFormat() {
     std::vector<VkSurfaceFormatKHR> formats(count);
     VCP_VK(vkGetPhysicalDeviceSurfaceFormatsKHR, device_.physical(), surface_, &count, formats.data());
     if (formats.empty()) return Error{.code = ErrorCode::Device, .message = "the window has no format for pictures"};
-    // The picture is encoded already: no conversion wanted.
+    // The picture is encoded already, so no conversion is wanted.
     const auto plain = std::find_if(formats.begin(), formats.end(), [](const VkSurfaceFormatKHR& f) {
         return f.format == VK_FORMAT_B8G8R8A8_UNORM || f.format == VK_FORMAT_R8G8B8A8_UNORM;
     });

@@ -1,4 +1,4 @@
-// The window's pictures.
+// The swapchain: the images that a window shows.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace vcp {
 
-/// Owns the surface. One thread.
+/// Owns the surface. Used by one thread.
 class Swapchain {
 public:
     /// Takes the surface over.
@@ -26,7 +26,7 @@ public:
     Result<void> show(const Buffer& picture, PictureSize pictureSize, PictureSize window,
                       const DrawOver& drawOver = {});
 
-    /// What drawOver draws in; made on first use. Errors: Device.
+    /// Returns the render pass that drawOver draws in; made on first use. Errors: Device.
     Result<VkRenderPass> renderPass();
 
 private:
@@ -48,7 +48,7 @@ private:
     std::vector<VkFramebuffer> framebuffers_;
     std::vector<VkSemaphore> shown_;  // one an image: free again when the image comes back
     VkSemaphore acquired_ = VK_NULL_HANDLE;
-    PictureSize window_;  // as asked for
+    PictureSize window_;  // as the caller asked for it
     VkExtent2D extent_{};
     PictureScaling scaling_;
 };

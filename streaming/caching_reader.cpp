@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* kExtension = ".vcpblock";
 
-/// XXH3 of a block, mixed with which block it is: a file under a wrong name does not match.
+/// Returns the XXH3 of a block, mixed with which block it is: so a file under a wrong name does not match.
 uint64_t sealOf(uint64_t source, uint64_t block, std::span<const std::byte> bytes) {
     return hashBytes(bytes) ^ (source + 0x9e3779b97f4a7c15u * (block + 1));
 }
@@ -32,7 +32,7 @@ struct KeptFile {
     uint64_t bytes;
 };
 
-/// The folder's blocks, used longest ago first.
+/// Lists the folder's blocks; those used longest ago come first.
 std::vector<KeptFile> keptFiles(const fs::path& folder) {
     std::vector<KeptFile> files;
     std::error_code failed;
@@ -124,7 +124,7 @@ void CachingReader::keep(uint64_t block, std::span<const std::byte> bytes) const
 void CachingReader::trim() const {
     const std::lock_guard lock(mutex_);
     if (kept_ <= limitBytes_) return;
-    // Counted anew: others may have added or removed. Some room, so that this is rare.
+    // The bytes are counted anew, since others may have added or removed blocks. Some spare room makes this rare.
     const std::vector<KeptFile> files = keptFiles(folder_);
     kept_ = 0;
     for (const KeptFile& file : files) kept_ += file.bytes;
@@ -160,7 +160,7 @@ Result<void> CachingReader::read(uint64_t offset, std::span<std::byte> bytes) co
             ++block;
             continue;
         }
-        // What is missing on end is read at once; a block that follows and is there ends it.
+        // Consecutive missing blocks are read at once; a block that is there ends the run.
         uint64_t end = block + 1;
         while (end <= last && !load(end, spanOf(end))) ++end;
         const uint64_t from = block * kCacheBlockBytes;

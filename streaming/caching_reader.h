@@ -25,14 +25,14 @@ public:
                                                        const std::string& identity, const std::filesystem::path& folder,
                                                        uint64_t limitBytes);
 
-    /// A block that cannot be kept (a full disk) is no error: it is read again next time.
+    /// A block that cannot be kept (a full disk) is no error: it is read from the source again next time.
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
     [[nodiscard]] uint64_t size() const override { return reader_->size(); }
     [[nodiscard]] const std::string& name() const override { return reader_->name(); }
     void interrupt() const override { reader_->interrupt(); }
     void distrust(uint64_t offset, uint64_t bytes) const override;
 
-    /// Bytes of blocks in the folder, as this reader knows.
+    /// Bytes of the folder's blocks, as far as this reader knows.
     [[nodiscard]] uint64_t bytesKept() const;
 
 private:

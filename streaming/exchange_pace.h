@@ -12,19 +12,19 @@ namespace vcp {
 
 class ExchangePace {
 public:
-    /// `mostBytes`: that the answer may have. `now`: seconds on any clock that never goes back.
+    /// `mostBytes`: the most that the answer may have. `now`: seconds on any clock that never goes back.
     ExchangePace(const HttpOptions& options, uint64_t mostBytes, double now);
 
-    /// What is wrong, if anything. `bytes`: that have come so far. `isConnected`: the server has the request; until
-    /// then only the end of it all counts, and what bounds connecting.
+    /// Returns what is wrong, if anything. `bytes`: how many have come so far. `isConnected`: the server has the
+    /// request; before that, only the overall end and the bound on connecting count.
     [[nodiscard]] std::optional<std::string> problem(double now, uint64_t bytes, bool isConnected);
-    /// The longest that it may take.
+    /// The longest that the exchange may take.
     [[nodiscard]] double mostSeconds() const { return mostSeconds_; }
 
 private:
     double stallSeconds_, leastBytesPerSecond_, begun_, mostSeconds_;
-    double since_;         // of the stretch
-    uint64_t before_ = 0;  // bytes that came before it
+    double since_;         // start of the stretch
+    uint64_t before_ = 0;  // bytes that came before the stretch
 };
 
 }  // namespace vcp

@@ -18,7 +18,7 @@ uint64_t drawn(const Faults& faults, uint64_t offset, uint64_t attempt, Draw dra
     return hashBytes(std::as_bytes(std::span(key)));
 }
 
-/// From 0 to below 1.
+/// Returns a number from 0 to below 1.
 double fraction(uint64_t random) { return static_cast<double>(random >> 11) * 0x1p-53; }
 
 }  // namespace
@@ -30,7 +30,7 @@ struct FaultyReader::Sleep {
     uint64_t epoch = 0;
     bool isReal = true;
 
-    /// False: interrupted.
+    /// Returns false when it was interrupted.
     bool wait(double seconds) {
         std::unique_lock lock(mutex);
         const uint64_t begun = epoch;

@@ -1,7 +1,7 @@
 // A file that is slow or broken on purpose: wraps any reader, for tests and `vcp stress`.
 //
-// What happens to a read follows from the seed, its offset, and how often that offset was read before; the
-// order and the threads do not matter. So the third attempt at a page fares the same in every run.
+// What happens to a read follows from the seed, its offset, and how often that offset was read before; the order and
+// the threads do not matter. So the third attempt at a page has the same outcome in every run.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 namespace vcp {
 
 struct Faults {
-    double errorRate = 0;    ///< of reads that fail with Io, 0 to 1
-    double corruptRate = 0;  ///< of reads that bring one wrong byte
-    double stallRate = 0;    ///< of reads that take stallSeconds longer
+    double errorRate = 0;    ///< share of reads that fail with Io, 0 to 1
+    double corruptRate = 0;  ///< share of reads that bring one wrong byte
+    double stallRate = 0;    ///< share of reads that take stallSeconds longer
     double stallSeconds = 0;
-    double latencySeconds = 0;  ///< of every read
+    double latencySeconds = 0;  ///< delay of every read
     double spreadSeconds = 0;   ///< added to it, 0 to this by the seed: reads overtake each other
     double bytesPerSecond = 0;  ///< shared by all reads; 0: as fast as they come
     uint64_t seed = 1;
@@ -26,7 +26,7 @@ struct Faults {
     bool operator==(const Faults&) const = default;
 };
 
-/// Time as FaultyReader sees it; steady time where not given.
+/// The time that FaultyReader sees; the steady clock where a function is not given.
 struct FaultClock {
     std::function<double()> now;  ///< seconds
     std::function<void(double seconds)> sleep;
@@ -52,7 +52,7 @@ private:
     FaultClock clock_;
     std::unique_ptr<Sleep> sleep_;
     mutable std::mutex mutex_;
-    mutable std::unordered_map<uint64_t, uint64_t> attempts_;  // by offset
+    mutable std::unordered_map<uint64_t, uint64_t> attempts_;  // for each offset, the reads so far
     mutable double busyUntil_ = 0;
 };
 

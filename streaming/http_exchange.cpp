@@ -18,7 +18,7 @@ namespace {
 
 constexpr size_t kMaxParts = 16;
 constexpr size_t kMostQuoted = 80;
-constexpr uint64_t kMostDiscarded = 16 << 10;  // of a redirect's page
+constexpr uint64_t kMostDiscarded = 16 << 10;  // bytes of a redirect's page
 constexpr int kPollMilliseconds = 50;
 constexpr size_t kMaxPartHeader = 1024;
 
@@ -116,7 +116,7 @@ std::vector<BodyPart> parseBodyParts(std::span<const std::byte> body, std::strin
     std::vector<BodyPart> parts;
     if (boundary.empty()) return parts;
     const std::string_view text(reinterpret_cast<const char*>(body.data()), body.size());
-    // The sizes in the parts' headers say where the next one begins: the bytes may contain anything.
+    // The sizes in the parts' headers say where the next part begins, as the bytes themselves may contain anything.
     size_t at = text.substr(0, kMaxPartHeader).find("--" + boundary);
     while (at != std::string_view::npos && parts.size() < kMaxParts) {
         const size_t blank = text.substr(at, kMaxPartHeader).find("\r\n\r\n");
@@ -155,8 +155,8 @@ struct HttpConnection::Exchange {
     curl_slist* fields;
     HttpAnswer answer;
 
-    uint64_t headerBytes = 0, bytes = 0;  // of all answers; bytes: with those of headers
-    std::optional<uint64_t> length;       // of the body, as the header has it
+    uint64_t headerBytes = 0, bytes = 0;  // bytes of all answers; `bytes` includes the headers
+    std::optional<uint64_t> length;       // length of the body, as the header says
     bool isLonger = false, hasManyHeaders = false;
     bool isHeaderWhole = false;
     bool isEnough = false;  // the header says all that is wanted of this answer
@@ -174,7 +174,7 @@ void HttpConnection::Exchange::begin(const char* data, size_t size) {
     if (space != data + size) std::from_chars(space + 1, data + size, answer.status);
 }
 
-/// At the end of a header: whether what follows is to be read.
+/// Decides at the end of a header whether the body that follows is read.
 bool HttpConnection::Exchange::admitBody() {
     if (answer.status / 100 == 1) return true;  // another header follows
     isHeaderWhole = true;
@@ -194,7 +194,7 @@ size_t HttpConnection::onHeader(char* data, size_t, size_t bytes, void* user) {
     exchange.hasManyHeaders = exchange.headerBytes > exchange.mostHeaderBytes;
     if (exchange.hasManyHeaders) return 0;
     const std::string_view line(data, bytes);
-    // A redirect's header comes before that of the answer.
+    // With redirects, the headers of several answers come; each begins anew.
     if (line.starts_with("HTTP/")) exchange.begin(data, bytes);
     HttpAnswer& answer = exchange.answer;
     const std::pair<std::string_view, std::string*> fields[] = {
@@ -210,7 +210,7 @@ size_t HttpConnection::onHeader(char* data, size_t, size_t bytes, void* user) {
 size_t HttpConnection::onBody(char* data, size_t, size_t bytes, void* user) {
     Exchange& exchange = *static_cast<Exchange*>(user);
     exchange.bytes += bytes;
-    if (exchange.answer.status != 206) return bytes;  // admitted, so it is short
+    if (exchange.answer.status != 206) return bytes;  // admitBody() let it in, so it is short
     exchange.isLonger = exchange.answer.body.size() + bytes > exchange.most;
     if (exchange.isLonger) return 0;
     const auto* from = reinterpret_cast<const std::byte*>(data);
@@ -219,7 +219,7 @@ size_t HttpConnection::onBody(char* data, size_t, size_t bytes, void* user) {
 }
 
 HttpConnection::HttpConnection(const HttpOptions& options) : options_(options) {
-    // Once a process; libcurl counts, and is safe to call from several threads since 7.84.
+    // curl is started once a process; libcurl counts, and is safe to call from several threads since 7.84.
     static const CURLcode started = curl_global_init(CURL_GLOBAL_DEFAULT);
     if (started != CURLE_OK) return;
     curl_ = curl_easy_init();
@@ -234,7 +234,7 @@ HttpConnection::~HttpConnection() {
 void HttpConnection::prepare(const WebAddress& address, const std::string& ranges, bool mayBePlain,
                              Exchange& exchange) {
     CURL* curl = curl_;
-    curl_easy_reset(curl);  // options only: connections stay
+    curl_easy_reset(curl);  // resets the options only: connections stay
     curl_easy_setopt(curl, CURLOPT_URL, address.url.c_str());
     if (address.hasUser) {
         curl_easy_setopt(curl, CURLOPT_USERNAME, address.user.c_str());
@@ -257,7 +257,7 @@ void HttpConnection::prepare(const WebAddress& address, const std::string& range
     curl_easy_setopt(curl, CURLOPT_WRITEDATA, &exchange);
 }
 
-/// One request, redirects not followed.
+/// Sends one request and does not follow redirects.
 Result<void> HttpConnection::transfer(Exchange& exchange) {
     std::array<char, CURL_ERROR_SIZE> detail{};
     curl_easy_setopt(curl_, CURLOPT_ERRORBUFFER, detail.data());
@@ -268,7 +268,7 @@ Result<void> HttpConnection::transfer(Exchange& exchange) {
     return done;
 }
 
-/// To its end; looks often enough whether it is to go on. `detail`: where curl says what is wrong.
+/// Runs a transfer to its end; looks often enough whether it may go on. `detail`: where curl says what is wrong.
 Result<void> HttpConnection::perform(Exchange& exchange, const char* detail) {
     for (;;) {
         int running = 0, left = 0;
@@ -311,7 +311,7 @@ Result<HttpAnswer> HttpConnection::get(const WebAddress& address, const std::str
         if (!next || (address.isSecure() && !next->isSecure()))
             return lasting("redirected to a protocol that is not allowed: \"" +
                            quoted(shownAddress(exchange.answer.location)) + "\"");
-        // Who was not asked by the user does not learn the password.
+        // The password is sent only to the origin that the user named.
         if (next->origin == address.origin && !next->hasUser)
             next->hasUser = address.hasUser, next->user = address.user, next->password = address.password;
         at = *std::move(next);

@@ -24,7 +24,7 @@ struct ByteRange {
     bool operator==(const ByteRange&) const = default;
 };
 
-/// "Content-Range: bytes 0-99/1234". Nothing where it is not of this form or the range is outside of the file.
+/// What "Content-Range: bytes 0-99/1234" says; nothing where its form is another or the range is outside of the file.
 struct ContentRange {
     ByteRange range;
     uint64_t fileBytes = 0;
@@ -33,10 +33,10 @@ std::optional<ContentRange> parseContentRange(std::string_view value);
 
 struct BodyPart {
     ByteRange range;
-    std::span<const std::byte> bytes;  ///< in the body
+    std::span<const std::byte> bytes;  ///< the part's bytes in the body
 };
 
-/// The parts of a multipart/byteranges body (RFC 9110, 14.6); empty where it is not one. Safe on hostile
+/// Returns the parts of a multipart/byteranges body (RFC 9110, 14.6); empty where it is not one. Safe on hostile
 /// bytes.
 std::vector<BodyPart> parseBodyParts(std::span<const std::byte> body, std::string_view contentType);
 
@@ -47,7 +47,7 @@ struct HttpAnswer {
     std::vector<std::byte> body;
 };
 
-/// The text of a header field for a message: its beginning, where it is long.
+/// Shortens the text of a header field for a message: to its beginning, where it is long.
 std::string quoted(const std::string& field);
 
 inline constexpr int kMostRedirects = 5;
@@ -60,12 +60,12 @@ public:
     HttpConnection(const HttpConnection&) = delete;
     HttpConnection& operator=(const HttpConnection&) = delete;
 
-    /// Sends GET with `Range: bytes=RANGES` and `condition` (a header line, may be empty). At most `most` bytes
-    /// of body are taken: a longer one is an error, and so is one shorter than announced. The body of an
-    /// answer other than 206 is not read, but for up to 16 KiB of a redirect's. Header lines of all answers together
-    /// have at most options.headerBytes; all of it takes no longer than ExchangePace allows. Ends within some 50 ms
-    /// where `epoch` changes or options.cancelled says so. User and password go to the address's origin only. Memory:
-    /// what has come. Errors: Io, InvalidInput (TLS, redirects, headers), Cancelled; the message only.
+    /// Sends GET with `Range: bytes=RANGES` and `condition` (a header line, may be empty). At most `most` bytes of body
+    /// are taken: a longer body is an error, and so is one shorter than announced. The body of an answer other than 206
+    /// is not read, except up to 16 KiB of a redirect's. The header lines of all answers together have at most
+    /// options.headerBytes; the exchange takes no longer than ExchangePace allows. It ends within some 50 ms where
+    /// `epoch` changes or options.cancelled says so. User and password go to the address's origin only. Memory: what
+    /// has come. Errors: Io, InvalidInput (TLS, redirects, headers), Cancelled; with the message only.
     Result<HttpAnswer> get(const WebAddress& address, const std::string& ranges, const std::string& condition,
                            uint64_t most, const std::atomic<uint64_t>& epoch);
 

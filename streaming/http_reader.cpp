@@ -28,8 +28,8 @@ bool isFieldText(std::string_view text) {
 
 std::string rangeText(ByteRange range) { return fmt::format("{}-{}", range.first, range.last); }
 
-/// What a first view needs of a .vcp file beside its first bytes and its last: the coarsest page, and the directory
-/// where it is small. Nothing where this is no such file, or all of that is in the first bytes.
+/// Returns what a first view needs of a .vcp file beside its first bytes and its last: the coarsest page, and the
+/// directory where it is small. Nothing where the file is no .vcp, or all of that is in the first bytes.
 std::optional<ByteRange> restOfFirstView(std::span<const std::byte> head) {
     if (head.size() < kDirectoryOffset + sizeof(PageEntry)) return std::nullopt;
     FileHeader header;
@@ -43,7 +43,7 @@ std::optional<ByteRange> restOfFirstView(std::span<const std::byte> head) {
     const bool isWhole = blocks <= wholeDirectoryBytes(kLeadBytes) / kBlockBytes;
     const uint64_t lead = isWhole ? blockOffset(blocks) : kLeadBytes;
     const uint64_t rootEnd = std::max(root.offset + root.storedBytes, root.colourOffset + root.colourStoredBytes);
-    // Behind a large directory the coarsest page is a range of its own.
+    // Where the directory is large, the coarsest page behind it is a range of its own.
     const bool isApart = !isWhole && head.size() >= lead;
     const uint64_t first = isApart ? std::max<uint64_t>(root.offset, head.size()) : head.size();
     const uint64_t end = (isWhole || isApart) && rootEnd > first && rootEnd - first < kMostAtOpening ? rootEnd : lead;
@@ -55,7 +55,7 @@ std::optional<ByteRange> restOfFirstView(std::span<const std::byte> head) {
 
 struct HttpReader::State {
     WebAddress address;
-    std::string shown, kept;  // the address for messages, and for what is kept: without user and password
+    std::string shown, kept;  // both without user and password: the address for messages, and for what is kept
     HttpOptions options;
     uint64_t size = 0;
     std::string entityTag, lastModified, condition;
@@ -63,14 +63,14 @@ struct HttpReader::State {
 
     std::mutex mutex;
     std::vector<std::unique_ptr<HttpConnection>> idle;
-    std::optional<Error> changed;  // once it has, every read fails at once
+    std::optional<Error> changed;  // once the file has changed, every read fails at once
     struct Stretch {
         uint64_t begin = 0;
         std::vector<std::byte> bytes;
     };
-    // What came at opening, until the coarsest page has been taken over; and the last bytes.
+    // What came at opening, held until the coarsest page has been taken over; and the file's last bytes.
     std::vector<std::shared_ptr<const Stretch>> held;
-    uint64_t heldEnd = 0;  // of the coarsest page
+    uint64_t heldEnd = 0;  // end of the coarsest page
     std::vector<std::byte> tail;
 
     Result<HttpAnswer> get(const std::string& ranges, uint64_t most);
@@ -117,7 +117,7 @@ Error HttpReader::State::refused(const HttpAnswer& answer) const {
                 fmt::format("the server answers with status {}", answer.status));
 }
 
-/// That bytes of the file follow.
+/// Checks that the answer brings bytes of the file.
 Result<void> HttpReader::State::checkAnswer(const HttpAnswer& answer) const {
     if (answer.status != 206) return refused(answer);
     if (answer.coding.empty() || answer.coding == "identity") return {};
@@ -152,7 +152,7 @@ Result<HttpAnswer> HttpReader::State::get(const std::string& ranges, uint64_t mo
 }
 
 Result<void> HttpReader::State::checkVersion(const HttpAnswer& answer, uint64_t fileBytes) {
-    // Some servers ignore If-Match.
+    // The answer is compared too, since some servers ignore If-Match.
     if (fileBytes != size || answer.entityTag != entityTag || answer.lastModified != lastModified) return changedNow();
     return {};
 }
@@ -180,8 +180,8 @@ Result<void> HttpReader::State::begin() {
     return readAhead();
 }
 
-/// What else a first view needs and the commit record, in one request where the server puts several ranges into an
-/// answer; else they are read when they are needed.
+/// Reads what else a first view needs and the commit record, in one request where the server puts several ranges into
+/// an answer; else they are read when they are needed.
 Result<void> HttpReader::State::readAhead() {
     const uint64_t headBytes = held[0]->bytes.size();
     const auto rest = restOfFirstView(held[0]->bytes);
@@ -193,7 +193,7 @@ Result<void> HttpReader::State::readAhead() {
     if (!answer && answer.error().code == ErrorCode::Cancelled) return answer.error();
     if (!answer || !checkAnswer(*answer)) return {};
     std::vector<BodyPart> parts = parseBodyParts(answer->body, answer->type);
-    // A server may answer with the first range alone.
+    // A server may answer with only the first range.
     if (const auto only = parts.empty() ? parseContentRange(answer->range) : std::nullopt;
         only && only->range.size() == answer->body.size())
         parts.push_back({only->range, answer->body});
@@ -205,7 +205,7 @@ Result<void> HttpReader::State::readAhead() {
     return {};
 }
 
-/// Behind the first bytes, or apart from them.
+/// Holds a part: appended to the first bytes where it follows them, else apart.
 void HttpReader::State::hold(const BodyPart& part) {
     Stretch stretch{part.range.first, {}};
     if (part.range.first == held[0]->bytes.size()) {

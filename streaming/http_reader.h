@@ -34,9 +34,9 @@ struct HttpOptions {
     double connectSeconds = 10;
     double stallSeconds = 10;  ///< an answer has failed that brings less than the least rate for so long
     uint64_t leastBytesPerSecond = 1024;
-    uint64_t headerBytes = 64 << 10;  ///< of all header lines of an answer and the redirects before it, at most
-    uint64_t firstBytes = 64 << 10;   ///< of the first request
-    /// Ends reads with Cancelled, soon, once it says so; asked in whichever thread reads, as long as the reader lives.
+    uint64_t headerBytes = 64 << 10;  ///< most bytes of all header lines of an answer and the redirects before it
+    uint64_t firstBytes = 64 << 10;   ///< bytes that the first request asks for
+    /// Once it returns true, reads end soon with Cancelled. Reading threads call it, as long as the reader lives.
     std::function<bool()> cancelled = {};
 };
 
@@ -55,15 +55,15 @@ public:
     /// Cancelled after interrupt().
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
     [[nodiscard]] uint64_t size() const override;
-    /// The address as it may be shown.
+    /// The address without user and password, as it may be shown.
     [[nodiscard]] const std::string& name() const override;
 
     /// Ends reads that are under way soon, with Cancelled. Any thread.
     void interrupt() const override;
 
-    /// Address without user and password, size and version of the file: equal for equal bytes.
+    /// The address without user and password, and the file's size and version: equal for equal bytes.
     [[nodiscard]] std::string identity() const;
-    /// Requests sent so far, and bytes of bodies received.
+    /// The number of requests sent so far, and the bytes of bodies received.
     [[nodiscard]] uint64_t requests() const;
     [[nodiscard]] uint64_t bytesReceived() const;
 

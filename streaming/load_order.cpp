@@ -13,9 +13,9 @@ namespace vcp {
 
 namespace {
 
-constexpr int kPlaceBits = 30;  // of RayFeedback::Hit::place
+constexpr int kPlaceBits = 30;  // bits of RayFeedback::Hit::place
 
-// Part of what earlier frames reported that counts beside the newest.
+// The share of what earlier frames reported that counts beside the newest report.
 constexpr double kRemembered = 0.75;
 constexpr double kForgotten = 1e-6;
 
@@ -35,7 +35,7 @@ uint64_t hashOf(uint64_t x) {
     return x ^ x >> 31;
 }
 
-/// The child at a place, or nothing where the surface does not go on there.
+/// Returns the child at a place, or nothing where the surface does not continue there.
 std::optional<uint64_t> childAt(const PageEntry& page, glm::ivec3 place) {
     const int bit = kPlaceBits - 1 - page.level;
     const uint32_t octant =
@@ -64,7 +64,7 @@ LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span
     : dataset_(std::move(dataset)), pageUnits_(pageUnits.size()), parents_(dataset_->pages.size()), order_(order) {
     for (uint64_t page = 0; page < pageUnits.size(); ++page) {
         if (!dataset_->pages.knows(page))
-            page += kEntriesPerBlock - 1 - page % kEntriesPerBlock;  // nor is any other of its block
+            page += kEntriesPerBlock - 1 - page % kEntriesPerBlock;  // no other page of its block is known either
         else if (pageUnits[page] != 0)
             learn(page, pageUnits[page]);
     }
@@ -103,7 +103,7 @@ double LoadPriorities::gainOf(uint64_t page) const {
     return gain != gains_.end() ? gain->second : 0;
 }
 
-/// Of the page itself or what it is part of: half as much for each level below what was passed.
+/// Nearness of the page itself, or of the page that it is part of: half as much for each level below the page passed.
 double LoadPriorities::nearnessOf(uint64_t page) const {
     for (double part = 1;; part /= 2, page = parents_[page]) {
         if (const auto found = nearness_.find(page); found != nearness_.end()) return found->second * part;
@@ -120,7 +120,7 @@ double LoadPriorities::feedbackPriority(uint64_t page, std::span<const Selection
     return inRange(error, kLeast, kPassed);
 }
 
-/// Of the children of `page`, which take so many units.
+/// The priority of the children of `page`, which take `units` units.
 double LoadPriorities::priorityBelow(uint64_t page, std::span<const SelectionView> views, uint64_t units) const {
     const PageEntry& entry = dataset_->pages[page];
     switch (order_) {
@@ -144,14 +144,14 @@ double LoadPriorities::priorityBelow(uint64_t page, std::span<const SelectionVie
 std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing,
                                                 std::span<const SelectionView> views) const {
     if (order_ == LoadOrder::Error) return missing;
-    std::unordered_map<uint64_t, uint64_t> units;  // of missing children
+    std::unordered_map<uint64_t, uint64_t> units;  // for each page, units of its missing children
     for (const WantedPage& wanted : missing) units[parents_[wanted.page]] += pageUnits_[wanted.page];
     std::unordered_map<uint64_t, double> given;
     for (WantedPage& wanted : missing) {
         if (wanted.page == 0) {
             wanted.priority = std::numeric_limits<double>::infinity();
         } else {
-            // No more urgent than its parent, which comes before it in the list where it is missing too.
+            // A page is no more urgent than its parent, which comes before it in the list where it is missing too.
             const uint64_t parent = parents_[wanted.page];
             const auto above = given.find(parent);
             wanted.priority = priorityBelow(parent, views, units[parent]);
@@ -159,7 +159,7 @@ std::vector<WantedPage> LoadPriorities::ordered(std::vector<WantedPage> missing,
         }
         given.emplace(wanted.page, wanted.priority);
     }
-    // Of equals the first in the directory, which has parents before children.
+    // Among equals the directory's order decides, which has parents before children.
     std::sort(missing.begin(), missing.end(), [](const WantedPage& a, const WantedPage& b) {
         return a.priority != b.priority ? a.priority > b.priority : a.page < b.page;
     });

@@ -1,4 +1,4 @@
-// In which order missing pages are read: what the rays ask for first. Pure: no threads, no clock, no GPU.
+// Decides in which order missing pages are read: what the rays ask for first. Pure: no threads, no clock, no GPU.
 //
 // A frame that misses pages traces 24 x 16 of its rays through the page tree (render/passes/feedback.h) and reports
 // what they met. From that follows, for each page that could be refined (its children be drawn in its place):
@@ -28,8 +28,8 @@
 
 namespace vcp {
 
-/// Feedback is the one to use; the others are there to be compared with. All read parents before children and
-/// give the children of one page the same priority: they are drawn together.
+/// Feedback is the order to use; the others are there to be compared with it. All read parents before children and give
+/// the children of one page the same priority: they are drawn together.
 enum class LoadOrder : uint8_t {
     Feedback,
     Error,    ///< largest projected error of the parent first
@@ -38,7 +38,7 @@ enum class LoadOrder : uint8_t {
     Random,   ///< by a hash of the parent's number
 };
 
-/// "feedback", "error", "nearest", "breadth", "random"; nothing for another text.
+/// Parses "feedback", "error", "nearest", "breadth" or "random"; nothing for another text.
 std::optional<LoadOrder> loadOrderNamed(std::string_view name);
 std::string_view nameOf(LoadOrder order);
 
@@ -49,7 +49,7 @@ struct RayFeedback {
     struct Hit {
         uint64_t page = 0;
         glm::ivec3 place{0};
-        uint32_t ray = 0;  ///< of the 24 x 16, row by row
+        uint32_t ray = 0;  ///< number of the ray among the 24 x 16, row by row
     };
     /// A page of the cut that rays went into, and the sum of 1 / (a + eps) over them, in any unit.
     struct Passed {
@@ -62,29 +62,29 @@ struct RayFeedback {
 
 class LoadPriorities {
 public:
-    /// `pageUnits[i]`: what page i takes of the pool; 0 where its entry is not known yet. Only those of known entries
-    /// are read.
+    /// `pageUnits[i]`: the units that page i takes of the pool; 0 where its entry is not known yet. Only those of known
+    /// entries are read.
     LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits, LoadOrder order);
 
     [[nodiscard]] LoadOrder order() const { return order_; }
     void setOrder(LoadOrder order) { order_ = order; }
 
-    /// The page's entry is known now: it takes so many units of the pool.
+    /// Records that the page's entry is known now, and that it takes `units` units of the pool.
     void learn(uint64_t page, uint64_t units);
 
     /// Takes in what the rays of a frame of `view` met; `views` such frames in turn are a round of all views.
     void hear(const RayFeedback& feedback, const SelectionView& view, size_t views = 1);
 
     /// `missing`: wanted pages that are not resident, as choosePages ordered them. Returns them most urgent first;
-    /// priorities are 0.001 to 10^6, the root's is infinite; with LoadOrder::Error, `missing` as it is. Of several
-    /// views the one counts to which a page is most urgent.
+    /// priorities are 0.001 to 10^6, the root's is infinite; with LoadOrder::Error, `missing` as it is. With several
+    /// views, the view to which a page is most urgent counts.
     [[nodiscard]] std::vector<WantedPage> ordered(std::vector<WantedPage> missing,
                                                   std::span<const SelectionView> views) const;
 
-    /// Pixels of error that refining `page` takes off the rays heard of; 0: no ray would have liked that.
+    /// Pixels of error that refining `page` takes off the rays heard of; 0: no ray asked for it.
     [[nodiscard]] double gainOf(uint64_t page) const;
 
-    /// Memory that this takes, near enough.
+    /// Approximate bytes of memory that this object takes.
     [[nodiscard]] uint64_t bytesHeld() const;
 
 private:
@@ -94,9 +94,9 @@ private:
 
     std::shared_ptr<const Dataset> dataset_;
     SparseArray<uint64_t> pageUnits_;
-    SparseArray<uint32_t> parents_;  // the root's is itself
+    SparseArray<uint32_t> parents_;  // the root's parent is itself
     LoadOrder order_;
-    std::unordered_map<uint64_t, double> gains_, nearness_;  // by the page that is refined
+    std::unordered_map<uint64_t, double> gains_, nearness_;  // for each page, by its number, what refining it gains
 };
 
 }  // namespace vcp

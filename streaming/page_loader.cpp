@@ -12,7 +12,7 @@ namespace vcp {
 namespace {
 
 constexpr uint32_t kLongestRun = 64;
-/// Pages are read with a more urgent one where they are at least so urgent, compared with it.
+/// Pages are read together with a more urgent one where their urgency is at least this share of its own.
 constexpr double kRunUrgency = 0.5;
 
 uint64_t sizeOf(const Loaded& loaded) {
@@ -24,7 +24,7 @@ std::string elementOf(Request request) {
     return fmt::format("{} {}", request.isPage() ? "page" : "directory block", request.number);
 }
 
-// Makes this thread, one of so many, less urgent than what started it: by steps of the system's niceness, of which each
+// Makes this thread, one of `threads`, less urgent than what started it, by steps of the system's niceness. Each step
 // takes a fifth of its share of the processor. All together have about the share that two threads have 8 steps down, a
 // third of one thread that draws.
 void giveWay(uint32_t threads) {
@@ -51,7 +51,7 @@ PageLoader::~PageLoader() {
         stop_ = true;
         work_.notify_all();
         ready_.notify_all();
-        // A thread may just be about to read: it is interrupted until it has ended.
+        // A thread may just be about to read, so it is interrupted until it has ended.
         while (working_ > 0) {
             lock.unlock();
             source_->interrupt();
@@ -106,8 +106,8 @@ LoaderStats PageLoader::stats() const {
     return stats_;
 }
 
-/// Reserves memory for the most urgent page and those read with it; nothing where none may begin now. A run of
-/// no pages: one was handed over unread.
+/// Reserves memory for the most urgent page and those read with it; returns nothing where none may begin now. A run of
+/// no pages means that one was handed over unread.
 std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     if (doneBytes_ >= mostDone_) return std::nullopt;
     const auto wish = queue_.next(now);
@@ -139,7 +139,7 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     return run;
 }
 
-/// The source keeps stored pages in what pages on their way leave.
+/// Lets the source keep stored pages in the memory that pages on their way leave free.
 void PageLoader::shareMemory() {
     const uint64_t kept = source_->keepWithin(options_.heldBytes - stats_.heldBytes);
     stats_.heldBytesMax = std::max(stats_.heldBytesMax, stats_.heldBytes + kept);
@@ -182,7 +182,7 @@ void PageLoader::work() {
             finishRun(*run, std::move(pages));
             work_.notify_all();  // memory was given back
         } else {
-            // Woken by new wishes, by collect(), or when a page may be tried again.
+            // New wishes, collect(), or a page that may be tried again wake it.
             const double wait = queue_.nextTry() - now;
             if (wait > 0 && std::isfinite(wait))
                 work_.wait_for(lock, std::chrono::duration<double>(wait));

@@ -1,19 +1,18 @@
-// Background threads that read pages and blocks of the directory, called pages here. They give way to the threads that
-// draw: where these keep the processor busy, as a software device does, a frame takes about as long with loads as
-// without.
-//
-// A page's way: wished for in request(), read and checked by a thread, fetched with collect(). request()
-// replaces all wishes before it, but those that a thread has begun with; so what no view wants any more is
-// not read. What fails is tried again after a while, and given up after a few attempts (request_queue.h);
-// meanwhile the threads read other pages. Pages that lie together and are about as urgent are read together
+// Background threads that read pages. They give way to the threads that draw: where these keep the processor busy, as a
+// software device does, a frame takes about as long with loads as without.
+// A page's way: wished for in request(), read and checked by a thread, fetched with collect(). request() replaces
+// all earlier wishes except those that a thread has begun; so what no view wants any more is not read. A page
+// that fails is tried again after a while, and given up after a few attempts (request_queue.h); meanwhile the
+// threads read other pages. Pages that lie together and are about as urgent are read together where the source
+// says so.
 // where the source says so.
 //
-// No read begins while as many bytes are done as the next collect() would take: what a moving view wants changes before
-// more could be of use, and it would have been read in vain.
+// No read begins while as many bytes are done as the next collect() would take: a moving view changes its wishes before
+// more could be of use, and what was read would be wasted.
 //
-// Memory is reserved before a page is read and given back when it is collected: it never exceeds the limit. What is
-// left of it, the source may keep stored pages in (PageSource::keepWithin). Nothing here waits but waitForPage() and
-// the destructor, which interrupts reads in progress.
+// Memory is reserved before a page is read and given back when it is collected: it never exceeds the limit. The source
+// may keep stored pages in what is left of it (PageSource::keepWithin). Only waitForPage() and the destructor wait; the
+// destructor interrupts reads in progress.
 #pragma once
 
 #include <chrono>
@@ -40,21 +39,21 @@ struct Loaded {
 struct LoaderOptions {
     bool withColour = true;
     uint32_t threads = 2;
-    uint32_t allThreads = 0;  ///< with those of other loaders of the same picture; 0: there are none
+    uint32_t allThreads = 0;  ///< threads of all loaders of the same picture, these included; 0: there are no others
     uint64_t heldBytes =
-        64ull << 20;  ///< of pages being read and not collected yet, and of those that the source keeps
+        64ull << 20;  ///< most bytes of pages being read or not collected yet, and of those that the source keeps
     RetryPolicy retry;
 };
 
 struct LoaderStats {
-    uint64_t bytesRead = 0;     ///< decompressed, of all pages that were read without an error
-    uint64_t pagesRead = 0;     ///< without an error
-    uint64_t failures = 0;      ///< of single attempts
-    uint64_t heldBytes = 0;     ///< of pages being read and not collected yet
-    uint64_t heldBytesMax = 0;  ///< of these and what the source kept
+    uint64_t bytesRead = 0;     ///< decompressed bytes of all pages that were read without an error
+    uint64_t pagesRead = 0;     ///< pages read without an error
+    uint64_t failures = 0;      ///< single attempts that failed
+    uint64_t heldBytes = 0;     ///< bytes of pages being read or not collected yet
+    uint64_t heldBytesMax = 0;  ///< most bytes of these and of what the source kept, at any time
 };
 
-/// All functions but the constructor and destructor may be called from any thread.
+/// Reads pages in threads of its own. All functions but constructor and destructor may be called from any thread.
 class PageLoader {
 public:
     PageLoader(std::shared_ptr<const PageSource> source, const LoaderOptions& options);
@@ -70,11 +69,11 @@ public:
     /// Never waits for a read.
     std::vector<Loaded> collect(uint64_t mostBytes = UINT64_MAX);
 
-    /// Waits until collect() would give something. False: after `timeout`, or nothing is wished for or under
-    /// way.
+    /// Waits until collect() would return something. Returns false after `timeout`, or where nothing is wished for or
+    /// under way.
     bool waitForPage(std::chrono::milliseconds timeout);
 
-    /// Wishes not begun, being read, or not collected.
+    /// The number of wishes not begun, being read, or not collected.
     [[nodiscard]] size_t pending() const;
     [[nodiscard]] LoaderStats stats() const;
 

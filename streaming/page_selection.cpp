@@ -17,7 +17,7 @@ struct Candidate {
     double error;
     uint64_t page;
 
-    /// Largest error first; of equals the first in the directory.
+    /// The largest error comes first; among equals, the first in the directory.
     bool operator<(const Candidate& other) const {
         return error != other.error ? error < other.error : page > other.page;
     }
@@ -49,7 +49,7 @@ namespace {
 // Where a view allows no error, errors are compared as multiples of this.
 constexpr double kLeastErrorPixels = 1e-9;
 
-/// Of pages outside of the view: none.
+/// Returns the page's error in the view; 0 for pages outside of the view.
 double errorInView(const Dataset& dataset, uint64_t page, const SelectionView& view) {
     const PageEntry& entry = dataset.pages[page];
     return inFrustum(dataset, entry, view) ? projectedError(dataset, entry, view) : 0;
@@ -76,7 +76,7 @@ struct ChildrenBytes {
     uint64_t bytes = 0;
     bool areKnown = true;
 };
-/// Of children that are not known: about as large as their parent.
+/// Returns the bytes of a page's children; those that are not known count as about as large as their parent.
 ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<const uint64_t> pageBytes) {
     ChildrenBytes sum;
     for (const uint64_t child : childrenOf(parent)) {
@@ -92,7 +92,7 @@ ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<c
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
                        std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
     PageChoice choice;
-    choice.refined = SparseArray<uint8_t>(dataset.pages.size());  // kNotRefined
+    choice.refined = SparseArray<uint8_t>(dataset.pages.size());  // all are kNotRefined
     if (dataset.pages.empty() || states[0] != kAvailable || pageBytes[0] > budgetBytes) return choice;
     std::priority_queue<Candidate> open;
     uint64_t bytes = pageBytes[0];
@@ -113,7 +113,7 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
             choice.relaxed = more.areKnown;
             break;
         }
-        // Room is kept for children to come: what is less urgent does not take it.
+        // Room is kept for children that are not there yet, so that less urgent pages do not take it.
         bytes += more.bytes;
         if (!more.areKnown) continue;
         choice.refined[next.page] = kRefined;
@@ -133,7 +133,7 @@ DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const
     if (choice.wanted.empty()) return drawable;
     const bool hasRoot = resident[0] != 0;
     if (hasRoot) drawable.errorPixels = 0;
-    // Refined where all children are there; beneath what is drawn, pages are counted only.
+    // A page is refined where all its children are there; pages beneath what is drawn are only counted.
     struct Place {
         uint64_t page;
         bool isCovered;

@@ -30,7 +30,7 @@ namespace vcp {
 struct SelectionView {
     glm::dvec3 eye{0};
     bool orthographic = false;
-    /// Pixels a world unit: at distance 1 (perspective) or anywhere (orthographic).
+    /// Pixels per world unit: at distance 1 (perspective) or anywhere (orthographic).
     double pixelsPerUnit = 1;
     /// Inward planes of the frustum: a point x is outside of a plane where dot(xyz, x - eye) + w < 0.
     std::array<glm::dvec4, 4> planes{};
@@ -54,20 +54,20 @@ enum PageState : uint8_t {
 enum Refinement : uint8_t {
     kNotRefined,
     kRefined,
-    kAwaited,  ///< it would, once they are known
+    kAwaited,  ///< it would be replaced, once its children are known
 };
 
-/// What views want, whatever is resident.
+/// What the views want, whatever is resident.
 struct PageChoice {
     /// The ideal cut and all pages above it, parents before children, most urgent first.
     std::vector<WantedPage> wanted;
-    std::vector<uint64_t> awaited;  ///< pages that would be refined next, were their children known; most urgent first
+    std::vector<uint64_t> awaited;  ///< pages to refine next, once their children are known; most urgent first
     SparseArray<uint8_t> refined;   ///< a Refinement for each page of the dataset
     bool relaxed = false;           ///< the budget kept a page from being refined
 };
 
 /// `pageBytes[i]`: what page i takes of the budget (any unit); 0: its entry is not known yet. `states[i]`: a PageState.
-/// Both have one element a page of the dataset.
+/// Both have one element for each page of the dataset.
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
                        std::span<const uint64_t> pageBytes, std::span<const uint8_t> states);
 
@@ -75,23 +75,23 @@ PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> vi
 struct DrawableCut {
     std::vector<uint64_t> cut;  ///< what can be drawn now, in directory order; empty without the root
     double errorPixels =
-        0;  ///< largest projected error in the cut, of pages in view, from no nearer than a cell; infinite without one
-    uint64_t pagesWanted = 0, pagesMissing = 0;  ///< of the choice, that this view needs; of these, not resident
-    bool complete = false;                       ///< none is missing; also where nothing can be drawn
+        0;  ///< largest projected error of pages in view, seen from no nearer than a cell; infinite without a cut
+    uint64_t pagesWanted = 0, pagesMissing = 0;  ///< pages of the choice that this view needs; of these, not resident
+    bool complete = false;                       ///< no page is missing; also where nothing can be drawn
     bool isRelaxed = false;                      ///< the budget kept a page of this view from being refined
 };
 
-/// `view`: one of those of the choice. `resident[i]`: page i may be drawn.
+/// `view` is one of the views of the choice. `resident[i]`: page i may be drawn.
 DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice,
                         std::span<const uint8_t> resident);
 
-/// Both in one: the answer for a view and what is resident.
+/// Choice and cut in one, for a single view and what is resident.
 struct Selection : PageChoice, DrawableCut {};
 Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,
                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
                       std::span<const uint8_t> states);
 
-/// Certified error of a page in pixels, at the point of its box nearest to the eye; infinite where the eye
+/// Returns the certified error of a page in pixels, at the point of its box nearest to the eye; infinite where the eye
 /// is inside of the box.
 double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
 

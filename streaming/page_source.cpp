@@ -7,14 +7,14 @@ namespace vcp {
 
 namespace {
 
-// Pages stand on 256 bytes; a gap of this size, such as colour that nobody wants, is read and thrown away.
+// Pages stand on 256 bytes; a gap of this size, such as colour that is not wanted, is read and thrown away.
 constexpr uint64_t kLargestGap = 4096;
 
 struct Extent {
     uint64_t begin = 0, end = 0;
 };
 
-/// Where a page's stored bytes are; geometry and colour follow each other.
+/// Returns where a page's stored bytes are; geometry and colour follow each other.
 Extent extentOf(const PageEntry& page, bool withColour) {
     const bool colour = withColour && page.colourStoredBytes != 0;
     return {page.offset, colour ? page.colourOffset + page.colourStoredBytes : page.offset + page.storedBytes};
@@ -85,7 +85,7 @@ std::vector<Result<PageBytes>> FilePageSource::readPages(uint64_t first, uint32_
     std::vector<StoredPages::Bytes> kept;
     for (uint64_t page = first; page < first + count; ++page) kept.push_back(kept_.find(page));
     const auto extent = [&](uint32_t i) { return extentOf(dataset_->pages[first + i], withColour); };
-    // From the first page that is not kept to the last, in one read.
+    // One read covers all from the first page that is not kept to the last.
     uint32_t from = 0, to = count;
     while (from < to && kept[from]) ++from;
     while (to > from && kept[to - 1]) --to;

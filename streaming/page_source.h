@@ -1,4 +1,4 @@
-// Where pages come from: a file, a server, a test.
+// Where pages come from: a file, a server or a test.
 #pragma once
 
 #include <cstdint>
@@ -32,15 +32,15 @@ public:
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
-    /// The file that the pages are of, for errors; empty where there is none.
+    /// The name of the pages' file, for errors; empty where there is none.
     [[nodiscard]] virtual std::string name() const { return {}; }
 };
 
-/// Pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none unless it may (keepWithin).
+/// Reads the pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none but by keepWithin().
 class FilePageSource final : public PageSource {
 public:
-    /// `runBytes`: pages that lie together are read together up to so many stored bytes. Worth it where a
-    /// read takes long however short it is; 0: one page at a time.
+    /// `runBytes`: pages that lie together are read together up to so many stored bytes. This helps where a read takes
+    /// long however short it is; 0: one page at a time.
     FilePageSource(std::shared_ptr<const ByteReader> reader, std::shared_ptr<const Dataset> dataset,
                    uint64_t runBytes = 0)
         : reader_(std::move(reader)), dataset_(std::move(dataset)), runBytes_(runBytes) {}

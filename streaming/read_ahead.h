@@ -10,7 +10,7 @@
 
 namespace vcp {
 
-/// One thread at a time.
+/// Used by one thread at a time.
 class ReadAhead final : public ByteReader {
 public:
     explicit ReadAhead(std::shared_ptr<const ByteReader> reader, uint64_t pieceBytes = 4 << 20)

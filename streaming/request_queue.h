@@ -1,10 +1,10 @@
-// Which page, or block of the directory, is read next. Pure: no threads, and time is what the caller says.
+// Decides which page is read next. Pure: no threads, and the caller says what time it is.
 //
 // The way of both: wished for (replace), begun (begin) as soon as it is the most urgent one, then
 //   delivered    it is not begun again until a new list wishes for it
 //   failed       it waits, longer after each failure, and is begun again while it is wished for; after a few
 //                failures it is given up: reported once, and never begun again
-// What waits holds nobody up: the next most urgent one is begun in its place.
+// A page that waits does not delay others: the next most urgent one is begun in its place.
 #pragma once
 
 #include <cstdint>
@@ -21,13 +21,13 @@ namespace vcp {
 
 /// When what failed is read again.
 struct RetryPolicy {
-    uint32_t attempts = 8;         ///< of a read that fails
-    uint32_t damagedAttempts = 4;  ///< of these, where bytes came and were wrong
+    uint32_t attempts = 8;         ///< most attempts of a read that fails
+    uint32_t damagedAttempts = 4;  ///< most of these attempts where bytes came and were wrong
     double firstDelaySeconds = 0.05;
     double growth = 2;
     double longestDelaySeconds = 0.5;
 
-    /// Seconds to wait after so many failures, `damaged` of them by wrong bytes; nothing: it is given up.
+    /// Returns the seconds to wait after so many failures, `damaged` of them by wrong bytes; nothing: it is given up.
     [[nodiscard]] std::optional<double> delayAfter(uint32_t failures, uint32_t damaged) const;
 };
 

@@ -12,31 +12,31 @@ namespace vcp {
 
 namespace {
 
-// Wishes for what comes later are less urgent than any for what is in view.
+// Wishes for what a view wants later are less urgent than any for what is in view.
 constexpr double kAheadUrgency = 1e-9;
-// Of blocks of the directory: nothing but the coarsest page comes before.
+// The urgency of blocks of the directory: only the coarsest page comes before them.
 constexpr double kBlockUrgency = std::numeric_limits<double>::max();
-// Moving pages aside costs a frame its time: so many times a page's units are moved for it before what nobody wants
-// goes.
+// Moving pages aside costs a frame its time: at most so many times a page's units are moved for it, before pages that
+// no view wants are evicted.
 constexpr uint64_t kCheapMoves = 2;
-// Motion is continued for no more steps than this.
+// Motion is continued for at most so many steps.
 constexpr double kMostAhead = 20;
 
-/// The page that chunks leave room for: of so many bytes at least, so that what fits does not depend on which pages are
-/// known so far; where chunks are small, the largest known.
+/// The units of the page that each chunk leaves room for: a fixed least size, so that what fits does not depend on
+/// which pages are known so far; where chunks are small, the largest known page.
 uint64_t largestPlanned(uint64_t largestKnown, uint64_t unitsPerChunk) {
     constexpr uint64_t kLeastBytes = 32 << 20;
     return std::max(largestKnown, std::min(kLeastBytes / kPoolUnitBytes, unitsPerChunk / 32));
 }
 
-/// What first fit may leave unused: in every chunk less than the largest page needs. One chunk can be
+/// The units that first fit may leave unused: in every chunk, less than the largest page needs. A single chunk can be
 /// gathered whole.
 uint64_t unusableUnits(PoolShape pool, uint64_t largestKnown) {
     const uint64_t chunks = (pool.units + pool.unitsPerChunk - 1) / pool.unitsPerChunk;
     return chunks > 1 ? chunks * (largestPlanned(largestKnown, pool.unitsPerChunk) - 1) : 0;
 }
 
-/// Where a view that went from `before` to `view` in so many seconds will be.
+/// Returns where a view that went from `before` to `view` in so many seconds will be.
 std::optional<SelectionView> aheadOf(const SelectionView& view, const SelectionView& before, double seconds) {
     if (view.orthographic != before.orthographic || seconds <= 0) return std::nullopt;
     const double times = std::min(kAheadSeconds / seconds, kMostAhead);
@@ -48,7 +48,7 @@ std::optional<SelectionView> aheadOf(const SelectionView& view, const SelectionV
 
 bool isWhole(const Dataset& dataset) { return dataset.pages.blocksKnown() == dataset.pages.blocks(); }
 
-/// Nothing but zeros where the directory comes in parts: look() learns what there is.
+/// Returns the units of each page; only zeros where the directory comes in parts, as look() learns them later.
 SparseArray<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
     SparseArray<uint64_t> units(dataset.pages.size());
     if (isWhole(dataset))
@@ -105,7 +105,7 @@ ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool wi
     planFor(pool);
 }
 
-/// Takes over what is known of the directory since the last time.
+/// Takes over what became known of the directory since the last call.
 void ResidencyPolicy::learnBlocks() {
     const PageDirectory& pages = dataset_->pages;
     if (blocksSeen_.empty() || blocksKnown_ == pages.blocksKnown()) return;
@@ -124,7 +124,7 @@ void ResidencyPolicy::learnBlocks() {
     }
     stale_ = true;
     planFor(pool_);
-    // A page too large for a pool of several parts is refused; the coarsest has its place.
+    // A page too large for a pool of several parts is refused, but the coarsest page always has its place.
     if (pool_.units > 0) planned_ = std::max(planned_, pageUnits_[0]);
 }
 
@@ -150,7 +150,7 @@ void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber
     Motion next{view, seconds, std::nullopt, known == motions_.end() || known->second.view != view};
     if (next.moves && known != motions_.end())
         next.later = aheadOf(view, known->second.view, seconds - known->second.seconds);
-    // A view that stands still looks at nothing ahead.
+    // A view that stands still plans nothing ahead.
     stale_ = stale_ || next.moves || known->second.moves;
     if (next.moves || emptied_) stillSince_ = round_;
     emptied_ = false;
@@ -215,16 +215,16 @@ void ResidencyPolicy::evict(uint64_t page) {
     ++counts_.evictions;
 }
 
-/// Moves pages down until `units` free ones are on end: few units, or as few as possible. False: no chunk has so many,
-/// or it takes more than `most` units.
+/// Moves pages down until `units` free ones are contiguous; moves few units, or as few as possible. Returns false where
+/// no chunk has so many free, or where it takes more than `most` units.
 bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves) {
     struct Window {
-        uint64_t begin = 0, end = 0, cost = UINT64_MAX;  // units
+        uint64_t begin = 0, end = 0, cost = UINT64_MAX;  // in units
     } best;
     const uint64_t perChunk = allocator_.unitsPerChunk();
     for (uint64_t chunk = 0; chunk < allocator_.units(); chunk += perChunk) {
         const uint64_t chunkEnd = std::min(chunk + perChunk, allocator_.units());
-        // Slots of the chunk and the gap before each; the last entry is the gap at the end.
+        // The slots of the chunk and the gap before each; the last entry is the gap at the end.
         std::vector<PoolSlot> gaps;
         uint64_t at = chunk;
         for (auto slot = pageAt_.lower_bound(chunk); slot != pageAt_.end() && slot->first < chunkEnd; ++slot) {
@@ -268,7 +268,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     const uint64_t units = pageUnits_[page];
     const Rank rank = rankOf(page);
     placement.slot = allocator_.allocate(units);
-    // What nobody wants any more takes no work.
+    // Evicting pages that no view wants any more takes no work.
     while (!placement.slot && rank != Rank::Stale) {
         const bool isEnough = allocator_.unitsFree() >= units;
         const bool hasRoom = (isEnough && gather(units, kCheapMoves * units, placement.moves)) || evictOne(rank) ||
@@ -293,7 +293,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     return placement;
 }
 
-/// Units that are free or hold pages that may go.
+/// The units that are free or hold pages that may go for one of that rank.
 uint64_t ResidencyPolicy::unitsWithin(Rank forRank) const {
     uint64_t units = allocator_.unitsFree();
     for (const auto& [page, resident] : slots_)
@@ -313,7 +313,7 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     std::copy_if(choice_.wanted.begin(), choice_.wanted.end(), std::back_inserter(missing),
                  [&](const WantedPage& wanted) { return !isResident(wanted.page); });
     outcome.missing = missing.size() + choice_.awaited.size();
-    // Wishes in order of urgency, as long as there is room for them.
+    // Pages are wished for in order of urgency, as long as there is room for them.
     uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
     bool full = false;
     std::set<uint64_t> blocks;
@@ -331,7 +331,7 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
         if (isResident(wanted.page) || rankOf(wanted.page) != Rank::Ahead) continue;
         reserved += pageUnits_[wanted.page];
         if (reserved > room) break;
-        // Parents, which come before, are no less urgent.
+        // Parents, which come before their children, are no less urgent.
         urgency = std::min(urgency, wanted.priority);
         outcome.wishes.push_back({wanted.page, urgency * kAheadUrgency});
     }
@@ -339,7 +339,7 @@ PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     return outcome;
 }
 
-/// Those that hold children of the pages that wait for them, but `blocks`, which have been wished for.
+/// Wishes for the blocks that hold children of the awaited pages, but those in `blocks`: they are wished for already.
 void ResidencyPolicy::wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
                                     std::vector<Wish>& wishes) const {
     uint64_t last = UINT64_MAX;
@@ -370,7 +370,7 @@ bool ResidencyPolicy::giveUp(Request request) {
 }
 
 uint64_t ResidencyPolicy::bytesHeld() const {
-    constexpr uint64_t kNode = 4 * sizeof(void*);  // of a map, beside its value
+    constexpr uint64_t kNode = 4 * sizeof(void*);  // a node of a map, beside its value
     const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
     uint64_t bytes = pageUnits_.bytes() + resident_.bytes() + states_.bytes() + blocksSeen_.bytes() +
                      loadedIn_.bytes() + bytesOf(views_) + bytesOf(ahead_.wanted) + ahead_.refined.bytes() +
@@ -388,7 +388,7 @@ void ResidencyPolicy::restore(Request request) {
 
 void ResidencyPolicy::clear() {
     while (!slots_.empty()) evict(slots_.begin()->first);
-    emptied_ = true;  // what was lost may come again
+    emptied_ = true;  // pages that were lost may come again
 }
 
 }  // namespace vcp

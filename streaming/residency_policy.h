@@ -1,4 +1,4 @@
-// Which pages of a dataset are in the pool, where, and which are wished for. Pure: no threads, no clock, no
+// Decides which pages of a dataset are in the pool, where, and which are wished for. Pure: no threads, no clock, no
 // GPU; a round's outcome depends on the views, the pages that were placed, the time it is told, and nothing else.
 //
 // A round, one for each update of a view:
@@ -19,11 +19,10 @@
 // - Parents before children; children are evicted before parents; what a view wants is not evicted, so
 //   still views load no page twice. The coarsest page is wanted by all views.
 // - Hysteresis: while a view moves, a page that came less than kSettlingSeconds ago is not evicted
-//   for another, and what would need its place is not wished for.
+//   for another, and pages that would need its place are not wished for.
 // - Where the directory comes in parts, views wish for the blocks that they must know, before all pages but the
-// coarsest.
-//   What has come counts from the next look() on. A view whose pages may have children that are not known has not
-//   settled.
+//   coarsest. What has come counts from the next look() on. A view whose pages may have children that are not
+//   known has not settled.
 // - While a view moves, what it would want a little later (its motion continued for kAheadSeconds) is
 //   wished for last, and only into places that are free or hold what no view wants.
 #pragma once
@@ -48,7 +47,7 @@ namespace vcp {
 inline constexpr double kSettlingSeconds = 0.5;
 inline constexpr double kAheadSeconds = 0.2;
 
-/// A view among those that share a pool.
+/// Identifies a view among those that share a pool.
 using ViewNumber = uint32_t;
 
 /// A pool of slots of kPoolUnitBytes, in chunks that no slot crosses.
@@ -56,30 +55,30 @@ struct PoolShape {
     uint64_t units = 0, unitsPerChunk = 0;
 };
 
-/// The largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only part of
-/// its directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
+/// Returns the largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only
+/// part of its directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
 PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes);
 
 inline constexpr uint64_t kMostGrowth = 8;
 
-/// Units of a page: its geometry and, where asked for, its colour behind it, in one slot.
+/// Returns the units of a page: its geometry and, where asked for, its colour behind it, in one slot.
 uint64_t pageUnits(const PageEntry& page, bool withColour);
 
 struct PageMove {
     uint64_t page = 0;
-    PoolSlot from, to;  ///< of one chunk; may overlap; `to` is the lower one
+    PoolSlot from, to;  ///< both in one chunk; they may overlap; `to` is the lower one
 };
 
 struct Placement {
-    std::vector<PageMove> moves;   ///< to be carried out in this order, also where there is no slot
-    std::optional<PoolSlot> slot;  ///< nothing: there is no place for it now, or it is there already
+    std::vector<PageMove> moves;   ///< to be carried out in this order, even where there is no slot
+    std::optional<PoolSlot> slot;  ///< nothing: there is no place for the page now, or it has a place already
 };
 
 struct PolicyCounts {
     uint64_t loads = 0, evictions = 0, moves = 0;
     uint64_t unitsLoaded = 0, unitsMoved = 0;
     uint64_t refused = 0;  ///< pages that were read and had no place
-    uint64_t reloads = 0;  ///< pages placed twice in one still view: must stay 0
+    uint64_t reloads = 0;  ///< pages placed twice while the view stood still: must stay 0
 };
 
 struct PolicyOutcome {
@@ -90,23 +89,23 @@ struct PolicyOutcome {
 
 class ResidencyPolicy {
 public:
-    /// `pool` from poolShapeFor. `order` decides what is read first, and nothing else.
+    /// `pool` is made by poolShapeFor. `order` decides what is read first, and nothing else.
     ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
                     LoadOrder order = LoadOrder::Feedback);
 
-    /// Whether the coarsest page fits.
+    /// Whether the coarsest page fits into the pool.
     [[nodiscard]] bool hasRoom() const { return !pageUnits_.empty() && pageUnits_[0] <= planned_; }
 
-    /// `seconds`: the time, on any clock; never less than before.
+    /// Says what a view sees. `seconds`: the time on any clock; never less than before.
     void look(const SelectionView& view, double seconds, ViewNumber number = 0);
-    /// The view is gone.
+    /// Forgets a view that is gone.
     void forgetView(ViewNumber number);
-    /// What the rays of a frame of `view` met: its wishes come first.
+    /// Takes in what the rays of a frame of `view` met: the pages they ask for are wished for first.
     void hear(const RayFeedback& feedback, const SelectionView& view) {
         priorities_.hear(feedback, view, views_.size());
     }
     Placement place(uint64_t page);
-    /// Precondition: hasLooked(number).
+    /// Returns what the view can draw and what to read. Precondition: hasLooked(number).
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
     [[nodiscard]] DrawableCut drawable(ViewNumber number) const;
 
@@ -117,19 +116,19 @@ public:
     void restore(Request request);
     /// Forgets all pages: the pool's content was lost.
     void clear();
-    /// Another pool, empty; from the next look() on, views want what fits into it. Forgets all pages, but not which
-    /// cannot be read.
+    /// Sets another pool, which is empty; from the next look() on, views want what fits into it. Forgets all pages, but
+    /// not which of them cannot be read.
     void setPool(PoolShape pool);
     [[nodiscard]] bool hasLooked(ViewNumber number = 0) const { return motions_.contains(number); }
     /// Whether a view moved when it was last looked at.
     [[nodiscard]] bool isMoving() const { return moving_; }
-    /// Counts up with all that can change a cut or a page's place.
+    /// A counter that grows with each change that can affect a cut or a page's place.
     [[nodiscard]] uint64_t version() const { return version_; }
-    /// Memory that this takes at most, near enough: bounded by the dataset, whatever the number of rounds.
+    /// Approximate bytes of memory that this takes at most: bounded by the dataset, whatever the number of rounds.
     [[nodiscard]] uint64_t bytesHeld() const;
 
     [[nodiscard]] bool isResident(uint64_t page) const { return resident_[page] != 0; }
-    /// Precondition: isResident(page).
+    /// Returns a page's slot. Precondition: isResident(page).
     [[nodiscard]] PoolSlot slotOf(uint64_t page) const { return slots_.at(page).slot; }
     [[nodiscard]] uint64_t unitsTaken() const { return allocator_.unitsTaken(); }
     [[nodiscard]] size_t pagesResident() const { return slots_.size(); }
@@ -144,27 +143,27 @@ private:
     enum class Rank : uint8_t { Stale, Ahead, Wanted };
     struct Resident {
         PoolSlot slot;
-        uint64_t lastWanted = 0;  // round
-        double loaded = 0;        // seconds
+        uint64_t lastWanted = 0;  // a round's number
+        double loaded = 0;        // in seconds
     };
     struct Evictable {
         Rank rank;
         uint64_t lastWanted, page;
 
-        /// Goes later: first the least wanted, then what was wanted longest ago; deeper levels come later in the
-        /// directory.
+        /// Orders by what goes later: the least wanted goes first, then what was wanted longest ago; deeper levels come
+        /// later in the directory.
         bool operator<(const Evictable& other) const {
             return std::tuple(other.rank, other.lastWanted, page) < std::tuple(rank, lastWanted, other.page);
         }
     };
     struct Motion {
         SelectionView view;
-        double seconds = 0;                  // of the last look
-        std::optional<SelectionView> later;  // where it will be, while it moves
+        double seconds = 0;                  // time of the last look
+        std::optional<SelectionView> later;  // where the view will be, while it moves
         bool moves = false;
     };
     [[nodiscard]] Rank rankOf(uint64_t page) const { return ranks_[page]; }
-    /// Whether a page may go for one of rank `forRank`.
+    /// Whether a page may go to make room for one of rank `forRank`.
     [[nodiscard]] bool mayEvict(uint64_t page, const Resident& resident, Rank forRank) const;
     bool evictOne(Rank forRank);
     void evict(uint64_t page);
@@ -179,25 +178,25 @@ private:
 
     std::shared_ptr<const Dataset> dataset_;
     SlotAllocator allocator_;
-    SparseArray<uint64_t> pageUnits_;  // 0: its entry is not known yet
-    uint64_t largestUnits_ = 1;        // of pageUnits_
+    SparseArray<uint64_t> pageUnits_;  // 0: the page's entry is not known yet
+    uint64_t largestUnits_ = 1;        // largest of pageUnits_
     bool withColour_ = false;
     LoadPriorities priorities_;
     PoolShape pool_;
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
-    std::map<uint64_t, uint64_t> pageAt_;                      // by the slot's first unit
-    std::optional<std::priority_queue<Evictable>> evictable_;  // of this round, once one had to go; some may have gone
+    std::map<uint64_t, uint64_t> pageAt_;                      // by the first unit of its slot
+    std::optional<std::priority_queue<Evictable>> evictable_;  // made once a page had to go; some may be gone
     SparseArray<uint8_t> resident_;
-    SparseArray<uint8_t> states_;      // PageState
-    SparseArray<uint8_t> blocksSeen_;  // of the directory; empty: all
-    uint64_t blocksKnown_ = 0;         // of these, seen
-    SparseArray<uint64_t> loadedIn_;   // the still view that a page was last placed in: its stillSince_
+    SparseArray<uint8_t> states_;      // a PageState for each page
+    SparseArray<uint8_t> blocksSeen_;  // for each block of the directory; empty: all are seen
+    uint64_t blocksKnown_ = 0;         // the blocks that were seen
+    SparseArray<uint64_t> loadedIn_;   // for each page, stillSince_ of the still view in which it was last placed
 
     std::map<ViewNumber, Motion> motions_;
-    std::vector<SelectionView> views_;  // of motions_
+    std::vector<SelectionView> views_;  // the views of motions_
     PageChoice choice_;
-    PageChoice ahead_;  // of where views will be, while they move
+    PageChoice ahead_;  // what views will want where they are going, while they move
     SparseArray<Rank> ranks_;
     bool moving_ = false, stale_ = true, emptied_ = false;
     double seconds_ = 0;

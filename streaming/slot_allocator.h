@@ -1,4 +1,4 @@
-// Where pages go in a pool: runs of units, first fit. Pure bookkeeping.
+// Decides where pages go in a pool: runs of units, first fit. Pure bookkeeping.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +21,14 @@ struct PoolSlot {
 
 class SlotAllocator {
 public:
-    /// `units` in all; a slot never crosses a multiple of `unitsPerChunk`.
+    /// The pool has `units` in all; a slot never crosses a multiple of `unitsPerChunk`.
     SlotAllocator(uint64_t units, uint64_t unitsPerChunk);
 
-    /// The lowest run of `units` free ones, or nothing. Precondition: units > 0.
+    /// Takes the lowest run of `units` free ones, or returns nothing. Precondition: units > 0.
     std::optional<PoolSlot> allocate(uint64_t units);
-    /// Precondition: all of it is free and in one chunk.
+    /// Takes a given slot. Precondition: all of it is free and in one chunk.
     void take(PoolSlot slot);
-    /// Precondition: all of it is taken.
+    /// Frees a slot. Precondition: all of it is taken.
     void release(PoolSlot slot);
 
     [[nodiscard]] uint64_t units() const { return taken_.size(); }

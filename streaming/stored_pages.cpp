@@ -4,7 +4,7 @@
 
 namespace vcp {
 
-/// Allocations, list and map of one page besides its bytes.
+/// Bytes that one page takes besides its own: allocations, list and map.
 constexpr uint64_t kEntryBytes = 192;
 
 uint64_t StoredPages::costOf(const Entry& entry) { return entry.bytes->size() + kEntryBytes; }

@@ -1,5 +1,5 @@
-// Pages as their file stores them, kept in memory to be read again: a view under a small budget gives pages up and
-// wants them back.
+// Keeps pages in memory as their file stores them, to be read again: a view under a small budget evicts pages that it
+// soon wants back.
 #pragma once
 
 #include <cstddef>
@@ -12,16 +12,16 @@
 
 namespace vcp {
 
-/// What was used longest ago goes first. Any thread.
+/// A cache of stored pages; those used longest ago go first. Any thread.
 class StoredPages {
 public:
     using Bytes = std::shared_ptr<const std::vector<std::byte>>;
 
-    /// No more than `bytes` from now on, what each page takes besides included. Returns how many there are.
+    /// Keeps at most `bytes` from now on, bookkeeping included. Returns how many bytes there are.
     uint64_t limitTo(uint64_t bytes);
-    /// Nothing where it is not kept.
+    /// Returns a page's bytes, or nothing where it is not kept.
     [[nodiscard]] Bytes find(uint64_t page);
-    /// Nothing happens where it is kept already, or larger than the limit.
+    /// Keeps a page. Nothing happens where it is kept already or is larger than the limit.
     void keep(uint64_t page, std::vector<std::byte> bytes);
 
 private:
@@ -33,7 +33,7 @@ private:
     void trim();
 
     std::mutex mutex_;
-    std::list<Entry> entries_;  // used last first
+    std::list<Entry> entries_;  // the last used comes first
     std::unordered_map<uint64_t, std::list<Entry>::iterator> places_;
     uint64_t bytes_ = 0, limit_ = 0;
 };

@@ -19,11 +19,11 @@ bool startsWith(std::string_view text, std::string_view start) {
            });
 }
 
-/// Where user and password are in what follows "://": their end is the "@". Nothing without.
+/// Returns where user and password end in what follows "://": the position of their "@". Nothing where there are none.
 std::optional<size_t> endOfUser(std::string_view rest) {
     const std::string_view authority = rest.substr(0, rest.find_first_of("/?#"));
     if (const size_t at = authority.rfind('@'); at != std::string_view::npos) return at;
-    // What stands for a port and is none may be the beginning of a password with a slash in it.
+    // What stands in the place of a port but is none may begin a password with a slash in it.
     const size_t colon = authority.rfind(':');
     if (colon == std::string_view::npos || authority.starts_with('[')) return std::nullopt;
     const std::string_view port = authority.substr(colon + 1);
@@ -33,7 +33,7 @@ std::optional<size_t> endOfUser(std::string_view rest) {
     return at == std::string_view::npos ? std::nullopt : std::optional(at);
 }
 
-/// `stand`: what takes the place of user, password and "@".
+/// `stand`: the text that replaces user, password and "@".
 std::string withUserReplaced(std::string_view text, std::string_view stand) {
     std::string shown;
     while (!text.empty()) {

@@ -1,4 +1,4 @@
-// Addresses on the web: their user and password are for the server alone, and are shown and kept nowhere.
+// Addresses on the web: their user and password are sent to the server alone, and are shown and kept nowhere.
 #pragma once
 
 #include <optional>
@@ -10,16 +10,16 @@ namespace vcp {
 /// Whether this is an http:// or https:// address.
 bool isHttpUrl(std::string_view text);
 
-/// The text with "***" for the user and password of each http(s) address in it: "https://***@host/x". Any text may be
-/// given, also what is no valid address.
+/// Replaces the user and password of each http(s) address in a text by "***": "https://***@host/x". The text need not
+/// contain a valid address.
 std::string shownAddress(std::string_view text);
 
-/// An address without its user and password; anything else as it is.
+/// Returns an address without its user and password; any other text as it is.
 std::string addressWithoutUser(std::string_view address);
 
-/// What a request is sent to.
+/// The target of a request.
 struct WebAddress {
-    std::string url;     ///< without user and password
+    std::string url;     ///< the address without user and password
     std::string origin;  ///< scheme, host and port
     std::string user, password;
     bool hasUser = false;
@@ -27,11 +27,11 @@ struct WebAddress {
     [[nodiscard]] bool isSecure() const { return origin.starts_with("https:"); }
 };
 
-/// Nothing where it is no http(s) address.
+/// Parses an address. Returns nothing where it is no http(s) address.
 std::optional<WebAddress> parseAddress(const std::string& text);
 
-/// Where a Location header leads from `from`: with the user and password of `from` where the origin is the same.
-/// Nothing where that is no http(s) address.
+/// Returns where a Location header leads from `from`: with the user and password of `from` where the origin is the
+/// same. Nothing where that is no http(s) address.
 std::optional<WebAddress> redirected(const WebAddress& from, const std::string& location);
 
 }  // namespace vcp

@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint64_t kMostBytes = 256ull << 20;
 
-/// Where a ray is within a box, if anywhere.
+/// The stretch of a ray within a box, if any.
 struct Stretch {
     double enter, leave;
 };
@@ -36,7 +36,7 @@ struct PageOnRay {
     double enter;
 };
 
-/// Reads what part of the directory a page's children need.
+/// Reads the part of the directory that a page's children need.
 Result<void> learnChildren(const ByteReader& reader, const Dataset& dataset, const PageEntry& page) {
     for (const uint64_t child : childrenOf(page)) {
         if (dataset.pages.knows(child)) continue;
@@ -47,7 +47,7 @@ Result<void> learnChildren(const ByteReader& reader, const Dataset& dataset, con
     return {};
 }
 
-/// The finest pages whose boxes, a little widened, the ray touches, nearest first.
+/// Returns the finest pages whose boxes, a little widened, the ray touches, nearest first.
 Result<std::vector<PageOnRay>> finestPagesOn(const ByteReader& reader, const Dataset& dataset, const Ray& ray) {
     std::vector<PageOnRay> found;
     std::vector<uint64_t> open{0};
@@ -66,7 +66,7 @@ Result<std::vector<PageOnRay>> finestPagesOn(const ByteReader& reader, const Dat
     return found;
 }
 
-/// Shortens a ray to what a plane keeps of it.
+/// Shortens a ray to the part that a plane keeps.
 void clip(Ray& ray, const SectionPlane& plane) {
     const double start = glm::dot(plane.normal, ray.origin) - plane.offset,
                  slope = glm::dot(plane.normal, ray.direction);
@@ -101,7 +101,7 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
 Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections) {
     std::optional<SceneHit> nearest;
     for (Part& part : parts_) {
-        // Of all together no more than one alone may keep, beside those that are cast into now.
+        // All picks together keep no more than one alone may, beside the pages that are cast into now.
         uint64_t kept = 0;
         for (const Part& each : parts_) kept += each.pick.bytesKept();
         if (kept > kMostBytes)

@@ -1,5 +1,5 @@
-// Picking on the finest level, whatever the picture shows: the pages along one ray are read, nearest first, and cast
-// in double precision (octree/reference_caster.h). Pages are kept for the next pick, up to 256 MiB.
+// Picks on the finest level, whatever the picture shows: the pages along one ray are read, nearest first, and cast in
+// double precision (octree/reference_caster.h). Pages are kept for the next pick, up to 256 MiB.
 #pragma once
 
 #include <memory>
@@ -19,11 +19,11 @@ public:
     FinestPick(std::shared_ptr<const ByteReader> reader, const Dataset& dataset)
         : reader_(std::move(reader)), pages_(reader_, dataset) {}
 
-    /// The first hit on what the section planes keep; nothing where the ray hits nothing. Reads from the file or
-    /// server, so it may take long. One thread at a time. Errors: those of readPage.
+    /// Returns the first hit on what the section planes keep; nothing where the ray hits nothing. Reads from the file
+    /// or server, so it may take long. One thread at a time. Errors: those of readPage.
     Result<std::optional<RayHit>> cast(Ray ray, std::span<const SectionPlane> sections = {});
     [[nodiscard]] uint64_t bytesKept() const { return pages_.bytes(); }
-    /// Ends a cast that reads from a server soon, with Cancelled. Any thread.
+    /// Makes a cast that reads from a server end soon, with Cancelled. Any thread.
     void interrupt() const { reader_->interrupt(); }
     void forget() { pages_ = PageCache(reader_, pages_.dataset()); }
 
@@ -36,14 +36,14 @@ struct SceneHit : RayHit {
     size_t dataset = 0;  ///< number of the dataset, in the order of add()
 };
 
-/// The same over several datasets, each where it is placed; the nearest hit, in the world.
+/// Picks in several datasets, each where it is placed; the nearest hit, in the world.
 class ScenePick {
 public:
     void add(std::shared_ptr<const ByteReader> reader, const Dataset& dataset, const Similarity& placement) {
         parts_.push_back({FinestPick(std::move(reader), dataset), placement});
     }
     Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {});
-    /// As that of each. The read that is under way ends; another may follow.
+    /// Interrupts the pick of each dataset. The read that is under way ends; another may follow.
     void interrupt() const {
         for (const Part& part : parts_) part.pick.interrupt();
     }

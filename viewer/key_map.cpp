@@ -43,7 +43,7 @@ constexpr KeyHelp kKeyMap[] = {
     {"Ctrl+Q", "quit"},
 };
 
-/// Camera axes, as Viewer::fly(); 0: nowhere.
+/// Returns the direction in camera axes, as for Viewer::fly(); 0 for other keys.
 glm::dvec3 flyDirectionOf(uint32_t key) {
     switch (key) {
         case 'W':

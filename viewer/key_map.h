@@ -1,5 +1,5 @@
-// What keys do, and what keys and the mouse do in the window, for people: F1, `vcp help view` and docs/window.md show
-// this table, and a test holds the last of them to it.
+// The keys and what they do, and what keys and mouse do in the window, as text: F1, `vcp help view` and docs/window.md
+// show this table, and a test compares docs/window.md with it.
 #pragma once
 
 #include <cstdint>
@@ -18,14 +18,14 @@ struct KeyHelp {
 
 std::span<const KeyHelp> keyMap();
 
-/// What a key does to the view: the character on it in capitals. Keys of the window itself (measuring, panels) have
-/// none.
+/// Returns what a key does to the view. `key`: the character on it in capitals. Keys of the window itself (measuring,
+/// panels) have no action.
 std::optional<ViewerAction> actionOf(uint32_t key);
-/// The keys that fly, W A S D E Q, held together: `held` is which way they go (Viewer::fly). False: the key is none of
-/// them.
+/// Handles the keys that fly, W A S D E Q, which may be held together: `held` is the direction (Viewer::fly). Returns
+/// false where the key is none of them.
 bool holdFlyKey(glm::dvec3& held, uint32_t key, bool isPressed);
 
-/// Two columns of plain text.
+/// Returns the table as two columns of plain text.
 std::string keyMapText();
 
 }  // namespace vcp

@@ -12,13 +12,13 @@ namespace vcp {
 
 namespace {
 
-// In units of the layout.
+// These lengths are in units of the layout.
 constexpr double kArrow = 80, kRing = 48, kLeastArrow = 16, kReach = 8, kFootReach = 11;
 constexpr int kRingPoints = 48;
-// Of the ring's radius: how much deeper than the foot the far side begins.
+// The part of the ring's radius by which the far side begins deeper than the foot.
 constexpr double kFarSide = 0.3;
 
-/// World units a pixel at a point, or 0 behind the eye.
+/// Returns world units per pixel at a point, or 0 behind the eye.
 double unitsPerPixelAt(glm::dvec3 point, const OrbitCamera& camera, glm::ivec2 size) {
     const double depth = camera.depthOf(point);
     if (depth <= 0) return 0;
@@ -28,7 +28,7 @@ double unitsPerPixelAt(glm::dvec3 point, const OrbitCamera& camera, glm::ivec2 s
     return height / std::max(1, size.y);
 }
 
-/// Two unit vectors of the plane.
+/// Returns two unit vectors of the plane.
 std::pair<glm::dvec3, glm::dvec3> axesOf(glm::dvec3 normal) {
     const glm::dvec3 other = std::abs(normal.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     const glm::dvec3 u = glm::normalize(glm::cross(normal, other));
@@ -115,7 +115,7 @@ SectionDrag::SectionDrag(const SectionHandle& handle, SectionGrip grip, const Se
     }
 }
 
-/// Where along the normal, from the foot, the cursor is: nearest to its ray.
+/// Returns where along the normal, from the foot, the cursor is: nearest to its ray.
 double SectionDrag::along(glm::dvec2 pixel) const {
     if (isAlongView_) return (pressed_.y - pixel.y) * unitsPerPixel_;
     const CameraRay ray = camera_.rayThrough(pixel, size_);

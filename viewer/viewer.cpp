@@ -18,18 +18,18 @@ namespace {
 // The camera counts as moving for so long after it last did.
 constexpr double kRestSeconds = 0.15;
 
-// While pages arrive: how often they are looked for, and how often at most the picture is drawn anew. Drawing
-// takes the processors from the loader where the device is software, hence a part of the time only.
+// While pages arrive: how often they are looked for, and how often at most the picture is drawn anew. On a software
+// device drawing takes the processors from the loader, so it is done only a part of the time.
 constexpr double kLoadingPollSeconds = 0.01;
 constexpr double kRefineSeconds = 0.1;
 constexpr double kRefineFrames = 3;
 
 constexpr int kLargestReduction = 8;
 constexpr double kZoomPerNotch = 0.85;
-constexpr double kSectionPerNotch = 0.01;  // of the bounding box's diagonal
-constexpr double kFarthestSection = 4;     // of the diagonal, that a drag moves a plane
-constexpr double kFlySeconds = 4;          // for the dataset's diagonal, at speed 1
-constexpr double kLongestFlyStep = 0.1;    // seconds: a hiccup is no leap
+constexpr double kSectionPerNotch = 0.01;  // part of the bounding box's diagonal
+constexpr double kFarthestSection = 4;     // the most that a drag moves a plane, in diagonals
+constexpr double kFlySeconds = 4;          // time that flying over the dataset's diagonal takes, at speed 1
+constexpr double kLongestFlyStep = 0.1;    // in seconds: a delay must not become a leap
 constexpr double kFlySpeedPerNotch = 1.25;
 constexpr uint32_t kOcclusionRays = 8;
 // A dataset smaller than this part of the picture's height is far enough away.
@@ -39,7 +39,7 @@ ShadingMode next(ShadingMode mode) {
     return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(static_cast<int>(mode) + 1);
 }
 
-/// A long name loses its middle.
+/// Shortens a long name in its middle.
 std::string shortened(const std::string& name, size_t most) {
     constexpr size_t kLeast = 8;
     if (name.size() <= std::max(most, kLeast)) return name;
@@ -47,7 +47,7 @@ std::string shortened(const std::string& name, size_t most) {
     return name.substr(0, half) + ".." + name.substr(name.size() - half);
 }
 
-/// Starts and ends slowly.
+/// Returns a part of the way that starts and ends slowly.
 double eased(double part) { return part * part * (3 - 2 * part); }
 
 bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
@@ -64,7 +64,7 @@ std::string formatPixels(double pixels) {
 std::string statusLine(const ViewerStatus& status, size_t most) {
     const std::string device = status.device + (status.software ? " (software)" : "");
     if (status.name.empty()) return device.substr(0, most);
-    // What matters most comes first: a narrow window has no room for the rest.
+    // The most important parts come first: a narrow window has no room for the rest.
     std::vector<std::string> parts{shortened(status.name, most / 3), status.update.settled ? "settled" : "loading"};
     if (!status.without.empty()) parts.push_back(status.without);
     if (status.update.drawable && status.levels > 0) {
@@ -191,7 +191,7 @@ std::optional<glm::dvec3> Viewer::capAt(glm::dvec2 pixel) {
 glm::dvec3 Viewer::pointOfInterest(glm::dvec2 pixel) {
     const auto hit = pointAt(pixel);
     if (hit && camera_.depthOf(*hit) > 0) {
-        // The hit is known to the picture's pixel; the cursor's own ray at its depth is where the hand is.
+        // The hit is known to a pixel of the picture; the hand is on the cursor's own ray, at the hit's depth.
         const CameraRay ray = camera_.rayThrough(pixel, size_);
         const double along = glm::dot(ray.direction, camera_.forwardVector());
         return ray.origin + ray.direction * (camera_.depthOf(*hit) / along);
@@ -219,7 +219,7 @@ void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
 
 void Viewer::move(glm::dvec2 pixel) {
     const glm::dvec2 by = pixel - cursor_;
-    // A drag over the picture's height is half a turn; what is under the cursor goes where it goes.
+    // A drag over the picture's height is half a turn; what is under the cursor moves with it.
     const double perPixel = std::numbers::pi / std::max(1, size_.y);
     const double headPerPixel = camera_.fovY / std::max(1, size_.y);
     switch (drag_) {
@@ -523,7 +523,7 @@ Result<void> Viewer::draw() {
     const bool wantsLight =
         request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
     status_.without = isPaper_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
-    // The first frame also compiles; it says nothing about the next. Nor does a moving one trace occlusion.
+    // The first frame also compiles: it says nothing about the next. Nor does a moving one, which has no occlusion.
     if (framesDrawn_ > 0)
         fullFrameMs_ = requestReduction_ * requestReduction_ *
                        (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));

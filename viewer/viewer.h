@@ -41,11 +41,11 @@ struct Modifiers {
     bool shift = false, control = false;
 };
 
-/// What keys do; which key does it is the host's to say.
+/// What keys do; the host decides which key does it.
 enum class ViewerAction {
-    Fit,          ///< all of the dataset into the picture, from the same side
-    Reset,        ///< the camera the dataset opened with
-    ToggleLight,  ///< the light follows the camera, or stays where it is in the world
+    Fit,          ///< fits all of the dataset into the picture, from the same side
+    Reset,        ///< goes to the camera the dataset opened with
+    ToggleLight,  ///< lets the light follow the camera, or stay where it is in the world
     ToggleShadows,
     ToggleOcclusion,   ///< ambient occlusion; left out while the camera moves
     ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
@@ -66,45 +66,45 @@ struct ViewerOptions {
     Shading shading;
     std::vector<SectionPlane> sections;
     bool sectionCaps = false;
-    PaperMarch march;  ///< of datasets of the method `paper`
+    PaperMarch march;  ///< march through datasets of the method `paper`
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
     double movingFrameMs = 50;
-    double moveSeconds = 0.3;  ///< that a smooth move takes; 0: at once
+    double moveSeconds = 0.3;  ///< time that a smooth move takes; 0: at once
 };
 
-/// What the host is to do next.
+/// What the host should do next.
 struct NextStep {
     bool draw = false;
-    /// Come back after this time even if nothing happens; infinity: nothing is going on.
+    /// Time after which to come back even if nothing happens; infinity: nothing is going on.
     double waitSeconds = std::numeric_limits<double>::infinity();
 };
 
-/// What the status line says.
+/// What the status line shows.
 struct ViewerStatus {
     std::string name;
     uint64_t triangles = 0;
     uint32_t levels = 0;
     UpdateResult update;
-    FrameStats frame;   ///< of the last draw()
+    FrameStats frame;   ///< statistics of the last draw()
     int reduction = 1;  ///< the last picture has 1/reduction of the width and height
     std::string device;
     bool software = false;
     uint64_t budgetBytes = 0;
-    std::string without;  ///< what is asked for and not drawn, in a few words; empty: nothing
-    std::string problem;  ///< the last thing that went wrong, in one line; empty when nothing has
+    std::string without;  ///< requested, but not drawn, in a few words; empty: nothing
+    std::string problem;  ///< the last error, in one line; empty when there was none
 };
 
-/// "0.46", "510".
+/// Returns a text such as "0.46" or "510".
 std::string formatPixels(double pixels);
 
-/// The status in one line of at most so many characters: what matters less is left out.
+/// Returns the status in one line of at most so many characters: less important parts are left out.
 std::string statusLine(const ViewerStatus& status, size_t most = std::numeric_limits<size_t>::max());
 
 class Viewer {
 public:
-    /// Errors: those of Renderer::create.
+    /// Makes a viewer with a renderer of its own. Errors: those of Renderer::create.
     static Result<std::unique_ptr<Viewer>> create(const ViewerOptions& options);
-    /// On a view that shares its device with others (Renderer::addView).
+    /// Makes a viewer on a view that shares its device with others (Renderer::addView).
     static std::unique_ptr<Viewer> on(std::unique_ptr<Renderer> view, const ViewerOptions& options);
 
     /// Shows a dataset from `camera`, which also is where Reset goes. `name` is for the status line.
@@ -117,50 +117,50 @@ public:
     Result<void> open(std::vector<PlacedDataset> datasets, const MesoScene& surfaces, const OrbitCamera& camera,
                       std::string name);
 
-    /// The same, where a view that shares the device has opened it all already; what it is made of is not looked at.
+    /// Does the same where a view that shares the device has opened it all; sources and arrays are not used.
     void show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera,
               std::string name);
 
-    /// Either side 0: minimized, nothing is drawn.
+    /// Sets the picture's size. Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);
 
-    /// Left: orbit about the point under the cursor, with shift: pan, with control: turn the light. Middle and
+    /// Left: orbits about the point under the cursor, with shift: pans, with control: turns the light. Middle and
     /// right: pan. While flying, left turns the head. Left on the handle of a section moves or turns the plane.
     void press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers = {});
     void move(glm::dvec2 pixel);
     void release(MouseButton button);
-    /// Puts a section plane that is in the hand back where it was gripped. False where none is.
+    /// Puts a section plane that is being dragged back where it was gripped. Returns false where none is.
     bool cancelSectionDrag();
     /// Zooms in on the point under the cursor by `steps` notches of a wheel; out when negative. With shift: moves the
     /// section planes, deeper into what they keep.
     void scroll(glm::dvec2 pixel, double steps, bool shift = false);
     void act(ViewerAction action);
 
-    /// Goes there smoothly. Without a dataset: nothing.
+    /// Moves the camera there smoothly. Without a dataset it does nothing.
     void moveTo(const OrbitCamera& camera);
-    /// What is under the cursor comes to the middle of the picture, smoothly. Nothing where nothing is.
+    /// Moves what is under the cursor to the middle of the picture, smoothly. Does nothing where nothing is hit.
     void centreOn(glm::dvec2 pixel);
-    /// While flying: which way, in camera axes (right, up, forward), each from -1 to 1, until told otherwise.
+    /// While flying: sets the direction in camera axes (right, up, forward), each from -1 to 1, until the next call.
     void fly(glm::dvec3 direction) { flyDirection_ = direction; }
     [[nodiscard]] bool isFlying() const { return isFlying_; }
-    /// Of flying: at 1 the dataset's diagonal takes 4 seconds.
+    /// The speed of flying: at 1 the dataset's diagonal takes 4 seconds.
     [[nodiscard]] double flySpeed() const { return flySpeed_; }
 
-    /// Errors: those of Renderer::update; problems of single pages go to the status instead.
+    /// Takes in pages and says what to do next. Errors: those of Renderer::update; problems of pages go to the status.
     Result<NextStep> update(double now);
     /// Draws what the last update chose.
     Result<void> draw();
 
-    /// What the last picture shows at a pixel.
+    /// Returns what the last picture shows at a pixel.
     std::optional<PixelHit> hitAt(glm::dvec2 pixel);
-    /// Its world position.
+    /// Returns the world position of what is shown there.
     std::optional<glm::dvec3> pointAt(glm::dvec2 pixel);
 
-    /// Where the last picture shows a section's cap under the cursor: the point of the plane itself. Nothing elsewhere.
+    /// The point of the plane itself where the last picture shows a section's cap under the cursor; else nothing.
     std::optional<glm::dvec3> capAt(glm::dvec2 pixel);
 
     [[nodiscard]] const OrbitCamera& camera() const { return camera_; }
-    /// At once.
+    /// Sets the camera at once.
     void setCamera(const OrbitCamera& camera) {
         camera_ = camera;
         move_.reset();
@@ -168,12 +168,12 @@ public:
     [[nodiscard]] const Box& bounds() const { return bounds_; }
     /// Whether anything was opened.
     [[nodiscard]] bool isOpen() const { return isOpen_; }
-    /// The first one; null without any.
+    /// The first dataset; null without any.
     [[nodiscard]] const std::shared_ptr<const Dataset>& dataset() const { return dataset_; }
-    /// Why an action shows nothing on what is open; empty where it shows something.
+    /// Returns why an action shows nothing on what is open; empty where it shows something.
     [[nodiscard]] std::string whyWithout(ViewerAction action) const;
     [[nodiscard]] glm::ivec2 size() const { return size_; }
-    /// What panels of the host cover: Fit and the standard views keep clear of it from now on.
+    /// Sets what panels of the host cover: Fit and the standard views keep clear of it from now on.
     void setCovered(const PictureMargins& covered) { covered_ = covered; }
     [[nodiscard]] const PictureMargins& covered() const { return covered_; }
 
@@ -183,30 +183,30 @@ public:
     [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
     void setSections(std::vector<SectionPlane> planes);
     void setSectionCaps(bool caps) { sectionCaps_ = caps; }
-    /// Section planes can be gripped from now on; for a host that draws the handles. `scale`: as of sectionHandle(); 0:
-    /// no longer.
+    /// Lets section planes be gripped from now on; for a host that draws the handles. `scale`: as for sectionHandle();
+    /// 0: not any more.
     void showSectionHandles(double scale) { handleScale_ = scale; }
-    /// To be drawn over the picture.
+    /// Returns the handles to draw over the picture.
     [[nodiscard]] std::vector<SectionHandle> sectionHandles() const;
-    /// The part of a handle in the hand, else under the cursor as of the last move().
+    /// Returns the part of a handle that is dragged, else the one under the cursor at the last move().
     [[nodiscard]] SectionGrab sectionGrab() const;
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
-    /// Of the page pool, from now on. Errors: those of Renderer::setBudgets.
+    /// Sets the budget of the page pool, from now on. Errors: those of Renderer::setBudgets.
     Result<void> setBudget(uint64_t bytes);
     [[nodiscard]] const ViewerStatus& status() const { return status_; }
     void dismissProblem() { status_.problem.clear(); }
     [[nodiscard]] uint64_t framesDrawn() const { return framesDrawn_; }
-    /// What the window shows, at full quality and of another size, for pictures.
+    /// Returns a request for what the window shows, at full quality and of another size, for pictures.
     [[nodiscard]] FrameRequest pictureOf(glm::ivec2 size) const;
-    /// For present() and the pictures.
+    /// The renderer, for present() and the pictures.
     [[nodiscard]] Renderer& renderer() { return *renderer_; }
 
 private:
     enum class Drag { None, Orbit, Pan, Light, Head, Section };
     struct Move {
         OrbitCamera from, to;
-        double beganAt;  ///< of the update that saw it first; not a number until then
+        double beganAt;  ///< time of the update that saw it first; not a number until then
     };
 
     Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer);
@@ -232,12 +232,12 @@ private:
     std::unique_ptr<Renderer> renderer_;
     std::shared_ptr<const Dataset> dataset_;
     bool isOpen_ = false;
-    bool isPaper_ = false;  // all datasets are of that method
+    bool isPaper_ = false;  // all datasets are of the method `paper`
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;
     std::vector<SectionPlane> sections_;
-    std::vector<glm::dvec3> sectionAnchors_;  // of the planes' handles, as they were turned last; may be fewer
+    std::vector<glm::dvec3> sectionAnchors_;  // for the planes' handles, as the planes were turned last; may be fewer
     double handleScale_ = 0;
     std::optional<SectionDrag> sectionDrag_;
     bool sectionCaps_ = false;
@@ -253,9 +253,9 @@ private:
     glm::dvec3 flyDirection_{0};
     double flySpeed_ = 1;
 
-    FrameRequest request_;  ///< of the last update
+    FrameRequest request_;  ///< request of the last update
     int requestReduction_ = 1;
-    std::optional<FrameRequest> drawn_;  ///< of the last draw
+    std::optional<FrameRequest> drawn_;  ///< request of the last draw
     OrbitCamera seen_;                   ///< the camera of the last update
     double movedAt_ = -std::numeric_limits<double>::infinity();
     double drawnAt_ = -std::numeric_limits<double>::infinity();

@@ -18,7 +18,7 @@ using Point = std::array<int32_t, 3>;
 Point pointOf(glm::i32vec3 p) { return {p.x, p.y, p.z}; }
 glm::i32vec3 vectorOf(const Point& p) { return {p[0], p[1], p[2]}; }
 
-/// Part of a collapsed triangle's line; a == b where it is a point.
+/// A part of a collapsed triangle's line; a == b where it is a point.
 struct Segment {
     Point a, b;
     std::array<uint32_t, 2> colour;
@@ -27,7 +27,7 @@ struct Segment {
     bool operator<(const Segment& o) const { return std::tie(a, b, colour) < std::tie(o.a, o.b, o.colour); }
 };
 
-/// The parts between neighbouring corners along the line. Points on a line are in order when sorted by coordinates.
+/// Adds the parts between neighbouring corners along the line. Sorted by coordinates, points on a line are in order.
 void addSegments(const LatticeTriangle& t, std::vector<Segment>& segments) {
     std::array<std::pair<Point, uint32_t>, 3> corner;
     for (int i = 0; i < 3; ++i) corner[i] = {pointOf(t.corner[i]), t.colour[i]};
@@ -40,7 +40,7 @@ void addSegments(const LatticeTriangle& t, std::vector<Segment>& segments) {
     if (corner[1].first != corner[2].first) add(1, 2);
 }
 
-/// Takes away the segments that are an edge, or a corner, of a triangle with area.
+/// Removes the segments that are an edge, or a corner, of a triangle with area.
 void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segment>& segments) {
     std::set<std::pair<Point, Point>> covered, wanted;
     for (const Segment& s : segments) wanted.insert(s.ends());
@@ -53,7 +53,7 @@ void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segme
     std::erase_if(segments, [&](const Segment& s) { return covered.contains(s.ends()); });
 }
 
-/// A neighbour of `p` in its page that does not lie on the line from `p` to `q`.
+/// Returns a neighbour of `p` in its page that does not lie on the line from `p` to `q`.
 glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q,
                         const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
     for (int axis = 0; axis < 3; ++axis)

@@ -9,7 +9,7 @@
 
 namespace vcp {
 
-/// Sums finite doubles that are not negative, up to 2^64 of them, exactly: integers by exponent. One thread.
+/// Sums finite doubles that are not negative, up to 2^64 of them, exactly: integers by exponent. Used by one thread.
 class ExactSum {
 public:
     void add(double value) {
@@ -18,7 +18,7 @@ public:
         const uint64_t fraction = bits & ((uint64_t{1} << 52) - 1);
         parts_[exponent] += exponent == 0 ? fraction : fraction | uint64_t{1} << 52;
     }
-    /// Rounded; the same for the same numbers in any order.
+    /// Returns the rounded sum; the same for the same numbers in any order.
     [[nodiscard]] double value() const {
         double sum = 0;
         for (size_t e = 0; e < parts_.size(); ++e)

@@ -31,7 +31,7 @@ public:
         while (size < count * 2) size *= 2;
         slots_.assign(size, kEmpty);
     }
-    /// Index of `p` in `positions`, or `next` after entering it.
+    /// Returns the index of `p` in `positions`, or `next` after entering it.
     uint32_t findOrAdd(const std::vector<glm::i32vec3>& positions, glm::i32vec3 p, uint32_t next) {
         if (next * 3ull >= slots_.size() * 2) grow(positions);
         const size_t mask = slots_.size() - 1;
@@ -56,7 +56,7 @@ private:
     std::vector<uint32_t> slots_;
 };
 
-/// Vertex numbers of `corners` in the canonical order of the vertices, which are sorted into it.
+/// A vertex on its way into the canonical order, by which vertices are numbered.
 struct OrderedVertex {
     uint64_t cell;
     glm::i32vec3 position;
@@ -94,7 +94,7 @@ struct OrderedTriangle {
     bool operator<(const OrderedTriangle& b) const { return key() != b.key() ? key() < b.key() : turned < b.turned; }
 };
 
-/// Triangles by smallest vertex, then by the others; of the repeated ones the first, with the largest stray.
+/// Sorts triangles by smallest vertex, then by the others; of repeated ones keeps the first, with the largest stray.
 void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, LatticeMesh& mesh) {
     std::vector<uint32_t> begin(mesh.positions.size() + 1, 0);
     for (size_t k = 0; k < soup.size(); ++k)
@@ -125,7 +125,7 @@ void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint
     }
 }
 
-/// Means of the colours that triangles give their vertices.
+/// Returns the means of the colours that triangles give their vertices.
 std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners,
                                   size_t vertices) {
     std::vector<std::array<uint32_t, 5>> sums(vertices, {0, 0, 0, 0, 0});
@@ -144,7 +144,7 @@ std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const s
 }  // namespace
 
 bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
-    // Coordinates may span 31 bits: the products need more than 64.
+    // Coordinates may span 31 bits, so the products need more than 64.
     using Wide = __int128;
     const int64_t ux = int64_t{b.x} - a.x, uy = int64_t{b.y} - a.y, uz = int64_t{b.z} - a.z;
     const int64_t vx = int64_t{c.x} - a.x, vy = int64_t{c.y} - a.y, vz = int64_t{c.z} - a.z;
@@ -167,8 +167,8 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
         const std::vector<uint32_t> renamed = sortVertices(mesh.positions);
         for (uint32_t& v : corners) v = renamed[v];
     }
-    // They agree, but where a kept thin part ends at another's vertex: then any will do that does not depend on the
-    // order.
+    // The normals agree, except where a kept thin part ends at another triangle's vertex: then any of them will do that
+    // does not depend on the order.
     mesh.normals.assign(mesh.positions.size(), 0xffffffffu);
     for (size_t k = 0; k < corners.size(); ++k)
         mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);

@@ -20,7 +20,7 @@ struct LatticeMesh {
     std::vector<uint32_t> colours;                   ///< RGBA8, as many as positions, or empty
     std::vector<uint32_t> normals;                   ///< packNormal with crease flag, as many as positions
     std::vector<std::array<uint32_t, 3>> triangles;  ///< none without area, none twice
-    std::vector<float> stray;  ///< cells, as many as triangles: how far its points may be from the mesh's, both ways
+    std::vector<float> stray;  ///< cells, one a triangle: how far its points may be from the mesh's, both ways
 };
 
 /// Rounding a point to the lattice moves it at most so far, in cells.
@@ -32,17 +32,17 @@ inline constexpr int kMaxEdgeCells = 256;
 /// Whether three lattice points span an area; exact.
 bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 
-/// The mesh of a bag of triangles, the same for any order of them: vertices by cell along the Morton curve,
-/// triangles by their vertices; of repeated triangles one stays, with the largest stray. Colours that differ
-/// at a vertex are averaged, triangle by triangle. Uses the calling arena's threads.
+/// Makes the mesh of a bag of triangles, the same for any order of them: vertices by cell along the Morton curve,
+/// triangles by their vertices; of repeated triangles one stays, with the largest stray. Colours that differ at a
+/// vertex are averaged, triangle by triangle. Uses the calling arena's threads.
 LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
 
-/// Number of the vertex at `p` in a mesh from meshOf, or none.
+/// Returns the number of the vertex at `p` in a mesh from meshOf, or none.
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 
-/// Vertex normals (octree/vertex_normal.h): the mean of the incident triangles' normals by area, taken without
-/// orientation (a mesh need not have one); the page codec foretells them from a page's triangles. A vertex where a
-/// triangle turns away by more than 40 degrees is marked as crease: its normal is not to be interpolated.
+/// Computes vertex normals (octree/vertex_normal.h): the mean of the incident triangles' normals by area, taken without
+/// orientation (a mesh need not have one); the page codec predicts them from a page's triangles. A vertex where a
+/// triangle turns away by more than 40 degrees is marked as a crease: its normal is not to be interpolated.
 void computeNormals(LatticeMesh& mesh);
 
 }  // namespace vcp

@@ -21,7 +21,7 @@ struct PageGrid {
 
     [[nodiscard]] int lastPage() const { return (1 << level) - 1; }
     [[nodiscard]] double edgeCells() const { return double(1u << log2Cells); }
-    /// Morton code of the page that a lattice point lies in.
+    /// Returns the Morton code of the page that a lattice point lies in.
     [[nodiscard]] uint64_t pageOf(glm::i32vec3 p) const {
         const glm::i32vec3 page = glm::min(p >> static_cast<int>(log2Cells + kLog2LatticePerCell), lastPage());
         return mortonEncode(glm::u32vec3(page));
@@ -32,7 +32,7 @@ struct PageGrid {
         const double steps = double(kLatticePerCell);
         const glm::i32vec3 low = glm::min(corner[0], glm::min(corner[1], corner[2])),
                            high = glm::max(corner[0], glm::max(corner[1], corner[2]));
-        // Touching counts, so the bounds are widened by a hair.
+        // Touching counts, so the bounds are widened a little.
         const glm::dvec3 from = (glm::dvec3(low) / steps - margin) / edgeCells() - 1e-9,
                          to = (glm::dvec3(high) / steps + margin) / edgeCells() + 1e-9;
         const glm::i32vec3 first = glm::max(glm::i32vec3(glm::floor(from)), 0),
@@ -54,11 +54,11 @@ struct PageGrid {
 /// Bins are the runs between `first` codes; a page belongs to the last bin that begins at or before it.
 class PagePartition {
 public:
-    /// One bin.
+    /// Makes a single bin.
     PagePartition() : first_{0} {}
-    /// `first`: ascending, from 0.
+    /// `first`: ascending codes, from 0.
     explicit PagePartition(std::vector<uint64_t> first) : first_(std::move(first)) {}
-    /// As few bins as hold at most `limit` each; a page alone may have more. `pages`: ascending (code, count).
+    /// Makes as few bins as hold at most `limit` each; a single page may have more. `pages`: ascending (code, count).
     PagePartition(const std::vector<std::pair<uint64_t, uint64_t>>& pages, uint64_t limit) : first_{0} {
         uint64_t held = 0;
         for (const auto& [page, count] : pages) {
@@ -75,7 +75,7 @@ public:
     [[nodiscard]] size_t binOf(uint64_t page) const {
         return static_cast<size_t>(std::upper_bound(first_.begin(), first_.end(), page) - first_.begin()) - 1;
     }
-    /// The same bins on the next coarser level.
+    /// Returns the same bins on the next coarser level.
     [[nodiscard]] PagePartition coarser() const {
         std::vector<uint64_t> first{0};
         for (const uint64_t code : first_)

@@ -1,5 +1,5 @@
-// The records that pass between the stages of a build: triangles by themselves, without indices. A vertex is
-// its position; what belongs to it travels with every triangle that has it.
+// The records that pass between the stages of a build: triangles that stand alone, without indices. A vertex is its
+// position; its attributes travel with every triangle that has it.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ static_assert(sizeof(WorldTriangle<float>) == 80 && sizeof(WorldTriangle<double>
 struct LatticeTriangle {
     glm::i32vec3 corner[3];
     uint32_t colour[3];
-    uint32_t normal[3];  ///< packNormal with crease flag; not yet known before the vertices' pass
+    uint32_t normal[3];  ///< packNormal with crease flag; unknown before the vertices' pass
     float stray;         ///< cells: how far its points may be from the mesh's, both ways
 };
 static_assert(sizeof(LatticeTriangle) == 64);

@@ -13,14 +13,14 @@ namespace {
 
 constexpr double kTouch = 1e-9;
 
-// Instead of a zero that is divided by.
+// This stands for a zero that would be divided by.
 constexpr double kTiny = 1e-300;
 
-// By value: std::min and std::max hide what a vector can do.
+// It takes doubles by value: std::min and std::max hide from the compiler that it can use vectors.
 double smaller(double a, double b) { return a < b ? a : b; }
 double larger(double a, double b) { return a > b ? a : b; }
 
-/// Closest point to the origin of the segment a b, as the weight of b.
+/// Finds the closest point of the segment a b to the origin, as the weight of b.
 double closestOnSegment(glm::dvec3 a, glm::dvec3 b, double& squared) {
     const glm::dvec3 u = b - a;
     const double length2 = glm::dot(u, u);
@@ -67,7 +67,7 @@ WIDER_CLONES void squaredDistances(glm::dvec3 query, TriangleBatch& batch) {
         const double cx = batch.corners[6][i] - px, cy = batch.corners[7][i] - py, cz = batch.corners[8][i] - pz;
         const double ux = bx - ax, uy = by - ay, uz = bz - az, vx = cx - ax, vy = cy - ay, vz = cz - az, wx = cx - bx,
                      wy = cy - by, wz = cz - bz;
-        // The interior: as in closestOnTriangle.
+        // The interior is handled as in closestOnTriangle.
         const double nx = uy * vz - vy * uz, ny = uz * vx - vz * ux, nz = ux * vy - vx * uy;
         const double n2 = nx * nx + ny * ny + nz * nz;
         const double wc = -((uy * az - ay * uz) * nx + (uz * ax - az * ux) * ny + (ux * ay - ax * uy) * nz);
@@ -107,7 +107,7 @@ bool BoxOverlap::test(glm::dvec3 centre, double half) const {
         return false;
     const glm::dvec3 b = t_[1] - centre, c = t_[2] - centre;
     for (const glm::dvec3& e : edge_) {
-        // Axes e x (x, y, z): two components of the projection each.
+        // For the axes e x (x, y, z), each projection has two components.
         const double ax = e.z * a.y - e.y * a.z, bx = e.z * b.y - e.y * b.z, cx = e.z * c.y - e.y * c.z;
         const double rx = half * (std::abs(e.z) + std::abs(e.y));
         if (std::min(ax, std::min(bx, cx)) > rx || std::max(ax, std::max(bx, cx)) < -rx) return false;

@@ -19,11 +19,11 @@ struct ClosestPoint {
     glm::dvec3 weights{1, 0, 0};  ///< barycentric, of the three corners
 };
 
-/// Closest point of a triangle, which may be a segment or a point. All three edges are always looked at and
+/// Finds the closest point of a triangle, which may be a segment or a point. All three edges are always looked at and
 /// coordinates are taken about the query, so slivers cost no accuracy (Heidrich 2005 for the interior).
 ClosestPoint closestOnTriangle(glm::dvec3 query, const Triangle3& triangle);
 
-/// Squared distances of a query to several triangles at once: those of closestOnTriangle but for the last bits.
+/// Squared distances of a query to several triangles at once: those of closestOnTriangle, except for the last bits.
 struct TriangleBatch {
     static constexpr int kSize = 8;
     alignas(64) float corners[9][kSize];  ///< x, y, z of each triangle's first, second and third corner
@@ -52,7 +52,7 @@ bool segmentMeetsBox(glm::dvec3 a, glm::dvec3 b, glm::dvec3 centre, double half)
 /// A convex polygon: a triangle cut by the six planes of a box.
 class Polygon {
 public:
-    /// 9, but rounding may bend an edge, and a plane then cut more than two.
+    /// 9 corners at most in theory; but rounding may bend an edge, and a plane then cuts more than two.
     static constexpr size_t kMaxCorners = 16;
     [[nodiscard]] size_t size() const { return size_; }
     [[nodiscard]] bool empty() const { return size_ == 0; }

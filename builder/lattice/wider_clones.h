@@ -1,6 +1,6 @@
-// Functions of hot loops, also compiled for wider vectors; the one that runs is chosen when the program
-// starts. They round alike, since nothing is fused: results do not depend on the processor. None under the thread
-// sanitizer, which is not there yet when they are chosen.
+// Compiles functions of hot loops also for wider vectors; the clone that runs is chosen when the program starts. All
+// round alike, since nothing is fused: results do not depend on the processor. There are no clones under the thread
+// sanitizer, which is not yet loaded when they are chosen.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)

@@ -93,7 +93,7 @@ private:
         return false;
     }
 
-    /// Images that are lines and no image's edge.
+    /// Keeps images that are lines and no other image's edge.
     void keepLines() {
         struct Line {
             uint32_t a, b, fine;
@@ -116,7 +116,7 @@ private:
         }
     }
 
-    /// Images that are points and no image's corner.
+    /// Keeps images that are points and no other image's corner.
     void keepPoints() {
         struct Point {
             uint32_t cluster, fine;
@@ -138,7 +138,7 @@ private:
         }
     }
 
-    /// The vertex farthest from a line, or from a point, on the coarser lattice; ties by position.
+    /// Finds the vertex farthest from a line, or from a point, on the coarser lattice; ties by position.
     class Farthest {
     public:
         Farthest(glm::i32vec3 a, glm::i32vec3 b) : a_(a), along_(b - a) {}
@@ -162,7 +162,7 @@ private:
         glm::i32vec3 fine_{0};
     };
 
-    /// A vertex of the finer mesh as it is, or if there is none a step away from a cluster's.
+    /// Adds a vertex of the finer mesh as it is, or if there is none, a step away from a cluster's.
     uint32_t addVertex(const Farthest& farthest, uint32_t cluster, glm::i32vec3 step) {
         const std::optional<uint32_t> v = farthest.vertex();
         LatticeMesh& mesh = out_.mesh;
@@ -186,7 +186,7 @@ private:
     CoarseTriangles out_;
     std::vector<uint32_t> collapsed_;        ///< short fine triangles
     std::vector<uint32_t> fanBegin_, fans_;  ///< images at each cluster
-    std::vector<bool> used_;                 ///< clusters that are a corner of something
+    std::vector<bool> used_;                 ///< whether a cluster is a corner of something
 };
 
 }  // namespace
@@ -207,7 +207,7 @@ LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image
         moved = std::max(moved, glm::length(glm::dvec3(fine.corner[i]) / 2.0 - glm::dvec3(image[i].position)));
     t.stray = std::nextafter(static_cast<float>(moved / kLatticePerCell + double(fine.stray) / 2), 1e9f);
     if (hasArea(t.corner[0], t.corner[1], t.corner[2])) return t;
-    // Along the longest side, with the third corner where the mesh had it; ties by that.
+    // The thin triangle lies along the longest side, with the third corner where the mesh had it; ties by that.
     int from = 0;
     double longest = -1;
     for (int i = 0; i < 3; ++i) {

@@ -15,9 +15,9 @@
 namespace vcp {
 
 Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
-    // Where all pages are one bin's, none needs to be looked for.
+    // Where one bin has all pages, no other needs to be looked for.
     if (sink_.partition_.bins() == 1) return batch_.add(0, t);
-    // A triangle seldom spans more than two bins: the list of those seen is short.
+    // A triangle seldom spans more than two bins, so the list of those seen is short.
     touched_.clear();
     sink_.grid_.forPagesNear(t.corner, kStepMarginCells, [&](uint64_t page) {
         const size_t bin = sink_.partition_.binOf(page);
@@ -27,9 +27,9 @@ Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
     return {};
 }
 
-/// Per vertex of the bin's mesh.
+/// The images of the vertices of the bin's mesh.
 struct LevelStep::Images {
-    std::vector<uint32_t> bin;  ///< that the vertex lies in
+    std::vector<uint32_t> bin;  ///< the bin that the vertex lies in
     std::vector<uint8_t> known;
     std::vector<VertexImage> image;
 };
@@ -139,7 +139,7 @@ Result<void> LevelStep::stepShort(size_t bin, const LatticeMesh& mesh, const Ver
             t.normal[i] = to.normals[v];
             lowest = std::min(lowest, binOf(to.positions[v] * 2));
         }
-        // Images near the bin's ends are the business of others, and not known whole here.
+        // Images near the bin's ends belong to other bins, and are not wholly known here.
         if (lowest != bin) return {};
         t.stray = stray[k];
         return batch.add(t);

@@ -2,10 +2,10 @@
 //
 // Each vertex has an image: where it goes, with which colour and normal (coarsen.h). A bin knows the images of its
 // own vertices and of those nearby, because it has all triangles around them; and every bin that knows an image
-// knows the same. Short triangles are stepped together, each image by the lowest bin that has one of its corners.
-// A long triangle is stepped by itself, from the lowest bin that has one of its corners. When another corner is
-// too far away, it waits for the bin that has that, taking the images along that are known: bins are worked on in
-// ascending order, so none is visited twice.
+// knows the same. Short triangles are stepped together, each image by the lowest bin that has one of its corners. A
+// long triangle is stepped by itself, from the lowest bin that has one of its corners. Where another corner is too far
+// away, it waits for the bin that has that corner, and takes the known images along. Bins are worked on in ascending
+// order, so none is visited twice.
 //
 // The first step leads from the snapped triangles to the finest level: there a vertex stays where it is, and
 // gets its normal.
@@ -21,9 +21,9 @@
 
 namespace vcp {
 
-/// A bin's surroundings, in cells, whose triangles it is given: what pages need (kBinMarginCells), and what the
-/// images and strays of its triangles depend on. From a page's wall, a short triangle reaches 2 cells, its
-/// clusters 2 more; those measured against it and what else these are measured against, 4 each.
+/// How far around a bin, in cells, it is given triangles: what pages need (kBinMarginCells), and what the images and
+/// strays of its triangles depend on. From a page's wall, a short triangle reaches 2 cells, its clusters 2 more; the
+/// triangles measured against it, and those that these are measured against, 4 each.
 inline constexpr double kStepMarginCells = 12;
 
 /// A triangle whose images are not all known yet.
@@ -39,7 +39,7 @@ public:
     LevelSink(const PageGrid& grid, const PagePartition& partition, RecordBins<LatticeTriangle>& bins)
         : grid_(grid), partition_(partition), bins_(bins) {}
 
-    /// A batch of its own for each thread; flush when done.
+    /// Collects triangles; each thread has a batch of its own, and flushes it when done.
     class Batch {
     public:
         explicit Batch(LevelSink& sink) : sink_(sink), batch_(sink.bins_) {}
@@ -58,10 +58,10 @@ private:
     RecordBins<LatticeTriangle>& bins_;
 };
 
-/// Steps one level. One thread calls, in ascending order of bins; the calling arena's threads work.
+/// Steps one level. One thread calls, in ascending order of bins; the calling arena's threads do the work.
 class LevelStep {
 public:
-    /// `first`: the step from the snapped triangles to the finest level. `grid`, `partition`: of the level
+    /// `first`: the step leads from the snapped triangles to the finest level. `grid`, `partition`: those of the level
     /// stepped from.
     LevelStep(bool first, const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting,
               LevelSink& sink)

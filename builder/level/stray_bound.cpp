@@ -21,12 +21,12 @@ namespace {
 
 constexpr uint32_t kNone = VertexClusters::kNone;
 
-// Bounds below this are not improved, in coarse cells: a page's error is that of its worst triangle.
+// Bounds below this, in coarse cells, are not improved: a page's error is that of its worst triangle.
 constexpr double kEnough = 0.25;
-// Where the corners moved no farther, that is the bound.
+// Where the corners moved no farther than this, their motion is the bound.
 constexpr double kSmallMotion = 0.1;
 
-// A part of a coarse triangle with more fine triangles near it is quartered, at most so often.
+// A part of a coarse triangle with more fine triangles near it is quartered, up to so many times.
 constexpr size_t kManyPieces = 32;
 constexpr int kPartHalvings = 5;
 
@@ -44,7 +44,7 @@ public:
         for (size_t k = 0; k < triangles; ++k)
             forDistinct(corners(k), clusters, [&](uint32_t c) { all_[next[c]++] = static_cast<uint32_t>(k); });
     }
-    /// Triangles at any of the corners, ascending.
+    /// Returns the triangles at any of the corners, ascending.
     void around(const Index3& corners, std::vector<uint32_t>& out) const {
         out.clear();
         forDistinct(corners, begin_.size() - 1,
@@ -78,7 +78,7 @@ Index3 clustersAt(const LatticeMesh& fine, const VertexClusters& clusters, size_
     return {clusters.ofVertex[t[0]], clusters.ofVertex[t[1]], clusters.ofVertex[t[2]]};
 }
 
-/// What all threads work on.
+/// The meshes that all threads work on.
 struct Meshes {
     Meshes(const LatticeMesh& fineMesh, const VertexClusters& vertexClusters, const CoarseTriangles& coarseTriangles)
         : fine(fineMesh),
@@ -102,12 +102,12 @@ struct Meshes {
     const VertexClusters& clusters;
     const CoarseTriangles& coarse;
     Fans coarseFans, fineFans;
-    std::vector<TrianglePrism> prisms;  ///< of the coarse triangles
+    std::vector<TrianglePrism> prisms;  ///< prisms of the coarse triangles
     std::vector<double> stray;
     std::vector<double> moved;  ///< least motion of a preimage, with its stray; infinite for kept thin parts
 };
 
-/// One thread's work on them.
+/// One thread's work on the meshes.
 class StrayBound {
 public:
     explicit StrayBound(Meshes& meshes)
@@ -130,7 +130,7 @@ public:
 
 private:
     [[nodiscard]] Index3 clustersOf(size_t k) const { return clustersAt(fine_, clusters_, k); }
-    /// The largest counts, whichever thread comes first.
+    /// Raises a stray: the largest value counts, whichever thread comes first.
     void raise(size_t coarse, double stray) {
         const std::atomic_ref<double> shared(stray_[coarse]);
         double now = shared.load(std::memory_order_relaxed);
@@ -141,7 +141,7 @@ private:
         const Index3& t = fine_.triangles[k];
         return isLong(fine_.positions[t[0]], fine_.positions[t[1]], fine_.positions[t[2]]);
     }
-    /// Coarse cells; corners by position, so that their numbering does not show in the last bit.
+    /// A fine triangle in coarse cells; corners by position, so that their numbering does not show in the last bit.
     [[nodiscard]] Triangle3 fineTriangle(size_t k) const {
         std::array<glm::i32vec3, 3> p;
         for (int i = 0; i < 3; ++i) p[i] = fine_.positions[fine_.triangles[k][i]];
@@ -152,7 +152,7 @@ private:
         for (int i = 0; i < 3; ++i) t[i] = glm::dvec3(p[i]) / (2.0 * kLatticePerCell);
         return t;
     }
-    /// How far a fine triangle's points move to its image's.
+    /// Returns how far a fine triangle's points move to its image's.
     [[nodiscard]] double motionOf(size_t k) const {
         double squared = 0;
         for (const uint32_t v : fine_.triangles[k]) {
@@ -173,7 +173,7 @@ private:
         return true;
     }
 
-    /// Bound for a part of a coarse triangle, against pieces_[begin, end); `reach` is a bound that is known.
+    /// Bounds a part of a coarse triangle, against pieces_[begin, end); `reach` is a bound that is known already.
     /// Where the pieces are many, the part is quartered, so that each quarter has its own few.
     double boundPart(const TrianglePrism& prism, const Triangle3& part, size_t begin, size_t end, double reach,
                      int halvings) {
@@ -223,7 +223,7 @@ private:
         return cover_.bound(part, others_);
     }
 
-    /// A kept thin part: where only long triangles lie along it, only they are at hand at both of its ends.
+    /// Handles a kept thin part: where only long triangles lie along it, only they are at hand at both of its ends.
     void keepThoseAlong(const Index3& t) {
         const size_t clusters = clusters_.positions.size();
         const auto along = [&](uint32_t n) {
@@ -257,7 +257,7 @@ private:
     TriangleCover cover_{kEnough};
     std::vector<uint32_t> near_;
     std::vector<std::pair<double, uint32_t>> order_;
-    std::vector<FinePiece> pieces_;  ///< a stack: those of each part under work
+    std::vector<FinePiece> pieces_;  ///< a stack: the pieces of each part in work
     std::vector<TrianglePrism> ownPrisms_;
     std::vector<const TrianglePrism*> others_;
     std::vector<double> worst_;
@@ -297,7 +297,7 @@ void StrayBound::boundCoarse(size_t k) {
     }
     fineFans_.around(t, near_);
     if (!isImage) keepThoseAlong(t);
-    // Those over or under it are enough, but for ridges and borders.
+    // The triangles over or under it are enough, except at ridges and borders.
     pieces_.clear();
     for (const uint32_t n : near_)
         if (const FinePiece piece{fineTriangle(n), double(fine_.stray[n]) / 2}; overlap(prisms_[k], piece.corners))

@@ -9,7 +9,7 @@ namespace vcp {
 
 namespace {
 
-// A part thinner than this is not cut off: it counts with what it hangs on to.
+// A part thinner than this is not cut off: it counts with the part that it is attached to.
 constexpr double kThin = 1e-9;
 
 // Sine of a triangle's smallest angle below which a point kThin outside its prism may be far from the triangle.
@@ -28,7 +28,7 @@ constexpr double kShortest = 0.06;
 
 }  // namespace
 
-/// Convex; a triangle cut by planes, with room for one corner more a cut.
+/// A convex polygon: a triangle cut by planes, with room for one corner more per cut.
 struct TriangleCover::Polygon {
     static constexpr int kMost = 24;
     int count = 0;
@@ -37,7 +37,7 @@ struct TriangleCover::Polygon {
     void add(glm::dvec3 q) { p[count++] = q; }
 };
 
-/// Heights of a polygon's corners over a prism's planes, with the least and the largest over each plane.
+/// The heights of a polygon's corners over a prism's planes, with the least and the largest over each plane.
 struct TriangleCover::PolygonHeights {
     TrianglePrism::Heights of[Polygon::kMost], low, high;
 
@@ -52,7 +52,7 @@ struct TriangleCover::PolygonHeights {
     }
     /// Whether the polygon has a part inside of all sides, each taken alone.
     [[nodiscard]] bool reachInto() const { return low[0] < -kThin && low[1] < -kThin && low[2] < -kThin; }
-    /// Least and largest distance from the triangle's own plane.
+    /// Returns the least and the largest distance from the triangle's own plane.
     [[nodiscard]] double nearest() const {
         return low[TrianglePrism::kOwn] > 0    ? low[TrianglePrism::kOwn]
                : high[TrianglePrism::kOwn] < 0 ? -high[TrianglePrism::kOwn]
@@ -61,10 +61,10 @@ struct TriangleCover::PolygonHeights {
     [[nodiscard]] double farthest() const { return std::max(high[TrianglePrism::kOwn], -low[TrianglePrism::kOwn]); }
 };
 
-/// What a prism's sides, one after the other, cut a polygon into.
+/// The pieces into which a prism's sides, one after the other, cut a polygon.
 struct TriangleCover::Pieces {
     std::array<Polygon, 3> inside, outside;
-    double beside = 0;  ///< how far what is left at the end is outside of a side
+    double beside = 0;  ///< how far the remaining part is outside of a side
 };
 
 TrianglePrism::TrianglePrism(const Triangle3& t, double more) : corners(t), extra(more) {
@@ -94,7 +94,7 @@ double TriangleCover::bound(const Triangle3& triangle, std::span<const TriangleP
     others_ = others;
     worst_ = worst;
     if (others.empty()) return std::numeric_limits<double>::infinity();
-    // Often one prism holds all of it.
+    // Often a single prism holds all of it.
     for (size_t i = 0; i < others.size(); ++i) {
         const TrianglePrism& o = *others[i];
         double distance = 0;
@@ -119,7 +119,7 @@ WIDER_CLONES double TriangleCover::cover(const Polygon& polygon, size_t first, M
         if (o.isNeedle || o.extra >= best.distance || polygon.count + 3 > Polygon::kMost) continue;
         heights.measure(o, polygon);
         if (heights.nearest() + o.extra >= best.distance || !heights.reachInto()) continue;
-        // Over a ridge the prisms leave a wedge: what is little outside counts as inside, with its distance.
+        // Over a ridge the prisms leave a wedge: a part that is a little outside counts as inside, with its distance.
         const double room = std::max(kThin, std::min(kMostBeside, kBeside * heights.farthest()) / o.cornerFactor);
         Pieces pieces;
         const Polygon* rest = split(o, room, polygon, heights, pieces);
@@ -136,8 +136,8 @@ WIDER_CLONES double TriangleCover::cover(const Polygon& polygon, size_t first, M
     return settle(polygon, best, kHalvings);
 }
 
-/// Cuts off what is farther than `room` outside the prism, side by side. What is left; null where that is nothing.
-/// `heights`: of the polygon, then of what is left.
+/// Cuts off what is farther than `room` outside the prism, side by side. Returns what is left; null where nothing is.
+/// `heights` are those of the polygon, then of what is left.
 WIDER_CLONES const TriangleCover::Polygon* TriangleCover::split(const TrianglePrism& o, double room,
                                                                 const Polygon& polygon, PolygonHeights& heights,
                                                                 Pieces& pieces) {
@@ -164,7 +164,7 @@ WIDER_CLONES const TriangleCover::Polygon* TriangleCover::split(const TrianglePr
     return left;
 }
 
-/// No prism is left to try: the convex bound, and where that is poor, that of halves.
+/// Called when no prism is left to try: takes the convex bound, and where that is poor, the bound of halves.
 double TriangleCover::settle(const Polygon& polygon, Match best, int halvings) {
     for (size_t j = 0; j < others_.size(); ++j) {
         const TrianglePrism& o = *others_[j];

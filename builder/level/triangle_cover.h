@@ -21,23 +21,23 @@ namespace vcp {
 /// A triangle with its plane and, upright on it, a plane through each edge (positive outside).
 struct TrianglePrism {
     static constexpr int kPlanes = 4, kOwn = 3;  ///< the sides come first
-    /// One value a plane, in a vector register. Passed by reference only: by value it would depend on the processor,
-    /// as the alignment would if it were not given.
+    /// One value for each plane, in a vector register. Passed by reference only: passed by value it would depend on the
+    /// processor, as the alignment would if it were not given.
     using Heights = double __attribute__((vector_size(kPlanes * sizeof(double)), aligned(kPlanes * sizeof(double))));
 
     Triangle3 corners;
     Heights x{}, y{}, z{}, offset{};  ///< the planes' unit normals, by axis, and their offsets
     double extra = 0;                 ///< added to distances to it
-    double cornerFactor = 1;          ///< a point x outside all of its sides at once is at most x times this off
-    bool isNeedle = false;            ///< too thin for its prism to be certain; measured by the convex bound alone
+    double cornerFactor = 1;          ///< a point outside of all its sides by x at once is at most x times this off
+    bool isNeedle = false;            ///< too thin for its prism to be certain; measured only by the convex bound
 
     TrianglePrism() = default;
     /// `corners` must span an area.
     explicit TrianglePrism(const Triangle3& corners, double extra = 0);
 
-    /// Of a point, over each plane.
+    /// Sets the heights of a point over each plane.
     void heights(glm::dvec3 p, Heights& h) const { h = x * p.x + y * p.y + z * p.z - offset; }
-    /// Distance of a point from the triangle's own plane.
+    /// Returns the distance of a point from the triangle's own plane.
     [[nodiscard]] double away(glm::dvec3 p) const {
         return std::abs(x[kOwn] * p.x + y[kOwn] * p.y + z[kOwn] * p.z - offset[kOwn]);
     }
@@ -48,9 +48,9 @@ public:
     /// Bounds below `enough` are not worth improving.
     explicit TriangleCover(double enough) : enough_(enough) {}
 
-    /// Bound on the distance (plus its `extra`) of all points of `triangle` to the nearest of `others`. `others`
-    /// are tried in their order, so near ones should come first. `worst[i]`, if given, grows to the bound of
-    /// what was measured against others[i]. Infinite where there are none.
+    /// Bounds the distance (plus its `extra`) of all points of `triangle` to the nearest of `others`. `others` are
+    /// tried in their order, so near ones should come first. `worst[i]`, if given, grows to the bound of what was
+    /// measured against others[i]. Infinite where there are none.
     double bound(const Triangle3& triangle, std::span<const TrianglePrism* const> others, std::span<double> worst = {});
 
 private:

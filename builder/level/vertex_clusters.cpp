@@ -16,31 +16,31 @@ namespace vcp {
 
 namespace {
 
-// Steps of the finer lattice.
+// A coarse cell, in steps of the finer lattice.
 constexpr int kCoarseCell = 2 * kLatticePerCell;
 constexpr int kLargestCube = static_cast<int>(kLargestClusterCells * kCoarseCell);
 constexpr int kSmallestCube = static_cast<int>(kSmallestClusterCells * kCoarseCell);
 
-// Sums are of integers, so that their order does not matter: reals are cut to multiples of this.
+// Sums are of integers, so that their order does not matter: reals are rounded to multiples of this.
 constexpr double kFixedPoint = 1 << 30;
 
-// The part of the planes' weight that draws a vertex to the mean of its cluster where the planes leave it free.
+// The share of the planes' weight that draws a vertex to the mean of its cluster where the planes leave it free.
 constexpr double kMeanWeight = 0.01;
 
-// Cosine of half the angle between the two triangles of an edge, above which the surface turns back there.
+// The cosine of half the angle between the two triangles of an edge, above which the surface turns back there.
 constexpr double kTurningBack = 0.8;
 
-// Mean of the directions of a vertex' edges above which it is a tip; in the middle of a border it is 0.64.
+// The mean of the directions of a vertex' edges, above which it is a tip; in the middle of a border it is 0.64.
 constexpr double kTip = 0.8;
 
 constexpr double kCreaseCosine = 0.766;  // 40 degrees
 
 int64_t fixed(double x) { return static_cast<int64_t>(x * kFixedPoint); }
 
-/// xx yy zz yz zx xy
+/// The order of components is xx yy zz yz zx xy.
 using Symmetric3 = std::array<double, 6>;
 
-/// Eigenvector of the largest eigenvalue, by Jacobi rotations.
+/// Returns the eigenvector of the largest eigenvalue, by Jacobi rotations.
 glm::dvec3 dominantDirection(const Symmetric3& m) {
     double a[3][3] = {{m[0], m[5], m[4]}, {m[5], m[1], m[3]}, {m[4], m[3], m[2]}};
     double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -72,7 +72,7 @@ glm::dvec3 dominantDirection(const Symmetric3& m) {
     return glm::normalize(glm::dvec3(v[0][k], v[1][k], v[2][k]));
 }
 
-/// Sum of squared distances to planes, as integers.
+/// A sum of squared distances to planes, as integers.
 struct Quadric {
     std::array<int64_t, 6> a{};
     std::array<int64_t, 3> b{};
@@ -91,7 +91,7 @@ struct Quadric {
         for (int i = 0; i < 6; ++i) m[i] = double(a[i]);
         return m;
     }
-    /// The minimiser, drawn to `mean`.
+    /// Returns the minimiser, drawn to `mean`.
     [[nodiscard]] glm::dvec3 minimiser(glm::dvec3 mean) const {
         Symmetric3 m = matrix();
         const double pull = kMeanWeight * (m[0] + m[1] + m[2]);
@@ -138,11 +138,11 @@ public:
 private:
     struct Member {
         uint32_t vertex;
-        bool stays = false;    ///< how far it moves counts: a long triangle uses it, or it is a tip
-        uint32_t planes = 0;   ///< first in planes_
-        uint32_t borders = 0;  ///< first of the planes at borders
+        bool stays = false;    ///< its motion counts: a long triangle uses it, or it is a tip
+        uint32_t planes = 0;   ///< first of its planes in planes_
+        uint32_t borders = 0;  ///< first of its planes at borders
         uint32_t end = 0;
-        glm::dvec3 point{0};  ///< coarse cells from centre_
+        glm::dvec3 point{0};  ///< in coarse cells from centre_
         Quadric quadric{};
     };
     struct Plane {
@@ -179,7 +179,7 @@ private:
         const auto& t = mesh_.triangles[k];
         const glm::i32vec3 a = mesh_.positions[t[0]], b = mesh_.positions[t[1]], c = mesh_.positions[t[2]];
         m.stays = m.stays || isLong(a, b, c);
-        // Exact, so whichever corner comes first only the sign can differ.
+        // The product is exact, so whichever corner comes first, only the sign can differ.
         const glm::dvec3 n = glm::cross(glm::dvec3(b - a), glm::dvec3(c - a));
         const double length = glm::length(n);
         const glm::dvec3 unit = n / length;
@@ -188,7 +188,7 @@ private:
         m.quadric.add(unit, planes_.back().offset, weight);
         for (int i = 0; i < 3; ++i) {
             if (t[i] == m.vertex) continue;
-            // The third corner: neither this one nor the member's.
+            // The third corner is neither this vertex nor the member's.
             const uint32_t third = t[0] + t[1] + t[2] - t[i] - m.vertex;
             const glm::dvec3 v(mesh_.positions[m.vertex]);
             const glm::dvec3 along = glm::dvec3(mesh_.positions[t[i]]) - v;
@@ -196,16 +196,16 @@ private:
         }
     }
 
-    /// Direction in the plane of `along` and `to`, upright on `along`, on the side of `to`.
+    /// Returns the direction in the plane of `along` and `to`, upright on `along`, on the side of `to`.
     static glm::dvec3 upright(glm::dvec3 along, glm::dvec3 to) {
         return glm::normalize(glm::cross(glm::cross(along, to), along));
     }
 
-    /// Planes upright on the edges where the surface ends or turns back: all of their triangles are on one side.
-    /// A vertex all of whose edges are on one side is a tip, which planes do not hold.
+    /// Adds planes upright on the edges where the surface ends or turns back: there all triangles are on one side. A
+    /// vertex with all of its edges on one side is a tip, which planes do not hold.
     void addBorders(Member& m) {
         std::sort(edges_.begin(), edges_.end(), [](const Edge& a, const Edge& b) { return a.other < b.other; });
-        Quadric direction;  // for its sums in integers
+        Quadric direction;  // used for its sums in integers
         int64_t count = 0;
         for (size_t i = 0, end = 0; i < edges_.size(); i = end) {
             glm::dvec3 inward(0);
@@ -214,7 +214,7 @@ private:
             const double length = glm::length(edges_[i].along);
             direction.add(edges_[i].along / length, 1, 1);
             ++count;
-            // Sums of three and more may depend on their order in the last bit: such edges are no borders.
+            // Sums of three and more may depend on their order in the last bit, so such edges are no borders.
             if (end - i > 2 || glm::length(inward) < kTurningBack * double(end - i)) continue;
             const glm::dvec3 n = glm::normalize(inward);
             planes_.push_back({n, glm::dot(n, m.point)});
@@ -260,8 +260,8 @@ private:
         }
     }
 
-    /// How far the surface would move, about: the least of three views of it, as planes, as one rough sheet
-    /// and as points.
+    /// Estimates how far the surface would move: the least of three views of it, as planes, as one rough sheet and as
+    /// points.
     double errorOf(Members members, glm::dvec3 r, const Quadric& sum) const {
         double planes = 0, borders = 0, motion = 0, staying = 0;
         for (const Member& m : members) {
@@ -286,7 +286,7 @@ private:
     void emit(Members members, glm::dvec3 r, glm::i32vec3 lower, int edge) {
         const uint32_t number = static_cast<uint32_t>(out_.positions.size());
         for (const Member& m : members) out_.ofVertex[m.vertex] = number;
-        // Within the half-open cube, so that no two clusters meet in a point.
+        // The point stays within the half-open cube, so that no two clusters meet in a point.
         const glm::dvec3 steps = glm::round((centre_ + r) * double(kLatticePerCell));
         out_.positions.push_back(glm::clamp(glm::i32vec3(steps), lower / 2, (lower + edge) / 2 - 1));
         if (!mesh_.colours.empty()) out_.colours.push_back(meanColour(members));
@@ -317,7 +317,7 @@ private:
         return packNormal(n, crease);
     }
 
-    /// One of a member's triangles' edges at it.
+    /// An edge, at a member, of one of its triangles.
     struct Edge {
         uint32_t other;
         glm::dvec3 along, inward;
@@ -326,7 +326,7 @@ private:
     const LatticeMesh& mesh_;
     VertexClusters out_;
     std::vector<uint32_t> begin_, incident_;  ///< triangles at each vertex
-    glm::dvec3 centre_{0};                    ///< of the largest cube, coarse cells
+    glm::dvec3 centre_{0};                    ///< centre of the largest cube, coarse cells
     std::vector<Member> members_;
     std::vector<Plane> planes_;
     std::vector<Edge> edges_;

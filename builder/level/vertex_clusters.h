@@ -24,8 +24,8 @@ inline constexpr double kSmallestClusterCells = 0.25;
 /// A cube is cut while its vertex would be farther than this from the surface, in cells of the coarser level.
 inline constexpr double kClusterErrorCells = 0.15;
 
-/// Triangles whose bounding box is wider than this, in cells of their level, count as long: they are compared
-/// by how far their corners moved, since what surrounds their other end is not at hand.
+/// Triangles whose bounding box is wider than this, in cells of their level, count as long: they are compared by how
+/// far their corners moved, since the surroundings of their other end are not at hand.
 inline constexpr int kShortTriangleCells = 2;
 
 struct VertexClusters {
@@ -36,7 +36,7 @@ struct VertexClusters {
     std::vector<uint32_t> normals;        ///< mean of the vertices' normals; empty where the mesh has none
 };
 
-/// Clusters are numbered cube by cube, in Morton order.
+/// Clusters vertices; clusters are numbered cube by cube, in Morton order.
 VertexClusters clusterVertices(const LatticeMesh& fine);
 
 /// Whether a fine triangle is long.

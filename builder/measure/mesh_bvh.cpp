@@ -19,17 +19,17 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr uint32_t kLeafTriangles = 4;
 constexpr int kBins = 16;
 
-/// Point of segment a b nearest to the coordinate origin.
+/// Returns the point of segment a b nearest to the coordinate origin.
 glm::dvec3 closestOfSegment(glm::dvec3 a, glm::dvec3 b) {
     const glm::dvec3 ab = b - a;
     const double length2 = glm::dot(ab, ab);
     if (!(length2 > 0)) return a;
     const double u = std::clamp(-glm::dot(a, ab) / length2, 0.0, 1.0);
-    // From the nearer end: no cancellation along long edges.
+    // The point is computed from the nearer end: no cancellation along long edges.
     return u <= 0.5 ? a + u * ab : b - std::clamp(glm::dot(b, ab) / length2, 0.0, 1.0) * ab;
 }
 
-/// Foot of the perpendicular from the coordinate origin, where it is inside the triangle.
+/// Returns the foot of the perpendicular from the coordinate origin, where it is inside the triangle.
 std::optional<glm::dvec3> footInside(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
     const glm::dvec3 n = glm::cross(b - a, c - a);
     const double wa = glm::dot(n, glm::cross(b, c)), wb = glm::dot(n, glm::cross(c, a)),
@@ -72,7 +72,7 @@ struct Split {
     double position = 0;
 };
 
-/// The cheapest of 16 planes an axis by surface area; axis -1 where all centres agree.
+/// Returns the cheapest of 16 planes an axis by surface area; axis -1 where all centres agree.
 Split cheapestSplit(const IndexedMesh& mesh, const uint32_t* triangles, uint32_t count,
                     const std::vector<glm::dvec3>& centres) {
     Bounds spread;
@@ -155,7 +155,7 @@ struct MeshBvh::WoopRay {
         originHigh = o - glm::dvec3(pad);
     }
 
-    /// Smallest t in [tMin, tMax] inside of the box, or infinity. Errs towards inside.
+    /// Returns the smallest t in [tMin, tMax] inside of the box, or infinity. Errs towards inside.
     [[nodiscard]] double enter(glm::dvec3 low, glm::dvec3 high, double tMin, double tMax) const {
         for (int axis = 0; axis < 3; ++axis) {
             const double a = (low[axis] - originLow[axis]) * inverse[axis];

@@ -1,5 +1,5 @@
-// MeshBvh: exact questions to a mesh in double precision: the nearest point, and what a ray hits. It is the
-// oracle that everything rendered is measured against, so it shares no code with the octree or its builder.
+// MeshBvh answers two questions about a mesh exactly, in double precision: the nearest point, and what a ray hits. It
+// is the oracle that everything rendered is measured against, so it shares no code with the octree or its builder.
 //
 // Rays: the watertight test of Woop, Benthin and Wald 2013 in double, edges and vertices inclusive. A sheared
 // edge function is a difference of two products; rounding keeps its sign or makes it zero, and zero counts
@@ -31,13 +31,13 @@ struct NearestPoint {
     uint32_t triangle = 0;
 };
 
-/// Closest point of triangle a b c to p. Exact to rounding for slivers, segments and points.
+/// Returns the closest point of triangle a b c to p. Exact to rounding for slivers, segments and points.
 glm::dvec3 closestPointOfTriangle(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c);
 
 struct MeshHit {
     double t = 0;  ///< in units of |direction|
     uint32_t triangle = 0;
-    glm::dvec3 normal{0};  ///< of the triangle, unit, on the side its vertices turn left around
+    glm::dvec3 normal{0};  ///< unit normal of the triangle, on the side from which its vertices turn left
 };
 
 class MeshBvh {
@@ -45,19 +45,19 @@ public:
     /// `mesh` must outlive the tree, and have fewer than 2^31 triangles; positions finite.
     explicit MeshBvh(const IndexedMesh& mesh);
 
-    /// Nearest point of the mesh within `within` of p; among equals any. Any thread.
+    /// Returns the nearest point of the mesh within `within` of p; any one among equals. Any thread.
     [[nodiscard]] std::optional<NearestPoint> nearestPoint(
         glm::dvec3 p, double within = std::numeric_limits<double>::infinity()) const;
 
-    /// First hit with tMin <= t <= tMax. Triangles seen exactly edge-on are not hit. Any thread.
+    /// Returns the first hit with tMin <= t <= tMax. Triangles seen exactly edge-on are not hit. Any thread.
     [[nodiscard]] std::optional<MeshHit> nearestHit(glm::dvec3 origin, glm::dvec3 direction, double tMin = 0,
                                                     double tMax = std::numeric_limits<double>::infinity()) const;
     [[nodiscard]] bool anyHit(glm::dvec3 origin, glm::dvec3 direction, double tMin, double tMax) const;
-    /// Every hit, sorted by t. A ray through a shared edge reports both triangles.
+    /// Returns every hit, sorted by t. A ray through a shared edge reports both triangles.
     [[nodiscard]] std::vector<MeshHit> allHits(glm::dvec3 origin, glm::dvec3 direction, double tMin = 0,
                                                double tMax = std::numeric_limits<double>::infinity()) const;
 
-    /// Triangles whose boxes touch the box low, high. Any thread.
+    /// Returns the triangles whose boxes touch the box low, high. Any thread.
     [[nodiscard]] std::vector<uint32_t> trianglesNear(glm::dvec3 low, glm::dvec3 high) const;
 
     [[nodiscard]] const IndexedMesh& mesh() const { return *mesh_; }
@@ -68,7 +68,7 @@ private:
     struct Node {
         glm::dvec3 low, high;
         uint32_t first;  ///< first of the two children, or first triangle in order_
-        uint32_t count;  ///< triangles; 0 for an inner node
+        uint32_t count;  ///< number of triangles; 0 for an inner node
     };
     struct WoopRay;
 

@@ -23,13 +23,13 @@ std::array<glm::dvec3, 2> perpendiculars(glm::dvec3 d) {
     return {u, glm::cross(d, u)};
 }
 
-/// Between the segments p0 p1 and q0 q1.
+/// Returns the distance between the segments p0 p1 and q0 q1.
 double segmentDistance(glm::dvec3 p0, glm::dvec3 p1, glm::dvec3 q0, glm::dvec3 q1) {
     const glm::dvec3 p = p1 - p0, q = q1 - q0, r = p0 - q0;
     const double pp = glm::dot(p, p), pq = glm::dot(p, q), qq = glm::dot(q, q), pr = glm::dot(p, r),
                  qr = glm::dot(q, r);
     const auto share = [](double part, double whole) { return whole > 0 ? std::clamp(part / whole, 0.0, 1.0) : 0.0; };
-    // The nearest points of the lines, cut to one segment, then to the other, then to the first again.
+    // The nearest points of the lines are cut to one segment, then to the other, then to the first again.
     double s = share(pq * qr - qq * pr, pp * qq - pq * pq);
     const double t = share(pq * s + qr, qq);
     s = share(pq * t - pr, pp);
@@ -83,7 +83,7 @@ bool RayJudge::leaks(glm::dvec3 origin, glm::dvec3 direction, double until) cons
         const auto hit = mesh_->nearestHit(origin, direction, from, until);
         if (!hit) return false;
         const Piece piece = pieceNearMesh(origin, direction, hit->t);
-        // Stopped within the piece: by the surface of this very crossing.
+        // The ray is stopped within the piece, by the surface of this very crossing.
         if (until <= piece.last + radius_) return false;
         // A piece that begins behind the eye says nothing about a surface in front of it.
         if (piece.first > 0 && parallelsCross(origin, direction, piece) &&
@@ -123,7 +123,7 @@ bool RayJudge::parallelsCross(glm::dvec3 origin, glm::dvec3 direction, Piece pie
 }
 
 bool RayJudge::borderNear(glm::dvec3 first, glm::dvec3 last) const {
-    // Both triangles of an edge that comes so near are among these. Corners are told apart by their places.
+    // Both triangles of an edge that comes so near are among these. Corners are compared by their positions.
     const IndexedMesh& mesh = mesh_->mesh();
     using Place = std::array<double, 3>;
     std::map<std::pair<Place, Place>, int> triangles;

@@ -43,7 +43,7 @@ enum class RayClass : uint8_t { Hit, Miss, Missed, False, WrongSheet, Unresolved
 inline constexpr std::array<std::string_view, 6> kRayClassNames = {"hit",   "miss",        "missed",
                                                                    "false", "wrong_sheet", "unresolved"};
 
-/// What a method says about a ray.
+/// What a method reports about a ray.
 struct SurfaceHit {
     double t = 0;               ///< world units; |direction| = 1
     glm::dvec3 normal{0};       ///< unit, either side
@@ -52,21 +52,21 @@ struct SurfaceHit {
 
 struct RayJudgement {
     RayClass rayClass = RayClass::Miss;
-    double depthError = 0;     ///< world units along the ray; of the class hit
-    double distance = 0;       ///< from the surface hit to the mesh, world units; of every surface hit
+    double depthError = 0;     ///< world units along the ray; for the class hit
+    double distance = 0;       ///< from the surface hit to the mesh, world units; for every surface hit
     double overCertified = 0;  ///< distance / certified error (1: at the bound)
-    double normalDegrees = 0;  ///< against the plane of the hit triangle, 0 to 90; of the class hit
+    double normalDegrees = 0;  ///< against the plane of the hit triangle, 0 to 90; for the class hit
     bool hole = false;
     bool tooFar = false;
 };
 
 class RayJudge {
 public:
-    /// `cell`: edge of the finest cell; `certifiedError`: of the surface, both in world units. `mesh` must
-    /// outlive the judge.
+    /// `cell`: edge of the finest cell; `certifiedError`: that of the surface; both in world units. `mesh` must outlive
+    /// the judge.
     RayJudge(const MeshBvh& mesh, double cell, double certifiedError);
 
-    /// |direction| = 1. `resolved` is false where the method gave up. Any thread.
+    /// Judges a ray; |direction| = 1. `resolved` is false where the method gave up. Any thread.
     [[nodiscard]] RayJudgement judge(glm::dvec3 origin, glm::dvec3 direction, const std::optional<SurfaceHit>& hit,
                                      bool resolved = true) const;
 
@@ -95,13 +95,13 @@ public:
 
     [[nodiscard]] uint64_t rays() const;
     [[nodiscard]] uint64_t count(RayClass rayClass) const { return counts_[static_cast<size_t>(rayClass)]; }
-    /// Of all rays; the six sum to 1.
+    /// Returns a class's fraction of all rays; the six fractions sum to 1.
     [[nodiscard]] double fraction(RayClass rayClass) const;
     [[nodiscard]] uint64_t holes() const { return holes_; }
     [[nodiscard]] uint64_t tooFar() const { return tooFar_; }
     [[nodiscard]] double overCertifiedMax() const { return overCertifiedMax_; }
-    /// Of the class hit: distance of the hit to the mesh and error along the ray, both in cells of edge
-    /// `cell`; angle between the normals in degrees.
+    /// For the class hit: distance of the hit to the mesh and error along the ray, both in cells of edge `cell`; angle
+    /// between the normals in degrees.
     [[nodiscard]] Quantiles distanceCells(double cell) const;
     [[nodiscard]] Quantiles depthCells(double cell) const;
     [[nodiscard]] Quantiles normalDegrees() const { return quantilesOf(normalDegrees_); }

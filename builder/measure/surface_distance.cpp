@@ -43,7 +43,7 @@ private:
     uint64_t state_;
 };
 
-/// Runs `work(sample)` for all samples below `count` in blocks. False when cancelled.
+/// Runs `work(sample)` for all samples below `count` in blocks. Returns false when cancelled.
 class BlockRunner {
 public:
     explicit BlockRunner(const SurfaceDistanceOptions& options)
@@ -83,7 +83,7 @@ private:
     double done_ = 0;
 };
 
-/// A convex polygon of a triangle cut off at the walls of a box: up to 3 + 6 corners.
+/// A convex polygon, of a triangle cut off at the walls of a box: up to 3 + 6 corners.
 struct Polygon {
     std::array<glm::dvec3, 12> corner;
     int count = 0;
@@ -123,14 +123,14 @@ double boxDistance(glm::dvec3 p, glm::dvec3 lowest, double edge) {
 
 glm::dvec3 octantOffset(uint32_t octant) { return {octant & 1u, octant >> 1 & 1u, octant >> 2 & 1u}; }
 
-/// A leaf of the level.
+/// A leaf of the measured level.
 struct LeafBox {
     uint64_t page;
     glm::dvec3 lowest;  ///< in cells from the page's lowest corner
     double edge;
 };
 
-/// The leaves of the cut: as a list, and nearest hard leaves by descent.
+/// The leaves of the cut, as a list; and a descent to the nearest hard leaves.
 class LevelLeaves {
 public:
     LevelLeaves(const PageCache& cache, const std::vector<uint64_t>& cut)
@@ -145,7 +145,7 @@ public:
         return leaves;
     }
 
-    /// Distance from a world point to the triangles of hard leaves, or `best` if that is less.
+    /// Returns the distance from a world point to the triangles of hard leaves, or `best` if that is less.
     [[nodiscard]] double hardDistance(glm::dvec3 p, double best) const {
         visitPage(0, p, best);
         return best;
@@ -203,7 +203,7 @@ private:
     std::vector<bool> inCut_;
 };
 
-/// Points of the mesh, by area, on edges and at vertices in the ratio 2 : 1 : 1. Triangles without area are no
+/// Samples points of the mesh, by area, on edges and at vertices in the ratio 2 : 1 : 1. Triangles without area are not
 /// part of the surface: scans have hairs of them that stick out.
 class MeshSampler {
 public:
@@ -247,11 +247,11 @@ private:
     }
 
     const IndexedMesh& mesh_;
-    std::vector<uint32_t> triangles_;  ///< with area
-    std::vector<double> areaUpTo_;     ///< of these, summed up
+    std::vector<uint32_t> triangles_;  ///< triangles with area
+    std::vector<double> areaUpTo_;     ///< their areas, summed up
 };
 
-/// Upper bound on the distance of a world point to the rendered surface.
+/// Returns an upper bound on the distance of a world point to the rendered surface.
 double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leaves, const MeshSampler::Sample& sample,
                          double cell, double certifiedError) {
     double best = kInfinity;
@@ -278,7 +278,7 @@ double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leave
     return best;
 }
 
-/// Hits of one random ray through a leaf that lie in the leaf.
+/// Finds the hits of one random ray through a leaf that lie in the leaf.
 void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random,
                 std::vector<glm::dvec3>& hits) {
     const Dataset& dataset = caster.cache().dataset();
@@ -293,7 +293,7 @@ void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom
             hits.push_back(hit.position);
 }
 
-/// Keeps the largest of what threads report; ties go to the lowest sample.
+/// Keeps the largest distance that threads report; ties go to the lowest sample.
 struct Worst {
     std::mutex mutex;
     double distance = -1;
@@ -344,7 +344,7 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     if (!leaves.empty() && !runner.run(options.samples, 0.6, 1, [&](uint64_t i) {
             SampleRandom random(options.seed, 2 * i + 1);
             std::vector<glm::dvec3> hits;
-            // Most lines through a leaf pass its surface by.
+            // Most lines through a leaf miss its surface.
             const LeafBox& leaf = leaves[random.below(leaves.size())];
             for (int ray = 0; ray < 8 && hits.empty(); ++ray) hitsOfLeaf(*caster, leaf, random, hits);
             for (const glm::dvec3& hit : hits) {

@@ -1,4 +1,4 @@
-// How far the surface of a level of a dataset and a mesh are apart, both ways, measured by samples (`vcp verify
+// Measures by samples, both ways, how far the surface of a level of a dataset and a mesh are apart (`vcp verify
 // --against`).
 //
 //   mesh to surface   samples: vertices, points on edges, points inside triangles, by area; of triangles that
@@ -8,7 +8,7 @@
 //                     exact distance to the triangles of hard leaves, each cut off at its leaf's walls.
 //   surface to mesh   samples: hits of random rays through the leaves of the level, every leaf alike.
 //                     The distance to the mesh is exact (MeshBvh).
-// Both measurements are seeded: the same numbers whatever the threads.
+// Both measurements are seeded: the numbers are the same whatever the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -34,13 +34,13 @@ struct SurfaceDistance {
     Quantiles surfaceToMesh;       ///< world units
     glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
     glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
-    uint64_t samples = 0;          ///< measured, both ways together
-    double cell = 0;               ///< of the level, world units
-    double certifiedErrorMax = 0;  ///< of the level, world units
+    uint64_t samples = 0;          ///< samples measured, both ways together
+    double cell = 0;               ///< cell of the level, world units
+    double certifiedErrorMax = 0;  ///< certified error of the level, world units
 };
 
-/// Measures one level of `cache`, all of whose pages it needs loaded. Errors: Usage (a page is not
-/// loaded), InvalidInput (the mesh has no triangle with area), Cancelled.
+/// Measures one level of `cache`, all of whose pages must be loaded. Errors: Usage (a page is not loaded), InvalidInput
+/// (the mesh has no triangle with area), Cancelled.
 Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const MeshBvh& mesh,
                                                const SurfaceDistanceOptions& options = {});
 

@@ -41,7 +41,7 @@ public:
         p_ += word.size();
         return true;
     }
-    /// What is left, without the white space around it: names may hold spaces.
+    /// Returns what is left, without the white space around it: names may hold spaces.
     [[nodiscard]] std::string rest() {
         (void)peek();
         const char* end = end_;
@@ -62,7 +62,7 @@ public:
 
     void read() {
         sideFiles_.emplace_back(path_);
-        // A named pipe would wait for its writer.
+        // Opening a named pipe would wait for its writer.
         std::error_code ignored;
         if (!std::filesystem::is_regular_file(path_, ignored)) return warn("no such file; its colours are left out");
         auto source = ByteSource::open(path_);

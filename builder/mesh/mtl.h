@@ -1,8 +1,8 @@
 // Wavefront MTL: the materials of an OBJ file, as far as the colour of a surface goes.
 //
-// `newmtl`, `Kd` and `map_Kd` with its options -o, -s and -clamp; the others are read over. Where there is an image,
-// it is the colour: Kd is ignored then, as many exporters leave a grey one behind. Images lie below the folder of the
-// MTL file; others are left out with a warning, as is what is wrong in the file.
+// Reads `newmtl`, `Kd` and `map_Kd` with its options -o, -s and -clamp; other statements are skipped. Where there is an
+// image, it is the colour: Kd is ignored then, as many exporters leave a grey one behind. Images lie below the folder
+// of the MTL file; others are left out with a warning, as are faulty statements.
 #pragma once
 
 #include <filesystem>
@@ -22,8 +22,8 @@ struct MtlMaterial {
     glm::vec2 uvScale{1};  ///< texture coordinates of the file are scaled, then moved
 };
 
-/// Appends the materials of a file. Limits: 16 MiB, 65536 materials. Never fails: what cannot be read is a warning,
-/// one line that names the file. `sideFiles` gets the file and the images that it names.
+/// Appends the materials of a file. Limits: 16 MiB, 65536 materials. It never fails: what cannot be read becomes a
+/// warning, one line that names the file. `sideFiles` gets the file and the images that it names.
 void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings,
              std::vector<SideFile>& sideFiles);
 

@@ -16,10 +16,10 @@ namespace vcp {
 namespace {
 
 constexpr size_t kStatementLimit = 1024 * 1024;
-constexpr size_t kStartBytes = 256 * 1024;  // looked at for colours
+constexpr size_t kStartBytes = 256 * 1024;  // bytes that are searched for colours
 constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
 
-// After the last line end that no backslash precedes.
+// Returns the position after the last line end that no backslash precedes.
 size_t afterLastStatement(std::string_view text) {
     while (true) {
         const size_t lineEnd = text.rfind('\n');
@@ -166,7 +166,7 @@ private:
         return {};
     }
 
-    // Where the word `keyword` ends, or nullptr when another stands at p.
+    // Returns where the word `keyword` ends, or nullptr when another word stands at p.
     const char* afterKeyword(const char* p, std::string_view keyword) const {
         const auto left = static_cast<size_t>(end_ - p);
         if (left <= keyword.size() || std::string_view(p, keyword.size()) != keyword || !isBlank(p[keyword.size()]))
@@ -174,7 +174,7 @@ private:
         return p + keyword.size();
     }
 
-    // `vt`, `usemtl`, and an `mtllib` that comes too late to count.
+    // Reads `vt`, `usemtl`, and an `mtllib` that comes too late to count.
     Result<void> readPaint(const char*& p) {
         const char* const end = lineEnd(p);
         if (const char* const name = afterKeyword(p, "usemtl")) {
@@ -190,7 +190,7 @@ private:
         return {};
     }
 
-    // To the next word of the statement, over line ends after a backslash. False at the statement's end.
+    // Moves to the next word of the statement, over line ends after a backslash. Returns false at the statement's end.
     bool toWord(const char*& p) {
         while (p != end_) {
             if (isBlank(*p)) {
@@ -211,7 +211,7 @@ private:
     // A word ends with white space, or with the backslash of a continued line.
     bool endsWord(const char* p) const { return p && (p == end_ || isSpace(*p) || *p == '\\'); }
 
-    // False when a word is not a number; `p` is left at it.
+    // Returns false when a word is not a number; `p` is left at it.
     bool readNumbers(const char*& p, VertexNumbers& numbers) {
         while (numbers.count < numbers.values.size() && toWord(p)) {
             const char* const stop = parseReal(p, end_, numbers.values[numbers.count]);
@@ -243,7 +243,7 @@ private:
         const double* const rgb = numbers.colour();
         Rgba8 colour = 0xFF000000;
         for (int channel = 0; channel < 3; ++channel) {
-            // Not std::clamp: the order of the comparisons makes NaN 0.
+            // std::clamp is not used: here the order of the comparisons makes NaN 0.
             const double value = std::min(std::max(0.0, rgb[channel] * colourScale_ + 0.5), 255.0);
             colour |= static_cast<Rgba8>(value) << (8 * channel);
         }
@@ -254,7 +254,7 @@ private:
         ++faces_;
         uint64_t first = 0;
         uint64_t last = 0;
-        std::array<std::optional<uint64_t>, 3> uvs;  // of the first corner, the last and this one
+        std::array<std::optional<uint64_t>, 3> uvs;  // numbers for the first corner, the last and this one
         for (size_t corner = 0; toWord(p); ++corner) {
             uint64_t vertex = 0;
             VCP_TRY(readCorner(p, vertex, uvs[2]));
@@ -268,7 +268,7 @@ private:
         return {};
     }
 
-    // v, v/t, v//n or v/t/n; n does not matter, and t only for images.
+    // Reads v, v/t, v//n or v/t/n; n does not matter, and t matters only for images.
     Result<void> readCorner(const char*& p, uint64_t& vertex, std::optional<uint64_t>& uv) {
         int64_t number = 0;
         const char* stop = parseInteger(p, end_, number);
@@ -289,7 +289,7 @@ private:
         return {};
     }
 
-    // The number after the slash, from 0; nothing where there is none, or none yet.
+    // Returns the number after the slash, from 0; nothing where there is none, or none yet.
     std::optional<uint64_t> uvNumber(const char* p) const {
         int64_t number = 0;
         if (!parseInteger(p, end_, number)) return std::nullopt;
@@ -323,7 +323,7 @@ private:
     double colourScale_ = 255.0;  // from the file's colours to 0..255
     uint64_t mostVertices_ = 0;
 
-    const char* begin_ = nullptr;  // of the window, which starts at the cursor
+    const char* begin_ = nullptr;  // start of the window, which starts at the cursor
     const char* end_ = nullptr;
     const char* statement_ = nullptr;
     uint64_t line_ = 1;
@@ -331,7 +331,7 @@ private:
 
     uint64_t vertices_ = 0;
     uint64_t faces_ = 0;
-    uint64_t promised_ = 0;  // vertices that must exist at the end, for faces that came before them
+    uint64_t promised_ = 0;  // number of vertices that faces before them have named, so that must exist at the end
     uint64_t promisedLine_ = 0;
     uint64_t promisedByte_ = 0;
 };

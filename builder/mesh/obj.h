@@ -20,16 +20,16 @@
 
 namespace vcp {
 
-/// Does this text begin with a statement of OBJ, comments aside?
+/// Returns whether this text begins with a statement of OBJ, comments aside.
 bool looksLikeObj(std::string_view start);
 
-/// `source` stands at the start of the file; `path` is where it was opened, for the MTL files beside it, or empty.
-/// Errors: InvalidInput with line and byte (not a number, not finite, no such vertex, no faces), Unsupported (UTF-16),
-/// Limit (a statement of more than 1 MiB), Io.
+/// Opens an OBJ file. `source` stands at its start; `path` is where it was opened, for the MTL files beside it, or
+/// empty. Errors: InvalidInput with line and byte (not a number, not finite, no such vertex, no faces), Unsupported
+/// (UTF-16), Limit (a statement of more than 1 MiB), Io.
 Result<std::unique_ptr<MeshStream>> openObj(ByteSource source, const std::filesystem::path& path,
                                             const MeshOpenOptions& options);
 
-/// Without materials.
+/// Opens an OBJ file without materials.
 Result<std::unique_ptr<MeshStream>> openObj(ByteSource source);
 
 }  // namespace vcp

@@ -42,7 +42,7 @@ void ObjMaterials::addLibrary(std::string_view names) {
             warnings_.push_back(
                 fmt::format("{}: the material file {} lies outside its folder; it is left out", file_, shown(name)));
     };
-    // One name with spaces, or several names.
+    // The text is one name with spaces, or several names.
     const auto whole = nameBelow(folder_, std::string(names));
     if (whole) sideFiles_.emplace_back(*whole);
     std::error_code ignored;

@@ -1,4 +1,4 @@
-// What paints the faces of an OBJ file: its MTL files, the material in use, and its texture coordinates.
+// Holds what paints the faces of an OBJ file: its MTL files, the material in use, and its texture coordinates.
 #pragma once
 
 #include <array>
@@ -18,17 +18,17 @@ namespace vcp {
 
 class ObjMaterials {
 public:
-    /// `path` of the OBJ, for the files beside it; empty or "-": there is no folder.
+    /// `path`: where the OBJ is, for the files beside it; empty or "-": there is no folder.
     ObjMaterials(const std::filesystem::path& path, const MeshOpenOptions& options);
 
-    /// The names after an `mtllib`. Until begin(); after it they are a warning.
+    /// Takes the names after an `mtllib`. Called before begin(); after it they become a warning.
     void addLibrary(std::string_view names);
 
     /// Decides whether there are colours: an image, or several different Kd.
     void begin();
 
     [[nodiscard]] bool active() const { return active_; }
-    /// Texture coordinates are of use.
+    /// Whether texture coordinates are of use.
     [[nodiscard]] bool hasImages() const { return hasImages_; }
 
     void use(std::string_view name);

@@ -19,7 +19,7 @@ namespace {
 
 constexpr size_t kLineLimit = 1024 * 1024;
 
-// What the two encodings share: how far the stream is, and what is wrong.
+// The state that the two encodings share: how far the stream is, and what is wrong.
 class OffStream : public MeshStream {
 public:
     OffStream(ByteSource source, const OffHeader& header) : source_(std::move(source)), header_(header) {
@@ -91,7 +91,7 @@ protected:
     std::vector<std::string> warnings_;
     uint64_t vertex_ = 0;
     uint64_t face_ = 0;
-    uint64_t first_ = 0;  // of the face's fan
+    uint64_t first_ = 0;  // first vertex of the face's fan
     uint64_t last_ = 0;
 };
 
@@ -147,7 +147,7 @@ private:
         Rgba8 colour = 0xFF000000;
         for (size_t channel = 0; header_.hasColour && before + channel < count; ++channel) {
             const double scaled = fractions ? numbers[before + channel] * 255 + 0.5 : numbers[before + channel];
-            // Not std::clamp: the order of the comparisons makes NaN 0.
+            // std::clamp is not used: here the order of the comparisons makes NaN 0.
             const double value = std::min(std::max(0.0, scaled), 255.0);
             colour &= ~(0xFFu << (8 * channel));
             colour |= static_cast<Rgba8>(value) << (8 * channel);
@@ -175,8 +175,8 @@ private:
         return {};
     }
 
-    const char* begin_ = nullptr;  // of the window, which starts at the cursor
-    const char* end_ = nullptr;    // of the line that is read
+    const char* begin_ = nullptr;  // start of the window, which starts at the cursor
+    const char* end_ = nullptr;    // end of the line that is read
 };
 
 class BinaryOff final : public OffStream {
@@ -214,7 +214,7 @@ private:
         return {};
     }
 
-    // Number by number: a face may be larger than the window.
+    // Faces are read number by number, since one may be larger than the window.
     Result<void> readFaces(MeshChunk& chunk) {
         const auto bytes = source_.window(4);
         if (!bytes) return bytes.error();
@@ -263,7 +263,7 @@ private:
 
     Part part_ = Part::Corners;
     uint64_t corners_ = 0;
-    uint64_t left_ = 0;  // numbers of the part
+    uint64_t left_ = 0;  // numbers left in the part
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 //   smaller count of vertices.
 // - Polygons become fans about their first vertex. Colours of faces are read over, which is a warning.
 //
-// Ours and not OpenMesh's: that one holds the mesh and refuses faces that are not manifold.
+// This reader is ours and not OpenMesh's, which holds the mesh and refuses faces that are not manifold.
 #pragma once
 
 #include <memory>
@@ -20,11 +20,11 @@
 
 namespace vcp {
 
-/// Does this text begin with the keyword, comments aside?
+/// Returns whether this text begins with the keyword, comments aside.
 bool looksLikeOff(std::string_view start);
 
-/// `source` stands at the start of the file. Errors: InvalidInput with vertex or face and byte (not a number, not
-/// finite, no such vertex, truncated, no faces), Unsupported, Limit (a line of more than 1 MiB), Io.
+/// Opens an OFF file. `source` stands at its start. Errors: InvalidInput with vertex or face and byte (not a number,
+/// not finite, no such vertex, truncated, no faces), Unsupported, Limit (a line of more than 1 MiB), Io.
 Result<std::unique_ptr<MeshStream>> openOff(ByteSource source);
 
 }  // namespace vcp

@@ -27,7 +27,7 @@ std::string_view firstWord(std::string_view text) {
     return {begin, static_cast<size_t>(wordEnd(begin, end) - begin)};
 }
 
-// The bytes of the keyword at the start of `word`; 0 when there is none.
+// Returns the bytes of the keyword at the start of `word`; 0 when there is none.
 size_t keywordBytes(std::string_view word, OffHeader& header, bool& otherDimension) {
     std::string_view rest = word;
     const auto take = [&](std::string_view prefix) {
@@ -71,7 +71,7 @@ private:
         return source_.error(ErrorCode::InvalidInput, "header", lineByte_, std::move(message));
     }
 
-    // The next line that has more than a comment.
+    // Goes to the next line that has more than a comment.
     Result<void> nextLine() {
         do {
             lineByte_ = source_.offset();
@@ -133,7 +133,7 @@ private:
 
     ByteSource& source_;
     OffHeader header_;
-    std::string_view line_;  // valid until the next
+    std::string_view line_;  // valid until the next line
     uint64_t lineByte_ = 0;
 };
 

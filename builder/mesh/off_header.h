@@ -25,8 +25,8 @@ struct OffHeader {
     }
 };
 
-/// Leaves the source at the first vertex. Errors: InvalidInput (no keyword nor counts, counts that the file cannot
-/// hold, none), Unsupported (other dimensions), Limit, Io.
+/// Reads the header and leaves the source at the first vertex. Errors: InvalidInput (no keyword nor counts, counts that
+/// the file cannot hold, none), Unsupported (other dimensions), Limit, Io.
 Result<OffHeader> readOffHeader(ByteSource& source);
 
 }  // namespace vcp

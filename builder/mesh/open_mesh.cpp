@@ -28,7 +28,7 @@ std::string lower(std::string text) {
     return text;
 }
 
-// "ply" for "a.PLY.gz"; empty when the name says nothing.
+// Returns "ply" for "a.PLY.gz"; empty when the name says nothing.
 std::string formatByName(std::filesystem::path path) {
     std::string extension = lower(path.extension().string());
     if (extension == ".gz" || extension == ".zst") {
@@ -88,7 +88,7 @@ Result<std::vector<std::filesystem::path>> expandInputs(std::span<const std::fil
     for (const fs::path& path : paths) {
         std::error_code failure;
         if (!fs::is_directory(path, failure)) {
-            expanded.push_back(path);  // what is missing fails when it is opened
+            expanded.push_back(path);  // a missing file fails when it is opened
             continue;
         }
         const auto cannot = [&](const std::error_code& why) {

@@ -1,4 +1,4 @@
-// Opens a mesh file of any format that is known.
+// Opens a mesh file of any known format.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace vcp {
 
-/// "ply", "obj", ...: what MeshOpenOptions::format may say.
+/// Lists the names that MeshOpenOptions::format may have: "ply", "obj", ...
 std::span<const std::string_view> meshFormats();
 
 /// Opens a mesh by its content, then by its extension, from a file or, for "-", from standard input: PLY (ASCII,
@@ -21,8 +21,8 @@ std::span<const std::string_view> meshFormats();
 /// Unsupported (unknown format; the message lists what is known), Usage (no such format as the options say).
 Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, const MeshOpenOptions& options = {});
 
-/// Replaces each folder among `paths` by the mesh files in it, told by extension and sorted by name; not those in
-/// folders inside it. Errors: Io (a folder cannot be read), InvalidInput (a folder has no mesh file).
+/// Replaces each folder among `paths` by the mesh files in it, recognised by extension and sorted by name; files in
+/// folders inside it are not read. Errors: Io (a folder cannot be read), InvalidInput (a folder has no mesh file).
 Result<std::vector<std::filesystem::path>> expandInputs(std::span<const std::filesystem::path> paths);
 
 }  // namespace vcp

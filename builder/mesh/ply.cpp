@@ -31,8 +31,8 @@ Error elementError(const ByteSource& source, const PlyElement& element, std::str
                         std::move(message));
 }
 
-// Does the file have the bytes that the header promises? Names the first row that is not there when rows
-// of one size make that certain.
+// Checks that the file has the bytes that the header promises. Names the first missing row when rows of one size make
+// that certain.
 Result<void> checkCounts(const ByteSource& source, const PlyHeader& header) {
     const bool ascii = header.encoding == PlyEncoding::Ascii;
     uint64_t left = source.remaining() + (ascii ? 1 : 0);  // the last line may lack its end
@@ -158,7 +158,7 @@ private:
     ByteSource source_;
     PlyHeader header_;
     MeshInfo info_;
-    std::vector<PlyPlan> plans_;  // of the elements that have rows
+    std::vector<PlyPlan> plans_;  // plans of the elements that have rows
     size_t planned_ = 0;          // plans that were started
     std::unique_ptr<PlyRows> rows_;
 };

@@ -7,7 +7,7 @@
 namespace vcp {
 namespace {
 
-// Nothing that stands for a number is as long as this.
+// No text for a number is as long as this.
 constexpr size_t kWordLimit = 4096;
 
 // A row is a line, as in the original library: a missing value is found in its own row instead of shifting
@@ -98,7 +98,7 @@ private:
         return {};
     }
 
-    // The length of a list, or its next item.
+    // Takes the length of a list, or its next item.
     Result<void> takeOfList(const char*& p, MeshChunk& chunk) {
         const bool isLength = !insideList_;
         if (!isLength && !columns_[column_].isIndex) {
@@ -126,7 +126,7 @@ private:
     }
 
     Result<void> beginList(std::optional<int64_t> length, const char* p) {
-        // Every value takes a digit and a space.
+        // Every value takes at least a digit and a space.
         const uint64_t fitting = (source_.size() - byteAt(p)) / 2;
         if (!length || *length < 0 || static_cast<uint64_t>(*length) > fitting) return badLength(length, byteAt(p));
         listLeft_ = static_cast<uint64_t>(*length);
@@ -153,10 +153,10 @@ private:
     }
 
     std::vector<Column> columns_;
-    const char* begin_ = nullptr;  // of the window, which starts at the cursor
+    const char* begin_ = nullptr;  // start of the window, which starts at the cursor
     const char* end_ = nullptr;
 
-    size_t column_ = 0;  // columns_.size(): all but the end of the line
+    size_t column_ = 0;  // columns_.size(): only the end of the line is left
     bool insideList_ = false;
     uint64_t listLeft_ = 0;
     glm::dvec3 position_{0};

@@ -63,15 +63,15 @@ std::optional<int64_t> loadWhole(PlyType type, const char* p) {
     });
 }
 
-// A row as stored: runs of scalars, and lists between them.
+// A part of a row as stored: a run of scalars, or a list between runs.
 struct Step {
     bool isList = false;
-    size_t column = 0;       // of a list
-    uint64_t bytes = 0;      // of a run
-    uint64_t rowOffset = 0;  // of a run: scalar bytes of the row before it
+    size_t column = 0;       // column of a list
+    uint64_t bytes = 0;      // bytes of a run
+    uint64_t rowOffset = 0;  // for a run: scalar bytes of the row before it
 };
 
-// Where a face row of the usual kind (one list) has its list.
+// Where a face row of the usual kind (with one list) has its list.
 struct FaceLayout {
     size_t before = 0;
     size_t after = 0;
@@ -196,7 +196,7 @@ private:
         return {};
     }
 
-    // `p` holds whole rows of scalars that begin at the cursor.
+    // Decodes `p`, which holds whole rows of scalars that begin at the cursor.
     Result<void> decodeVertices(const char* p, size_t rows, MeshChunk& chunk) {
         const size_t before = chunk.positions.size();
         chunk.positions.resize(before + rows);
@@ -216,7 +216,7 @@ private:
         return {};
     }
 
-    // Both return how many leading rows are finite; the row after them is decoded, the rest is not.
+    // Both functions return how many leading rows are finite; the row after them is decoded, the rest is not.
     template <class T>
     size_t decodePositions(const char* p, size_t rows, glm::dvec3* out) const {
         const uint64_t x = scalarOffsets_[plan_.positionColumns[0]];
@@ -268,7 +268,7 @@ private:
         return source_.offset() + row * rowBytes_ + scalarOffsets_[plan_.positionColumns[axis]];
     }
 
-    // Rows with lists: step by step, resumable at every list item.
+    // Rows with lists are walked step by step, and can be resumed at every list item.
     Result<void> walkRows(MeshChunk& chunk) {
         const auto bytes = source_.window(std::max<uint64_t>(rowBytes_, sizeof(double)));
         if (!bytes) return bytes.error();
@@ -281,7 +281,7 @@ private:
             const char* const at = p;
             const size_t stepBefore = step_;
             VCP_TRY(walkStep(p, end, source_.offset() + static_cast<uint64_t>(p - begin), chunk));
-            if (p == at && step_ == stepBefore) break;  // needs more than the window holds
+            if (p == at && step_ == stepBefore) break;  // a step needs more than the window holds
         }
         if (p == begin && !done() && hasRoom(chunk)) return truncated();
         source_.advance(static_cast<uint64_t>(p - begin));
@@ -300,7 +300,7 @@ private:
         } while (taken == batch.size());
     }
 
-    // Takes one run, one list length, or what the input and the chunk hold of one list. `byte` is that of `p`.
+    // Takes one run, one list length, or what the input and the chunk hold of one list. `byte` is the offset of `p`.
     Result<void> walkStep(const char*& p, const char* end, uint64_t byte, MeshChunk& chunk) {
         const Step& step = steps_[step_];
         const auto available = static_cast<uint64_t>(end - p);
@@ -374,7 +374,7 @@ private:
     }
 
     std::vector<Step> steps_;
-    std::vector<uint64_t> scalarOffsets_;  // a column: scalar bytes of the row before it
+    std::vector<uint64_t> scalarOffsets_;  // for each column: scalar bytes of the row before it
     uint64_t rowBytes_ = 0;                // scalars only
     bool fixedRows_ = false;
 

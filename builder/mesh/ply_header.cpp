@@ -77,7 +77,7 @@ private:
                              std::move(message));
     }
 
-    // "ply" and the kind of line break that follows it: a lone CR must not swallow a body byte 0x0A.
+    // Reads "ply" and the kind of line break that follows it: a lone CR must not swallow a body byte 0x0A.
     Result<void> findLineBreak() {
         const auto start = source_.window(kLongestFirstLine);
         if (!start) return start.error();
@@ -93,7 +93,7 @@ private:
         return {};
     }
 
-    // Splits the next line into words_; false at the end of the file.
+    // Splits the next line into words_; returns false at the end of the file.
     Result<bool> nextLine() {
         ++lineNumber_;
         lineByte_ = source_.offset();
@@ -174,7 +174,7 @@ private:
 
     ByteSource& source_;
     PlyHeader header_;
-    std::vector<std::string_view> words_;  // of the current line; valid until the next
+    std::vector<std::string_view> words_;  // words of the current line; valid until the next
     char lineBreak_ = '\n';
     bool formatSeen_ = false;
     uint64_t lineNumber_ = 1;

@@ -21,8 +21,8 @@ constexpr size_t byteSize(PlyType type) {
 
 struct PlyProperty {
     std::string name;
-    PlyType type = PlyType::Float32;   ///< of the scalar, or of the list's items
-    std::optional<PlyType> countType;  ///< of the list's length; absent for a scalar
+    PlyType type = PlyType::Float32;   ///< type of the scalar, or of the list's items
+    std::optional<PlyType> countType;  ///< type of the list's length; absent for a scalar
     [[nodiscard]] bool isList() const { return countType.has_value(); }
 };
 
@@ -33,9 +33,9 @@ struct PlyElement {
     std::vector<PlyProperty> properties;
 
     [[nodiscard]] bool hasLists() const;
-    /// Bytes of a binary row's scalars: the whole row when there are no lists.
+    /// Returns the bytes of a binary row's scalars: the whole row when there are no lists.
     [[nodiscard]] uint64_t scalarBytes() const;
-    /// The fewest bytes that a row can take: empty lists, one digit a value.
+    /// Returns the fewest bytes that a row can take: empty lists, one digit a value.
     [[nodiscard]] uint64_t leastBytes(PlyEncoding encoding) const;
     [[nodiscard]] const PlyProperty* find(std::string_view property) const;
 };

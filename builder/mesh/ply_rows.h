@@ -29,7 +29,7 @@ enum class PlyRole : uint8_t { Skip, Vertices, Faces, Strips };
 struct PlyPlan {
     const PlyElement* element = nullptr;
     PlyRole role = PlyRole::Skip;
-    uint64_t vertexCount = 0;                            ///< of the mesh; bounds the indices
+    uint64_t vertexCount = 0;                            ///< vertices of the mesh; bounds the indices
     size_t indexColumn = 0;                              ///< Faces, Strips: the list of vertex numbers
     std::array<size_t, 3> positionColumns{};             ///< Vertices: x, y, z
     std::array<std::optional<size_t>, 4> colourColumns;  ///< Vertices: red, green, blue, alpha
@@ -43,21 +43,21 @@ public:
 
     void beginList() { seen_ = 0; }
 
-    /// Takes the next number of the list. False when it names no vertex.
+    /// Takes the next number of the list. Returns false when it names no vertex.
     bool add(std::optional<int64_t> number, std::vector<std::array<uint64_t, 3>>& triangles);
 
 private:
     PlyRole role_;
     uint64_t vertexCount_;
     uint64_t seen_ = 0;   // numbers since the list, or the strip in it, began
-    uint64_t first_ = 0;  // of the fan; of a strip the last but one
+    uint64_t first_ = 0;  // first vertex of the fan; in a strip the last but one
     uint64_t last_ = 0;
 };
 
-/// A number as a vertex or list count; nothing when it is not whole.
+/// Returns a number as a vertex or list count; nothing when it is not whole.
 std::optional<int64_t> wholeNumber(double value);
 
-/// A colour value of a property of this type as 8 bits.
+/// Returns a colour value of a property of this type as 8 bits.
 uint8_t colourChannel(PlyType type, double value);
 
 class PlyRows {
@@ -68,7 +68,7 @@ public:
 
     [[nodiscard]] bool done() const { return row_ == plan_.element->count; }
 
-    /// Appends what the next window holds, at most until the chunk is full.
+    /// Appends what the next window holds, until the chunk is full at most.
     virtual Result<void> readSome(MeshChunk& chunk) = 0;
 
 protected:
@@ -84,7 +84,7 @@ protected:
     uint64_t row_ = 0;
 };
 
-/// `source` stands at the first row and must outlive the reader. Errors: InvalidInput with row and byte, Io.
+/// Makes a reader. `source` stands at the first row and must outlive it. Errors: InvalidInput with row and byte, Io.
 std::unique_ptr<PlyRows> makePlyBinaryRows(ByteSource& source, const PlyPlan& plan, PlyEncoding encoding);
 std::unique_ptr<PlyRows> makePlyAsciiRows(ByteSource& source, const PlyPlan& plan);
 

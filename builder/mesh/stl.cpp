@@ -24,7 +24,7 @@ static_assert(std::endian::native == std::endian::little, "STL is little endian"
 
 bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// `keyword` in lower case.
+// Compares with `keyword`, which is in lower case.
 bool sameWord(std::string_view word, std::string_view keyword) {
     if (word.size() != keyword.size()) return false;
     for (size_t i = 0; i < word.size(); ++i) {
@@ -42,7 +42,7 @@ uint32_t facetCount(std::string_view start) {
     return count;
 }
 
-// Text that begins with "solid" and has no other bytes than text; "facet" or "endsolid" follows the name.
+// Whether a text begins with "solid" and has only bytes of text; "facet" or "endsolid" must follow the name.
 bool looksLikeAscii(std::string_view start) {
     const char* const end = start.data() + start.size();
     const char* p = skipSpaces(start.data(), end);
@@ -57,7 +57,7 @@ bool looksLikeAscii(std::string_view start) {
     return false;
 }
 
-// Of binary STL whose length is not known: the whole facets at hand are finite, with normals of length 1 or 0.
+// For binary STL whose length is not known: whether the whole facets at hand are finite, with normals of length 1 or 0.
 bool facetsArePlausible(std::string_view start) {
     size_t facets = 0;
     for (size_t at = kHeaderBytes; at + kFacetBytes <= start.size(); at += kFacetBytes, ++facets) {
@@ -148,7 +148,7 @@ private:
     ByteSource source_;
     MeshInfo info_;
     uint64_t facets_ = 0;
-    uint64_t facet_ = 0;  // the next one
+    uint64_t facet_ = 0;  // number of the next facet
 };
 
 // Where the text stands, after a word has been taken.
@@ -311,15 +311,15 @@ private:
 
     ByteSource source_;
     MeshInfo info_;
-    const char* begin_ = nullptr;  // of the window, which starts at the cursor
+    const char* begin_ = nullptr;  // start of the window, which starts at the cursor
     const char* end_ = nullptr;
 
     Place place_ = Place::OutsideSolid;
-    uint64_t facets_ = 0;  // complete ones
+    uint64_t facets_ = 0;  // complete facets
     uint64_t facetByte_ = 0;
     bool inVertex_ = false;
-    size_t axis_ = 0;     // numbers of the vertex that were read
-    size_t corners_ = 0;  // vertices of the facet that were read
+    size_t axis_ = 0;     // numbers of the vertex that were read so far
+    size_t corners_ = 0;  // vertices of the facet that were read so far
     std::array<glm::dvec3, 3> corner_{};
 };
 
@@ -338,7 +338,7 @@ Result<std::unique_ptr<MeshStream>> openStl(ByteSource source) {
     const std::string_view start = window->substr(0, kStartBytes);
     const uint64_t exactBytes =
         start.size() < kHeaderBytes ? 0 : kHeaderBytes + uint64_t{facetCount(start)} * kFacetBytes;
-    // A short or garbled text still fails best as text.
+    // For a short or garbled text, the error of the text reader is the most useful.
     const bool isText =
         start.size() < kHeaderBytes && sameWord(wordAt(start.data(), start.data() + start.size()), "solid");
     if (source.size() != exactBytes && (isText || looksLikeAscii(start)))

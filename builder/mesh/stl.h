@@ -14,13 +14,14 @@
 
 namespace vcp {
 
-/// Is this STL beyond doubt? Either the size is exactly what the binary count says (many binary files begin
-/// with "solid", so the size is asked first), or it is text that begins with "solid" and goes on like STL. Where
-/// the size is not known (a pipe), the first facets must be plausible. `start` holds the first 1024 bytes, or all.
+/// Returns whether this is STL beyond doubt. Either the size is exactly what the binary count says (many binary files
+/// begin with "solid", so the size is checked first), or it is text that begins with "solid" and continues like STL.
+/// Where the size is not known (a pipe), the first facets must be plausible. `start` holds the first 1024 bytes, or
+/// all.
 bool looksLikeStl(std::string_view start, std::optional<uint64_t> fileBytes);
 
-/// `source` stands at the start of the file. Errors: InvalidInput with facet and byte (truncated, not a
-/// number, not finite, a keyword that does not belong, no facets), Limit, Io.
+/// Opens an STL file. `source` stands at its start. Errors: InvalidInput with facet and byte (truncated, not a number,
+/// not finite, a keyword that does not belong, no facets), Limit, Io.
 Result<std::unique_ptr<MeshStream>> openStl(ByteSource source);
 
 }  // namespace vcp

@@ -1,4 +1,4 @@
-// Binning: which triangles each subvolume of a level needs.
+// Binning: finds which triangles each subvolume of a level needs.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace vcp {
 
-/// A page's surroundings, in cells, whose triangles it needs: its corners' closest points lie within sqrt(3)
-/// cells, found in whole cells around them.
+/// How far around a page, in cells, it needs triangles: its corners' closest points lie within sqrt(3) cells, and are
+/// searched in whole cells around them.
 inline constexpr double kBinMarginCells = 2.25;
 
-/// Triangles of each page, pages in Morton order, triangles in the mesh's order.
+/// The triangles of each page: pages in Morton order, triangles in the mesh's order.
 struct TriangleBins {
     std::vector<uint64_t> pages;  ///< Morton codes
     std::vector<uint64_t> begin;  ///< pages.size() + 1 offsets into `triangles`
@@ -25,8 +25,8 @@ struct TriangleBins {
     }
 };
 
-/// A triangle is binned to every page from code `first` to before `end` whose cube, widened by the margin, it
-/// overlaps. Uses the calling arena's threads.
+/// Bins each triangle to every page from code `first` to before `end` whose cube, widened by the margin, it overlaps.
+/// Uses the calling arena's threads.
 TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first = 0,
                           uint64_t end = ~uint64_t{0});
 

@@ -24,7 +24,7 @@ CellOverlap::CellOverlap(const Triangle3& t, double margin) {
     const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     x_[0] = normal.x, y_[0] = normal.y, z_[0] = normal.z;
     for (int i = 0; i < 3; ++i) {
-        // Edge times x, y, z.
+        // The axes are the edge times x, y, z.
         const glm::dvec3 e = t[(i + 1) % 3] - t[i];
         y_[3 * i + 1] = e.z, z_[3 * i + 1] = -e.y;
         x_[3 * i + 2] = -e.z, z_[3 * i + 2] = e.x;
@@ -48,7 +48,7 @@ WIDER_CLONES void CellOverlap::classify(glm::ivec3 low, glm::ivec3 high, std::ve
     const double middle = 0.5 * (low.x + high.x + 1), half = 0.5 * (size.x - 1);
     for (int z = low.z; z <= high.z; ++z)
         for (int y = low.y; y <= high.y; ++y, cell += size.x) {
-            // First the row as one box, then cell by cell.
+            // First the row is tested as one box, then cell by cell.
             double row[kAxes];
             int64_t apart = 0;
             for (int a = 0; a < kAxes; ++a) {

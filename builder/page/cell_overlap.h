@@ -1,4 +1,4 @@
-// Which cells of a grid a triangle meets: the separating axis test of BoxOverlap, set up once for all cells.
+// Finds which cells of a grid a triangle meets: the separating axis test of BoxOverlap, set up once for all cells.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace vcp {
 
-/// Closed unit cells, and the same widened by a margin. Widened by 1e-9 as well: what touches, meets.
+/// Tests closed unit cells, and the same widened by a margin; both are widened by 1e-9 too, so that touching counts.
 class CellOverlap {
 public:
     CellOverlap(const Triangle3& triangle, double margin);
@@ -18,8 +18,8 @@ public:
     [[nodiscard]] glm::ivec3 upper() const { return nearHigh_; }
 
     static constexpr uint8_t kNear = 1, kTouches = 2;
-    /// For each cell from `low` to `high`, x running fastest, whether the triangle comes near, or even touches
-    /// the cell itself; 0 neither. Precondition: lower() <= low, high <= upper().
+    /// Sets for each cell from `low` to `high`, x running fastest, whether the triangle comes near, or even touches the
+    /// cell itself; 0 for neither. Precondition: lower() <= low, high <= upper().
     void classify(glm::ivec3 low, glm::ivec3 high, std::vector<uint8_t>& cells) const;
 
 private:

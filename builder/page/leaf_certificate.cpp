@@ -12,19 +12,19 @@ namespace vcp {
 
 namespace {
 
-// Normals of mesh and gradient must stay within 60 degrees of the reference; beyond it a leaf is hard.
+// Normals of mesh and gradient must stay within 60 degrees of the reference; otherwise the leaf is hard.
 constexpr double kConeCosine = 0.5;
 constexpr double kMinSlope = 0.5;
 constexpr int kMaxSubdivision = 1;
 
-// Part of the tolerance that may be given away for not bounding a small polygon exactly.
+// The share of the tolerance that may be given away for not bounding a small polygon exactly.
 constexpr double kCheapSlack = 0.15;
 
-// f is a quadric but for terms of third order. Where the mesh's distance from every quadric is this part of the
-// tolerance in the root mean square, next to no leaf would certify: it is not tried.
+// f is a quadric up to terms of third order. Where the mesh's root mean square distance from every quadric is this
+// share of the tolerance, hardly any leaf would certify: it is not tried.
 constexpr double kHopelessResidual = 0.3;
 
-// A corner whose vector turns so far from the reference (cosine) sees another sheet: likewise.
+// A corner whose vector turns so far from the reference (cosine) sees another sheet: it is not tried either.
 constexpr double kHopelessCosine = 0.4;
 
 double clippedArea(const Polygon& polygon, glm::dvec3 normal) {
@@ -34,7 +34,7 @@ double clippedArea(const Polygon& polygon, glm::dvec3 normal) {
     return std::abs(glm::dot(sum, normal)) / 2;
 }
 
-/// The triangles clipped to the widened leaf, in leaf space. False when a bad edge is inside.
+/// Clips the triangles to the widened leaf, in leaf space. Returns false when a bad edge is inside.
 bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTriangle* const> triangles,
                    CertificateScratch& s) {
     const double half = edge / 2 + kCertificateMarginCells;
@@ -45,7 +45,7 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
             if ((t->badEdges >> i & 1) && segmentMeetsBox(t->corners[i], t->corners[(i + 1) % 3], centre, half))
                 return false;
     }
-    // Edges are powers of two, so leaf space costs no rounding.
+    // Edges are powers of two, so the change to leaf space costs no rounding.
     const double scale = 1 / edge, margin = kCertificateMarginCells * scale;
     const size_t room = triangles.size() * Polygon::kMaxCorners + LeafSurface::kBatchStep;
     if (s.x.size() < room)
@@ -74,7 +74,7 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
     return !s.ends.empty();
 }
 
-/// Mean normal without orientation, started from the largest piece; zero where the pieces disagree.
+/// Returns the mean normal without orientation, started from the largest piece; zero where the pieces disagree.
 glm::dvec3 referenceDirection(const CertificateScratch& s) {
     const size_t largest = static_cast<size_t>(std::max_element(s.areas.begin(), s.areas.end()) - s.areas.begin());
     glm::dvec3 sum(0);
@@ -88,8 +88,8 @@ glm::dvec3 referenceDirection(const CertificateScratch& s) {
     return n;
 }
 
-/// From the values of a quartic at the 15 points (i, j, k) / 4 of a triangle to its Bernstein coefficients,
-/// which bound it. The matrix is the inverse of the Bernstein polynomials' values at those points.
+/// Turns the values of a quartic at the 15 points (i, j, k) / 4 of a triangle into its Bernstein coefficients, which
+/// bound it. The matrix is the inverse of the Bernstein polynomials' values at those points.
 class QuarticTriangle {
 public:
     static constexpr int kPoints = 15;
@@ -124,7 +124,7 @@ public:
             for (int c = 0; c < 3; ++c) weight_[c][p] = static_cast<float>(index_[p % kPoints][c]) / 4;
     }
 
-    /// The 15 points of a triangle (and its first corner again).
+    /// Sets the 15 points of a triangle (and its first corner again).
     void place(glm::vec3 t0, glm::vec3 t1, glm::vec3 t2, LeafSurface::Batch& b) const {
         for (int p = 0; p < 16; ++p) {
             b.x[p] = weight_[0][p] * t0.x + weight_[1][p] * t1.x + weight_[2][p] * t2.x;
@@ -133,7 +133,7 @@ public:
         }
     }
 
-    /// Largest coefficient, by magnitude, of the quartic with these values at the 15 points.
+    /// Returns the largest coefficient, by magnitude, of the quartic with these values at the 15 points.
     WIDER_CLONES float bound(const float* values) const {
         alignas(64) float c[16] = {};
         for (int p = 0; p < kPoints; ++p)
@@ -160,19 +160,19 @@ private:
                                                                      {1, 2, 1},
                                                                      {1, 1, 2}}};
     alignas(64) float coefficient_[kPoints][16] = {};  ///< [point][coefficient]
-    alignas(64) float weight_[3][16] = {};             ///< of the corners, at each point
+    alignas(64) float weight_[3][16] = {};             ///< weights of the corners, at each point
 };
 
-/// Bound on |f| over flat polygons: on a plane f is a quartic. Values at points do where the curvature cannot
-/// add much between them: linear interpolation over a triangle within a ball of radius R errs by at most
-/// curvature R^2 / 2. First the polygon's corners are tried, then points half and a quarter of the way
-/// between them, then the quartic's coefficients.
+/// Bounds |f| over flat polygons: on a plane f is a quartic. Values at points suffice where the curvature cannot add
+/// much between them: linear interpolation over a triangle within a ball of radius R errs by at most curvature R^2 / 2.
+/// First the polygon's corners are tried, then points half and a quarter of the way between them, then the quartic's
+/// coefficients.
 class PolygonBound {
 public:
     PolygonBound(const LeafSurface& surface, double curvature, double limit, CertificateScratch& scratch)
         : surface_(surface), s_(scratch), limit_(limit), halfCurvature_(curvature / 2 * (1 + 1e-5)) {}
 
-    /// All of the scratch memory's polygons. False as soon as the bound exceeds the limit.
+    /// Adds all polygons of the scratch memory. Returns false as soon as the bound exceeds the limit.
     bool addAll() {
         float most = 0;
         for (size_t i = 0; i < s_.count; ++i) most = std::max(most, std::abs(s_.value[i]));
@@ -185,7 +185,7 @@ public:
     [[nodiscard]] double bound() const { return bound_; }
 
 private:
-    /// Whether samples up to `value` that may miss `slack` are enough; then they are part of the bound.
+    /// Whether samples up to `value` that may miss `slack` suffice; then they become part of the bound.
     bool accept(double value, double slack) {
         const double total = value + slack + LeafSurface::kBatchRounding;
         if (total > bound_ && (slack > kCheapSlack * limit_ || total > limit_)) return false;
@@ -222,7 +222,7 @@ private:
 
     static constexpr size_t kHalfway = 16;  ///< points halfway along edges: enough for polygons of 9 corners
 
-    /// Largest |f| halfway along the edges of the polygon's fan of triangles: twice the corners less 3.
+    /// Returns the largest |f| halfway along the edges of the polygon's fan of triangles: twice the corners less 3.
     float largestHalfway(size_t begin, size_t end) const {
         LeafSurface::Batch batch;
         size_t count = 0;
@@ -250,7 +250,7 @@ private:
         for (const float v : batch.value) most = std::max(most, std::abs(v));
         if (double(most) > limit_) return false;
         if (accept(double(most), slack)) return true;
-        // The coefficients' rounding: the matrix' rows have an absolute sum below 35.
+        // This accounts for the coefficients' rounding: the matrix' rows have an absolute sum below 35.
         const double bound = quartic.bound(batch.value) + 35 * LeafSurface::kBatchRounding;
         if (bound <= limit_ || depth == kMaxSubdivision) {
             bound_ = std::max(bound_, bound);
@@ -267,7 +267,7 @@ private:
     double limit_, halfCurvature_, bound_ = 0;
 };
 
-/// Largest F that, with the wall tolerance of its code, is at most `sum`.
+/// Returns the largest F that, with the wall tolerance of its code, is at most `sum`.
 double largestWalled(double sum) {
     double most = 0;
     for (uint32_t code = 1; code <= kSoftWallMask; ++code)

@@ -21,14 +21,14 @@
 
 namespace vcp {
 
-/// The leaf and the mesh are compared within the leaf's cube widened by so many cells.
+/// The leaf and the mesh are compared within the leaf's cube, widened by so many cells.
 inline constexpr double kCertificateMarginCells = 0.125;
 
 /// A corner's vector to the closest point, in cells. Corner i of a leaf at (i & 1, i >> 1 & 1, i >> 2).
 struct CornerVector {
     double distance = 0;
     glm::dvec3 direction{0, 0, 1};  ///< unit, from the closest point to the corner
-    uint32_t colour = 0;            ///< of the closest point
+    uint32_t colour = 0;            ///< colour at the closest point
 };
 
 /// A triangle as the certificate sees it, in page space.
@@ -46,11 +46,11 @@ struct Certificate {
     double curvature = 0;             ///< per leaf edge
 };
 
-/// Scratch memory of certify; one a thread.
+/// Scratch memory of certify; each thread has its own.
 struct CertificateScratch {
     std::vector<float> x, y, z, value;  ///< corners of the clipped triangles, in leaf space, and f there
-    size_t count = 0;                   ///< of them, with those that fill up the last batch
-    std::vector<uint32_t> ends;         ///< of each polygon among the corners
+    size_t count = 0;                   ///< the number of these, with those that fill up the last batch
+    std::vector<uint32_t> ends;         ///< where each polygon ends among the corners
     std::vector<glm::dvec3> normals;
     std::vector<double> areas;
 };
@@ -63,12 +63,12 @@ Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const Certified
                         double tolerance, const std::function<const CornerVector&(int)>& corner,
                         CertificateScratch& scratch);
 
-/// Smallest wall code whose tolerance is at least `value` leaf edges; 16 when there is none.
+/// Returns the smallest wall code whose tolerance is at least `value` leaf edges; 16 when there is none.
 uint32_t wallCode(double value);
-/// Tolerance of a code, in leaf edges.
+/// Returns the tolerance of a code, in leaf edges.
 double wallOf(uint32_t code);
 
-/// Dip code for a bound on the second derivatives: the swing over the leaf's diagonal is curvature * 3 / 8.
+/// Returns the dip code for a bound on the second derivatives: the swing over the leaf's diagonal is curvature * 3 / 8.
 uint32_t dipCode(double curvature);
 
 }  // namespace vcp

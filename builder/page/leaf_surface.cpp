@@ -79,7 +79,7 @@ BernsteinCube::BernsteinCube(const LeafSurface& surface, double lower, double up
                 corner[i | bit][k] = a + upper * d;
             }
         }
-    // ... then to degree 2, an axis at a time; its own coordinate's factor joins f there.
+    // ... then they are raised to degree 2, an axis at a time; the factor of the axis' own coordinate joins f there.
     double f1[4][3], y1[4][3], z1[4][3];  // [corner of y, z][x]
     for (int i = 0; i < 4; ++i) {
         const double *a = corner[2 * i], *b = corner[2 * i + 1];
@@ -102,7 +102,7 @@ BernsteinCube::BernsteinCube(const LeafSurface& surface, double lower, double up
 }
 
 double BernsteinCube::minDerivative(glm::dvec3 n) const {
-    // Each partial has degree 1 along its axis; raised to 2 there, the three share one control net.
+    // Each partial derivative has degree 1 along its axis; raised to 2 there, the three share one control net.
     const auto slope = [](double a, double b, double c, int i) {
         return i == 0 ? b - a : i == 2 ? c - b : (c - a) / 2;
     };

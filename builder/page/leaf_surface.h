@@ -1,4 +1,4 @@
-// f of a soft leaf in double and in batches, and its bounds over a cube (docs/surface.md).
+// Evaluates f of a soft leaf, in double and in batches, and bounds it over a cube (docs/surface.md).
 #pragma once
 
 #include <array>
@@ -9,14 +9,14 @@
 
 namespace vcp {
 
-/// f of a leaf, from its packed corners; leaf space. Independent of the axis order of the faces.
+/// f of a leaf, from its packed corners; in leaf space. It does not depend on the axis order of the faces.
 class LeafSurface {
 public:
     explicit LeafSurface(const std::array<uint32_t, 8>& codes);
     [[nodiscard]] double value(glm::dvec3 x) const;
 
-    /// Values at `count` points (a multiple of kBatchStep) at once, in float: within kBatchRounding of value()
-    /// for |x| up to 2.
+    /// Evaluates `count` points (a multiple of kBatchStep) at once, in float: within kBatchRounding of value() for |x|
+    /// up to 2.
     void evaluate(const float* x, const float* y, const float* z, float* value, size_t count) const;
     static constexpr size_t kBatchStep = 8;
     static constexpr double kBatchRounding = 4e-6;
@@ -38,11 +38,11 @@ private:
 class BernsteinCube {
 public:
     BernsteinCube(const LeafSurface& surface, double lower, double upper);
-    /// Least derivative in direction n, per leaf edge.
+    /// Returns the least derivative in direction n, per leaf edge.
     [[nodiscard]] double minDerivative(glm::dvec3 n) const;
-    /// Bound on the second derivative in any direction.
+    /// Returns a bound on the second derivative in any direction.
     [[nodiscard]] double maxCurvature() const;
-    /// Least and largest value on the face of `axis` at its lower (0) or upper (1) end.
+    /// The least and largest value on the face of `axis` at its lower (0) or upper (1) end.
     struct Range {
         double min, max;
     };

@@ -12,12 +12,12 @@ namespace vcp {
 
 namespace {
 
-// Splitting a crowded hard leaf is given up where the children together repeat its triangles more often than
+// Splitting a crowded hard leaf is given up where the children together would repeat its triangles more often than
 // this: a fan's centre or long triangles gain nothing from smaller leaves.
 constexpr double kMaxRepetition = 3.5;
 
-// A merged leaf must do with this part of the tolerance: where leaves of different sizes meet, their normals
-// differ by about their errors over a cell, and shading shows it sooner than the surface does.
+// A merged leaf may use only this share of the tolerance: where leaves of different sizes meet, their normals differ by
+// about their errors over a cell, and shading shows it sooner than the surface does.
 constexpr double kMergeTolerance = 0.5;
 
 // Merging is tried only while the leaves' own error is below this part of the tolerance.
@@ -32,7 +32,7 @@ double errorOf(const SoftLeaf& leaf) {
 
 class TreeBuilder {
 public:
-    /// `hardEdge`: of the boxes, in cells, that become leaves without a try for less; 1: none do.
+    /// `hardEdge`: boxes up to this edge, in cells, become hard leaves without trying other kinds; 1: none do.
     TreeBuilder(PageGeometry& geometry, double tolerance, int hardEdge)
         : geometry_(geometry),
           tolerance_(tolerance),
@@ -95,7 +95,7 @@ private:
         merge(index);
     }
 
-    /// A cell or less: soft if it certifies, hard if its triangles are few or splitting gains nothing, else split.
+    /// Fills a cell or less: soft if it certifies, hard if its triangles are few or splitting gains nothing, else split
     void fillCell(uint32_t index, const NodeBox& box, std::span<const uint32_t> around,
                   std::span<const uint32_t> inside, uint32_t depth) {
         tree_.nodes[index].box = box;
@@ -149,7 +149,7 @@ private:
         records_ += triangles.size();
     }
 
-    /// The merging rule (Demir and Westermann 2015, section 3, with a true bound): eight siblings become one
+    /// Applies the merging rule (Demir and Westermann 2015, section 3, with a true bound): eight siblings become one
     /// leaf where one leaf represents the mesh within tolerance, or is hard with few triangles.
     void merge(uint32_t index) {
         const uint32_t first = tree_.nodes[index].index;
@@ -161,14 +161,14 @@ private:
             worst =
                 std::max(worst, tree_.nodes[c].kind == Kind::Soft ? errorOf(tree_.soft[tree_.nodes[c].index]) : 0.0);
             if (tree_.nodes[c].kind != Kind::Hard) continue;
-            // What a child holds, the parent would.
+            // The parent would hold what a child holds.
             if (tree_.hard[tree_.nodes[c].index].triangles.size() > kMergedHardTriangles) return;
             ++hard;
         }
         const NodeBox box = tree_.nodes[index].box;
         std::vector<uint32_t> around, inside;
         if (soft + hard > 0) {
-            // A larger leaf errs by the third power of its edge; one that cannot succeed is not tried.
+            // A leaf's error grows with the third power of its edge; one that cannot succeed is not tried.
             if (hard == 0 && (box.edge > kMaxSoftCells * kSubcells || worst > kMergeTrial * tolerance_)) return;
             geometry_.trianglesOf(box, around, inside);
         }
@@ -177,7 +177,7 @@ private:
         if (certificate && !colourFits(box, first)) return;
         const bool hardFits = hard > 0 && inside.size() <= kMergedHardTriangles;
         if (soft + hard > 0 && !certificate && !hardFits) return;
-        // The children and their leaves are the last ones made.
+        // The children and their leaves are the last elements that were made.
         tree_.nodes.resize(first);
         tree_.soft.resize(tree_.soft.size() - soft);
         for (size_t i = tree_.hard.size() - hard; i < tree_.hard.size(); ++i)
@@ -232,7 +232,7 @@ private:
     std::vector<CertifiedTriangle> triangles_;
     std::vector<const CertifiedTriangle*> pointers_;
     CertificateScratch scratch_;
-    std::array<PageGeometry::ChildTriangles, kMaxSubcellDepth> children_;  ///< of the cell being split, by depth
+    std::array<PageGeometry::ChildTriangles, kMaxSubcellDepth> children_;  ///< by depth, of the cell being split
 };
 
 }  // namespace

@@ -17,12 +17,12 @@ namespace vcp {
 inline constexpr size_t kHardLeafTriangles = 12;
 /// Hard siblings become one leaf when they have at most so many triangles together.
 inline constexpr size_t kMergedHardTriangles = 6;
-/// A page's leaves below the size of a cell are split further only while it has fewer leaves than this: what a
-/// page takes, in memory and in the file, is bounded by its triangles.
+/// A page's leaves below the size of a cell are split further only while it has fewer leaves than this: so a page's
+/// memory and file size are bounded by its triangles.
 constexpr uint64_t mostSplitLeaves(uint64_t triangles) { return 32768 + triangles * 3 / 4; }
-/// Likewise for the triangles that its leaves name: a bundle of long slivers would be repeated hundreds of times.
+/// The same bound for the triangles that its leaves name: a bundle of long slivers would be repeated hundreds of times.
 constexpr uint64_t mostSplitRecords(uint64_t triangles) { return 65536 + triangles * 8; }
-/// Largest soft leaf, in cells: beyond it the closest points of its corners are not certainly the mesh's.
+/// The largest soft leaf, in cells: beyond it the closest points of its corners are not certainly the mesh's.
 inline constexpr int kMaxSoftCells = 8;
 
 /// A node of the octree under construction.
@@ -30,7 +30,7 @@ struct TreeNode {
     enum class Kind : uint8_t { Empty, Soft, Hard, Internal };
     Kind kind = Kind::Empty;
     NodeBox box;
-    uint32_t index = 0;  ///< among the soft or hard leaves; when internal, of the first of 8 consecutive children
+    uint32_t index = 0;  ///< number among the soft or hard leaves; in an inner node that of its first child of 8
 };
 
 struct SoftLeaf {
@@ -49,19 +49,19 @@ struct PageTree {
     std::vector<TreeNode> nodes;
     std::vector<SoftLeaf> soft;
     std::vector<HardLeaf> hard;
-    /// Largest distance of the rendered surface from this level's mesh, in cells.
+    /// Returns the largest distance of the rendered surface from this level's mesh, in cells.
     [[nodiscard]] double certifiedError() const;
-    /// Triangle records of the hard leaves: a triangle has one in each leaf that it touches.
+    /// Returns the triangle records of the hard leaves: a triangle has one in each leaf that it touches.
     [[nodiscard]] size_t records() const;
 };
 
-/// `tolerance`: cells, for soft leaves. `mostRecords`: what a page can name; where there would be more, leaves are
-/// larger. With more triangles than that there is no such tree.
+/// Builds a page's octree. `tolerance`: in cells, for soft leaves. `mostRecords`: as many records as a page can name;
+/// where there would be more, leaves are larger. With more triangles than that there is no such tree.
 PageTree buildPageTree(PageGeometry& geometry, double tolerance, size_t mostRecords = kLeafIndexMask);
 
-/// What a page needs while it is built, in bytes; measured on scans and on random soups of triangles of 0.3 to 3
-/// cells, each at one third to 17 leaves a triangle. `touched`: cells that its triangles touch, each counted by
-/// itself.
+/// Returns the bytes that a page needs while it is built; measured on scans and on random soups of triangles of 0.3 to
+/// 3 cells, each at one third to 17 leaves a triangle. `touched`: the cells that its triangles touch, each triangle's
+/// counted by themselves.
 constexpr uint64_t pageWorkBytes(uint64_t triangles, uint64_t touched) {
     return (4 << 20) + 180 * triangles + 20 * touched + 390 * std::min(4 * touched, mostSplitLeaves(triangles));
 }

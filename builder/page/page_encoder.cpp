@@ -16,7 +16,7 @@ namespace vcp {
 
 namespace {
 
-/// Corner i of a leaf as corner c of the face at end `end` of `axis`.
+/// Returns corner i of a leaf that is corner c of the face at end `end` of `axis`.
 int cornerOfFace(int axis, int end, int c) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     return end << axis | (c & 1) << u | (c >> 1) << v;
@@ -29,7 +29,7 @@ public:
         map_.reserve(leaves.size());
         for (uint32_t i = 0; i < leaves.size(); ++i) map_.emplace(key(leaves[i].box), i);
     }
-    /// Number of the leaf of this very box, or -1.
+    /// Returns the number of the leaf with exactly this box, or -1.
     [[nodiscard]] int64_t find(const NodeBox& box) const {
         const auto entry = map_.find(key(box));
         return entry == map_.end() ? -1 : int64_t{entry->second};
@@ -49,8 +49,8 @@ NodeBox neighbour(const NodeBox& box, int axis, int end) {
     return n;
 }
 
-/// Whether two equal leaves agree on the sides of the corners of the face between them: 1 yes, -1 all are
-/// flipped, 0 neither.
+/// Whether two equal leaves agree on the sides of the corners of the face between them: 1 yes, -1 all are flipped, 0
+/// neither.
 int sideAgreement(const SoftLeaf& a, const SoftLeaf& b, int axis, int endOfA) {
     int same = 0;
     for (int c = 0; c < 4; ++c) {
@@ -64,8 +64,8 @@ int sideAgreement(const SoftLeaf& a, const SoftLeaf& b, int axis, int endOfA) {
     return same == 4 ? 1 : same == -4 ? -1 : 0;
 }
 
-/// A leaf needs its wall tolerance unless, at each face that the surface comes near, an equal leaf with the
-/// same f continues it.
+/// Sets wall codes. A leaf needs its wall tolerance unless, at each face that the surface comes near, an equal leaf
+/// with the same f continues it.
 void setWalls(PageTree& tree, const LeafMap& map) {
     for (SoftLeaf& leaf : tree.soft) {
         const BernsteinCube cube(LeafSurface(leaf.certificate.codes), 0, 1);
@@ -121,7 +121,7 @@ private:
         }
     }
 
-    /// Leaves come in the octree's order, so nothing unpacked lies before `leaf` on most axes: runs start here.
+    /// Leaves come in the octree's order: nothing unpacked lies before `leaf` on most axes, so runs start here.
     void packRun(uint32_t leaf) {
         std::vector<Link> best;
         int bestAxis = 0;
@@ -164,7 +164,7 @@ private:
     std::vector<uint32_t> first_, axis_;
 };
 
-/// The cells of the page that hold a part of the mesh.
+/// Marks the cells of the page that hold a part of the mesh.
 Clearance clearanceOf(const PageGeometry& geometry) {
     const int n = geometry.cells();
     Clearance clearance(n);
@@ -175,7 +175,7 @@ Clearance clearanceOf(const PageGeometry& geometry) {
     return clearance;
 }
 
-/// Triangle records and vertices of the hard leaves.
+/// Packs triangle records and vertices of the hard leaves.
 class TrianglePacker {
 public:
     TrianglePacker(const PageGeometry& geometry, const LatticeMesh& mesh) : geometry_(geometry), mesh_(mesh) {}
@@ -220,7 +220,7 @@ class NodePacker {
 public:
     NodePacker(const PageTree& tree, const FacePacker& faces, TrianglePacker& triangles, Clearance& clearance)
         : tree_(tree), faces_(faces), triangles_(triangles), clearance_(clearance) {
-        std::vector<uint32_t> queue;  // internal nodes, by group
+        std::vector<uint32_t> queue;  // internal nodes, one a group
         root = word(0, queue);
         for (size_t i = 0; i < queue.size(); ++i)
             for (uint32_t c = 0; c < 8; ++c) words.push_back(word(tree_.nodes[queue[i]].index + c, queue));
@@ -260,8 +260,8 @@ void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>
     if (!items.empty()) std::memcpy(bytes.data() + offset, items.data(), items.size() * sizeof(T));
 }
 
-/// Everything that separates the page's surface from the mesh, in cells: certified leaves, the level's
-/// stray, the slack of hard leaves' triangles (1e-4 cells).
+/// Returns all that separates the page's surface from the mesh, in cells: certified leaves, the level's stray, the
+/// slack of hard leaves' triangles (1e-4 cells).
 double pageError(const PageTree& tree, const PageGeometry& geometry) {
     return std::max(tree.certifiedError(), 2e-4) + geometry.stray();
 }

@@ -12,13 +12,13 @@ namespace vcp {
 /// A page's bytes, ready for compression.
 struct EncodedPage {
     std::vector<std::byte> geometry;
-    std::vector<std::byte> colour;  ///< empty when the mesh has none
-    uint32_t leaves = 0;            ///< soft and hard
+    std::vector<std::byte> colour;  ///< empty when the mesh has no colour
+    uint32_t leaves = 0;            ///< soft and hard leaves
     uint32_t hardLeaves = 0;
-    double certifiedError = 0;  ///< cells: of the leaves, the stray of the level's mesh and rounding
+    double certifiedError = 0;  ///< in cells: error of the leaves, stray of the level's mesh, and rounding
 };
 
-/// Sets the leaves' wall codes in `tree`.
+/// Encodes a page; sets the leaves' wall codes in `tree`.
 EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh& mesh);
 
 }  // namespace vcp

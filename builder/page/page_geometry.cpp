@@ -16,10 +16,10 @@ namespace {
 // Two triangles that meet at an edge with a sharper turn than this are not one sheet for a certificate.
 constexpr double kCreaseCosine = 0.35;
 
-// Batches measure distances up to their last bits: so much is left open for the exact ones to settle.
+// Batches measure distances except for their last bits: this factor leaves room for exact measuring to decide.
 constexpr double kBatchDistance = 1 + 1e-9;
 
-// Distances to triangles' centres are in float, of coordinates up to some hundred cells: room for rounding.
+// Distances to triangles' centres are in float, of coordinates up to some hundred cells; this is room for rounding.
 constexpr float kBallRounding = 1e-3f;
 
 /// How often an edge occurs, and where it did first: a table with linear probing.
@@ -90,7 +90,7 @@ void PageGeometry::markBadEdges() {
             if (slot.uses == 1) slot.firstUse = 4 * k + i;
             slot.good = false;
             if (slot.uses != 2) continue;
-            // Oriented by the shared edge, both normals agree where the surface continues and oppose at a fold.
+            // Oriented by the shared edge, both normals agree where the surface continues, and oppose at a fold.
             const uint32_t first = slot.firstUse / 4;
             const bool sameDirection = vertices_[first][slot.firstUse % 4] == a;
             slot.good = (sameDirection ? -1 : 1) * double(glm::dot(triangles_[first].normal, triangles_[k].normal)) >=
@@ -131,7 +131,7 @@ void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
                     if (*how) touchesPage |= add({x, y, z}, k, *how == CellOverlap::kTouches);
         if (touchesPage) stray_ = std::max(stray_, double(mesh_.stray[numbers[k]]));
     }
-    // Counts are two places on: after the sums, place list + 1 holds where the list's next entry goes.
+    // Counts are two places further on: after the sums, place list + 1 holds where the list's next entry goes.
     for (size_t i = 2; i < listBegin_.size(); ++i) listBegin_[i] += listBegin_[i - 1];
     cellTriangles_.resize(entries.size());
     for (const Entry& e : entries) cellTriangles_[listBegin_[e.list + 1]++] = e.triangle;
@@ -174,7 +174,7 @@ void PageGeometry::filter(const NodeBox& box, std::span<const uint32_t> candidat
 void PageGeometry::split(const NodeBox& box, std::span<const uint32_t> candidates, ChildTriangles& children) const {
     for (auto* lists : {&children.around, &children.inside})
         for (std::vector<uint32_t>& list : *lists) list.clear();
-    // With the children as unit cells.
+    // The box is scaled so that its children are unit cells.
     const glm::dvec3 lower = box.lowerCells();
     const double scale = 2 / box.edgeCells();
     std::vector<uint8_t> met;

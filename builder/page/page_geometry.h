@@ -33,7 +33,7 @@ struct NodeBox {
 
 class PageGeometry {
 public:
-    /// `triangles`: of `mesh`, ascending, all that come within kBinMarginCells of the page at `page` (Morton
+    /// `triangles`: numbers in `mesh`, ascending, of all that come within kBinMarginCells of the page at `page` (Morton
     /// position, in pages of 2^log2Cells cells).
     PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page, uint32_t log2Cells);
 
@@ -55,22 +55,22 @@ public:
         return {{lists + begin[0], lists + begin[2]}, {lists + begin[0], lists + begin[1]}};
     }
 
-    /// Local triangle numbers (ascending) that touch the box widened by kCertificateMarginCells; of them, those
-    /// that touch the closed box itself in `inside`. Boxes of at least a cell.
+    /// Finds local triangle numbers (ascending) that touch the box widened by kCertificateMarginCells, and in `inside`
+    /// those that touch the closed box itself. Boxes have at least a cell's edge.
     void trianglesOf(const NodeBox& box, std::vector<uint32_t>& around, std::vector<uint32_t>& inside);
-    /// The same for a smaller box, from the triangles around its parent.
+    /// Does the same for a smaller box, from the triangles around its parent.
     void filter(const NodeBox& box, std::span<const uint32_t> candidates, std::vector<uint32_t>& around,
                 std::vector<uint32_t>& inside) const;
 
-    /// The same for the eight children of a box.
+    /// Holds the triangles of the eight children of a box.
     struct ChildTriangles {
         std::array<std::vector<uint32_t>, 8> around, inside;
     };
     void split(const NodeBox& box, std::span<const uint32_t> candidates, ChildTriangles& children) const;
 
-    /// Exact closest point of a corner (position in subcells) among the page's triangles, the smallest
-    /// (squared distance, triangle) winning. Exact for the whole mesh where it is within 2 cells.
-    /// Valid until the next call.
+    /// Returns the exact closest point of a corner (position in subcells) among the page's triangles; the smallest
+    /// (squared distance, triangle) wins. It is exact for the whole mesh where it is within 2 cells. Valid until the
+    /// next call.
     const CornerVector& corner(glm::ivec3 subcells);
 
     [[nodiscard]] bool hasColour() const { return !mesh_.colours.empty(); }
@@ -79,9 +79,9 @@ public:
         const Triangle& t = triangles_[local];
         return {cornersOf(t), glm::dvec3(t.normal), t.badEdges};
     }
-    /// Vertex numbers in the mesh.
+    /// Returns the vertex numbers in the mesh.
     [[nodiscard]] const std::array<uint32_t, 3>& vertices(uint32_t local) const { return vertices_[local]; }
-    /// Largest stray of the vertices of the triangles that touch the page, in cells.
+    /// Returns the largest stray of the triangles that touch the page, in cells.
     [[nodiscard]] double stray() const { return stray_; }
 
 private:
@@ -91,7 +91,7 @@ private:
         glm::vec3 normal;  ///< unit
         uint8_t badEdges;  ///< as in CertifiedTriangle
         glm::vec3 centre;  ///< a point of the triangle
-        float radius;      ///< all of it is so close to the centre
+        float radius;      ///< all of the triangle is so close to the centre
     };
     static Triangle3 cornersOf(const Triangle& t) {
         return {glm::dvec3(t.corners[0]), glm::dvec3(t.corners[1]), glm::dvec3(t.corners[2])};
@@ -101,8 +101,8 @@ private:
     void markBadEdges();
     void fillCells(std::span<const uint32_t> numbers);
     CornerVector searchCorner(glm::dvec3 p);
-    /// Measures the triangles from number `first` in found_, but for those that cannot be closest;
-    /// `least` is the least squared distance before, and returned after.
+    /// Measures the triangles from number `first` in found_, except those that cannot be closest; `least` is the least
+    /// squared distance so far; returns the new one.
     double measureFound(glm::dvec3 p, size_t first, double least);
     [[nodiscard]] size_t cellIndex(glm::ivec3 cell) const {
         const int side = cells_ + 2 * kBorder;
@@ -118,15 +118,15 @@ private:
     std::vector<Triangle> triangles_;
     std::vector<std::array<uint32_t, 3>> vertices_;
     std::vector<uint32_t> cellTriangles_;  ///< lists of CellTriangles, cell by cell
-    std::vector<uint32_t> listBegin_;      ///< in cellTriangles_, two a cell: of those that touch, of the others
+    std::vector<uint32_t> listBegin_;      ///< starts in cellTriangles_, two a cell: touching, others
     std::vector<uint32_t> stamp_;          ///< a triangle is new to a search until it bears stampNow_
     uint32_t stampNow_ = 0;
     struct Found {
         uint32_t triangle;
-        float least;     ///< it is not closer than this
-        double squared;  ///< distance, once measured
+        float least;     ///< the distance is at least this
+        double squared;  ///< squared distance, once measured
     };
-    std::vector<Found> found_;          ///< candidates of a search
+    std::vector<Found> found_;          ///< the candidates of a search
     std::vector<uint32_t> gridCorner_;  ///< corners of cells: number in corners_ + 1, 0: not searched
     std::unordered_map<uint64_t, uint32_t> subcellCorner_;  ///< the same for corners within cells
     std::vector<CornerVector> corners_;

@@ -14,10 +14,10 @@ namespace {
 
 constexpr size_t kLanes = 8;
 
-// Keeps the equations solvable where the points do not determine a quadric.
+// This keeps the equations solvable where the points do not determine a quadric.
 constexpr double kRidge = 1e-6;
 
-/// Sums over all points: u^i v^j for i + j <= 4, then those up to degree 2 times the height, then its square.
+/// The sums over all points: u^i v^j for i + j <= 4, then those up to degree 2 times the height, then its square.
 struct Moments {
     double uv[5][5], h[3][3], hh;
 };
@@ -62,7 +62,7 @@ double quadricResidual(const float* x, const float* y, const float* z, size_t co
     const glm::vec3 frame[3] = {glm::vec3(u), glm::vec3(glm::cross(n, u)), glm::vec3(n)};
     Moments moments;
     sumMoments(x, y, z, count, frame, moments);
-    // Normal equations by elimination; what is left of the squared heights is the residual's square.
+    // The normal equations are solved by elimination; what is left of the squared heights is the residual's square.
     constexpr int kTerms = 6;
     constexpr std::array<std::array<int, 2>, kTerms> power{{{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}};
     double a[kTerms][kTerms + 1];

@@ -24,7 +24,7 @@ enum class Kind : uint8_t { Inner, Empty, Leaf };
 
 struct BuildNode {
     glm::ivec3 low{0};   ///< lowest cell
-    uint32_t first = 0;  ///< of the eight children, one level below; of inner nodes
+    uint32_t first = 0;  ///< first of the eight children, one level below; of inner nodes
     uint32_t word = 0;   ///< where its word goes
     Kind kind = Kind::Empty;
 };
@@ -75,7 +75,7 @@ private:
         const CornerSample* known = points_.find(point);
         return known && known->isReached() ? *known : sampleAt(point);
     }
-    /// Cells, without sign; nothing where it is more than `within`.
+    /// Returns the distance in cells, without sign; nothing where it is more than `within`.
     [[nodiscard]] std::optional<float> distanceWithin(glm::ivec3 point, float within) const {
         if (const CornerSample* known = points_.find(point); known && known->isReached())
             return std::abs(known->distance);
@@ -97,7 +97,7 @@ private:
                 for (int x = 0; x < frame.roots.x; ++x) roots.push_back({glm::ivec3(x, y, z) * (1 << frame.rootLevel)});
     }
 
-    /// Nodes without a point within `band` of the surface stay empty, the others become inner.
+    /// Makes nodes without a point within `band` of the surface empty, the others inner.
     void findEmpty(int level, float band) {
         auto& nodes = levels_[level];
         const double half = 0.5 * (1 << level);
@@ -120,7 +120,7 @@ private:
         return true;
     }
 
-    /// The grid points of blocks that may be kept; blocks all of whose points are beyond the band become empty.
+    /// Samples the grid points of blocks that may be kept; blocks with all points beyond the band become empty.
     void sampleBlocks() {
         auto& blocks = levels_[kBlockLevel];
         const auto forPoints = [](const BuildNode& block, const auto& visit) {
@@ -171,7 +171,7 @@ private:
         });
     }
 
-    /// At the corners of the children that are leaves, against what is exact.
+    /// Compares, at the corners of the children that are leaves, the merged leaf with the exact samples.
     [[nodiscard]] bool mergedIsGood(int level, const BuildNode& node) const {
         const int size = 1 << level, half = size / 2;
         const CornerSamples corners = cornersOf(node.low, size);
@@ -190,7 +190,7 @@ private:
         return true;
     }
 
-    /// Where each reachable node's word goes, and the words of inner nodes.
+    /// Chooses where each reachable node's word goes, and writes the words of inner nodes.
     void number() {
         const int top = tree_.frame.rootLevel;
         for (uint32_t i = 0; i < levels_[top].size(); ++i) levels_[top][i].word = i;
@@ -225,7 +225,7 @@ private:
         tree_.cutoff = glm::length(glm::vec3(tree_.frame.cells()));
         forEachIndex(empties_.size(), options_.threads, [&](size_t i) {
             const BuildNode& node = at(empties_[i]);
-            // A cell beside a leaf has no distance worth a step.
+            // A cell beside a leaf has no distance that is worth a step.
             float least = empties_[i].level == 0 ? 0 : leastOnBoundary(node.low, 1 << empties_[i].level);
             if (options_.safeEmpty) least = std::max(least - kPointToBoundary, 0.0f);
             const double scaled = std::min(double(least) / tree_.cutoff, 1.0) * (CornerOctree::kEmpty - 1);
@@ -234,13 +234,13 @@ private:
         });
     }
 
-    /// The least distance of the grid points on a cube's boundary: faces are halved until no point in a piece can be
-    /// nearer than the nearest one seen.
+    /// Returns the least distance of the grid points on a cube's boundary: faces are halved until no point in a piece
+    /// can be nearer than the nearest one seen.
     [[nodiscard]] float leastOnBoundary(glm::ivec3 low, int size) const {
         const glm::dvec3 centre = tree_.frame.worldFromGrid(glm::dvec3(low) + 0.5 * size);
         glm::ivec3 start = low;
         if (const auto nearest = mesh_.nearestPoint(centre)) {
-            // Where the way from the centre to the surface leaves the cube.
+            // The point where the way from the centre to the surface leaves the cube.
             const glm::dvec3 way = (nearest->point - centre) / options_.cell;
             const double longest = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z), 1e-30});
             start = glm::clamp(glm::ivec3(glm::round(glm::dvec3(low) + 0.5 * size + way * (0.5 * size / longest))), low,
@@ -293,7 +293,7 @@ private:
         tree_.slices.resize(slices);
         forEachIndex(leaves_.size(), options_.threads, [&](size_t i) {
             const CornerSamples corners = cornersOf(at(leaves_[i]).low, 1 << leaves_[i].level);
-            // A shared slice is written once, by the leaf before.
+            // A shared slice is written once, by the leaf before it.
             for (uint32_t x = adjoins[i] ? 1 : 0; x < 2; ++x)
                 for (uint32_t k = 0; k < 4; ++k)
                     tree_.slices[slice[i] + x][k] = field_.pack(corners[x + 2 * k], tree_.largest);

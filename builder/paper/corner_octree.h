@@ -29,7 +29,7 @@ struct CornerSample {
     glm::vec3 toSurface{0};  ///< closest point minus grid point
     float distance = 0;      ///< signed where the field asks for signs
 
-    /// Of a point that region growing did not reach.
+    /// The sample of a point that region growing did not reach.
     static CornerSample unreached() { return {glm::vec3(0), std::numeric_limits<float>::infinity()}; }
     [[nodiscard]] bool isReached() const { return distance < std::numeric_limits<float>::infinity(); }
 };
@@ -39,19 +39,19 @@ using CornerSamples = std::array<CornerSample, 8>;  ///< x lowest
 class CornerField {
 public:
     virtual ~CornerField() = default;
-    /// Blocks farther than this from the surface are empty, cells.
+    /// Returns the distance, in cells, beyond which blocks are empty.
     [[nodiscard]] virtual float band() const = 0;
     [[nodiscard]] virtual bool isSigned() const = 0;
     /// Whether a cell of a kept block needs a leaf.
     [[nodiscard]] virtual bool keepCell(const CornerSamples&) const { return true; }
-    /// Largest `mergeError` at which eight leaves become one; below 0: never.
+    /// Returns the largest `mergeError` at which eight leaves become one; below 0: never.
     [[nodiscard]] virtual float mergeThreshold() const { return -1; }
-    /// How far the field of `corners` errs at `at` (0 to 1 an axis) of a leaf of edge `size`, cells.
+    /// Returns how far, in cells, the field of `corners` errs at `at` (0 to 1 an axis) of a leaf of edge `size`.
     [[nodiscard]] virtual float mergeError(const CornerSamples&, float /*size*/, glm::vec3 /*at*/,
                                            const CornerSample&) const {
         return 0;
     }
-    /// `largest`: of all distances that are stored, cells.
+    /// `largest`: the largest of all distances that are stored, cells.
     [[nodiscard]] virtual uint32_t pack(const CornerSample&, float largest) const = 0;
 };
 
@@ -61,7 +61,7 @@ public:
     std::vector<int32_t> nodes;  ///< the roots first, x lowest
     std::vector<std::array<uint32_t, 4>> slices;
     float cutoff = 1;   ///< D, cells
-    float largest = 0;  ///< distance stored in a leaf, cells
+    float largest = 0;  ///< largest distance stored in a leaf, cells
     uint64_t leaves = 0, emptyNodes = 0;
 
     static constexpr int32_t kEmpty = 1 << 30;
@@ -70,11 +70,11 @@ public:
     [[nodiscard]] int32_t childWord(int32_t inner, int, int octant) const { return nodes[inner + octant]; }
     [[nodiscard]] static bool isInner(int32_t word) { return word >= 0 && word < kEmpty; }
     [[nodiscard]] static bool isLeaf(int32_t word) { return word < 0; }
-    /// Cells; of an empty node.
+    /// Returns the distance of an empty node, in cells.
     [[nodiscard]] float emptyDistance(int32_t word) const {
         return static_cast<float>(word - kEmpty) * (cutoff / static_cast<float>(kEmpty - 1));
     }
-    /// Eight codes, x slowest: code 4 x + 2 z + y.
+    /// Returns the eight codes, x slowest: code 4 x + 2 z + y.
     [[nodiscard]] const uint32_t* leafCodes(int32_t word) const { return slices[-(word + 1)].data(); }
     [[nodiscard]] uint64_t bytes() const { return nodes.size() * 4 + slices.size() * 16; }
 };
@@ -92,8 +92,8 @@ struct CornerOctreeOptions {
     static constexpr int kExactPoints = -1;
 };
 
-/// `sides` is needed by signed fields. Errors: Limit where a grid of more than RootGrid::kMaxCells / 2 cells an edge
-/// or 2^30 nodes would be needed.
+/// Builds the octree. `sides` is needed by signed fields. Errors: Limit where a grid of more than RootGrid::kMaxCells /
+/// 2 cells an edge or 2^30 nodes would be needed.
 Result<CornerOctree> buildCornerOctree(const MeshBvh& mesh, const MeshSides* sides, const CornerField& field,
                                        const CornerOctreeOptions& options);
 

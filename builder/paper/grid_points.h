@@ -15,7 +15,7 @@ namespace vcp {
 template <class Value>
 class GridPoints {
 public:
-    /// One thread. Once fill() was called, no more points are added.
+    /// Adds a point, in one thread. Once fill() was called, no more points are added.
     void add(glm::ivec3 point) {
         if (4 * (count_ + 1) > 3 * slots_.size()) grow();
         uint64_t& slot = slots_[slotOf(keyOf(point))];
@@ -35,14 +35,14 @@ public:
             if (isUsed(i)) values_[i] = compute(i);
         });
     }
-    /// Null where the point was never added. After fill(), any thread.
+    /// Returns a point's value; null where it was never added. After fill(), any thread.
     [[nodiscard]] const Value* find(glm::ivec3 point) const {
         const auto slot = slotAt(point);
         return slot ? &values_[*slot] : nullptr;
     }
     [[nodiscard]] size_t size() const { return count_; }
 
-    /// Slots are numbers below slots(); not all are used. They stay while no point is added.
+    /// Slots are numbers below slots(); not all are used. They stay the same while no point is added.
     [[nodiscard]] size_t slots() const { return slots_.size(); }
     [[nodiscard]] bool isUsed(size_t slot) const { return slots_[slot] != kFree; }
     [[nodiscard]] glm::ivec3 pointAt(size_t slot) const { return pointOf(slots_[slot]); }

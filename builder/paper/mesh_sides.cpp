@@ -10,7 +10,7 @@ namespace vcp {
 
 namespace {
 
-/// Nearer to an edge or vertex than this part of the triangle's height, a point is on it.
+/// A point that is nearer to an edge or vertex than this part of the triangle's height is on it.
 constexpr double kOnEdge = 1e-9;
 
 uint64_t edgeKey(uint32_t a, uint32_t b) { return uint64_t{std::min(a, b)} << 32 | std::max(a, b); }

@@ -11,7 +11,7 @@ class NodeFinder {
 public:
     explicit NodeFinder(const CornerOctree& tree) : tree_(tree) {}
 
-    /// The word of the node at cell c; low() and level() say where it is.
+    /// Returns the word of the node at cell c; low() and level() say where it is.
     template <class Work>
     int32_t find(glm::ivec3 c, Work& work) {
         if (level_ >= 0 && holds(level_, c)) return word_;
@@ -34,7 +34,7 @@ public:
         level_ = level;
         return word_ = word;
     }
-    /// The next search starts at the root.
+    /// Lets the next search start at the root.
     void forget() { level_ = parentLevel_ = -1; }
     [[nodiscard]] int level() const { return level_; }
     [[nodiscard]] glm::ivec3 low() const { return cell_ & glm::ivec3(-(1 << level_)); }

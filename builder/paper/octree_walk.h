@@ -13,7 +13,7 @@
 
 namespace vcp {
 
-/// Counters of one ray's work, and none at all. A cell: a leaf whose surface is looked at.
+/// Counters of one ray's work, and counters that count nothing. A cell: a leaf whose surface is looked at.
 struct RayWork {
     uint32_t steps = 0, cells = 0, fetches = 0;
     void step() { ++steps; }
@@ -26,7 +26,7 @@ struct NoWork {
     void fetch(uint32_t = 1) {}
 };
 
-/// A node that a ray crosses from t to tExit: no inner node.
+/// A node that a ray crosses from t to tExit: a leaf or an empty node.
 struct WalkedNode {
     int32_t word = 0;
     int level = 0;
@@ -36,7 +36,7 @@ struct WalkedNode {
 
 inline constexpr float kStopWalk = std::numeric_limits<float>::infinity();
 
-/// The cell that holds p. Truncation is enough: what rounding leaves below 0 belongs to cell 0.
+/// Returns the cell that holds p. Truncation is enough: what rounding leaves below 0 belongs to cell 0.
 inline glm::ivec3 cellAt(glm::vec3 p, glm::ivec3 last) { return glm::clamp(glm::ivec3(p), glm::ivec3(0), last); }
 
 inline int octantOf(glm::ivec3 c, int level) {

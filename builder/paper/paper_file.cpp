@@ -106,7 +106,7 @@ FileHeader headerOf(const PaperCaster& octree, const SoupMeasures& mesh) {
     return header;
 }
 
-/// Tells the caller how far things are; false: cancelled.
+/// Tells the caller how far things are; false means that the caller cancelled.
 class Stages {
 public:
     explicit Stages(const BuildOptions& options) : options_(options) {}

@@ -14,12 +14,12 @@ struct PaperFile {
     PageBytes page;
 };
 
-/// `mesh`: what the octree was built from. Errors: Limit where the page would have more than 256 MiB.
+/// Makes the file's content. `mesh`: what the octree was built from. Errors: Limit where the page has over 256 MiB.
 Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh);
 
-/// Builds meshes into a .vcp file of the method `paper`. Holds mesh and octree in memory; of `options` it heeds inputs,
-/// output, cell, threads and progress. The report's certified error is not a number. The same bytes for any number of
-/// threads. Errors: what loadMesh, chooseFrame, PaperCaster::create, paperFile and VcpWriter say; Cancelled.
+/// Builds meshes into a .vcp file of the method `paper`. Holds mesh and octree in memory; of `options` it uses inputs,
+/// output, cell, threads and progress. The report's certified error is not a number. The bytes are the same for any
+/// number of threads. Errors: what loadMesh, chooseFrame, PaperCaster::create, paperFile and VcpWriter say; Cancelled.
 Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper);
 
 }  // namespace vcp

@@ -10,7 +10,7 @@ namespace vcp {
 
 namespace {
 
-/// Sines and cosines of all azimuths and polar angles that have a code.
+/// The sines and cosines of all azimuths and polar angles that have a code.
 struct AngleTables {
     std::array<float, 512> sinTheta, cosTheta;
     std::array<float, 1024> sinPhi, cosPhi;

@@ -31,7 +31,7 @@ struct PaperOptions {
     PaperMarch march;
     float band = 3.4641016f;                        ///< t, cells: twice the diagonal
     float mergeThreshold = 0.05f;                   ///< cells; below 0: no merging
-    PaperScheme mergeScheme = PaperScheme::Longer;  ///< that merging is judged by
+    PaperScheme mergeScheme = PaperScheme::Longer;  ///< interpolation by which merging is judged
     PaperPacking packing = PaperPacking::Spherical;
     /// k: rounds of region growing, or CornerOctreeOptions::kExactPoints. 5 reach every point of the default band.
     int growRounds = 5;
@@ -40,9 +40,9 @@ struct PaperOptions {
     bool operator==(const PaperOptions&) const = default;
 };
 
-/// The vector at `at` (0 to 1 an axis) of a leaf of edge `size` cells.
+/// Returns the vector at `at` (0 to 1 an axis) of a leaf of edge `size` cells.
 glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 at, PaperScheme scheme);
-/// Euclidean distance of that vector to the exact one (section 3), cells.
+/// Returns the Euclidean distance of that vector to the exact one (section 3), in cells.
 float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact,
                        PaperScheme scheme = PaperScheme::Longer);
 
@@ -65,7 +65,7 @@ private:
 
 class PaperCaster {
 public:
-    /// `build`: its growRounds and safeEmpty are those of `options`.
+    /// Builds the octree. `build`: its growRounds and safeEmpty are those of `options`.
     static Result<PaperCaster> create(const MeshBvh& mesh, const PaperOptions& options,
                                       const CornerOctreeOptions& build);
 
@@ -75,7 +75,7 @@ public:
     [[nodiscard]] uint64_t bytes() const { return tree_->bytes(); }
     void setMarch(const PaperMarch& march) { options_.march = march; }
 
-    /// Any thread.
+    /// Casts a ray. Any thread.
     template <class Work>
     [[nodiscard]] GridHit cast(const GridRay& ray, Work& work) const;
 
@@ -86,7 +86,7 @@ private:
           decode_(tree_->largest, options.packing) {}
     [[nodiscard]] LeafVectors vectorsOf(int32_t leaf) const;
 
-    std::shared_ptr<const CornerOctree> tree_;  // shared by copies that march otherwise
+    std::shared_ptr<const CornerOctree> tree_;  // shared by copies with other rules of the march
     PaperOptions options_;
     PaperDecoder decode_;
 };
@@ -101,7 +101,7 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
     struct Sample {
         float distance;
         bool isLeaf;
-        glm::vec3 vector;  // of a leaf
+        glm::vec3 vector;  // vector of a leaf
     };
     const auto sampleAt = [&](float t) -> Sample {
         work.step();

@@ -1,4 +1,4 @@
-// Work spread over threads by row.
+// Spreads work over threads, row by row.
 #pragma once
 
 #include <functional>

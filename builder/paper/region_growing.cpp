@@ -16,12 +16,12 @@ namespace {
 
 constexpr uint32_t kNoTriangle = ~uint32_t{0};
 
-/// A point's triangle so far.
+/// The nearest triangle of a point so far.
 struct Owner {
     uint32_t triangle = kNoTriangle;
     double squared = std::numeric_limits<double>::infinity();  // world units
 
-    /// The nearer one; of equals the lower number, whatever the order.
+    /// Takes the nearer of two; among equals the lower number, whatever the order.
     void offer(uint32_t other, double distance2) {
         if (distance2 < squared || (distance2 == squared && other < triangle)) *this = {other, distance2};
     }
@@ -80,7 +80,7 @@ private:
                 for (int x = low.x; x <= high.x; ++x)
                     if (const auto slot = points_.slotAt({x, y, z})) offer(*slot, owners_[*slot], triangle);
     }
-    /// A box with more grid points than there are points that count.
+    /// Handles a box with more grid points than there are points that count.
     void insertIntoAll(uint32_t triangle, glm::ivec3 low, glm::ivec3 high) {
         forEachIndex(owners_.size(), threads_, [&](size_t slot) {
             if (!points_.isUsed(slot)) return;
@@ -114,7 +114,7 @@ private:
     const RootGrid& frame_;
     unsigned threads_;
     const GridPoints<CornerSample>& points_;
-    std::vector<Owner> owners_;  // by slot
+    std::vector<Owner> owners_;  // one for each slot
 };
 
 }  // namespace

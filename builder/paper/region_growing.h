@@ -16,8 +16,8 @@
 
 namespace vcp {
 
-/// Fills the values of `points`; what no triangle reaches in `rounds` rounds is CornerSample::unreached(). Distances
-/// without sign.
+/// Fills the values of `points`; a point that no triangle reaches in `rounds` rounds is CornerSample::unreached().
+/// Distances have no sign.
 void growClosestPoints(const IndexedMesh& mesh, const RootGrid& frame, int rounds, unsigned threads,
                        GridPoints<CornerSample>& points);
 

@@ -29,7 +29,7 @@ struct RootGrid {
         return ((c.z >> rootLevel) * roots.y + (c.y >> rootLevel)) * roots.x + (c.x >> rootLevel);
     }
 
-    /// About the middle of a box, with at least `margin` cells around it. Precondition: the box is at most
+    /// Makes a grid about the middle of a box, with at least `margin` cells around it. Precondition: the box is at most
     /// kMaxCells / 2 cells across.
     static RootGrid around(glm::dvec3 boxLow, glm::dvec3 boxHigh, double cell, int margin) {
         RootGrid frame;
@@ -43,14 +43,14 @@ struct RootGrid {
     }
 };
 
-/// Grid space. `t` counts cells from `origin`, which lies in the grid.
+/// A ray in grid space. `t` counts cells from `origin`, which lies in the grid.
 struct GridRay {
     glm::vec3 origin, direction, inverse;
     float tMax = -1;    ///< where the ray leaves the grid; negative: it never enters
     double tStart = 0;  ///< cells from the eye to the origin
 };
 
-/// What a peer answers: t infinite for a miss, not a number where it gave up; the normal need not be a unit vector.
+/// A peer's answer: t is infinite for a miss, not a number where it gave up; the normal need not be a unit vector.
 struct GridHit {
     float t = std::numeric_limits<float>::infinity();
     glm::vec3 normal{0};

@@ -18,7 +18,7 @@ namespace {
 
 std::string hashed(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
 
-/// All of the journal; nothing where there is none.
+/// Returns the whole journal; nothing where there is none.
 Result<std::string> contentOf(const TempFolder& folder) {
     const auto file = folder.open(kJournalName);
     if (!file) return file.error();
@@ -69,7 +69,7 @@ Result<void> Journal::record(const TempFolder& folder, const nlohmann::json& fie
     const bool isNew = file_ < 0;
     if (isNew) VCP_TRY(open(folder));
     const std::string text = fields.dump();
-    // The line break in front ends a line that an interruption tore.
+    // The line break in front ends a line that an interruption cut off.
     const std::string line = fmt::format("{}{} {}\n", isNew ? "\n" : "", hashed(text), text);
     VCP_TRY(appendAll(file_, std::as_bytes(std::span(line)), path, kWhenTempIsFull));
     if (::fdatasync(file_) != 0) return systemError(path, "cannot be made durable", errno, kWhenTempIsFull);

@@ -1,4 +1,4 @@
-// The journal of a build: what is done, durably, so that an interrupted build goes on where it was.
+// The journal of a build records, durably, what is done, so that an interrupted build can be continued.
 //
 // A file of lines, each a JSON object behind its hash; later ones override the fields of earlier ones. A line
 // is appended only after the bytes that it speaks of are durable; a torn or damaged line counts as absent.
@@ -18,13 +18,13 @@ public:
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
 
-    /// All fields of the journal in `folder`, which is taken; null when there is none. Errors: Io (it cannot be read,
-    /// is a link).
+    /// Returns all fields of the journal in `folder`, which must be held; null when there is none. Errors: Io (it
+    /// cannot be read, is a link).
     static Result<nlohmann::json> read(const TempFolder& folder);
 
     /// Whether anything was recorded durably by this object.
     [[nodiscard]] bool active() const { return active_; }
-    /// Appends to the journal in `folder`, which is taken, durably. Errors: Io.
+    /// Appends to the journal in `folder`, which must be held, durably. Errors: Io.
     Result<void> record(const TempFolder& folder, const nlohmann::json& fields);
 
 private:

@@ -15,11 +15,11 @@ namespace {
 /// An entry as it lies in its file.
 struct SpooledEntry {
     PageEntry entry;
-    uint64_t hash = 0;  ///< of the entry and its place
+    uint64_t hash = 0;  ///< hash of the entry and its place
 };
 static_assert(sizeof(SpooledEntry) == sizeof(PageEntry) + sizeof(uint64_t));
 
-/// Entries that are read at once.
+/// Number of entries that are read at once.
 constexpr uint64_t kBatchEntries = 4096;
 
 }  // namespace
@@ -62,7 +62,7 @@ Result<void> PageSpool::reopen(uint64_t bytes, uint64_t entries) {
         return damagedTempFile(directory_.path());
     VCP_TRY(pages_.reopen(bytes));
     VCP_TRY(directory_.reopen(entries * sizeof(SpooledEntry)));
-    uint64_t end = 0;  // of the pages before
+    uint64_t end = 0;  // end of the pages so far
     std::vector<SpooledEntry> batch;
     for (uint64_t first = 0; first < entries; first += batch.size()) {
         batch.resize(std::min(kBatchEntries, entries - first));

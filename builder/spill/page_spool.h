@@ -12,17 +12,17 @@
 
 namespace vcp {
 
-/// A page of a level: its directory entry, and where its bytes are (offsets of the entry point into the spool).
+/// The pages of a level: directory entries, and where the bytes are (offsets of the entries point into the spool).
 class PageSpool {
 public:
     PageSpool(TempSpace& space, uint32_t level);
 
-    /// Pages come in Morton order. One thread.
+    /// Appends a page; pages come in Morton order. One thread.
     Result<void> append(PageEntry entry, const StoredPage& page);
     Result<void> sync();
-    /// What an interrupted build had: so many bytes and entries. Errors: Io; InvalidInput (damaged).
+    /// Takes over what an interrupted build had: so many bytes and entries. Errors: Io; InvalidInput (damaged).
     Result<void> reopen(uint64_t bytes, uint64_t entries);
-    /// A page, as it was appended. Errors: Io; InvalidInput (damaged).
+    /// Returns a page as it was appended. Errors: Io; InvalidInput (damaged).
     Result<StoredPage> read(const PageEntry& entry) const;
     void remove();
 

@@ -16,8 +16,8 @@ struct BlockHeader {
     uint32_t bin = 0;
     uint32_t records = 0;
     uint32_t storedBytes = 0;
-    uint64_t payloadHash = 0;  ///< of what follows
-    uint64_t hash = 0;         ///< of the above: the index is made of headers alone
+    uint64_t payloadHash = 0;  ///< hash of what follows
+    uint64_t hash = 0;         ///< hash of the above: the index is made of headers alone
 
     static constexpr uint32_t kMagic = 0x4c4c4256;
     [[nodiscard]] uint64_t hashOfHeader() const { return XXH3_64bits(this, offsetof(BlockHeader, hash)); }
@@ -28,7 +28,7 @@ constexpr size_t kMaxBlockRecords = 4096, kMinBlockRecords = 64;
 constexpr uint32_t kMaxBins = 1u << 24;
 constexpr int kFastCompression = 1;
 
-/// Word by word the difference to the record before, folded so that small ones of either sign have high bytes
+/// Writes, word by word, the difference to the record before, folded so that small ones of either sign have high bytes
 /// of zero, one byte plane after the other.
 void toPlanes(const std::byte* records, size_t count, size_t recordBytes, std::byte* planes) {
     const size_t words = recordBytes / 4;
@@ -95,7 +95,7 @@ Result<void> RawBins::append(size_t bin, const std::byte* records, size_t count)
     return {};
 }
 
-// Codes outside of the lock: that is the dear part.
+// Coding, which takes the time, runs outside of the lock.
 Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& records) {
     const size_t count = records.size() / recordBytes_;
     std::vector<std::byte> planes(records.size());

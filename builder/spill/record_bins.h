@@ -2,7 +2,7 @@
 //
 // Each bin fills a block; a full block is coded (words as differences to the record before, byte planes, zstd
 // at its fastest) and appended with a header that names its bin, so that the index can be made again from the
-// file after an interruption. Headers and blocks carry hashes: a temporary disk that lies is noticed.
+// file after an interruption. Headers and blocks carry hashes: a temporary disk that returns wrong bytes is noticed.
 #pragma once
 
 #include <algorithm>
@@ -18,22 +18,22 @@
 
 namespace vcp {
 
-/// Untyped; see RecordBins. append: any thread; the rest: one thread, no append beside it, but for read, which
-/// any thread may call.
+/// Untyped bins; see RecordBins. Any thread may append, and may call read; the rest is for one thread, while none
+/// appends.
 class RawBins {
 public:
-    /// `recordBytes`: a multiple of 4. `bins`: as many as are expected, more may come. `bufferBytes`: for all
-    /// open blocks together.
+    /// `recordBytes`: a multiple of 4. `bins`: the expected number, more may come. `bufferBytes`: memory for all open
+    /// blocks together.
     RawBins(TempSpace& space, std::string name, size_t recordBytes, size_t bins, uint64_t bufferBytes);
 
     Result<void> append(size_t bin, const std::byte* records, size_t count);
-    /// Writes the open blocks: only then are their records read. More may follow.
+    /// Writes the open blocks: only then are their records read back. More records may follow.
     Result<void> flush();
-    /// The same for one bin.
+    /// Writes one bin's open block.
     Result<void> flush(size_t bin);
-    /// flush, and durably.
+    /// Flushes, durably.
     Result<void> sync();
-    /// The index again, from a file cut to `bytes`. Errors: Io; InvalidInput (damaged).
+    /// Makes the index again, from a file cut to `bytes`. Errors: Io; InvalidInput (damaged).
     Result<void> reopen(uint64_t bytes);
     void remove();
 
@@ -44,7 +44,7 @@ public:
     [[nodiscard]] const std::string& fileName() const { return file_.name(); }
 
     struct Block {
-        uint64_t offset;  ///< of the header
+        uint64_t offset;  ///< offset of the header
         uint32_t records;
         uint32_t storedBytes;
     };
@@ -81,13 +81,13 @@ public:
     [[nodiscard]] const RawBins& raw() const { return raw_; }
     [[nodiscard]] uint64_t count(size_t bin) const { return raw_.count(bin); }
 
-    /// One block's records. Any thread.
+    /// Returns one block's records. Any thread.
     Result<std::vector<Record>> read(const RawBins::Block& block) const {
         std::vector<Record> records(block.records);
         VCP_TRY(raw_.read(block, reinterpret_cast<std::byte*>(records.data())));
         return records;
     }
-    /// All records of a bin.
+    /// Returns all records of a bin.
     Result<std::vector<Record>> load(size_t bin) const {
         std::vector<Record> records(raw_.count(bin));
         size_t at = 0;
@@ -102,7 +102,7 @@ private:
     RawBins raw_;
 };
 
-/// Records on their way into bins, collected so that each append has many. One thread; flush when done.
+/// Collects records on their way into bins, so that each append has many. One thread; flush when done.
 template <class Record>
 class BinBatch {
 public:

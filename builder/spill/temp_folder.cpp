@@ -33,7 +33,7 @@ bool isOfABuild(std::string_view name) {
     return std::find(std::begin(kWords), std::end(kWords), name) != std::end(kWords);
 }
 
-/// What lies in a folder, at most `limit` names.
+/// Lists what lies in a folder, at most `limit` names.
 std::vector<std::string> namesIn(int folder, size_t limit = ~size_t{0}) {
     std::vector<std::string> names;
     const int again = ::openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -88,7 +88,7 @@ Result<void> TempFolder::take() {
     }
 }
 
-/// Makes what is not there of the folder and of those that it lies in.
+/// Makes the missing folders: the folder and those that it lies in.
 Result<void> TempFolder::make() {
     std::vector<std::filesystem::path> missing;
     struct stat status {};
@@ -106,7 +106,7 @@ Result<void> TempFolder::make() {
     return {};
 }
 
-/// Opens and locks the folder; false: it is gone.
+/// Opens and locks the folder; returns false where it is gone.
 Result<bool> TempFolder::hold() {
     folder_ = ::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (folder_ < 0) {
@@ -119,7 +119,7 @@ Result<bool> TempFolder::hold() {
         return tempError(path_, "cannot make the temporary folder", code);
     }
     const NameLock lock = lockName(folder_, path_);
-    if (lock == NameLock::Held) made_.clear();  // what was made is that build's now
+    if (lock == NameLock::Held) made_.clear();  // the folders that were made belong to that build now
     if (lock == NameLock::Held)
         return refused(path_, "another build of this output is running; wait for it or choose another output");
     if (lock == NameLock::Taken) return true;
@@ -128,7 +128,7 @@ Result<bool> TempFolder::hold() {
     return false;
 }
 
-/// Sees to it that the folder that is held has the mark.
+/// Makes sure that the held folder has the mark.
 Result<void> TempFolder::mark() const {
     if (isRegular(folder_, kTempMark)) return {};
     if (!namesIn(folder_, 1).empty())
@@ -144,7 +144,7 @@ Result<void> TempFolder::mark() const {
     return durable;
 }
 
-/// Removes the folders that were made, while they are empty.
+/// Removes the folders that were made, if they are empty.
 void TempFolder::unmake() {
     while (!made_.empty() && ::rmdir(made_.back().c_str()) == 0) made_.pop_back();
     made_.clear();
@@ -160,7 +160,7 @@ Result<int> TempFolder::create(const std::string& name) const {
 }
 
 Result<int> TempFolder::open(const std::string& name) const {
-    // O_NONBLOCK: a named pipe must not hang the open.
+    // O_NONBLOCK keeps the open from waiting for a named pipe.
     const int file = ::openat(folder_, name.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     const int code = errno;
     if (file < 0 && code == ENOENT) return -1;
@@ -183,7 +183,7 @@ void TempFolder::clear(const std::vector<std::string>& kept) const {
     const auto isKept = [&](const std::string& name) {
         return std::find(kept.begin(), kept.end(), name) != kept.end();
     };
-    // The journal first: it must not outlive what it speaks of.
+    // The journal goes first: it must not outlive what it describes.
     if (!isKept(kJournalName) && isRegular(folder_, kJournalName)) unlink(kJournalName);
     for (const std::string& name : namesIn(folder_))
         if (isOfABuild(name) && !isKept(name) && isRegular(folder_, name.c_str())) unlink(name);
@@ -193,7 +193,7 @@ void TempFolder::remove() {
     clear();
     const std::scoped_lock guard(mutex_);
     if (folder_ < 0) return;
-    // The mark stays where something else does: the folder is still a build's.
+    // The mark stays where other files stay: the folder is still a build's.
     if (namesIn(folder_, 2) == std::vector<std::string>{kTempMark}) {
         unlink(kTempMark);
         if (!std::count(made_.begin(), made_.end(), path_)) made_.push_back(path_);

@@ -20,47 +20,47 @@ inline constexpr const char* kJournalName = "journal";
 /// The file that says that a build made the folder.
 inline constexpr const char* kTempMark = "vcp-build";
 
-/// Names of other temporary files end in it.
+/// The names of all other temporary files end in this.
 inline constexpr const char* kTempSuffix = ".spill";
 
 /// What to do about a folder that is full.
 inline constexpr const char* kWhenTempIsFull = "free some space, or give --temp a folder with more";
 
-/// What is said of bytes that are not what was written: in `file`, at `byte`.
+/// Returns the error for bytes that differ from what was written: in `file`, at `byte`.
 Error damagedTempFile(const std::filesystem::path& file, std::optional<uint64_t> byte = {});
 
-/// Any thread.
+/// A folder for temporary files. Any thread.
 class TempFolder {
 public:
-    /// Nothing is made yet.
+    /// Makes nothing yet.
     explicit TempFolder(std::filesystem::path path) : path_(std::move(path)) {}
     ~TempFolder();
     TempFolder(const TempFolder&) = delete;
     TempFolder& operator=(const TempFolder&) = delete;
 
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-    /// Whether there is anything of that name, be it a link to nothing.
+    /// Whether there is anything of that name, even a link to nothing.
     [[nodiscard]] bool exists() const;
 
     /// Makes the folder, and those that it lies in, or takes over that of an interrupted build or an empty one,
-    /// durably, for this process until removed or destroyed. Nothing is left behind where that fails. Errors: Io
-    /// (another build holds it; it is a link or a file; it has no mark and is not empty).
+    /// durably, for this process until it is removed or this is destroyed. Nothing is left behind where that fails.
+    /// Errors: Io (another build holds it; it is a link or a file; it has no mark and is not empty).
     Result<void> take();
     [[nodiscard]] bool isTaken() const { return folder_ >= 0; }
 
-    /// A new file, for reading and writing. Errors: Io (there is something of that name).
+    /// Makes a new file, for reading and writing. Errors: Io (the name is taken).
     Result<int> create(const std::string& name) const;
-    /// A file that a build left, for reading and writing; -1: there is none. Errors: Io (a link, no regular file,
-    /// or one that has another name as well).
+    /// Opens a file that a build left, for reading and writing; -1 where there is none. Errors: Io (a link, no regular
+    /// file, or one that has another name as well).
     Result<int> open(const std::string& name) const;
     /// Removes the file or the link of that name, never what a link leads to.
     void unlink(const std::string& name) const;
     /// Makes created files' names durable. Errors: Io.
     Result<void> sync() const;
 
-    /// Removes the files that a build makes, but for those named `kept`, when the folder is held.
+    /// Removes the files that a build makes, except those named `kept`, when the folder is held.
     void clear(const std::vector<std::string>& kept = {}) const;
-    /// The same with the folder, and those that were made for it, where nothing else lies in them. It is given back.
+    /// Does so, and removes the folder, and those made for it, where nothing else lies in them. It is no longer held.
     void remove();
 
 private:

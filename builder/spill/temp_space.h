@@ -4,9 +4,9 @@
 // file that is being appended to moves its bytes to the folder. A checkpoint moves all of them and makes them
 // durable, so that a journal may rely on their lengths (journal.h).
 //
-// A disk may give back other bytes than it was given. Whoever appends makes a hash of the bytes first, keeps it or
-// appends it too, and checks it when they are read: record_bins.h for blocks, page_spool.h for pages and their
-// entries, vertex_join.h for chunks of vertices.
+// A disk may return other bytes than were written. So whoever appends first makes a hash of the bytes, keeps it or
+// appends it too, and checks it on reading: record_bins.h for blocks, page_spool.h for pages and their entries,
+// vertex_join.h for chunks of vertices.
 #pragma once
 
 #include <atomic>
@@ -32,14 +32,14 @@ public:
     TempSpace(std::filesystem::path folder, uint64_t memoryBytes)
         : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
 
-    /// Taken before files go there, and given back with the space.
+    /// The folder, held before files go there, and released with the space.
     [[nodiscard]] TempFolder& folder() { return folder_; }
     [[nodiscard]] const TempFolder& folder() const { return folder_; }
 
-    /// Brings to the disk what the files hold in memory. No file may be appended to meanwhile. Errors: Io.
+    /// Writes to the disk what the files hold in memory. No file may be appended to meanwhile. Errors: Io.
     Result<void> spill();
 
-    /// Most bytes that lay in the folder at one time.
+    /// The most bytes that lay in the folder at one time.
     [[nodiscard]] uint64_t peakDiskBytes() const { return peakDisk_; }
     [[nodiscard]] uint64_t diskBytes() const { return disk_; }
 
@@ -65,16 +65,16 @@ public:
     [[nodiscard]] const std::string& name() const { return name_; }
     [[nodiscard]] std::filesystem::path path() const { return space_.folder().path() / name_; }
     [[nodiscard]] uint64_t size() const { return end_; }
-    /// Appends; returns where. Errors: Io.
+    /// Appends bytes; returns their offset. Errors: Io.
     Result<uint64_t> append(std::span<const std::byte> bytes);
-    /// Reads bytes that were appended, unchecked. Errors: Io.
+    /// Reads bytes that were appended, without checking them. Errors: Io.
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const;
-    /// Brings all bytes to the disk, durably. Errors: Io.
+    /// Writes all bytes to the disk, durably. Errors: Io.
     Result<void> sync();
-    /// Takes over what an interrupted build left, cut to `bytes`, in the folder that is taken. Errors: Io (not a
-    /// file of a build's own); InvalidInput (missing, shorter).
+    /// Takes over what an interrupted build left, cut to `bytes`, in the held folder. Errors: Io (not a file of a
+    /// build's own); InvalidInput (missing, shorter).
     Result<void> reopen(uint64_t bytes);
-    /// Gives back memory and disk.
+    /// Frees memory and disk.
     void remove();
 
 private:

@@ -15,7 +15,7 @@ Result<size_t> FileInput::read(char* to, size_t capacity) {
     while (true) {
         const ssize_t got = ::read(file_, to, capacity);
         if (got < 0 && errno == EINTR) continue;
-        // Not strerror: it may share its buffer between threads.
+        // strerror is not used: it may share its buffer between threads.
         if (got < 0)
             return Error{.code = ErrorCode::Io, .message = "cannot be read: " + std::generic_category().message(errno)};
         taken_ += static_cast<uint64_t>(got);
@@ -24,7 +24,7 @@ Result<size_t> FileInput::read(char* to, size_t capacity) {
 }
 
 Compression compressionOf(std::string_view start) {
-    // 8: deflate, the only method there is.
+    // 8 stands for deflate, the only method there is.
     if (start.starts_with("\x1F\x8B\x08")) return Compression::Gzip;
     if (start.starts_with("\x28\xB5\x2F\xFD")) return Compression::Zstd;
     // A skippable frame may come first.

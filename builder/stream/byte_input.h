@@ -1,5 +1,5 @@
-// ByteInput: where a ByteSource gets bytes that cannot be mapped to offsets beforehand: files, pipes, and what
-// comes out of a decompressor. Read forward, once.
+// ByteInput: where a ByteSource gets bytes that have no offsets beforehand: files, pipes, and the output of a
+// decompressor. It is read forward, once.
 #pragma once
 
 #include <cstddef>
@@ -16,15 +16,15 @@ class ByteInput {
 public:
     virtual ~ByteInput() = default;
 
-    /// Up to `capacity` > 0 bytes; 0 at the end only. Errors: Io; InvalidInput and Limit of a decompressor.
-    /// They name neither file nor byte; the ByteSource does.
+    /// Reads up to `capacity` > 0 bytes; returns 0 only at the end. Errors: Io; InvalidInput and Limit of a
+    /// decompressor. They name neither file nor byte; the ByteSource does.
     virtual Result<size_t> read(char* to, size_t capacity) = 0;
 
-    /// Bytes taken so far of the file or pipe itself, before decompression; for progress.
+    /// The bytes taken so far of the file or pipe itself, before decompression; for progress.
     [[nodiscard]] virtual uint64_t taken() const = 0;
 };
 
-/// An open file, pipe or socket, from where it stands. Closes it if it `owns` it.
+/// Reads an open file, pipe or socket from where it stands. Closes it if it `owns` it.
 class FileInput final : public ByteInput {
 public:
     FileInput(int file, bool owns) : file_(file), owns_(owns) {}
@@ -43,7 +43,7 @@ private:
 
 enum class Compression { None, Gzip, Zstd };
 
-/// How data that begin with these bytes are compressed; four bytes are enough.
+/// Returns how data that begin with these bytes are compressed; four bytes are enough.
 Compression compressionOf(std::string_view start);
 constexpr size_t kCompressionMarkBytes = 4;
 

@@ -16,7 +16,7 @@
 namespace vcp {
 namespace {
 
-// Not strerror: it may share its buffer between threads.
+// strerror is not used: it may share its buffer between threads.
 std::string systemMessage(int code) { return std::generic_category().message(code); }
 
 struct OpenFile {
@@ -26,7 +26,7 @@ struct OpenFile {
 
 Error ioError(std::string message) { return {.code = ErrorCode::Io, .message = std::move(message)}; }
 
-// What may be read forward: regular files, from where they stand, and pipes.
+// Checks that the file can be read forward: regular files, from where they stand, and pipes can.
 Result<OpenFile> asInput(int file, bool owns) {
     auto input = std::make_unique<FileInput>(file, owns);
     struct stat status {};
@@ -46,7 +46,8 @@ Result<OpenFile> asInput(int file, bool owns) {
 Result<OpenFile> openFile(const std::filesystem::path& path) {
     if (path == "-") return asInput(STDIN_FILENO, false);
     struct stat status {};
-    // Asked before the open: a named pipe's waits for a writer, which is right, but a device's might do anything.
+    // The type is checked before opening: a named pipe's open waits for a writer, which is right, but a device's might
+    // do anything.
     if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode) &&
         !S_ISFIFO(status.st_mode))
         return ioError("is a device, neither a file nor a pipe");
@@ -114,9 +115,9 @@ Result<std::string_view> ByteSource::window(size_t atLeast) {
     return std::string_view(buffer_.data() + skipped, bufferFilled_ - skipped - (sizeKnown() ? 0 : 1));
 }
 
-// Brings the bytes from the cursor on to the front of the buffer and reads until it is full. While the end is
-// not known it reads one byte more than the window will show: what follows the window, the end or a byte, is
-// then always known.
+// Moves the bytes from the cursor on to the front of the buffer and reads until it is full. While the end is not known
+// it reads one byte more than the window will show: so it is always known whether the end or a byte follows the
+// window.
 Result<void> ByteSource::fill(size_t atLeast) {
     assert(offset_ >= bufferStart_ && offset_ <= bufferStart_ + bufferFilled_);
     const auto skipped = static_cast<size_t>(offset_ - bufferStart_);
@@ -125,7 +126,7 @@ Result<void> ByteSource::fill(size_t atLeast) {
     bufferStart_ = offset_;
     const auto wanted = static_cast<size_t>(std::min<uint64_t>(std::max(atLeast, windowBytes_) + 1, remaining()));
     while (bufferFilled_ < wanted) {
-        // Grows with what arrives, not with what is asked for.
+        // The buffer grows with what arrives, not with what is asked for.
         if (buffer_.size() < wanted) buffer_.resize(std::min(wanted, std::max(windowBytes_ + 1, 2 * bufferFilled_)));
         const auto got = readSome(buffer_.data() + bufferFilled_, std::min(wanted, buffer_.size()) - bufferFilled_);
         if (!got) return got.error();
@@ -138,7 +139,7 @@ Result<void> ByteSource::fill(size_t atLeast) {
     return {};
 }
 
-// The next bytes of the input; 0 only at the end of one whose length was not known.
+// Reads the next bytes of the input; returns 0 only at the end of one whose length was not known.
 Result<size_t> ByteSource::readSome(char* to, size_t capacity) {
     const auto got = input_->read(to, capacity);
     const uint64_t at = bufferStart_ + bufferFilled_;

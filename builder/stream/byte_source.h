@@ -51,24 +51,24 @@ public:
     [[nodiscard]] uint64_t remaining() const { return size_ - offset_; }
     [[nodiscard]] bool atEnd() const { return offset_ == size_; }
 
-    /// A regular file that is not compressed: it may also be opened by its path and read at offset().
+    /// Whether this is a regular file that is not compressed: it may also be opened by its path and read at offset().
     [[nodiscard]] bool isPlainFile() const { return plainFile_; }
 
-    /// Of the file itself, as compressed as it is; for progress. 0: a pipe, which does not say.
+    /// The bytes of the file itself, before decompression; for progress. 0: a pipe, which does not say.
     [[nodiscard]] uint64_t fileBytes() const { return fileBytes_; }
     [[nodiscard]] uint64_t fileBytesRead() const;
 
-    /// The bytes at the cursor: at least min(atLeast, remaining()), usually more. Valid until the next
-    /// call of a member that is not const. Where fewer than asked come, the end is known from then on; and
-    /// where the window reaches the end of the input, that is known too.
-    /// Errors: Io (the read failed, or the file shrank meanwhile); InvalidInput, Limit of a decompressor.
+    /// Returns the bytes at the cursor: at least min(atLeast, remaining()), usually more. Valid until the next call of
+    /// a member that is not const. Where fewer bytes come than were asked for, the end is known from then on; where the
+    /// window reaches the end of the input, that is known too. Errors: Io (the read failed, or the file shrank
+    /// meanwhile); InvalidInput, Limit of a decompressor.
     Result<std::string_view> window(size_t atLeast = 1);
 
     /// Finds where the last whole item of a text ends: the number of leading bytes that hold whole items,
     /// 0 when not even one is whole.
     using WholeEnd = size_t (*)(std::string_view text);
 
-    /// A window cut where `wholeEnd` says, or uncut when it reaches the end of the file. Empty only at
+    /// Returns a window cut where `wholeEnd` says, or uncut when it reaches the end of the file. It is empty only at
     /// the end of the file. Errors: as window(); Limit when one item is longer than `limit` bytes.
     Result<std::string_view> wholeWindow(WholeEnd wholeEnd, size_t limit);
 
@@ -79,11 +79,11 @@ public:
     /// Moves the cursor forward by `count` bytes of the latest window.
     void advance(uint64_t count);
 
-    /// Moves the cursor forward, past the window if need be; returns how far, which is less at the end only.
+    /// Moves the cursor forward, past the window if need be; returns by how much, which is less only at the end.
     /// Errors: as window().
     Result<uint64_t> skip(uint64_t count);
 
-    /// An error of this file.
+    /// Makes an error of this file.
     [[nodiscard]] Error error(ErrorCode code, std::string element, std::optional<uint64_t> byte,
                               std::string message) const;
 

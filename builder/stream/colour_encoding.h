@@ -10,12 +10,12 @@
 
 namespace vcp {
 
-/// Stored 0..1 to light 0..1.
+/// Converts a stored value 0..1 to linear 0..1.
 inline double srgbToLinear(double value) {
     return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
-/// srgbToLinear of what 8 bits store.
+/// Gives srgbToLinear of each value that 8 bits store.
 inline const std::array<double, 256>& lightOfByte() {
     static const std::array<double, 256> table = [] {
         std::array<double, 256> t{};
@@ -29,9 +29,9 @@ inline double linearToSrgb(double light) {
     return light <= 0.0031308 ? light * 12.92 : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
-/// 0..1 to 8 bits; what lies outside is clamped, NaN is 0.
+/// Converts 0..1 to 8 bits; values outside are clamped, NaN becomes 0.
 inline uint8_t toByte(double value) {
-    // Not std::clamp: the order of the comparisons makes NaN 0.
+    // std::clamp is not used: here the order of the comparisons makes NaN 0.
     return static_cast<uint8_t>(std::min(std::max(0.0, value), 1.0) * 255 + 0.5);
 }
 
@@ -39,14 +39,14 @@ inline Rgba8 packRgba(const std::array<uint8_t, 4>& c) {
     return Rgba8{c[0]} | Rgba8{c[1]} << 8 | Rgba8{c[2]} << 16 | Rgba8{c[3]} << 24;
 }
 
-/// Light, and a linear alpha, as it is stored.
+/// Encodes linear colour, with a linear alpha, as it is stored.
 inline Rgba8 encodeRgba(const std::array<double, 4>& light) {
     const auto channel = [](double value) { return toByte(linearToSrgb(std::min(std::max(0.0, value), 1.0))); };
     return packRgba({channel(light[0]), channel(light[1]), channel(light[2]), toByte(light[3])});
 }
 
-/// The product of two stored colours, channel by channel. As sRGB is close to a power, that is close to what is
-/// stored for the product of their light.
+/// Multiplies two stored colours, channel by channel. As sRGB is close to a power, the result is close to the stored
+/// value of the product of the linear colours.
 inline Rgba8 modulate(Rgba8 a, Rgba8 b) {
     Rgba8 product = 0;
     for (int shift = 0; shift < 32; shift += 8) {

@@ -1,4 +1,4 @@
-// URIs in glTF files: data that stand in the URI itself, and names of files beside the file.
+// URIs in glTF files: data inside of the URI itself, and names of files beside the file.
 #pragma once
 
 #include <filesystem>
@@ -10,14 +10,14 @@ namespace vcp {
 
 inline bool isDataUri(std::string_view uri) { return uri.starts_with("data:"); }
 
-/// The data of "data:...;base64,...". Nothing when they are not base64.
+/// Decodes the data of "data:...;base64,...". Returns nothing when they are not base64.
 std::optional<std::string> decodeDataUri(std::string_view uri);
 
-/// The file that a relative URI names (RFC 3986, percent-encoded UTF-8), below `folder`. Nothing when it names
-/// a scheme, a root, a drive or a parent folder: nothing outside the folder is ever opened.
+/// Returns the file that a relative URI names (RFC 3986, percent-encoded UTF-8), below `folder`. Returns nothing when
+/// it names a scheme, a root, a drive or a parent folder: nothing outside the folder is ever opened.
 std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& folder, std::string_view uri);
 
-/// The same for a name that is not encoded, with either slash (MTL).
+/// Does the same for a name that is not encoded, with either slash (MTL).
 std::optional<std::filesystem::path> nameBelow(const std::filesystem::path& folder, std::string name);
 
 }  // namespace vcp

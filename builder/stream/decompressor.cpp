@@ -14,11 +14,11 @@ namespace vcp {
 namespace {
 
 constexpr size_t kInputBytes = 64 * 1024;
-constexpr int kLargestWindowLog = 27;  // of zstd: 128 MiB
+constexpr int kLargestWindowLog = 27;  // zstd's largest window: 128 MiB
 constexpr uint64_t kMostRatio = 2000;
 constexpr uint64_t kFreeBytes = 256u << 20;  // any ratio up to here
 
-// What both decompressors share: the compressed bytes at hand, and the limit on what they may become.
+// The state that both decompressors share: the compressed bytes at hand, and the limit on what they may become.
 class Decompressor : public ByteInput {
 public:
     Decompressor(std::unique_ptr<ByteInput> inner, std::string start)
@@ -48,7 +48,7 @@ protected:
     [[nodiscard]] std::string_view input() const { return {buffer_.data() + used_, filled_ - used_}; }
     void use(size_t bytes) { used_ += bytes; }
 
-    /// More compressed bytes when none are left; false at their end.
+    /// Reads more compressed bytes when none are left; returns false at their end.
     Result<bool> refill() {
         if (used_ < filled_) return true;
         const auto got = inner_->read(buffer_.data(), buffer_.size());
@@ -58,7 +58,7 @@ protected:
         return filled_ > 0;
     }
 
-    /// Between two members: skips zero bytes, which some archives end with. False at the end of the input.
+    /// Between two members, skips zero bytes, which some archives end with. Returns false at the end of the input.
     Result<bool> toNextMember() {
         while (true) {
             auto more = refill();

@@ -9,7 +9,7 @@
 
 namespace vcp {
 
-/// Colour as it is shown (sRGB encoded), 8 bits a channel, R in the lowest byte; alpha 255 where there is none.
+/// A colour as it is shown (sRGB encoded), 8 bits a channel, R in the lowest byte; alpha is 255 where there is none.
 using Rgba8 = uint32_t;
 
 constexpr Rgba8 kWhite = 0xFFFFFFFF;
@@ -17,17 +17,17 @@ constexpr uint32_t kNoMaterial = 0xFFFFFFFF;
 
 enum class Wrap : uint8_t { Repeat, Clamp, Mirror };
 
-/// A picture that a mesh file names (PNG, JPEG), or holds. Not read yet, perhaps not there.
+/// A picture that a mesh file names (PNG, JPEG), or holds. It is not read yet, and may not exist.
 struct ImageSource {
     std::filesystem::path path;                ///< empty when embedded, and when there is none
-    std::shared_ptr<const std::string> bytes;  ///< of an embedded file
+    std::shared_ptr<const std::string> bytes;  ///< bytes of an embedded file
     [[nodiscard]] bool exists() const { return !path.empty() || bytes; }
 };
 
 struct Material {
     std::string name;
     Rgba8 factor = kWhite;  ///< multiplies the other colours
-    ImageSource image;      ///< of the surface colour
+    ImageSource image;      ///< image of the surface colour
     Wrap wrapU = Wrap::Repeat;
     Wrap wrapV = Wrap::Repeat;
 };

@@ -28,16 +28,16 @@
 
 namespace vcp {
 
-/// A bounded piece of a mesh. Reused by the caller to keep its capacity.
+/// A bounded piece of a mesh. The caller reuses it to keep its capacity.
 ///
-/// The colour at a point of a triangle is the product of what there is of: the vertex colours, interpolated; the
-/// factor of the triangle's material; that material's image at the interpolated texture coordinates.
+/// The colour at a point of a triangle is the product of those that exist: the vertex colours, interpolated; the factor
+/// of the triangle's material; that material's image at the interpolated texture coordinates.
 struct MeshChunk {
     std::vector<glm::dvec3> positions;               ///< the next vertices, in file order, world units
     std::vector<Rgba8> colours;                      ///< as many as positions, or empty when the mesh has none
     std::vector<std::array<uint64_t, 3>> triangles;  ///< vertex numbers, 0-based over the whole mesh
-    /// As many as triangles, or both empty when the mesh has no materials. Texture coordinates of the corners:
-    /// (0, 0) is the upper left corner of the image, v grows downwards; finite, 0 where the file has none.
+    /// One for each triangle, or both are empty when the mesh has no materials. Texture coordinates of the corners: (0,
+    /// 0) is the upper left corner of the image, v grows downwards; finite, 0 where the file has none.
     std::vector<std::array<glm::vec2, 3>> uvs;
     std::vector<uint32_t> materials;  ///< indices into MeshStream::materials(), or kNoMaterial
 
@@ -53,11 +53,11 @@ struct MeshChunk {
 /// What the header says, before anything is read.
 struct MeshInfo {
     std::string format;                ///< "PLY binary little endian", "OBJ", "STL ASCII", ...
-    uint64_t fileBytes = 0;            ///< of the file, compressed as it is; 0 for a pipe
+    uint64_t fileBytes = 0;            ///< bytes of the file as it is, compressed or not; 0 for a pipe
     std::optional<uint64_t> vertices;  ///< declared; absent for formats that do not say (OBJ, ASCII STL)
     std::optional<uint64_t> faces;     ///< declared polygons (not triangles)
-    bool hasColour = false;     ///< vertex colours; for OBJ and other formats without a header: of the first vertex
-    bool hasMaterials = false;  ///< chunks carry uvs and materials
+    bool hasColour = false;            ///< vertex colours; where there is no header (OBJ), the first vertex decides
+    bool hasMaterials = false;         ///< chunks carry uvs and materials
 };
 
 class MeshStream {
@@ -66,30 +66,30 @@ public:
 
     [[nodiscard]] virtual const MeshInfo& info() const = 0;
 
-    /// Replaces `chunk` by the next piece (about 64 Ki elements). False at the end of the mesh, with an
-    /// empty chunk. After an error the stream is spent. Errors: InvalidInput (wrong bytes, truncated,
-    /// index out of range, not finite), Io, Limit, Unsupported.
+    /// Replaces `chunk` by the next piece (about 64 Ki elements). Returns false at the end of the mesh, with an empty
+    /// chunk. After an error the stream cannot be used. Errors: InvalidInput (wrong bytes, truncated, index out of
+    /// range, not finite), Io, Limit, Unsupported.
     virtual Result<bool> next(MeshChunk& chunk) = 0;
 
-    /// Bytes of the file consumed so far, compressed as it is; for progress.
+    /// The bytes of the file consumed so far, before decompression; for progress.
     [[nodiscard]] virtual uint64_t bytesRead() const = 0;
 
-    /// Grows while the mesh is read; what a chunk names is there when next() returns it.
+    /// The materials so far; they grow while the mesh is read. What a chunk names is there when next() returns it.
     [[nodiscard]] virtual std::span<const Material> materials() const { return {}; }
 
-    /// What was left out, one line each (a material file that is missing); complete at the end of the mesh.
+    /// What was left out, one line each (a missing material file); complete at the end of the mesh.
     [[nodiscard]] virtual std::span<const std::string> warnings() const { return {}; }
 
-    /// Files beside the mesh that it names, perhaps more than once; complete at the end of the mesh.
+    /// The files beside the mesh that it names, perhaps more than once; complete at the end of the mesh.
     [[nodiscard]] virtual std::span<const SideFile> sideFiles() const { return {}; }
 };
 
 struct MeshOpenOptions {
-    /// One of meshFormats() (open_mesh.h), without regard to case; empty: told by content, then by extension. What
-    /// content tells beyond doubt goes before it; a pipe needs it where content does not tell.
+    /// One of meshFormats() (open_mesh.h), without regard to case; empty: recognised by content, then by extension.
+    /// Where the content is beyond doubt, it decides; a pipe needs this where the content is not.
     std::string format;
     bool materials = true;  ///< false: MTL files are not looked for, chunks carry no uvs
-    /// Where what must be read more than once is put (texture coordinates of a large OBJ, a piped GLB), as a
+    /// The folder for data that must be read more than once (texture coordinates of a large OBJ, a piped GLB), in a
     /// file without a name. Empty: the system's folder for such files.
     std::filesystem::path tempFolder = {};
     uint64_t decoderBytes = uint64_t{1} << 30;  ///< limit on the memory that decodes Draco and meshopt

@@ -28,13 +28,13 @@ inline const char* wordEnd(const char* p, const char* end) {
     return p;
 }
 
-/// A leading plus sign is common in mesh files, though from_chars refuses it.
+/// Skips a leading plus sign, which is common in mesh files, though from_chars refuses it.
 inline const char* skipPlus(const char* p, const char* end) {
     return end - p > 1 && p[0] == '+' && p[1] != '-' && p[1] != '+' ? p + 1 : p;
 }
 
-/// The nearest double ("nan" and "inf" included; what is too large becomes infinite). Returns where the
-/// number ends, or nullptr when there is none.
+/// Parses to the nearest double ("nan" and "inf" included; too large values become infinite). Returns where the number
+/// ends, or nullptr when there is none.
 inline const char* parseReal(const char* p, const char* end, double& value) {
     const auto [stop, failure] = fast_float::from_chars(skipPlus(p, end), end, value);
     return failure == std::errc() ? stop : nullptr;
@@ -60,10 +60,10 @@ inline const char* parseInteger(const char* p, const char* end, int64_t& value) 
     return p == digits ? nullptr : p;
 }
 
-/// The number of leading bytes of `text` up to and including its last white space.
+/// Returns the number of leading bytes of `text` up to and including its last white space.
 inline size_t afterLastSpace(std::string_view text) { return text.find_last_of(" \t\r\n\v\f") + 1; }
 
-/// A word of the file as an error message may show it: short, and without control characters.
+/// Returns a word of the file as an error message may show it: short, and without control characters.
 inline std::string shown(std::string_view word) {
     constexpr size_t kLongest = 32;
     std::string text = "'";

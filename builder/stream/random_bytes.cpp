@@ -126,7 +126,7 @@ Result<void> Spool::write(std::string_view bytes) {
     return {};
 }
 
-/// Notes what the file is to give back.
+/// Hashes the bytes that the file must return later.
 void Spool::hash(std::string_view bytes) {
     while (!bytes.empty()) {
         const size_t n = std::min<size_t>(bytes.size(), kPieceBytes - last_.size());

@@ -20,11 +20,11 @@ public:
 
     [[nodiscard]] virtual uint64_t size() const = 0;
 
-    /// Precondition: offset + count <= size(). Errors: Io, without file and byte.
+    /// Reads bytes. Precondition: offset + count <= size(). Errors: Io, without file and byte.
     virtual Result<void> read(uint64_t offset, char* to, size_t count) = 0;
 };
 
-/// A regular file from `offset` on; nothing else is opened. Errors: Io, with the file's name.
+/// Opens a regular file from `offset` on; nothing else is opened. Errors: Io, with the file's name.
 Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path& path, uint64_t offset = 0);
 
 std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes);
@@ -39,11 +39,11 @@ public:
     Spool(const Spool&) = delete;
     Spool& operator=(const Spool&) = delete;
 
-    /// Errors: Io (no space, the folder cannot be written), with the folder's name.
+    /// Appends bytes. Errors: Io (no space, the folder cannot be written), with the folder's name.
     Result<void> append(std::string_view bytes);
 
     [[nodiscard]] uint64_t size() const override { return size_; }
-    /// Errors as above, and InvalidInput: the file's bytes are not those that were appended.
+    /// Reads bytes. Errors: as above, and InvalidInput where the file's bytes are not those that were appended.
     Result<void> read(uint64_t offset, char* to, size_t count) override;
 
 private:
@@ -59,7 +59,7 @@ private:
     std::string memory_;
     FileDescriptor file_;
     uint64_t size_ = 0;
-    std::vector<uint64_t> hashes_;  ///< of the file's whole pieces
+    std::vector<uint64_t> hashes_;  ///< hashes of the file's whole pieces
     std::string last_;              ///< the bytes after them, which the file has too
     std::string piece_;             ///< the piece that was read last
     uint64_t pieceNumber_ = ~uint64_t{0};

@@ -25,10 +25,10 @@ public:
 
     [[nodiscard]] uint64_t size() const { return size_; }
 
-    /// Errors: Io.
+    /// Appends coordinates. Errors: Io.
     Result<void> append(glm::vec2 uv);
 
-    /// Precondition: number < size(). Errors: Io.
+    /// Returns coordinates by number. Precondition: number < size(). Errors: Io.
     Result<glm::vec2> at(uint64_t number);
 
 private:

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 #include <jpeglib.h>
-// After what it needs.
+// This header comes after those that it needs.
 #include <jerror.h>
 #include <png.h>
 
@@ -54,7 +54,7 @@ Result<Image> decodePng(std::string_view file, const ImageLimits& limits) {
 }
 
 constexpr int kMostJpegScans = 100;
-constexpr long kJpegBytes = 256L << 20;  // of a progressive picture, which libjpeg holds as a whole
+constexpr long kJpegBytes = 256L << 20;  // bytes of a progressive picture, which libjpeg holds as a whole
 
 // libjpeg reports an error by a call that must not return.
 struct JpegFailure {
@@ -76,7 +76,7 @@ void vcpJpegSilent(j_common_ptr) {}
 void vcpJpegWarned(j_common_ptr info, int level) {
     if (level < 0) vcpJpegFailed(info);
 }
-// Each scan goes over the whole picture, however few its bytes; a picture has some ten.
+// Limits the scans: each goes over the whole picture, however few its bytes; a usual picture has some ten.
 void vcpJpegProgress(j_common_ptr info) {
     const int scans = reinterpret_cast<j_decompress_ptr>(info)->input_scan_number;
     if (scans <= kMostJpegScans) return;
@@ -86,8 +86,8 @@ void vcpJpegProgress(j_common_ptr info) {
 }
 }
 
-// A block of 8 by 8 texels of some channel takes a bit at least (Huffman's codes, of which arithmetic coding is rare).
-constexpr uint64_t kMostJpegTexels = 8 * 64;  // of a byte
+// A block of 8 by 8 texels of some channel takes at least a bit (in Huffman's codes; arithmetic coding is rare).
+constexpr uint64_t kMostJpegTexels = 8 * 64;  // texels of a byte
 
 // No object with a destructor lives in this function, since errors jump out of libjpeg back into it. `isWanted` looks
 // at the header.

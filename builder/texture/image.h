@@ -1,4 +1,4 @@
-// Pictures as mesh files bring them: PNG and JPEG, decoded with limits. Hostile bytes are an error, never a crash.
+// Decodes pictures as mesh files bring them: PNG and JPEG, with limits. Hostile bytes are an error, never a crash.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@ struct Image {
 };
 
 struct ImageLimits {
-    uint32_t edge = 32768;                 ///< texels
-    uint64_t bytes = uint64_t{512} << 20;  ///< of the decoded texels
+    uint32_t edge = 32768;                 ///< texels along an edge
+    uint64_t bytes = uint64_t{512} << 20;  ///< bytes of the decoded texels
     uint64_t fileBytes = uint64_t{256} << 20;
 };
 

@@ -1,4 +1,4 @@
-// What colour the materials give a vertex.
+// The colours that materials give to vertices.
 #pragma once
 
 #include <mutex>
@@ -13,7 +13,7 @@
 
 namespace vcp {
 
-/// Any thread may call.
+/// Colours of materials. Any thread may call.
 class MaterialColours {
 public:
     /// `textureBytes`: memory for images.

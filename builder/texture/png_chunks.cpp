@@ -9,7 +9,7 @@
 namespace vcp {
 namespace {
 
-constexpr size_t kSignatureBytes = 8, kFrameBytes = 12, kHeaderBytes = 13;  // of a chunk: length, name; checksum
+constexpr size_t kSignatureBytes = 8, kFrameBytes = 12, kHeaderBytes = 13;  // a chunk's frame: length, name; checksum
 constexpr uint64_t kMostOfDeflate = 1032;
 constexpr std::array<std::string_view, 7> kOfTexels{"tRNS", "gAMA", "cHRM", "sRGB", "sBIT", "iCCP", "bKGD"};
 
@@ -19,7 +19,7 @@ uint32_t wordAt(std::string_view bytes, size_t at) {
     return word;
 }
 
-// Gives name, contents and frame of each whole chunk to `use`; returns where they end.
+// Passes name, contents and frame of each whole chunk to `use`; returns where they end.
 template <class Use>
 size_t eachChunk(std::string_view file, Use use) {
     size_t at = std::min(kSignatureBytes, file.size());
@@ -36,7 +36,7 @@ size_t eachChunk(std::string_view file, Use use) {
 
 bool isCritical(std::string_view name) { return (name[0] & 0x20) == 0; }
 
-// 0: no such type.
+// Returns the channels of a colour type; 0: there is no such type.
 uint8_t channelsOf(uint8_t type) {
     constexpr std::array<uint8_t, 7> kChannels{1, 0, 3, 1, 2, 0, 4};
     return type < kChannels.size() ? kChannels[type] : uint8_t{0};

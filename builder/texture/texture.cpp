@@ -12,7 +12,7 @@ namespace {
 
 using Light = std::array<double, 4>;
 
-// Adds a texel's light, weighted by its alpha.
+// Adds a texel's linear colour, weighted by its alpha.
 void add(Light& sum, Rgba8 texel, double weight) {
     const auto& table = lightOfByte();
     const double alpha = weight * (texel >> 24) / 255;
@@ -24,16 +24,16 @@ void add(Light& sum, const Light& other, double weight) {
     for (size_t c = 0; c < 4; ++c) sum[c] += weight * other[c];
 }
 
-// A sum of weights 1 as it is stored; colour without alpha is of no matter.
+// Encodes a sum of weights 1 as it is stored; colour without alpha does not matter.
 Rgba8 encoded(const Light& sum) {
     if (!(sum[3] > 0)) return 0;
     return encodeRgba({sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3], sum[3]});
 }
 
-// What one texel of half as many covers of the `size` finer ones.
+// Which of the `size` finer texels one texel of half as many covers.
 struct Span {
     uint32_t first;
-    std::array<double, 3> weights;  // of up to three texels; sum 1
+    std::array<double, 3> weights;  // weights of up to three texels; their sum is 1
 };
 
 Span coverage(uint32_t coarse, uint32_t coarseSize, uint32_t size) {
@@ -65,7 +65,7 @@ Image halved(const Image& fine) {
     return coarse;
 }
 
-// A texel's number inside 0..size-1. Any finite number of a float fits into int64_t after the clamp.
+// Returns a texel's number inside 0..size-1. Any finite number of a float fits into int64_t after the clamp.
 uint32_t wrapped(double texel, uint32_t size, Wrap wrap) {
     const double edge = size;
     if (wrap == Wrap::Clamp) return static_cast<uint32_t>(std::clamp(texel, 0.0, edge - 1));

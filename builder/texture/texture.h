@@ -1,7 +1,7 @@
 // Texture: an image with a mip chain, sampled with filters; and the textures of a mesh's materials, in bounded memory.
 //
-// Texels are averaged as light, each level from the one above by areas (any size, not only powers of two), weighted by
-// alpha, so that what is transparent lends no colour. Sampling is trilinear (Williams 1983).
+// Texels are averaged as linear colours, each level from the one above by areas (any size, not only powers of two),
+// weighted by alpha, so that transparent texels lend no colour. Sampling is trilinear (Williams 1983).
 #pragma once
 
 #include <array>
@@ -22,11 +22,11 @@ namespace vcp {
 
 class Texture {
 public:
-    /// A white texel.
+    /// Makes a texture of one white texel.
     Texture();
     explicit Texture(Image image, Wrap wrapU = Wrap::Repeat, Wrap wrapV = Wrap::Repeat);
 
-    /// The colour at `uv` ((0, 0): upper left corner, v downwards; finite), averaged over a square of the edge
+    /// Returns the colour at `uv` ((0, 0): upper left corner, v downwards; finite), averaged over a square of the edge
     /// `footprint` in the same units; 0: the finest texels. Any thread.
     [[nodiscard]] Rgba8 sample(glm::vec2 uv, float footprint) const;
 
@@ -36,7 +36,7 @@ public:
 private:
     [[nodiscard]] std::array<double, 4> bilinear(const Image& level, glm::dvec2 uv) const;
 
-    std::vector<Image> levels_;  // the finest first
+    std::vector<Image> levels_;  // the finest comes first
     Wrap wrapU_;
     Wrap wrapV_;
 };
@@ -47,8 +47,8 @@ class TextureCache {
 public:
     explicit TextureCache(uint64_t memoryBytes, ImageLimits limits = {}) : memoryBytes_(memoryBytes), limits_(limits) {}
 
-    /// The texture of `materials[number]`, valid until the next call; nullptr where it has none, or where it cannot be
-    /// read, which is a warning once.
+    /// Returns the texture of `materials[number]`, valid until the next call; nullptr where it has none, or where it
+    /// cannot be read, which becomes one warning.
     const Texture* textureOf(std::span<const Material> materials, uint32_t number);
 
     [[nodiscard]] std::span<const std::string> warnings() const { return warnings_; }
@@ -63,7 +63,7 @@ private:
     uint64_t memoryBytes_;
     ImageLimits limits_;
     uint64_t bytes_ = 0;
-    std::list<Loaded> loaded_;  // the latest used first
+    std::list<Loaded> loaded_;  // the one used last comes first
     std::map<uint32_t, std::list<Loaded>::iterator> byMaterial_;
     std::map<uint32_t, bool> broken_;
     std::vector<std::string> warnings_;

@@ -6,7 +6,7 @@
 // docs/surface.md: f(x) = sum w_i(x) [ D_i + 1/2 N_i . (x - p_i) ] with signed distances D_i, oriented
 // directions N_i and trilinear weights w_i; exact where the surface is a quadric's level set.
 
-// The unit vector at a point of [-1, 1]^2, the unfolded octahedron.
+// Returns the unit vector at a point of [-1, 1]^2, the unfolded octahedron.
 INLINE Real3 unfoldOctahedron(Real x, Real y) {
     Real z = Real(1.0) - abs(x) - abs(y);
     Real fold = max(-z, Real(0.0));
@@ -50,13 +50,13 @@ INLINE uint decodeIndex0(uint lo) { return lo & kField21Mask; }
 INLINE uint decodeIndex1(uint lo, uint hi) { return (lo >> 21) | ((hi & 0x3ffu) << 11); }
 INLINE uint decodeIndex2(uint hi) { return (hi >> 10) & kField21Mask; }
 
-// Leaf space with the leaf's axis as x and the next axes, cyclically, as y and z: for the weights only.
+// Rotates leaf space so that the leaf's axis is x and the next axes, cyclically, are y and z: for the weights only.
 INLINE Real3 rotateToAxis(Real3 x, uint axis) {
     return axis == 0u ? x : axis == 1u ? Real3(x.y, x.z, x.x) : Real3(x.z, x.x, x.y);
 }
 
-// A soft leaf, decoded. Corners of the axis' lower face in the members ending in 0, of its upper face in
-// those ending in 1. f(x) = sum w_i (a_i + g_i . x); g is half the oriented direction.
+// A soft leaf, decoded. Members ending in 0 hold the corners of the axis' lower face, those ending in 1 its upper face.
+// f(x) = sum w_i (a_i + g_i . x); g is half the oriented direction.
 struct LeafField {
     Real4 a0, a1;
     Real4 gx0, gx1;
@@ -85,7 +85,7 @@ INLINE LeafField decodeLeaf(uint4 face0, uint4 face1, uint axis) {
     leaf.gx1 = Real4(m0.x, m1.x, m2.x, m3.x) * h1;
     leaf.gy1 = Real4(m0.y, m1.y, m2.y, m3.y) * h1;
     leaf.gz1 = Real4(m0.z, m1.z, m2.z, m3.z) * h1;
-    // a_i = D_i - 1/2 N_i . p_i. The corner p_i has, by axis, 0 or 1 along it and these along the next two.
+    // a_i = D_i - 1/2 N_i . p_i. Corner p_i is at 0 or 1 along the axis, at `next` and `last` along the other two.
     Real4 next = Real4(0.0, 1.0, 0.0, 1.0), last = Real4(0.0, 0.0, 1.0, 1.0);
     Real4 along0 = axis == 0u   ? leaf.gy0 * next + leaf.gz0 * last
                    : axis == 1u ? leaf.gz0 * next + leaf.gx0 * last
@@ -123,12 +123,12 @@ INLINE Real3 leafNormal(LeafField leaf, Real3 x) {
                  dot(w0, leaf.gz0) + dot(w1, leaf.gz1));
 }
 
-// n or -n, whichever is on the side of `reference`.
+// Returns n or -n, whichever is on the side of `reference`.
 INLINE Real3 turnedTo(Real3 n, Real3 reference) { return dot(n, reference) < Real(0.0) ? -n : n; }
 
-// A soft leaf's normal (leafNormal), turned to the side that a ray along d comes from. Where the ray grazes
-// the surface, the side is that of the ray's first point in the leaf, where f is `first`: a normal a little
-// past the silhouette must not turn over.
+// Turns a soft leaf's normal (leafNormal) to the side that a ray along d comes from. Where the ray grazes the surface,
+// the side is that of the ray's first point in the leaf, where f is `first`: a normal a little past the silhouette must
+// not turn over.
 INLINE Real3 facingNormal(Real3 n, Real3 d, Real first) {
     Real along = dot(n, d);
     bool grazing = along * along < Real(0.09) * dot(n, n) * dot(d, d);
@@ -136,20 +136,20 @@ INLINE Real3 facingNormal(Real3 n, Real3 d, Real first) {
     return away ? -n : n;
 }
 
-// f on the segment p + u d, u in [0, 1]: sum c_k u^k + fourth u^4. At the end it is `last`: taken from the corners, so
-// that two leaves agree on it at the wall between them.
+// f on the segment p + u d, u in [0, 1]: sum c_k u^k + fourth u^4. `last`, its value at the end, is taken from the
+// corners, so that two leaves agree on it at the wall between them.
 struct RayField {
     Real4 c;
     Real fourth, last;
 };
 
-// A corner's plane on the segment: value at its start, given from the corner, and slope.
+// A corner's plane on the segment: returns its value at the segment's start, given from the corner, and its slope.
 INLINE Real2 cornerOnRay(uint code, Real3 fromCorner, Real3 d) {
     Real3 n = decodeDirection(code >> 11);
     return Real2(decodeDistance(code) + Real(0.5) * dot(n, fromCorner), Real(0.5) * dot(n, d)) * decodeSide(code);
 }
 
-// (1 - x - u dx) a(u) + (x + u dx) b(u) of polynomials a and b, least power first.
+// Returns (1 - x - u dx) a(u) + (x + u dx) b(u) for polynomials a and b, lowest power first.
 INLINE Real3 blendLines(Real2 a, Real2 b, Real x, Real dx) {
     Real2 e = b - a;
     return Real3((Real(1.0) - x) * a.x + x * b.x, a.y + x * e.y + dx * e.x, dx * e.y);
@@ -159,7 +159,7 @@ INLINE Real4 blendParabolas(Real3 a, Real3 b, Real x, Real dx) {
     return Real4((Real(1.0) - x) * a.x + x * b.x, a.y + x * e.y + dx * e.x, a.z + x * e.z + dx * e.y, dx * e.z);
 }
 
-// From the corners' planes on the segment, faces as in LeafField; r and s: its start and extent, rotated to the axis.
+// Blends the corners' planes on the segment, faces as in LeafField; r and s: its start and extent, rotated to the axis.
 INLINE RayField blendOnRay(Real4 value0, Real4 slope0, Real4 value1, Real4 slope1, Real3 r, Real3 s) {
     Real3 low0 = blendLines(Real2(value0.x, slope0.x), Real2(value0.y, slope0.y), r.y, s.y);
     Real3 low1 = blendLines(Real2(value0.z, slope0.z), Real2(value0.w, slope0.w), r.y, s.y);
@@ -205,7 +205,7 @@ INLINE Real dipBound(uint node) {
     return code == 0u ? Real(0.004) : code == 1u ? Real(0.02) : code == 2u ? Real(0.1) : Real(1e30);
 }
 
-// First crossing of the segment with f = 0, as u in [0, 1], or -1.
+// Returns the first crossing of the segment with f = 0, as u in [0, 1], or -1.
 // wallIn, wallOut: |f| that counts as a hit at u = 0 and u = 1 (0 where that end is not a wall);
 // dip: how far f can swing between two ends on the same side (see page_layout.h).
 // The bracket is refined by the Illinois variant of false position, at most `steps` times, and until f is
@@ -219,7 +219,7 @@ INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int
     if ((fb < Real(0.0)) == below) {
         Real end = abs(fb) <= wallOut ? Real(1.0) : Real(-1.0);
         if (min(abs(fa), abs(fb)) > dip) return end;
-        // Both ends on one side: look where the parabola through the middle turns.
+        // Both ends are on one side: look where the parabola through the middle turns.
         Real fm = rayValue(ray, Real(0.5));
         b = Real(0.5);
         if ((fm < Real(0.0)) == below) {
@@ -253,7 +253,7 @@ INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int
     return a + (b - a) * (fa / (fa - fb));
 }
 
-// Where the line q + s d (|d| about 1) meets triangle a b c, in page space: x = s, y and z the weights of
+// Finds where the line q + s d (|d| about 1) meets triangle a b c, in page space: x = s, y and z the weights of
 // b and c; x = 1e30 where it does not. Vertices are taken relative to q, edges are widened by
 // `slack` cells, so that no ray slips between triangles that share an edge or an edge's point.
 INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real slack) {
@@ -262,20 +262,20 @@ INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real
     Real3 n = cross(ab, c - a);
     Real nd = dot(n, d);
     Real flip = nd < Real(0.0) ? Real(-1.0) : Real(1.0);
-    // Signed volumes of d with each edge; all have the sign of nd inside.
+    // The signed volumes of d with each edge; all have the sign of nd inside.
     Real wa = flip * dot(d, cross(vb, vc));
     Real wb = flip * dot(d, cross(vc, va));
     Real wc = flip * dot(d, cross(va, vb));
     Real3 miss = Real3(Real(1e30), Real(0.0), Real(0.0));
-    // wa < -slack |bc| and its like, without roots.
+    // Tests wa < -slack |bc| and its like, without roots.
     Real slack2 = slack * slack;
     if ((wa < Real(0.0) && wa * wa > slack2 * dot(bc, bc)) || (wb < Real(0.0) && wb * wb > slack2 * dot(ca, ca)) ||
         (wc < Real(0.0) && wc * wc > slack2 * dot(ab, ab)))
         return miss;
     if (!(abs(nd) > Real(0.0))) return miss;
-    // Weights below 0 are cut off and the hit is the triangle's point with the weights that are left. A ray in
-    // the slack must pass near that point: along needles and for grazing rays the widened edges reach far.
-    // So must, less strictly, any ray: seen edge-on, a needle's weights are rounding alone.
+    // Weights below 0 are cut off, and the hit is the triangle's point with the weights that are left. A ray in the
+    // slack must pass near that point: along needles and for grazing rays the widened edges reach far. Any other ray
+    // must pass near it too, less strictly: seen edge-on, a needle's weights are nothing but rounding.
     bool outside = wa < Real(0.0) || wb < Real(0.0) || wc < Real(0.0);
     wa = max(wa, Real(0.0));
     wb = max(wb, Real(0.0));

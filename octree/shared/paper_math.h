@@ -1,7 +1,7 @@
-// The march of Demir and Westermann 2015: vectors inside a leaf, step sizes, the hit. Compiles as GLSL and as C++ in
-// float (octree/paper_page.h), so that the tests of the C++ cover the shader. Lengths are in finest cells.
+// The march of Demir and Westermann 2015: vectors inside a leaf, step sizes, the hit. Compiles as GLSL and as C++
+// in
 
-// As PaperScheme, PaperPacking.
+// These values are those of PaperScheme and PaperPacking.
 const uint kPaperTrilinear = 0u;
 const uint kPaperMinPlane = 1u;
 const uint kPaperSpherical = 0u;
@@ -11,15 +11,15 @@ const int kPaperEmpty = 1073741824;  // 2^30: node words from here on are empty,
 const uint kPaperMostSteps = 4096u;
 const float kPaperFar = 3e38f;
 
-// Vectors of a leaf's corners; corner 4 x + 2 z + y.
+// The vectors of a leaf's corners; corner 4 x + 2 z + y.
 struct LeafVectors {
     float x[8];
     float y[8];
     float z[8];
 };
 
-// Directions of packed vectors (section 4.1): 13 bits root of the length, then the angles. The polar angle counts from
-// -pi here, where sines are most exact on all devices.
+// Decodes the direction of a packed vector (section 4.1): 13 bits root of the length, then the angles. The polar angle
+// counts from -pi here, where sines are most exact on all devices.
 INLINE vec3 sphericalDirection(uint code) {
     float theta = (float((code >> 13) & 511u) * (1.0f / 511.0f) - 0.5f) * 3.14159265f;
     float phi = (float(code >> 22) * (2.0f / 1023.0f) - 1.0f) * 3.14159265f;
@@ -27,7 +27,7 @@ INLINE vec3 sphericalDirection(uint code) {
     return vec3(-c * cos(phi), -c * sin(phi), sin(theta));
 }
 
-// 10 + 9 bits, for comparison.
+// Decodes the direction of 10 + 9 bits, for comparison.
 INLINE vec3 octahedralDirection(uint code) {
     float x = float((code >> 13) & 1023u) * (2.0f / 1023.0f) - 1.0f;
     float y = float(code >> 23) * (2.0f / 511.0f) - 1.0f;
@@ -39,8 +39,8 @@ INLINE vec3 octahedralDirection(uint code) {
     return vec3(x * scale, y * scale, z * scale);
 }
 
-// The vector at `at` (0 to 1 an axis) of a leaf of edge `size` (2.2; Fig. 4): trilinear; the perpendicular to the
-// nearest of the corners' planes; or the longer of the two. A vector of length 0 has no plane.
+// Returns the vector at `at` (0 to 1 an axis) of a leaf of edge `size` (2.2; Fig. 4): trilinear; the perpendicular to
+// the nearest of the corners' planes; or the longer of the two. A vector of length 0 has no plane.
 INLINE vec3 interpolateVectors(CONST_REF(LeafVectors) corners, float size, vec3 at, uint scheme) {
     float wx0 = 1.0f - at.x, wy0 = 1.0f - at.y, wz0 = 1.0f - at.z;
     float weight[8];
@@ -48,7 +48,7 @@ INLINE vec3 interpolateVectors(CONST_REF(LeafVectors) corners, float size, vec3 
     float squared[8];
     for (int k = 0; k < 8; ++k) {
         weight[k] = (k >= 4 ? at.x : wx0) * ((k & 1) != 0 ? at.y : wy0) * ((k & 2) != 0 ? at.z : wz0);
-        // From the point to the corner's closest point, along the corner's vector.
+        // The vector from the point to the corner's closest point, along the corner's vector.
         float ox = (float(k >> 2) - at.x) * size, oy = (float(k & 1) - at.y) * size,
               oz = (float((k >> 1) & 1) - at.z) * size;
         float x = corners.x[k], y = corners.y[k], z = corners.z[k];
@@ -78,14 +78,14 @@ INLINE vec3 interpolateVectors(CONST_REF(LeafVectors) corners, float size, vec3 
     return trilinear;
 }
 
-// How far to step where the vector has length d and v . direction is `approach`: d, or, by a plane, up to twice
-// epsilon (4.2). A plane that is not approached is never met.
+// How far to step where the vector has length d and v . direction is `approach`: d, or, by a plane, up to twice epsilon
+// (4.2). A ray never meets a plane that it does not approach.
 INLINE float marchStep(float d, float approach, float epsilon, bool byPlane) {
     float planar = approach > 0.0f ? d * d / approach : kPaperFar;
     return byPlane ? max(d, min(planar, 2.0f * epsilon)) : d;
 }
 
-// The part of the last step after which the distance is epsilon (2.1), 1 where it was not more before.
+// The part of the last step after which the distance is epsilon (2.1); 1 where the distance before was not larger.
 INLINE float marchBack(float lastDistance, float d, float epsilon) {
     return lastDistance > epsilon ? (lastDistance - epsilon) / (lastDistance - d) : 1.0f;
 }

@@ -1,4 +1,4 @@
-// Start distances of tiles and the list of tiles that are not empty (shaders/beam.comp).
+// Finds start distances of tiles and lists the tiles that are not empty (shaders/beam.comp).
 // Reads constants, pool, table. Writes tile starts, tile list. Before: FrameResources::begin. After:
 // barrierComputeToCompute, recorded here.
 #pragma once
@@ -14,7 +14,7 @@ public:
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool beam);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Pools with another layout are to come.
+    /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 
 private:

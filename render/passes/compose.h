@@ -1,4 +1,4 @@
-// Pictures of several datasets into one, dataset after dataset (shaders/compose.comp): the nearest surface is seen.
+// Composes pictures of several datasets, dataset after dataset (shaders/compose.comp): the nearest surface is seen.
 // Reads constants, tile list, hits and picture of the dataset's resources; writes the target: the picture of the first
 // dataset's resources, and depths of its own. Before: the shade pass. After: barrierComputeToReadback, recorded here.
 #pragma once
@@ -7,18 +7,18 @@
 
 namespace vcp {
 
-/// What is composed into: one a view, as large as its picture.
+/// What the pictures are composed into: one target a view, as large as its picture.
 class ComposeTarget {
 public:
-    /// Makes the depths fit. Errors: Device.
+    /// Makes the depths as large as the picture. Errors: Device.
     Result<void> resize(Device& device, PictureSize size);
-    /// For the first dataset of a frame: nothing is hit yet. Between begin() and the passes' first barrier.
+    /// Marks all pixels as not hit, before the first dataset of a frame. Between begin() and the passes' first barrier.
     void clear(VkCommandBuffer commands) const;
     [[nodiscard]] const Buffer& depths() const { return depths_; }
-    /// Copies the count of hits to where hitPixels() reads it. After ComposePass::record; ends with
+    /// Records the copy of the count of hits to where hitPixels() reads it. Comes after ComposePass::record; ends with
     /// barrierTransferToHost.
     void recordReadback(VkCommandBuffer commands) const;
-    /// Pixels that something is hit in. Precondition: the frame is done.
+    /// Returns the number of pixels where something is hit. Precondition: the frame is done.
     [[nodiscard]] uint32_t hitPixels() const;
 
 private:
@@ -30,7 +30,7 @@ private:
 class ComposePass {
 public:
     ComposePass();
-    /// `resources`: of the dataset, with the target set. Makes the pipeline on first use. Errors: Device.
+    /// `resources` are the dataset's, with the target set. Makes the pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;

@@ -48,7 +48,7 @@ Result<void> FeedbackPass::prepare(Device& device, FrameResources& resources, co
 }
 
 glm::vec2 FeedbackPass::jitter() const {
-    // Two-dimensional golden ratio: fills the square evenly, whatever the number of frames (Roberts 2018).
+    // The two-dimensional golden ratio fills the square evenly, whatever the number of frames (Roberts 2018).
     const double n = double(passes_ % 4096);
     return {std::fmod(0.5 + 0.7548776662466927 * n, 1.0), std::fmod(0.5 + 0.5698402909980532 * n, 1.0)};
 }

@@ -1,4 +1,4 @@
-// What the rays of 24 x 16 pixels met (shaders/feedback.comp): drives the order in which pages are read
+// Reports what the rays of 24 x 16 pixels met (shaders/feedback.comp); that drives the order in which pages are read
 // (streaming/load_order.h). Only frames that miss pages have this pass, and nothing is made before the first.
 // Reads constants, table, tile starts, hits. Writes its own buffer, and copies it where the CPU cannot see it, with
 // the frame's own commands: reading it once the frame is done waits for nothing. Before: the trace pass. After: the
@@ -19,29 +19,29 @@ namespace vcp {
 class FeedbackPass {
 public:
     FeedbackPass();
-    /// `table`: of the frame. Makes pipeline and buffers on first use. Errors: Device.
+    /// `table`: the frame's page table. Makes pipeline and buffers on first use. Errors: Device.
     Result<void> prepare(Device& device, FrameResources& resources, const PassConstants& constants,
                          std::span<const glm::uvec4> table);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands);
-    /// Of the last frame that had this pass. Precondition: it is done.
+    /// Returns what the last frame with this pass reported. Precondition: that frame is done.
     [[nodiscard]] RayFeedback read() const;
-    /// Forgets the pipeline: pools with another layout are to come.
+    /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
     /// Forgets all that the device holds.
     void release() { pipelines_.clear(), buffer_ = {}, readback_ = {}; }
 
-    /// Passes recorded so far.
+    /// The number of passes recorded so far.
     [[nodiscard]] uint64_t passes() const { return passes_; }
-    /// Where the rays of the next pass go in their parts of the picture, 0 to 1: another place each time.
+    /// Where in their parts of the picture the rays of the next pass go, 0 to 1: another place each time.
     [[nodiscard]] glm::vec2 jitter() const;
 
 private:
     Result<void> reserve(Device& device, uint64_t words);
 
     PipelineVariants pipelines_;
-    Buffer buffer_, readback_;     // the latter where the former is not mapped
-    std::vector<uint64_t> pages_;  // by record of the table; of the cut only
+    Buffer buffer_, readback_;     // readback_ is used where buffer_ is not mapped
+    std::vector<uint64_t> pages_;  // for each record of the table, its page; pages of the cut only
     uint64_t passes_ = 0;
 };
 

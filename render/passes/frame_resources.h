@@ -50,12 +50,12 @@ class FrameResources;
 class PipelineVariants {
 public:
     explicit PipelineVariants(std::span<const uint32_t> spirv) : spirv_(spirv) {}
-    /// Makes a variant the current one. `more`: values of the constants that this shader alone has. Errors: Device.
+    /// Makes a variant the current one. `more`: values of the constants that only this shader has. Errors: Device.
     Result<void> choose(FrameResources& resources, const PassConstants& constants,
                         std::initializer_list<uint32_t> more = {});
     /// Precondition: choose().
     [[nodiscard]] VkPipeline current() const { return current_; }
-    /// Forgets all variants: pools with another layout are to come.
+    /// Forgets all variants, before pools with another layout come.
     void clear() { variants_.clear(); }
 
 private:
@@ -70,7 +70,7 @@ struct WordBuffer {
     TexelView view;
 };
 
-/// What a frame counted.
+/// What is counted in a frame.
 struct FrameCounts {
     frame::FrameCounters counters;
     uint32_t listedTiles = 0;  ///< tiles that the beam pass could not prove empty
@@ -83,28 +83,28 @@ public:
     FrameResources(const FrameResources&) = delete;
     FrameResources& operator=(const FrameResources&) = delete;
 
-    /// Makes the buffers fit. `hitPlanes`: words that a pixel's hit takes. Errors: Device.
+    /// Makes the buffers as large as the picture needs. `hitPlanes`: words that a pixel's hit takes. Errors: Device.
     Result<void> resize(PictureSize size, uint32_t hitPlanes);
-    /// The table of the frames from the next one on; grows its buffer. Where the CPU does not see the device's memory,
-    /// begin() copies it. Errors: Device.
+    /// Sets the table for the frames from the next one on; grows its buffer. Where the CPU does not see the device's
+    /// memory, begin() copies it. Errors: Device.
     Result<void> setTable(std::span<const glm::uvec4> table);
-    /// What the picture shows where nothing is hit: a word a row. Precondition: resize(), and a row each.
+    /// Sets what the picture shows where nothing is hit: a word a row. Precondition: resize(), and a word for each row.
     void setBackground(std::vector<uint32_t> rows);
-    /// Null pools: nothing is shown, or without colour. They may be the same.
+    /// Sets the pools; both may be the same. Null: nothing is shown, or nothing has colour.
     void setPools(const PagePool* pages, const PagePool* colours);
-    /// Null, or as long as frames with the feedback pass are drawn.
+    /// Sets the feedback buffer: not null as long as frames with the feedback pass are drawn.
     void setFeedback(const Buffer* feedback);
 
-    /// Null, or what the pictures of several datasets are composed into.
+    /// Sets what the pictures of several datasets are composed into, or null.
     void setTarget(const Buffer* picture, const Buffer* depths);
 
     /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
 
-    /// Copies what a frame counted to where counts() reads it. After the last pass's barrierComputeToReadback; ends
-    /// with barrierTransferToHost.
+    /// Records the copy of what a frame counted to where counts() reads it. Comes after the last pass's
+    /// barrierComputeToReadback; ends with barrierTransferToHost.
     void recordReadback(VkCommandBuffer commands) const;
-    /// Precondition: the frame is done.
+    /// Returns what a frame counted. Precondition: the frame is done.
     [[nodiscard]] FrameCounts counts() const;
 
     [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
@@ -114,7 +114,7 @@ public:
     [[nodiscard]] const Buffer& tileStarts() const { return tileStarts_.buffer; }
     [[nodiscard]] const Buffer& tileList() const { return tileList_.buffer; }
 
-    /// One pipeline of this layout; counts it.
+    /// Makes one pipeline of this layout, and counts it.
     Result<ComputePipeline> pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants);
     [[nodiscard]] uint32_t pipelinesMade() const { return pipelinesMade_; }
 

@@ -1,4 +1,4 @@
-// Shadows and ambient occlusion of the hits (shaders/light.comp).
+// Traces shadows and ambient occlusion of the hits (shaders/light.comp).
 // Reads constants, pools, table, tile list, hits. Writes the hits' plane of light. Before: the trace pass. After:
 // barrierComputeToCompute, recorded here. A frame without both has no such pass.
 #pragma once
@@ -14,7 +14,7 @@ public:
     Result<void> prepare(FrameResources& resources, const PassConstants& constants);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Pools with another layout are to come.
+    /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 
 private:

@@ -1,5 +1,5 @@
-// Lists of rays through one asset (shaders/meso_rays.comp): what is measured and compared with the reference. Reads the
-// asset and the rays; writes the results. Ends with barrierComputeToReadback.
+// Marches lists of rays through one asset (shaders/meso_rays.comp), to be measured or compared with the reference.
+// Reads the asset and the rays; writes the results. Ends with barrierComputeToReadback.
 #pragma once
 
 #include "mesostructure/march.h"
@@ -11,7 +11,7 @@ class MesoRaysPass {
 public:
     MesoRaysPass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
 
-    /// Errors: Device, Limit.
+    /// Uploads the arrays and the rays. Errors: Device, Limit.
     Result<void> prepare(const MesoArrays& arrays, std::span<const meso::MarchRay> rays);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands) const;

@@ -32,7 +32,7 @@ struct MesoConstants {
 /// A buffer that shaders read as texels of one or two formats.
 struct MesoTexels {
     Buffer buffer;
-    TexelView view, quads;  ///< quads: of words alone
+    TexelView view, quads;  ///< `quads` are views of words only
 };
 
 /// A descriptor set with a pool of its own; frees both.
@@ -62,7 +62,7 @@ public:
     MesoResources(const MesoResources&) = delete;
     MesoResources& operator=(const MesoResources&) = delete;
 
-    /// Errors: Device (no memory); Limit (more texels than the device reads).
+    /// Makes texels of words. Errors: Device (no memory); Limit (more texels than the device reads).
     Result<MesoTexels> words(std::span<const uint32_t> words);
     Result<MesoTexels> vectors(std::span<const glm::vec4> vectors);
     Result<MesoTexels> halfs(std::span<const uint64_t> halfs);  ///< four to a texel
@@ -74,10 +74,10 @@ public:
         const Buffer *hits, *picture, *counters;
         const MesoTexels* look = nullptr;  ///< null: the shaders read none
     };
-    /// Errors: Device.
+    /// Makes a descriptor set. Errors: Device.
     Result<MesoSet> makeSet(const Bound& bound) const;
 
-    /// The pipeline of a shader and its constants, made on first use. Errors: Device.
+    /// Returns the pipeline of a shader and its constants, made on first use. Errors: Device.
     Result<VkPipeline> pipeline(std::span<const uint32_t> spirv, const std::vector<uint32_t>& constants);
     [[nodiscard]] uint32_t pipelinesMade() const { return uint32_t(pipelines_.size()); }
     [[nodiscard]] VkPipelineLayout layout() const { return layout_; }

@@ -20,7 +20,7 @@ constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT 
 
 glm::vec4 toVec4(glm::dvec3 v, double w = 0) { return {glm::vec3(v), float(w)}; }
 
-/// What is seen from far, then the textures, one after the other.
+/// Returns the words of what is seen from far, followed by the textures.
 std::vector<uint64_t> lookOf(const MesoSurface& surface, frame::MesoView& view) {
     std::vector<uint64_t> texels;
     if (surface.far)
@@ -73,7 +73,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
             look = std::make_shared<MesoTexels>(std::move(*uploadedLook));
         }
         made.look = look;
-        // What rays come through must be marched.
+        // A surface that rays may come through must be marched.
         made.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
         made.view.far.y = made.isFarDrawn ? float(surface.far->height) : 0.0f;
         auto shell = resources_.vectors(surface.shell.texels);
@@ -105,7 +105,7 @@ uint64_t MesoSurfacePass::assetBytes() const {
 
 Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows) {
     if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.handle()) {
-        // Nothing has a size until all is made.
+        // The target has no size until all of it is made.
         target = {};
         for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
                                             std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
@@ -134,7 +134,7 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
         if (!cast) return cast.error();
         surface.cast = *cast;
         if (!shadows) continue;
-        // Shadows have no textures.
+        // The shadow pass reads no textures.
         constants[4] = 1, constants[5] = 0;
         auto shadow = resources_.pipeline(kMesoSurfaceSpirv, constants);
         if (!shadow) return shadow.error();

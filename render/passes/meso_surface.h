@@ -21,22 +21,22 @@
 
 namespace vcp {
 
-/// One asset on one base.
+/// One asset on one base surface.
 struct MesoSurface {
     std::shared_ptr<const MesoArrays> arrays;  ///< surfaces may share them
     meso::Shell shell;
     glm::vec3 colour{0.8f};  ///< encoded, as the screen has it
     bool withBase = true;    ///< the base is drawn where rays come through to it
     double lift = 0;         ///< world units by which shadow rays start above a hit
-    /// Over the tile, at the hit's place in it; surfaces may share them. Colours are light, in place of `colour`.
+    /// A texture over the tile, at the hit's place in it, may be shared; its colours are linear and replace `colour`.
     std::shared_ptr<const MesoTexture> colours;
-    /// Unit vectors, x and y along the tile, z out of what the texture lies on, which is the mesostructure: they bend
-    /// its shading normals.
+    /// A texture of unit vectors that bend the mesostructure's shading normals: x and y are along the tile, z points
+    /// out of the mesostructure.
     std::shared_ptr<const MesoTexture> normals;
-    std::shared_ptr<const meso::Appearance> far;  ///< what is seen of it from far; null: it is marched from everywhere
+    std::shared_ptr<const meso::Appearance> far;  ///< what it looks like from far; null: it is marched from everywhere
 };
 
-/// A good lift: some texels or a part of a cell. `tileEdge` in world units.
+/// Returns a good lift: some texels or a part of a cell. `tileEdge` in world units.
 double shadowLift(const MesoArrays& arrays, double tileEdge);
 
 enum class MesoShading : uint32_t {
@@ -47,17 +47,17 @@ enum class MesoShading : uint32_t {
 };
 
 struct MesoLook {
-    Camera camera;  ///< of the whole, where the picture is a tile
+    Camera camera;  ///< camera of the whole picture, where this one is a tile
     PictureTile tile;
     glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light, unit
-    glm::dvec3 up{0, 0, 1};            ///< of the sky, unit
+    glm::dvec3 up{0, 0, 1};            ///< direction of the sky, unit
     bool shadows = false;
     MesoShading shading = MesoShading::Lit;
     double errorPixels =
         0.5;  ///< surfaces that stray less from their mean height are not marched (MesoSurface::far); 0: all are
 };
 
-/// What a frame counted (shaders/meso_bindings.glsl).
+/// What is counted in a frame (shaders/meso_bindings.glsl).
 struct MesoCounts {
     uint32_t unresolvedRays = 0, farHits = 0, hitPixels = 0, unused = 0;
 };
@@ -65,13 +65,13 @@ struct MesoCounts {
 /// What one view's pictures of the surfaces are drawn into.
 struct MesoTarget {
     PictureSize size;       ///< 0: nothing is made
-    uint64_t surfaces = 0;  ///< MesoSurfacePass::version() that the sets are of
+    uint64_t surfaces = 0;  ///< MesoSurfacePass::version() for which the sets were made
     Buffer hits, counters;
     Buffer counted;                     ///< the counters, for the CPU
     VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
-    std::vector<MesoSet> sets;          ///< of each surface
+    std::vector<MesoSet> sets;          ///< one for each surface
 
-    /// Precondition: the frame is done.
+    /// Returns what a frame counted. Precondition: the frame is done.
     [[nodiscard]] MesoCounts counts() const;
 };
 
@@ -84,12 +84,12 @@ public:
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
     /// Makes buffers and pipelines. Precondition: there are surfaces. Errors: Device, Limit.
     Result<void> prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows);
-    /// Precondition: prepare(); the picture is as it shall be where there is no mesostructure. `depths`: a float a
-    /// pixel, world units along the unit ray, of what is there already.
+    /// Records the surfaces' passes. Precondition: prepare(); the picture shows what is seen without mesostructure.
+    /// `depths`: a float a pixel, world units along the unit ray, of what the picture shows.
     void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths);
 
     [[nodiscard]] uint64_t version() const { return version_; }
-    /// Of assets, shells and textures.
+    /// Bytes of assets, shells and textures.
     [[nodiscard]] uint64_t assetBytes() const;
 
 private:

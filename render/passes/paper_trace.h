@@ -1,4 +1,4 @@
-// First hits in a dataset of the method `paper` (shaders/paper_trace.comp), in place of the trace pass.
+// Finds first hits in a dataset of the method `paper` (shaders/paper_trace.comp), in place of the trace pass.
 // Reads constants, pool, table, tile list. Writes hits, counters. Before: the beam pass. After:
 // barrierComputeToCompute, recorded here. Made only where such a dataset is drawn.
 #pragma once
@@ -16,7 +16,7 @@ public:
                          const PaperMarch& march);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Pools with another layout are to come.
+    /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 
 private:

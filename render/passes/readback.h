@@ -1,4 +1,4 @@
-// From the device's buffers to the CPU: directly where they are mapped, else by a copy.
+// Brings words from the device's buffers to the CPU: directly where they are mapped, else by a copy.
 #pragma once
 
 #include <span>
@@ -10,8 +10,8 @@
 
 namespace vcp {
 
-/// Copies `words` 32-bit words from `firstWord` on. Precondition: no frame in flight; `source` may be
-/// copied from. Errors: Device.
+/// Returns `words` 32-bit words from `firstWord` on. Precondition: no frame is in flight; `source` may be copied from.
+/// Errors: Device.
 Result<std::vector<uint32_t>> readWords(Device& device, const Buffer& source, uint64_t firstWord, uint64_t words);
 
 struct WordPlace {
@@ -19,10 +19,10 @@ struct WordPlace {
     uint64_t word;
 };
 
-/// Words from several places, with one wait at most. Precondition: as readWords. Errors: Device.
+/// Returns words from several places, with one wait at most. Precondition: as for readWords. Errors: Device.
 Result<std::vector<uint32_t>> readEach(Device& device, std::span<const WordPlace> places);
 
-/// A unit vector as hit_records.glsl packs it.
+/// Unpacks a unit vector that hit_records.glsl packed.
 glm::vec3 unpackNormal(uint32_t code);
 
 }  // namespace vcp

@@ -1,4 +1,4 @@
-// The picture from the hits (shaders/shade.comp).
+// Makes the picture from the hits (shaders/shade.comp).
 // Reads constants, tile list and starts, hits. Writes the picture's hit pixels. Before: the trace pass, with
 // `light` also the light pass. After: barrierComputeToReadback, recorded here.
 #pragma once
@@ -14,7 +14,7 @@ public:
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, bool light);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Pools with another layout are to come.
+    /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 
 private:

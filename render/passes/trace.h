@@ -1,4 +1,4 @@
-// First hits of the pixels of listed tiles (shaders/trace.comp).
+// Finds the first hits of the pixels of listed tiles (shaders/trace.comp).
 // Reads constants, pools, table, tile starts and list. Writes hits, counters. Before: the beam pass. After:
 // barrierComputeToCompute, recorded here.
 #pragma once
@@ -17,7 +17,7 @@ public:
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FrameResources& resources) const;
-    /// Pools with another layout are to come.
+    /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 
 private:

@@ -1,4 +1,4 @@
-// A start distance for every tile of 8 x 8 pixels, and the list of tiles that are not empty.
+// Finds a start distance for every tile of 8 x 8 pixels, and lists the tiles that are not empty.
 //
 // A tile's rays are enclosed, axis by axis, between the least and the greatest origin and direction; the
 // interval in which such a bundle may be inside a box follows from four divisions an axis. The tile walks
@@ -27,13 +27,13 @@ Bundle tileBundle(uvec2 tile) {
     vec2 hi = min(lo + float(kTileSize - 1u), vec2(frame.picture.xy) - 0.5);
     Ray a = rayAt(lo), b = rayAt(vec2(hi.x, lo.y)), c = rayAt(vec2(lo.x, hi.y)), d = rayAt(hi);
     Bundle bundle;
-    // Rounding of the rays' own points is relative to their distance: rays.glsl, latticePoint.
+    // Rounding of the rays' own points is relative to their distance (rays.glsl, latticePoint).
     bundle.originMin = min(min(a.origin, b.origin), min(c.origin, d.origin));
     bundle.originMax = max(max(a.origin, b.origin), max(c.origin, d.origin));
     vec3 least = min(min(a.direction, b.direction), min(c.direction, d.direction));
     vec3 greatest = max(max(a.direction, b.direction), max(c.direction, d.direction));
-    // A unit direction inside the tile is a blend of the corners' divided by its length, which is at least
-    // 1 - delta^2 for corners delta apart.
+    // A unit direction inside the tile is a blend of the corners' directions divided by its length, which is at least 1
+    // - delta^2 for corners delta apart.
     vec3 across = max(abs(a.direction - d.direction), abs(b.direction - c.direction));
     float bulge = dot(across, across) + 4e-7;
     least = withoutZeros(least - bulge);
@@ -56,7 +56,7 @@ vec3 planeAbove(ivec3 plane, float margin) {
     return x + margin + 1e-6 * abs(x);
 }
 
-// For each axis, when some ray of the bundle may be between two planes: at least x.., at most y...
+// For each axis, when some ray of the bundle may be between two planes: from at least x.. to at most y...
 struct SlabTimes {
     vec3 first, last;
 };
@@ -99,22 +99,22 @@ float octantStart(OctantTimes o, uint octant) {
 uint stackBase[kMaxDepth];
 uint stackOpen[kMaxDepth];
 
-// Least distance at which the tile's rays may enter a leaf.
+// Returns the least distance at which the tile's rays may enter a leaf.
 float tileStart(Bundle bundle) {
-    // Nearest octant first: bit set where the bundle goes towards lower coordinates.
+    // The nearest octant comes first: a bit is set where the bundle goes towards lower coordinates.
     uint order = (bundle.maxAhead.x ? 0u : 1u) | (bundle.maxAhead.y ? 0u : 2u) | (bundle.maxAhead.z ? 0u : 4u);
     float best = kTileEmpty;
     uint nodesTexel = 0u;
     int depth = 0;
-    ivec3 corner = ivec3(0);  // of the box at `depth`, on the lattice; its edge is 2^(30 - depth)
+    ivec3 corner = ivec3(0);  // lowest corner of the box at `depth`, on the lattice; its edge is 2^(30 - depth)
 
-    // The pending node: its word, in the page tree its record.
+    // The pending node: its word or, in the page tree, its record.
     bool inTable = true;
     uint node = 0u;
     int cellBits = 0;  // log2 of a cell of the current page on the lattice
     while (depth >= 0) {
         int bits = int(kLatticeBits) - depth;
-        // Arrive at a node whose box is corner, bits: a page record first.
+        // Arrive at a node whose box is corner, bits; a page's record comes first.
         uint open = 0u, base = 0u;
         uvec4 record = fetchTable(inTable ? node * kRecordTexels : 0u);
         bool isPage = inTable && (record.x & kRecordInCut) != 0u;
@@ -142,7 +142,7 @@ float tileStart(Bundle bundle) {
                 open |= 1u << k;
             }
         }
-        // A page that is one leaf.
+        // The page is a single leaf.
         if (inPage && !internal && node >> kNodeTypeShift != kNodeEmpty) {
             float first = kTileEmpty;
             for (uint octant = 0u; octant < 8u; octant++) first = min(first, octantStart(times, octant));
@@ -152,7 +152,7 @@ float tileStart(Bundle bundle) {
         stackBase[depth] = base;
         stackOpen[depth] = open | (inPage ? 0u : (record.x & 255u) << 8);
 
-        // Next: the nearest open child of the deepest box that has one.
+        // Continue with the nearest open child of the deepest box that has one.
         while (depth >= 0 && (stackOpen[depth] & 255u) == 0u) {
             depth--;
             corner = corner >> (int(kLatticeBits) - depth) << (int(kLatticeBits) - depth);

@@ -1,4 +1,4 @@
-// Casting a ray through the pages of the frame's cut: the first hit, and what is seen of it.
+// Casts a ray through the pages of the frame's cut: finds the first hit, and what is seen of it.
 //
 // Control flow is laid out for devices that run eight rays in lock step and skip nothing: what is rare
 // (triangles, changing the page) stands outside of the loops that are not.
@@ -9,11 +9,11 @@ const int kIllinoisSteps = 8;
 const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
 const float kIntervalSlack = 1e-4;
 const float kLastBelowOne = 0.99999994;
-const float kSeamErrors = 8.0;  // how far a coarser surface goes on beyond its page, in certified errors of the two pages
+const float kSeamErrors = 8.0;  // a coarser surface reaches so many certified errors of the two pages beyond its page
 
 struct Hit {
     float depth;  // finest cells; kNoHit
-    uint record;  // of the page, in the table
+    uint record;  // record of the hit page in the table
     int pageBits; // log2 of the page's edge on the lattice
     uint leaf;    // its node
     vec4 at;      // soft: the point in leaf space, and f where the ray entered; hard: weights of the second and third vertex
@@ -26,7 +26,7 @@ struct Surface {
     vec4 colour;
 };
 
-// Work of a ray; filled with kCountSteps only.
+// The work of a ray; counted with kCountSteps only.
 struct Work {
     uint steps, cells, fetches;
 };
@@ -41,7 +41,7 @@ struct Page {
     uint record;     // number in the table
 };
 
-// Exact powers of two.
+// Returns an exact power of two.
 float powerOfTwo(int exponent) { return uintBitsToFloat(uint(127 + exponent) << 23); }
 
 // How far the ray has come: along each axis, planes up to this distance are behind it. The three differ by the last
@@ -53,7 +53,7 @@ vec3 reachedBehind(float s, vec3 crossed) {
     return vec3(s, first.x ? before : s, first.x || first.y ? before : s);
 }
 
-// Beyond the wall by which the ray leaves a box of the lattice.
+// Steps beyond the wall by which the ray leaves a box of the lattice.
 vec3 leaveLatticeBox(Ray ray, ivec3 corner, int bits) {
     vec3 t = planeDistances(ray, mix(corner, corner + (1 << bits), greaterThan(ray.direction, vec3(0.0))));
     return reachedBehind(minOf(t), t);
@@ -64,7 +64,7 @@ struct Region {
     ivec3 corner;
     int bits;
     bool isPage;
-    float error;  // certified, of the page; finest cells
+    float error;  // certified error of the page; finest cells
 };
 const int kNoRegion = 64;  // bits before the first one
 
@@ -81,17 +81,17 @@ void usePage(uint node, uvec4 record, inout Page page) {
     page.cell = powerOfTwo(int(frame.mode.y) + page.bits - int(kLatticeBits));
 }
 
-// Goes down the frame's page tree to the page that the ray has reached, stepping over octants without one, but not
-// where such a one follows on a coarser page. False: nothing before `last`. The side of a plane that the ray is on is
-// told by the distance to the plane, never by a rounded place: a ray in a wall, or nearly parallel to it, would be
-// sent to a page that it enters much later.
+// Goes down the frame's page tree to the page that the ray has reached. Steps over octants without a page, except where
+// such an octant follows on a coarser page. Returns false where nothing comes before `last`. The distance to a plane,
+// never a rounded place, tells the ray's side of the plane: a ray in a wall, or nearly parallel to it, would be sent to
+// a page that it enters much later.
 bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out Region region, out Page page, inout uint steps) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     uint node = 0u;
     uvec4 record = uvec4(0u);
     bool inside = true, found = false;
     while (inside && !found) {
-        // Down to a page of the cut or an octant without one.
+        // Go down to a page of the cut or an octant without one.
         node = 0u;
         region.corner = ivec3(0);
         region.bits = int(kLatticeBits);
@@ -126,19 +126,19 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
 
 // A part of the ray beside a change of level, where the coarser surface counts as well.
 struct Seam {
-    ivec3 corner;  // of a box of the coarser level's pages that the part runs through
+    ivec3 corner;  // lowest corner of a box of the coarser level's pages that the part runs through
     int bits;
     bool behind;   // the coarser region lies ahead: boxes are looked at from its wall backwards
     float first, last;
 };
 
 // Between two levels the surfaces are apart by as much as their errors, and a ray could pass between them. So the
-// coarser one goes on for a while beyond the wall, in the finer one's region.
+// coarser surface is continued some way beyond the wall, in the finer one's region.
 Seam seamBetween(Region before, Region after, float wall) {
     Seam seam;
     seam.behind = after.isPage && after.bits > before.bits;
     seam.bits = max(before.bits, after.bits);
-    // No farther than a page's edge, whatever a file says.
+    // It reaches no farther than a page's edge, whatever a file says.
     float edge = powerOfTwo(int(frame.mode.y + frame.mode.x) + seam.bits - int(kLatticeBits));
     float reach = min(kSeamErrors * max(before.error, after.error), edge);
     seam.corner = (seam.behind ? before.corner : after.corner) >> seam.bits << seam.bits;
@@ -147,7 +147,7 @@ Seam seamBetween(Region before, Region after, float wall) {
     return seam;
 }
 
-// To the next box of the seam. False: there is none.
+// Steps to the next box of the seam. Returns false where there is none.
 bool nextBox(Ray ray, inout Seam seam) {
     ivec3 edge = ivec3(1 << seam.bits), far = seam.corner + edge;
     bvec3 upward = notEqual(greaterThan(ray.direction, vec3(0.0)), bvec3(seam.behind));
@@ -158,7 +158,8 @@ bool nextBox(Ray ray, inout Seam seam) {
     return inLattice && (seam.behind ? wall > seam.first : wall < seam.last);
 }
 
-// The page of the box of a seam; it is above pages of the cut, or there is none. False: not resident.
+// Finds the page of a seam's box, which is above pages of the cut, if there is one. Returns false where it is not
+// resident.
 bool coarserPage(Seam seam, inout Page page, inout uint steps) {
     uint node = 0u;
     uvec4 record = uvec4(0u);
@@ -179,8 +180,8 @@ bool coarserPage(Seam seam, inout Page page, inout uint steps) {
     return exists && (record.x & kRecordResident) != 0u;
 }
 
-// The ray in page space. Both points at the page's walls come from the lattice, as its neighbours see them. No point
-// is rounded onto a wall that the ray leaves by elsewhere: there its walk would end.
+// Brings the ray into page space. Both points at the page's walls come from the lattice, as its neighbours see them. No
+// point is rounded onto a wall other than the one that the ray leaves by: its walk would end there.
 PageRay enterPage(Ray ray, Page page, out float sStart) {
     ivec3 edge = ivec3(1 << page.bits);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
@@ -207,7 +208,7 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
     return local;
 }
 
-// Distance along the page's ray of the crossing in a soft leaf, or -1.
+// Returns the distance along the page's ray of the crossing in a soft leaf, or -1.
 float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
     uint face = page.sections.x + (node & kLeafIndexMask);
     uvec4 face0 = fetchTexel(face), face1 = fetchTexel(face + 1u);
@@ -225,7 +226,7 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 
-// The triangles of a hard leaf. Distance, or -1.
+// Intersects the triangles of a hard leaf. Returns the distance, or -1.
 float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
     if (kCountSteps != 0u) work.cells++;
     uint first = node & kLeafIndexMask;
@@ -291,8 +292,8 @@ Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction
     return surface;
 }
 
-// Normal and colour of a hit. The page is looked up again: see descend() on what is loaded in a loop. A kind of
-// leaf that none of the rays in lock step has hit is skipped, which only a loop does everywhere.
+// Finds the normal and colour of a hit. The page is looked up again: see descend() on what is loaded in a loop. A kind
+// of leaf that none of the rays in lock step has hit is skipped; only a loop does that on every device.
 Surface surfaceAt(Hit hit, vec3 direction) {
     Surface surface = Surface(vec3(0.0, 0.0, 1.0), vec4(0.0));
     bool found = hit.depth < kNoHit;
@@ -311,7 +312,7 @@ Surface surfaceAt(Hit hit, vec3 direction) {
     return surface;
 }
 
-// First hit in a page from distance `s` on, or kNoHit. Leaves that begin after `until` are not looked at.
+// Returns the first hit in a page from distance `s` on, or kNoHit. Leaves that begin after `until` are not looked at.
 float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Work work) {
     float sStart;
     PageRay local = enterPage(ray, page, sStart);
@@ -328,14 +329,14 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     Descent descent = Descent(rootGroup, kNoGroup, kNoGroup, rootBits, page.root);
 
     float found = -1.0;
-    vec3 lo = vec3(0.0), boxLo = vec3(0.0), boxHi = vec3(0.0);  // of the node, and what is to be left of it
+    vec3 lo = vec3(0.0), boxLo = vec3(0.0), boxHi = vec3(0.0);  // lowest corner of the node, and the box to leave
     float edge = 0.0;
     bool leave = false;
     LeafSegment segment;
     while (at.inPage && found < 0.0) {
-        // Soft leaves, until a hit or a hard leaf.
+        // Pass soft leaves until a hit or a hard leaf.
         while (true) {
-            // Empty nodes, until a leaf.
+            // Pass empty nodes until a leaf.
             while (true) {
                 if (leave) {
                     Place next = leaveBox(local, at, boxLo, boxHi);
@@ -368,7 +369,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
 }
 
-// First hit of the ray in the dataset at distance `from` or farther. Pages from `until` on are not looked at.
+// Returns the ray's first hit in the dataset at distance `from` or farther. Pages from `until` on are not looked at.
 Hit castRay(Ray ray, float from, float until, inout Work work) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     ivec3 root = ivec3(1 << kLatticeBits);
@@ -396,7 +397,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
             if (found.depth < hit.depth && found.depth >= first - slack && found.depth <= stop + slack) hit = found;
         }
         if (onSeam) {
-            // Its next box, or the region itself.
+            // Next is the seam's next box, or the region itself.
             onSeam = nextBox(ray, seam);
             fromNew = false;
             inside = onSeam || hit.depth > reached.x;

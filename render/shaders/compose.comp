@@ -1,4 +1,5 @@
-// One dataset's picture into that of all: the nearest surface is seen. Reads tile list, hits and the dataset's picture;
+// Composes one dataset's picture with that of all: the nearest surface is seen. Reads tile list, hits and the dataset's
+// picture;
 // writes the target's picture and depths, world units, and counts the pixels that something is hit in.
 #version 450
 #extension GL_GOOGLE_include_directive : require

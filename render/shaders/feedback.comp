@@ -1,4 +1,4 @@
-// What the rays of a few pixels met on their way: pages of the cut that they went into, and where they hit. Reads
+// Reports what the rays of a few pixels met on their way: pages of the cut that they entered, and where they hit. Reads
 // table, tile starts and hits; writes the feedback buffer (render/shared/frame_layout.h).
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 15, std430) buffer FeedbackBlock { uint feedback[]; };
 
-// More pages than this no ray meets that matters.
+// A walk ends after so many pages; rays that matter meet fewer.
 const uint kMostBoxes = 512u;
 
 uvec2 feedbackPixel(uint ray) {
@@ -19,7 +19,7 @@ uvec2 feedbackPixel(uint ray) {
     return min(uvec2(point), frame.picture.xy - 1u);
 }
 
-// The box of the page tree at `place`: a page of the cut, or an octant without one. Returns the record's flags.
+// Finds the box of the page tree at `place`: a page of the cut, or an octant without one. Returns the record's flags.
 uint boxAt(ivec3 place, out uint node, out int bits) {
     node = 0u;
     bits = int(kLatticeBits);
@@ -73,7 +73,7 @@ void main() {
                 feedback[at + 3u] = node + 1u;
             }
         }
-        // Across the face that the ray leaves by.
+        // Step across the face that the ray leaves by.
         ivec3 sideways = clamp(latticePoint(ray, leave), corner, corner + edge - 1);
         place = mix(sideways, mix(corner - 1, corner + edge, ahead), equal(t, vec3(minOf(t))));
         s = leave;

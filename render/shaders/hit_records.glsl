@@ -1,8 +1,8 @@
-// What the trace pass left of a pixel.
+// What the trace pass wrote for a pixel.
 
 struct PixelHit {
     float depth;  // finest cells along the ray; kNoHit
-    bool onCap;   // of a section
+    bool onCap;   // the hit is on the cap of a section
 };
 
 PixelHit fetchPixelHit(uint pixel) {

@@ -1,4 +1,5 @@
-// Light that reaches each hit: one ray to the sun, and some into the sky above the surface. Reads pool, table,
+// Traces the light that reaches each hit: one ray to the sun, and some into the sky above the surface. Reads pool,
+// table,
 // tile list and hits; writes the hits' plane of light.
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -14,7 +15,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const float kTurn = 6.2831853;
 const float kGoldenTurn = 0.61803399;
 
-// Direction of ray `i` of `count` about the normal, by its cosine (Malley's method on a spiral of the disc). Each
+// Returns the direction of ray `i` of `count` about the normal, by its cosine (Malley's method on a spiral of the
+// disc). Each
 // pixel of a square of 4 x 4 has its own spiral; the shade pass averages over the square.
 vec3 skyDirection(vec3 n, uint i, uint count, uvec2 pixel) {
     uint square = (pixel.x & 3u) | (pixel.y & 3u) << 2;

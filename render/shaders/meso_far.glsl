@@ -4,13 +4,14 @@
 // Pixels that a tile may be wide, over those that the surface may stray: docs/mesostructure.md has the measurement.
 const float kFarTile = 8.0;
 
-// Gradients of tile space, and the pixel's width, in world units.
+// `t0`, `t1`, `t2`: gradients of tile space; `width`: the pixel's width in world units.
 bool isFar(vec3 t0, vec3 t1, vec3 t2, float width) {
     float most = view.far.x * width;
     return max(view.far.y, meso.extent.z - view.far.y) <= most * length(t2) && max(meso.extent.x / length(t0), meso.extent.y / length(t1)) <= kFarTile * most;
 }
 
-// The mean height from above. A ray that comes from a piece that was marched may be below it: it is met there.
+// Meets the mean height from above. A ray that comes from a piece that was marched may be below it: it hits where it
+// is.
 MesoResult meetMean(MesoRay ray) {
     MesoResult result = MesoResult(kMesoMiss, 0.0, vec3(0.0, 0.0, 1.0), 0u, 0u, 0u);
     if (ray.d.z >= 0.0 || !ray.isOutside) return result;
@@ -19,7 +20,7 @@ MesoResult meetMean(MesoRay ray) {
     return result;
 }
 
-// Nine coefficients and the mean normal of a view of the grid.
+// The nine coefficients and the mean normal of a view of the grid.
 struct FarView {
     vec4 a, b, c;
 };
@@ -31,7 +32,7 @@ FarView fetchView(ivec2 at) {
 
 FarView mixViews(FarView x, FarView y, float w) { return FarView(mix(x.a, y.a, w), mix(x.b, y.b, w), mix(x.c, y.c, w)); }
 
-// `towards` the eye, z out of the slab.
+// `towards` points to the eye, z out of the slab.
 FarView farView(vec3 towards) {
     vec2 p = towards.xy / (abs(towards.x) + abs(towards.y) + max(towards.z, 0.0));
     vec2 at = (vec2(p.x + p.y, p.x - p.y) * 0.5 + 0.5) * float(kMesoFarViews - 1u), low = min(floor(at), float(kMesoFarViews - 2u)), w = at - low;
@@ -47,9 +48,9 @@ float farLight(mat3 frame, vec3 d, inout vec3 n) {
     // Spherical harmonics of l, in the order of the coefficients.
     float light = v.a.x * 0.282095 + 0.488603 * dot(v.a.yzw, l) + 1.092548 * dot(v.b.xyz, vec3(l.x * l.y, l.y * l.z, l.x * l.z)) + 0.315392 * v.b.w * (3.0 * l.z * l.z - 1.0) +
                   0.546274 * v.c.x * (l.x * l.x - l.y * l.y);
-    // No more light is seen than falls on the slab: what three bands miss where it is low would glow.
+    // No more light is seen than falls on the slab: where it is low, what three bands leave out would glow.
     if (view.far.z > 0.0) light = min(light, max(l.z, 0.0) / max(-dot(d, frame[2]), 1e-3));
-    // A unit normal sees more of the sky than many that differ.
+    // A unit normal sees more of the sky than the many normals that it stands for.
     vec3 mean = frame * v.c.yzw;
     n = normalize(mean);
     light = clamp(light - 0.5 * kMesoSky / kMesoSun * dot(n - mean, view.up.xyz), 0.0, 1.0);

@@ -11,7 +11,7 @@ struct Space {
     bool occupied;
     ivec3 further;
     float reach;
-    uint marks;  // of an occupied cell, which small cells the surface passes (meso::markSmallCells); 0: none
+    uint marks;  // which small cells of an occupied cell the surface passes (meso::markSmallCells); 0: not known
 };
 
 // coneOf (mesostructure/distance_map.h): signs and products, which no device may round further off than it says there.
@@ -27,7 +27,7 @@ int coneOf(vec3 d) {
     return elevation * meso.cones.x + azimuth;
 }
 
-// CompressedMap::lookUp.
+// Looks up a cell, as CompressedMap::lookUp does.
 Space lookUp(uint cone, ivec3 cell, inout uint fetches) {
     ivec3 at = ivec3(wrapped2(cell.xy, meso.cells.xy), cell.z), block = at / int(meso.levels[0].z >> 16);
     uint entry = uint(block.x + meso.top.x * (block.y + meso.top.y * block.z));
@@ -90,7 +90,7 @@ bool meetPatches(Walk w, float from, float to, inout MesoResult result) {
     return true;
 }
 
-// Heights of the bilinear cell at a texel, in 16-bit steps.
+// Returns the heights of the bilinear cell at a texel, in 16-bit steps.
 vec4 heightsAt(int x, int y) {
     ivec2 a = wrapped2(ivec2(x, y), meso.fine.xy), b = wrapped2(ivec2(x, y) + 1, meso.fine.xy);
     uint row0 = uint(meso.fine.x * a.y), row1 = uint(meso.fine.x * b.y);
@@ -99,7 +99,7 @@ vec4 heightsAt(int x, int y) {
 
 float signedShort(uint bits) { return float(int(bits << 16) >> 16); }
 
-// Samples at the corners of a field's cell, below and above.
+// Returns the samples at the corners of a field's cell, below and above.
 void fieldAt(ivec3 cell, out vec4 v0, out vec4 v1) {
     ivec2 a = wrapped2(cell.xy, meso.fine.xy), b = wrapped2(cell.xy + 1, meso.fine.xy);
     uvec4 at = uvec4(a.x + meso.fine.x * a.y, b.x + meso.fine.x * a.y, a.x + meso.fine.x * b.y, b.x + meso.fine.x * b.y);
@@ -110,7 +110,7 @@ void fieldAt(ivec3 cell, out vec4 v0, out vec4 v1) {
     }
 }
 
-// Of the methods that have samples and look at cells with surface only.
+// Serves the methods that have samples and look only at cells with surface.
 bool isSolidAt(vec3 p) {
     if (kSurface != kMesoHeights && kSurface != kMesoField) return false;
     vec3 at = p / meso.extent.xyz * vec3(meso.fine.xyz), w = fract(at);
@@ -153,14 +153,14 @@ CellHit solveField(Walk w, ivec3 at, vec3 o, vec3 d, float from, float to, bool 
     return found;
 }
 
-// The texels of a height map within a cell of the grid, from wall to wall.
+// Meets the texels of a height map within a cell of the grid, from wall to wall.
 bool meetHeights(Walk w, float from, float to, inout Side side, inout MesoResult result) {
     ivec3 ratio = ivec3(meso.ratio.xy, 1);
     vec3 scale = vec3(ratio), o = (walkAt(w, from) - vec3(w.cell)) * scale, d = w.d * scale;
     float span = to - from, s = 0.0;
     ivec3 at = clamp(ivec3(floor(o)), ivec3(0), ratio - 1);
     bvec3 still = bvec3(equal(w.sign.xy, ivec2(0)), true);
-    // At most the texels that a line crosses.
+    // A line crosses at most so many texels.
     for (int i = 0; i < ratio.x + ratio.y; i++) {
         vec3 walls = mix((vec3(at + ivec3(greaterThan(w.sign, ivec3(0)))) - o) / d, vec3(kFar), still);
         float first = min(walls.x, walls.y), end = max(s, min(first, span));
@@ -179,7 +179,8 @@ bool meetHeights(Walk w, float from, float to, inout Side side, inout MesoResult
     return false;
 }
 
-// The small cells of a field within a cell of the grid, from wall to wall; where marks say so, only those that the surface passes.
+// Meets the small cells of a field within a cell of the grid, from wall to wall; where marks say so, only those that
+// the surface passes.
 bool meetField(Walk w, float from, float to, uint marks, inout Side side, inout MesoResult result) {
     ivec3 ratio = meso.ratio.xyz;
     if (ratio != ivec3(2) || (marks & kSmallCells) == 0u) marks = 0u;
@@ -187,13 +188,13 @@ bool meetField(Walk w, float from, float to, uint marks, inout Side side, inout 
     float span = to - from, s = 0.0;
     ivec3 at = clamp(ivec3(floor(o)), ivec3(0), ratio - 1), forwards = ivec3(greaterThan(w.sign, ivec3(0)));
     bvec3 still = equal(w.sign, ivec3(0));
-    // At most the cells that a line crosses.
+    // A line crosses at most so many cells.
     int left = ratio.x + ratio.y + ratio.z;
     while (left > 0) {
         float end;
         bool passes = false;
         ivec3 small;
-        // As in marchGrid, all look, then all solve.
+        // As in marchGrid, all rays look first, then all solve.
         while (!passes && left > 0) {
             vec3 walls = mix((vec3(at + forwards) - o) / d, vec3(kFar), still);
             float first = min(walls.x, min(walls.y, walls.z));
@@ -231,7 +232,8 @@ void marchGrid(MesoRay ray, inout MesoResult result) {
     Walk w = startWalk(ray, meso.cells.xyz);
     int direction = kSkip == kMesoOccupancy ? 0 : kSkip == kMesoBoxes ? int(w.d.x < 0.0) | int(w.d.y < 0.0) << 1 | int(w.d.z < 0.0) << 2 : coneOf(w.d * meso.cell.xyz);
     Side side = Side(w.startsAtTop || ray.isOutside, !ray.isOutside);
-    // All rays of a group look for their next occupied cell, then all solve: solving is long work, and done for one ray at a time otherwise.
+    // All rays of a group look for their next occupied cell, then all solve: solving takes long, and would otherwise
+    // run for one ray at a time.
     while (true) {
         bool found = false;
         float exit = kFar;
@@ -309,7 +311,7 @@ float refineRelief(vec3 o, vec3 d, float low, float fLow, float high, float fHig
 
 bool isFinite(float x) { return !isnan(x) && !isinf(x); }
 
-// The listing, with depths from the top.
+// Refines as the listing prints it, with depths from the top.
 float refineAsPrinted(vec3 o, vec3 d, float low, float fLow, float high, float fHigh, inout MesoResult result) {
     float slope = -d.z, depth0 = 1.0 - o.z;
     float upperD = low, upperH = depth0 + slope * low + fLow, lowerD = high, lowerH = depth0 + slope * high + fHigh, best = upperH;
@@ -397,7 +399,7 @@ void marchPyramid(MesoRay ray, inout MesoResult result) {
         uvec4 maxima = meso.levels[level];
         ivec2 entry = home >> level;
         float most = float(fetchShort(maxima.x, uint(entry.y) * maxima.y + uint(entry.x))) * (1.0 / 65535.0);
-        // Where the ray leaves by the slab's bottom it is at 0, however that rounds: ground at 0 is a tie there.
+        // Where the ray leaves by the slab's bottom its height is 0, however that rounds: ground at 0 is a tie there.
         float atEnd = axisOut == 2 && end == exit ? float(w.sign.z > 0) : walkAt(w, end).z, lowest = min(walkAt(w, w.t).z, atEnd);
         bool isAbove = lowest > most && (outside || level > 0 || w.t > 0.0);
         if (!isAbove && level > 0) {
@@ -417,7 +419,7 @@ void marchPyramid(MesoRay ray, inout MesoResult result) {
     }
 }
 
-// Distances at the cells' centres, trilinear between them; z does not repeat.
+// Returns the distances at the cells' centres, trilinear between them; z does not repeat.
 void sphereCorners(vec3 p, out vec4 v0, out vec4 v1, out vec3 w) {
     vec3 at = p / meso.cell.xyz - 0.5, first = floor(at);
     w = at - first;

@@ -1,5 +1,6 @@
-// Marches a list of rays through one asset: what `vcp bench meso --device` times and the tests compare with the
-// reference. A ray is two texels, origin and tMax, direction and 1 where it starts on the slab's top; a result is eight words.
+// Marches a list of rays through one asset, which `vcp bench meso --device` times and the tests compare with the
+// reference. A ray is two texels: origin and tMax, direction and 1 where it starts on the slab's top; a result is eight
+// words.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/meso_bindings.glsl"

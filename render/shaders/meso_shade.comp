@@ -8,9 +8,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 
-const float kFarthest = 1e30;  // of what is hit
+const float kFarthest = 1e30;  // depth of the farthest hit
 
-// Blue through green to red.
+// Maps 0 to 1 from blue through green to red.
 vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
 void main() {

@@ -1,9 +1,9 @@
-// Where a ray first enters the solid inside one cell; the GLSL of mesostructure/cell_solve.h and of crossPatch
+// Finds where a ray first enters the solid inside one cell; the GLSL of mesostructure/cell_solve.h and of crossPatch
 // (mesostructure/patches.cpp).
 
 struct CellHit {
     bool hit;
-    float t;       // of the entry
+    float t;       // time of the entry
     bool outside;  // side at the end of the interval, when there was no hit
 };
 
@@ -90,7 +90,7 @@ Patch fetchPatch(uint i) {
 
 const float kOnPatch = 2e-4;
 
-// Below 0: none.
+// Returns the crossing; below 0: there is none.
 float crossPatch(Patch q, vec3 o, vec3 d, float span) {
     float a = q.abcd.x * d.x * d.x + q.abcd.y * d.y * d.y + q.abcd.z * d.z * d.z + q.abcd.w * d.x * d.y + q.efgh.x * d.y * d.z + q.efgh.y * d.z * d.x;
     float b = 2.0 * (q.abcd.x * o.x * d.x + q.abcd.y * o.y * d.y + q.abcd.z * o.z * d.z) + q.abcd.w * (o.x * d.y + o.y * d.x) +

@@ -1,4 +1,5 @@
-// Rays of a picture through the shell of one surface (mesostructure/shell.h), and shadow rays from what all surfaces left.
+// Casts a picture's rays through the shell of one surface (mesostructure/shell.h), and shadow rays from the hits on all
+// surfaces.
 // Reads and writes the hits: depth, normal, colour and light, iterations. A surface replaces what is farther.
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -21,24 +22,24 @@ const float kNoHit = 1e30;
 // pieces, and by kRounding of the products that a weight is the sum of: small pieces far from the origin lose more.
 const float kPieceSlack = 2e-5, kRounding = 4e-7;
 const uint kBaseFace = 16u;  // Shell::kBase
-// Nodes and pieces that a ray looks at, and iterations in all its pieces: then it is unresolved, with what it found. A ray along a base of
-// five million triangles, 1600 quads across, passes a tenth of that.
+// A ray looks at no more nodes and pieces, and makes no more iterations in all its pieces; then it is unresolved, with
+// what it found. A ray along a base of five million triangles, 1600 quads across, passes a tenth of that.
 const uint kMostVisits = 65536u;
-const float kLeastSlope = 1.0 / 16.0;  // of a ray to the slab: beyond, textures are not blurred further
+const float kLeastSlope = 1.0 / 16.0;  // least slope of a ray to the slab: below it, textures are not blurred further
 
 struct ShellHit {
     float t;        // along the ray; kNoHit
     vec3 normal;    // not unit
     uint iterations;
     bool unresolved;
-    int piece;      // its texel
-    bool far;       // not marched: normal and light are of the appearance
+    int piece;      // first texel of its piece
+    bool far;       // not marched: normal and light come from the appearance
 };
 
-// World units of a pixel's width along its ray: x + y * t.
+// A pixel's width in world units along its ray is x + y * t.
 vec2 pixelWidth;
 
-// A normal where the method gives none: of the nearest data, or of the voxel's face.
+// Gives a normal where the method has none: that of the nearest data, or of the voxel's face.
 vec3 fallbackNormal(vec3 p, vec3 d) {
     if (kWalk == kMesoRelief) {
         vec2 at = p.xy * float(meso.fine.x), i = floor(at), w = at - i;
@@ -51,7 +52,7 @@ vec3 fallbackNormal(vec3 p, vec3 d) {
         sphereCorners(p, v0, v1, w);
         return gradientTrilinear(v0, v1, w) / meso.cell.xyz;
     }
-    // The wall that the point is nearest to, of those that the ray may enter by.
+    // Takes the wall that the point is nearest to, among those that the ray may enter by.
     vec3 at = p * vec3(meso.cells.xyz) / meso.extent.xyz, off = abs(at - round(at));
     off = mix(off, vec3(1.0), equal(d, vec3(0.0)));
     float least = min(off.x, min(off.y, off.z));
@@ -78,7 +79,7 @@ bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, out Passag
     b.x = -b.y - b.z - b.w;
     vec3 size = abs(o) + abs(corner.xyz), lost = kRounding * vec3(dot(abs(r0), size), dot(abs(r1), size), dot(abs(r2), size));
     a += max(vec4(lost.x + lost.y + lost.z, lost), kPieceSlack);
-    // From the eye on: the piece may reach out of the box whose wall `o` is on.
+    // The passage begins at the eye at the earliest: the piece may reach out of the box whose wall `o` is on.
     passage = Passage(at, -start, tMax - start, -1, false);
     for (int i = 0; i < 4; i++) {
         float time = -a[i] / b[i];
@@ -129,7 +130,7 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
         float t = start + passage.enter + found.t / scale;
         if (found.state == kMesoHit && t < best.t) {
             vec3 n = found.normal != vec3(0.0) ? found.normal : fallbackNormal(ray.o + found.t * ray.d, ray.d);
-            // On a ridge, where rounding may choose the side that is turned away.
+            // On a ridge, rounding may have chosen the side that is turned away.
             if (ray.d.z < 0.0 && dot(n, ray.d) > 0.1 * length(n)) n = vec3(0.0, 0.0, 1.0);
             n = t0 * n.x + t1 * n.y + t2 * n.z;
             best = ShellHit(t, fromCut && found.t == 0.0 ? cut : n, best.iterations, best.unresolved, at, far);
@@ -155,13 +156,14 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     vec4 low, high;
     float start = boxEntry(0u, eye, inverse, tMax, low, high);
     if (start >= kNoHit) return best;
-    // From the shell's box on, where numbers are small.
+    // The ray starts at the shell's box, where numbers are small.
     vec3 o = eye + start * d;
     uint stack[32];
     stack[0] = 0u;
     int depth = 1;
     uint piece = 0u, left = 0u, visits = 0u;
-    // All rays of a group look for their next piece, then all march: a piece is long work, and done for one ray at a time otherwise.
+    // All rays of a group look for their next piece, then all march: a piece takes long, and would otherwise run for
+    // one ray at a time.
     while ((left > 0u || depth > 0) && visits < kMostVisits && best.iterations < kMostVisits) {
         Passage passage;
         bool passes = false;
@@ -183,7 +185,7 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
             uint child = uint(low.w);
             vec4 l, h;
             float e0 = boxEntry(child, o, inverse, best.t - start, l, h), e1 = boxEntry(child + 1u, o, inverse, best.t - start, l, h);
-            // The nearer one on top.
+            // The nearer child goes on top.
             uint swapped = e1 < e0 ? 1u : 0u;
             if (max(e0, e1) < kNoHit) stack[depth++] = child + 1u - swapped;
             if (min(e0, e1) < kNoHit) stack[depth++] = child + swapped;
@@ -191,19 +193,20 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
         if (passes) castPiece(passage, o, d, start, best);
         if (kShadow != 0u && best.t < tMax) return best;
     }
-    // Also where the device ends a long loop by itself, as software ones do.
+    // This also covers devices that end a long loop by themselves, as software ones do.
     if (left > 0u || depth > 0) best.unresolved = true;
     return best;
 }
 
-// The colour at a hit, encoded, and the part of the light that comes; bends its normal. `width`: of a pixel there, world units.
+// Returns the encoded colour at a hit, and the part of the light that reaches it; bends its normal. `width`: of a pixel
+// there, world units.
 vec4 lookAt(ShellHit hit, vec3 p, vec3 d, float width, inout vec3 n) {
     vec4 look = vec4(view.colour.xyz, 1.0);
     if (kTextures == 0u && !hit.far) return look;
     vec4 corner = texelFetch(inputTexels, hit.piece), q0 = texelFetch(inputTexels, hit.piece + 1), q1 = texelFetch(inputTexels, hit.piece + 2);
     mat3 gradients = mat3(texelFetch(inputTexels, hit.piece + 4).xyz, texelFetch(inputTexels, hit.piece + 5).xyz, texelFetch(inputTexels, hit.piece + 6).xyz);
     vec2 at = vec2(q0.w, q1.w) + ((p - corner.xyz) * gradients).xy;
-    // Along the slab, whatever stands on it.
+    // The footprint is measured along the slab, whatever stands on it.
     float slope = abs(dot(normalize(gradients[2]), d)), footprint = width * max(length(gradients[0]), length(gradients[1])) / max(slope, kLeastSlope);
     if (hit.far) {
         look.w = farLight(tileFrame(gradients), d, n);
@@ -226,7 +229,7 @@ void main() {
     pixelWidth = vec2(length(view.eyeX.xyz), length(view.forwardX.xyz) / length(towards));
     if (kShadow != 0u) {
         uint colour = hits[2u * plane + index];
-        // Only what is mesostructure, and not yet in the dark.
+        // Only mesostructure that is not yet in the dark casts a shadow ray.
         if (hits[plane + index] == 0u || colour >> 24 == 0u) return;
         vec3 n = unpackHitNormal(hits[plane + index]);
         if (dot(n, view.light.xyz) <= 0.0) return;
@@ -246,7 +249,7 @@ void main() {
     vec4 look = lookAt(hit, eye + hit.t * d, d, pixelWidth.x + pixelWidth.y * hit.t, n);
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;
     hits[index] = floatBitsToUint(hit.t);
-    // 0 says that a pixel has no mesostructure.
+    // 0 means that a pixel has no mesostructure.
     hits[plane + index] = max(packHitNormal(normalize(n)), 1u);
     hits[2u * plane + index] = packUnorm4x8(look);
 }

@@ -1,12 +1,12 @@
-// Textures over the tile (render/meso_texture.h), trilinear (Williams 1983). A texture is its first texel, width,
-// height, levels.
+// Textures over the tile (render/meso_texture.h), trilinear (Williams 1983). A texture is given by its first texel,
+// width, height, levels.
 
 vec4 textureTexel(uint first, ivec2 size, ivec2 at) {
     at = ivec2(at.x < 0 ? at.x + size.x : at.x >= size.x ? at.x - size.x : at.x, at.y < 0 ? at.y + size.y : at.y >= size.y ? at.y - size.y : at.y);
     return texelFetch(lookTexels, int(first) + at.x + size.x * at.y);
 }
 
-// `at`: parts of the tile, from 0 to 1.
+// `at`: place in the tile, from 0 to 1.
 vec4 textureLevel(uvec4 image, uint level, vec2 at) {
     uint first = image.x;
     for (uint i = 0u; i < level; i++) first += max(image.y >> i, 1u) * max(image.z >> i, 1u);
@@ -19,7 +19,7 @@ vec4 textureLevel(uvec4 image, uint level, vec2 at) {
     return mix(lower, upper, w.y);
 }
 
-// The mean over a square of the edge `footprint` about `at`, both in tile units.
+// Returns the mean over a square of edge `footprint` about `at`, both in tile units.
 vec4 sampleTexture(uvec4 image, vec2 at, float footprint) {
     vec2 texel = meso.extent.xy / vec2(image.yz), part = at / meso.extent.xy;
     float level = clamp(log2(max(footprint / min(texel.x, texel.y), 1.0)), 0.0, float(image.w - 1u));
@@ -29,17 +29,17 @@ vec4 sampleTexture(uvec4 image, vec2 at, float footprint) {
     return level > float(finer) ? mix(value, textureLevel(image, finer + 1u, part), level - float(finer)) : value;
 }
 
-// As it is shown (sRGB).
+// Encodes a linear colour as it is shown (sRGB).
 vec3 encodedColour(vec3 light) { return mix(1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, light * 12.92, lessThanEqual(light, vec3(0.0031308))); }
 
-// The tile's axes in the world, made orthonormal: z out of the slab, x and y along it.
+// Returns the tile's axes in the world, made orthonormal: z out of the slab, x and y along it.
 mat3 tileFrame(mat3 gradients) {
     vec3 z = normalize(gradients[2]), x = normalize(gradients[0] - dot(gradients[0], z) * z);
-    // Of a mirrored map y is on the other side.
+    // A mirrored map has y on the other side.
     return mat3(x, cross(z, x) * (determinant(gradients) < 0.0 ? -1.0 : 1.0), z);
 }
 
-// A normal of a texture (z: away from the surface) about the normal of what it lies on: turned as z is turned to that.
+// Turns a texture's normal `bend` (z: away from the surface) as z is turned to the normal of what it lies on.
 vec3 bentNormal(vec3 n, vec3 bend) {
     float a = -1.0 / max(1.0 + n.z, 0.05), b = n.x * n.y * a;
     return bend.x * vec3(1.0 + n.x * n.x * a, b, -n.x) + bend.y * vec3(b, 1.0 + n.y * n.y * a, -n.y) + bend.z * n;

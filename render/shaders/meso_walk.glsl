@@ -7,7 +7,8 @@ struct MesoRay {
     vec3 o, d;       // tile space, in the first tile; unit direction
     float tMax;      // tile units
     bool atTop;      // starts on the slab's top, or above it
-    bool isOutside;  // known to be outside the solid before the start, as a ray is that comes from another piece of a shell
+    bool isOutside;  // known to be outside the solid before the start, as a ray that comes from another piece of a
+                     // shell is
 };
 
 struct MesoResult {
@@ -24,7 +25,7 @@ struct Walk {
     bool startsAtTop;
 };
 
-// i modulo n, for n > 0.
+// Returns i modulo n, for n > 0.
 int wrapped(int i, int n) {
     int rest = i - n * int(floor((float(i) + 0.5) / float(n)));
     return rest < 0 ? rest + n : rest >= n ? rest - n : rest;
@@ -59,7 +60,7 @@ float walkEntry(Walk w) {
     return max(0.0, max(walls.x, max(walls.y, walls.z)));
 }
 
-// axisOut: -1 where the ray never leaves.
+// axisOut is -1 where the ray never leaves.
 float walkExit(Walk w, ivec3 further, out int axisOut) {
     ivec3 next = mix(w.cell - further, w.cell + further + 1, greaterThan(w.sign, ivec3(0)));
     vec3 walls = mix((vec3(next) - w.o) * w.inverse, vec3(kFar), equal(w.sign, ivec3(0)));
@@ -68,7 +69,7 @@ float walkExit(Walk w, ivec3 further, out int axisOut) {
     return first;
 }
 
-// Never backwards, and at most `further` cells.
+// Moves never backwards, and by at most `further` cells.
 ivec3 movedTo(Walk w, vec3 p, ivec3 further) {
     ivec3 target = ivec3(floor(p));
     ivec3 forwards = clamp(target, w.cell, w.cell + further), back = clamp(target, w.cell - further, w.cell);

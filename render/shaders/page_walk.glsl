@@ -1,6 +1,6 @@
-// Walking along a ray through one page, leaf by leaf. Page space: cells of the page's level, origin at its
-// lowest corner. Positions within are also kept as integers in eighths of a cell (the smallest leaf), so
-// that which node comes next across a face is never a matter of rounding.
+// Walks along a ray through one page, leaf by leaf. Page space: cells of the page's level, origin at its lowest corner.
+// Positions are also kept as integers in eighths of a cell (the smallest leaf), so that rounding never decides which
+// node comes next across a face.
 
 struct PageRay {
     vec3 start;      // where the ray enters the page or begins
@@ -73,7 +73,7 @@ void ascend(inout Descent at, ivec3 from, ivec3 to, uint rootGroup, int rootBits
     at.bits = lost ? rootBits : at.bits + max(up, 0);
 }
 
-// One of those that are true.
+// Keeps one of the components that are true.
 bvec3 oneOf(bvec3 b) { return bvec3(b.x, b.y && !b.x, b.z && !b.y && !b.x); }
 
 // Leaves the box lo..hi, which the ray is in, by the wall it meets first; by one wall where it meets several at once:
@@ -96,10 +96,10 @@ Place leaveBox(PageRay ray, Place from, vec3 lo, vec3 hi) {
     return to;
 }
 
-// The part of the ray inside a leaf. A function of ray, page and leaf alone: however the walk came here, the
-// same leaf gives the same answer; neighbours evaluate the same points at the wall between them. Only where
-// rounding has sent a ray along a wall to the wrong side of it does the leaf begin where the walk is (`tau`), not
-// where the ray crosses that wall, far ahead.
+// The part of the ray inside a leaf. It depends on ray, page and leaf only: however the walk came here, the same leaf
+// gives the same answer, and neighbours evaluate the same points at the wall between them. Only where rounding has sent
+// a ray along a wall to the wrong side of it does the leaf begin where the walk is (`tau`), not where the ray crosses
+// that wall, far ahead.
 struct LeafSegment {
     vec3 from, to;  // page space
     float tauFrom, tauTo;

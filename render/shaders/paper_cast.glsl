@@ -1,4 +1,4 @@
-// Casting a ray through a page of the method `paper` (octree/paper_page.h): the march of Demir and Westermann 2015, as
+// Casts a ray through a page of the method `paper` (octree/paper_page.h): the march of Demir and Westermann 2015, as
 // builder/paper/paper_octree.h does it on the CPU. Grid space: finest cells from the page's lowest corner.
 #define INLINE
 #define CONST_REF(T) T
@@ -7,10 +7,10 @@
 struct PaperHit {
     float depth;  // finest cells along the ray; kNoHit, kGaveUp
     vec3 normal;  // towards the ray's origin, not normalized
-    int level;    // of the leaf: 0 the finest cells
+    int level;    // level of the leaf: 0 is that of the finest cells
 };
 
-// Work of a ray; filled with kCountSteps only.
+// The work of a ray; counted with kCountSteps only.
 struct Work {
     uint steps, cells, fetches;
 };
@@ -21,8 +21,8 @@ struct PaperPage {
     uvec3 roots;
     ivec3 cells;
     uint packing;
-    float perDistance;  // cells a unit of an empty node
-    float perRoot;      // root of cells a unit of a packed length
+    float perDistance;  // cells per unit of an empty node's distance
+    float perRoot;      // root of cells per unit of a packed length
     bool isThere;
 };
 
@@ -101,7 +101,7 @@ LeafVectors fetchLeafVectors(PaperPage page, int word) {
     return corners;
 }
 
-// First hit between two distances along the ray.
+// Returns the first hit between two distances along the ray.
 PaperHit castPaper(Ray ray, PaperPage page, float from, float until, inout Work work) {
     PaperHit hit = PaperHit(kNoHit, -ray.direction, 0);
     int perCell = int(frame.lattice.x);
@@ -144,7 +144,8 @@ PaperHit castPaper(Ray ray, PaperPage page, float from, float until, inout Work 
         vec3 v = interpolateVectors(corners, size, (p - low) / size, kScheme);
         float d = isLeaf ? length(v) : float(at.word - kPaperEmpty) * page.perDistance;
         bool isHit = isLeaf && d < epsilon && !isBack;
-        // Of the point moved back to; before, the vector may point either way, or be too short to point anywhere.
+        // The vector is that of the point moved back to; before, it may point either way, or be too short to point
+        // anywhere.
         vec3 facing = dot(v, ray.direction) > 0.0 ? -v : v;
         if ((isHit || (isBack && isLeaf)) && d > 0.0) hit.normal = facing;
         if (isHit) {

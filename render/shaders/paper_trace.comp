@@ -1,4 +1,5 @@
-// First hits of pixels in a dataset of the method `paper`. Reads pool, table and tile list; writes what trace.comp does.
+// Finds first hits of pixels in a dataset of the method `paper`. Reads pool, table and tile list; writes what
+// trace.comp does.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -17,7 +18,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "render/shaders/paper_cast.glsl"
 
-// What a false colour shows, 0 to 1 (ShadingMode). Nothing is certified; levels are those of the leaves.
+// Returns what a false colour shows, 0 to 1 (ShadingMode). Nothing is certified; levels are those of the leaves.
 float falseColour(PaperHit hit, Work work, PaperPage page) {
     return frame.mode.w == kShadeSteps     ? float(work.steps) / kMostShownSteps
            : frame.mode.w == kShadeCells   ? float(work.cells) / kMostShownCells

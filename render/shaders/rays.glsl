@@ -21,20 +21,20 @@ Ray rayAt(vec2 point) {
     return ray;
 }
 
-// Lattice plane minus the ray's origin, in finest cells: one rounding of an exact difference.
+// Returns a lattice plane minus the ray's origin, in finest cells: one rounding of an exact difference.
 vec3 fromOrigin(Ray ray, ivec3 planes) {
     precise vec3 difference = vec3(planes - frame.originLattice.xyz) * frame.lattice.y - ray.origin;
     return difference;
 }
 
-// Distances to three lattice planes. Depends on nothing but the ray and the planes, so that all who ask get
+// Returns the distances to three lattice planes. They depend only on the ray and the planes, so that all callers get
 // the same answer.
 vec3 planeDistances(Ray ray, ivec3 planes) {
     precise vec3 distances = fromOrigin(ray, planes) * ray.inverse;
     return distances;
 }
 
-// The lattice point next to the ray's point at distance s.
+// Returns the lattice point next to the ray's point at distance s.
 ivec3 latticePoint(Ray ray, float s) {
     return frame.originLattice.xyz + ivec3(round((ray.origin + s * ray.direction) * frame.lattice.x));
 }

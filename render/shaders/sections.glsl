@@ -1,4 +1,4 @@
-// Section planes: of a ray, the interval that they leave.
+// Section planes: which interval of a ray they leave.
 
 struct Interval {
     float first, last;

@@ -1,5 +1,5 @@
-// Colours of hit pixels from their records. Reads tile list, tile starts and hits; writes those pixels of the picture,
-// which is the background before.
+// Colours the hit pixels from their records. Reads tile list, tile starts and hits; writes those pixels of the picture,
+// which holds the background before.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
@@ -9,10 +9,10 @@
 layout(constant_id = 6) const uint kLight = 0u;  // 1: the hits have a plane of light
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Blue through green to red.
+// Maps 0 to 1 from blue through green to red.
 vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
-// Light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
+// Returns the light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
 // colours come encoded, so that one power a pixel is enough.
 float encodedLight(vec3 n, float sunSeen, float skySeen) {
     float sun = max(dot(n, frame.lightDirection.xyz), 0.0);
@@ -21,8 +21,8 @@ float encodedLight(vec3 n, float sunSeen, float skySeen) {
     return pow(0.72 * sun * sunSeen * (0.5 + 0.5 * skySeen) + (0.10 + 0.18 * sky) * skySeen, 1.0 / 2.2);
 }
 
-// Sky seen, averaged over the pixels about that show the same surface: light.comp gives each pixel of a square of
-// 4 x 4 its own directions.
+// Returns how much sky is seen, averaged over the pixels around that show the same surface: light.comp gives each pixel
+// of a square of 4 x 4 its own directions.
 float skyAbout(uvec2 pixel, float depth, uint plane) {
     float reach = 8.0 * (frame.pixel.x + frame.pixel.y * depth);
     float sum = 0.0, count = 0.0;
@@ -38,7 +38,7 @@ float skyAbout(uvec2 pixel, float depth, uint plane) {
     return sum / max(count, 1.0);
 }
 
-// From the dataset's own axes.
+// Turns a normal from the dataset's own axes to the world's.
 vec3 worldNormal(vec3 n) {
     vec4 q = frame.rotation;
     return n + 2.0 * cross(q.xyz, cross(q.xyz, n) + q.w * n);

@@ -18,7 +18,7 @@ uint stripedIndex(uint i, uint count) {
     return i < run * stripes ? (i - stripe * run) * stripes + stripe : i;
 }
 
-// The invocation's tile of the list and its pixel; false where there is none.
+// Finds the invocation's tile of the list and its pixel; false where there is none.
 bool listedPixel(out uint tile, out uvec2 pixel) {
     uint index = gl_WorkGroupID.y * kTileRow + gl_WorkGroupID.x;
     uint count = fetchTileList(3u);

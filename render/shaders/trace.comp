@@ -1,6 +1,6 @@
-// First hit of every pixel's ray in the tiles that the beam pass left. Reads pool, table, tile starts and
-// list; writes depth, normal and, where asked for, colour and the value of a false colour of each pixel of
-// those tiles.
+// Finds the first hit of every pixel's ray in the tiles that the beam pass left. Reads pool, table, tile starts and
+// list; writes depth, normal and, where asked for, colour and the value of a false colour of each pixel of those
+// tiles.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -15,7 +15,7 @@ layout(constant_id = 6) const uint kSections = 0u;  // 0: none; 1: planes that c
 layout(local_size_x = 8, local_size_y = 8) in;
 
 const uint kMostCrossings = 64u;
-// Past a hit, in cells of its page: more than the walls of leaves bridge, less than what is thinnest.
+// A ray goes on so far past a hit, in cells of its page: more than leaf walls bridge, less than the thinnest parts.
 const float kPastHit = 0.15;
 
 // Whether a point in a section plane, the ray's origin, is inside of the solid: an odd number of walls lies
@@ -42,14 +42,14 @@ bool isInside(Ray ray, inout Work work) {
     return inside == 2u;
 }
 
-// The first hit of what the section planes leave, and the caps.
+// Finds the first hit in what the section planes leave, and on the caps.
 Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work work) {
     Ray rest = movedAlong(ray, kept.first);
     float last = kept.last - kept.first;
     Hit hit = castRay(rest, max(from - kept.first, 0.0), last, work);
     if (hit.depth > last) hit.depth = kNoHit;
     if (kSections == 2u) {
-        // What this loop does once a device that skips nothing skips where no ray enters through a plane.
+        // This loop runs once; a device that skips nothing skips it where no ray enters through a plane.
         bool entering = kept.first > 0.0 && kept.first < kept.last;
         while (entering) {
             onCap = isInside(rest, work);
@@ -61,7 +61,7 @@ Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work wor
     return hit;
 }
 
-// What a false colour shows of a hit, 0 to 1 (ShadingMode).
+// Returns what a false colour shows of a hit, 0 to 1 (ShadingMode).
 float falseColour(Hit hit, Work work) {
     int level = int(kLatticeBits) - hit.pageBits;
     float error = uintBitsToFloat(fetchTable(hit.record * kRecordTexels).x & kRecordErrorMask);

@@ -19,13 +19,13 @@ const uint kShadeLit = 0u;
 const uint kShadeClay = 1u;
 const uint kShadeNormals = 2u;
 const uint kShadeUnlit = 3u;
-// False colours, from here on.
+// The false colours begin here.
 const uint kShadeSteps = 4u;
 const uint kShadeCells = 5u;
 const uint kShadeFetches = 6u;
 const uint kShadeLevel = 7u;
 const uint kShadeError = 8u;
-// What false colours of work show as 1.
+// The counts of work that false colours show as 1.
 const float kMostShownSteps = 64.0f;
 const float kMostShownCells = 16.0f;
 const float kMostShownFetches = 128.0f;
@@ -47,7 +47,7 @@ struct FrameConstants {
     vec4 lightDirection;  // unit, world axes, towards the light
     vec4 upDirection;     // unit: where the hemisphere's light comes from
     vec4 clay;            // encoded for the screen
-    vec4 cap;             // of cut solids, encoded for the screen
+    vec4 cap;             // colour of cut solids, encoded for the screen
     // A pixel's edge in finest cells: x + y depth. z: how far occlusion reaches, finest cells. w: how far above
     // the surface rays of light begin, in pixels.
     vec4 pixel;
@@ -55,7 +55,7 @@ struct FrameConstants {
     uvec4 extra;
     vec4 march;     // x: of the method `paper`: epsilon, finest cells. y: world units a finest cell
     vec4 rotation;  // quaternion: world from the dataset's axes
-    // Kept is where dot(xyz, p) + w >= 0, p in finest cells relative to originLattice.
+    // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];
 };
 
@@ -73,12 +73,12 @@ const uint kRecordErrorMask = 0xffff0000u;
 // The list of tiles to trace. Three words of an indirect dispatch, the count, then each tile's place: x + 2^16 y.
 const uint kTileListHeader = 4u;
 
-// Start distance of a tile in which no ray can hit.
+// The start distance of a tile in which no ray can hit.
 const float kTileEmpty = 3e38f;
 
-// Depth of a pixel whose ray hits nothing.
+// The depth of a pixel whose ray hits nothing.
 const float kNoHit = 3e38f;
-// Of one whose ray gave up.
+// The depth of a pixel whose ray gave up.
 const float kGaveUp = 3.1e38f;
 
 // Feedback: a ray for each of 24 x 16 parts of the picture. Its buffer has four words a ray (lattice point of the

@@ -5,18 +5,18 @@
 const uint kMesoMaxLevels = 14u;
 const uint kMesoMostBorders = 32u;
 
-// Specialization constants, in the order of their ids.
+// The values of the specialization constants, in the order of their ids.
 const uint kMesoGrid = 0u, kMesoRelief = 1u, kMesoPyramid = 2u, kMesoSphere = 3u;            // kWalk
 const uint kMesoOccupancy = 0u, kMesoDistances = 1u, kMesoCompressed = 2u, kMesoBoxes = 3u;  // kSkip
 const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u;            // kSurface
 const uint kMesoUnrefined = 0u, kMesoBinary = 1u, kMesoSecant = 2u, kMesoAsPrinted = 3u,
            kMesoIllinois = 4u;  // kRefinement
 
-const uint kMesoColours = 1u, kMesoNormals = 2u;  // of kTextures, which is their sum
+const uint kMesoColours = 1u, kMesoNormals = 2u;  // bits of kTextures, which is their sum
 
-const uint kMesoFarViews = 8u, kMesoFarTexels = 6u;  // as meso::Appearance has them
+const uint kMesoFarViews = 8u, kMesoFarTexels = 6u;  // those of meso::Appearance
 
-// Parts of the light: of the sun by n . l, of the sky by how far n points up, of everywhere.
+// The parts of the light: of the sun by n . l, of the sky by how far n points up, and from everywhere.
 const float kMesoSun = 0.72f, kMesoSky = 0.18f, kMesoAmbient = 0.10f;
 
 const uint kMesoHit = 0u, kMesoMiss = 1u, kMesoUnresolved = 2u;
@@ -36,7 +36,7 @@ struct MesoRecord {
     vec4 borders[kMesoMostBorders];  // of cones: azimuth x y, elevation x y (meso::ConeBorders)
 };
 
-// What pictures show.
+// What the pictures show.
 const uint kMesoShowLit = 0u, kMesoShowHeat = 1u, kMesoShowNormals = 2u, kMesoShowUnlit = 3u;
 
 // A picture of one surface, in the space of its shell. Hits of a pixel: the depth along the unit ray, the packed

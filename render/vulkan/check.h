@@ -1,4 +1,4 @@
-// Vulkan results as errors; in release builds too.
+// Turns Vulkan results into errors; in release builds too.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace vcp {
 
-/// What a VkResult means, for a person.
+/// Says what a VkResult means, for a person.
 const char* vulkanResultText(VkResult result);
 
-/// "vkQueueSubmit: device lost".
+/// Makes an error such as "vkQueueSubmit: device lost".
 Error vulkanError(const char* call, VkResult result);
 
 }  // namespace vcp

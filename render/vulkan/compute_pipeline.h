@@ -29,13 +29,13 @@ private:
     VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
 
-/// What was copied or filled is seen by shaders and copies.
+/// Makes what was copied or filled visible to shaders and copies.
 void barrierTransferToAll(VkCommandBuffer commands);
-/// What compute shaders wrote is seen by compute shaders and indirect dispatches.
+/// Makes what compute shaders wrote visible to compute shaders and indirect dispatches.
 void barrierComputeToCompute(VkCommandBuffer commands);
-/// What compute shaders wrote is seen by copies and the CPU.
+/// Makes what compute shaders wrote visible to copies and the CPU.
 void barrierComputeToReadback(VkCommandBuffer commands);
-/// What was copied is seen by the CPU.
+/// Makes what was copied visible to the CPU.
 void barrierTransferToHost(VkCommandBuffer commands);
 
 }  // namespace vcp

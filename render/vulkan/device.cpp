@@ -108,8 +108,8 @@ void Device::useFamily(uint32_t index, const VkQueueFamilyProperties& family) {
 
 Result<void> Device::chooseQueue(VkSurfaceKHR surface, bool forWindows) {
     const auto families = queueFamilies();
-    // Pictures are scaled to windows and to the host's images on queues with graphics: these are the first choice
-    // anyhow.
+    // Pictures are scaled to windows and to the host's images on queues with graphics, so these are tried
+    // first.
     for (const bool graphics : {true, false}) {
         for (uint32_t i = 0; i < families.size(); ++i) {
             const VkQueueFlags wanted = graphics ? VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT : VK_QUEUE_COMPUTE_BIT;
@@ -132,7 +132,7 @@ bool Device::shows(VkSurfaceKHR surface) const {
            shows == VK_TRUE;
 }
 
-/// One that does nothing but copy, beside the processors: a discrete GPU's.
+/// Chooses a family that can only copy and runs beside the processors, as discrete GPUs have.
 void Device::chooseCopyFamily() {
     const auto families = queueFamilies();
     for (uint32_t i = 0; i < families.size() && !copyFamily_; ++i)
@@ -216,7 +216,7 @@ Result<uint32_t> Device::memoryType(uint32_t allowed, MemoryUse use) const {
     constexpr VkMemoryPropertyFlags kMapped =
         VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
-    // Local memory is mapped only where it is all one memory: a discrete device's mapped window is small.
+    // Local memory is mapped only on unified memory: a discrete device's mapped window is small.
     const bool unified = (info_.software || info_.type == "integrated") && !faults_.separateMemory;
     std::vector<VkMemoryPropertyFlags> wishes;
     if (use == MemoryUse::Local)
@@ -242,7 +242,7 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
     info.size = made.bytes_;
     info.usage = usage;
-    // Both queues see it: between them, bytes need no change of owner.
+    // The buffer is shared by both queues, so that bytes need no change of owner between them.
     const std::array families{family_, copyFamily_.value_or(family_)};
     if (families[0] != families[1]) {
         info.sharingMode = VK_SHARING_MODE_CONCURRENT;
@@ -345,7 +345,7 @@ Result<void> Device::beginCopies() {
 
 Result<void> Device::endCopies() {
     VCP_VK(vkEndCommandBuffer, copyCommands_);
-    // Of copies before, for which nothing has waited yet, these inherit the signal.
+    // Earlier copies that nothing has waited for yet: this signal covers them too.
     const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_TRANSFER_BIT;
     VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
     submit.waitSemaphoreCount = copiesAwaited_ ? 1 : 0;

@@ -1,4 +1,4 @@
-// A logical device with one queue, and one of its own for copies where it has such; its buffers and commands.
+// A logical device with one queue, and one only for copies where it has such; its buffers and commands.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ public:
 
     [[nodiscard]] VkBuffer handle() const { return buffer_; }
     [[nodiscard]] uint64_t bytes() const { return bytes_; }
-    /// Mapped memory, or null where the CPU cannot see it.
+    /// Returns the mapped memory, or null where the CPU cannot see it.
     [[nodiscard]] std::byte* mapped() const { return mapped_; }
 
 private:
@@ -41,7 +41,7 @@ private:
     VkDeviceMemory memory_ = VK_NULL_HANDLE;
     std::byte* mapped_ = nullptr;
     uint64_t bytes_ = 0;
-    uint64_t* account_ = nullptr;  // of the device: bytes allocated
+    uint64_t* account_ = nullptr;  // the device's count of allocated bytes
 };
 
 /// A view of a buffer as texels. Move-only.
@@ -77,7 +77,7 @@ public:
     static Result<std::unique_ptr<Device>> create(const Instance& instance, const std::string& choice,
                                                   VkSurfaceKHR surface, bool forWindows,
                                                   const DeviceFaults& faults = {});
-    /// The host's device, which it keeps. Errors: Usage (something is missing), Device (too old, no such queue).
+    /// Wraps the host's device, not owned. Errors: Usage (something is missing), Device (too old, no such queue).
     static Result<std::unique_ptr<Device>> borrow(const HostDevice& host, const DeviceFaults& faults = {});
     ~Device();
     Device(const Device&) = delete;
@@ -92,26 +92,26 @@ public:
     [[nodiscard]] bool hasGraphics() const { return hasGraphics_; }
     [[nodiscard]] const DeviceInfo& info() const { return info_; }
     [[nodiscard]] const VkPhysicalDeviceLimits& limits() const { return limits_; }
-    /// Nanoseconds a timestamp step, 0 where the queue has no timestamps.
+    /// Nanoseconds of a timestamp step, 0 where the queue has no timestamps.
     [[nodiscard]] double timestampNanoseconds() const { return timestampNanoseconds_; }
 
-    /// Submissions, and how often the CPU waited for one, since create().
+    /// Counts submissions, and how often the CPU waited for one, since create().
     [[nodiscard]] DeviceWork work() const { return {submissions_, waits_}; }
 
     /// Whether the queue can show pictures in this window.
     [[nodiscard]] bool shows(VkSurfaceKHR surface) const;
-    /// Whether the device was lost: nothing works any more but destroying it.
+    /// Whether the device was lost: then nothing works any more but destroying it.
     [[nodiscard]] bool isLost() const { return lost_; }
-    /// Whether a buffer could not be had for want of memory since this was asked last.
+    /// Whether memory for a buffer was lacking since the last call.
     [[nodiscard]] bool takeOutOfMemory() const { return std::exchange(outOfMemory_, false); }
 
-    /// Errors: Device (out of memory).
+    /// Makes a buffer. Errors: Device (out of memory).
     Result<Buffer> createBuffer(uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
-    /// A memory type among the bits `allowed`. Errors: Device.
+    /// Returns a memory type among the bits `allowed`. Errors: Device.
     Result<uint32_t> memoryType(uint32_t allowed, MemoryUse use) const;
     Result<TexelView> createTexelView(const Buffer& buffer, VkFormat format, uint64_t bytes) const;
 
-    /// Records nothing itself: hands `record` a command buffer, submits it and waits until it is done.
+    /// Hands `record` a command buffer, submits it and waits until it is done.
     template <class Record>
     Result<void> submitAndWait(Record record) {
         auto commands = beginCommands();
@@ -120,11 +120,12 @@ public:
         return endCommandsAndWait();
     }
     Result<VkCommandBuffer> beginCommands();
-    /// With semaphores: waits for `wait` before transfers, signals `signal`.
+    /// With semaphores, transfers wait for `wait`, and `signal` is signalled.
     Result<void> endCommandsAndWait(VkSemaphore wait = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
 
-    /// Copies between buffers, done before anything that is submitted after them. On a queue of their own they run
-    /// beside what the CPU does next, and waitForCopies() waits for them; elsewhere they are done on return.
+    /// Copies between buffers; the copies are done before anything that is submitted after them. On a queue of their
+    /// own they run beside what the CPU does next, and waitForCopies() waits for them; elsewhere they are done on
+    /// return.
     template <class Record>
     Result<void> submitCopies(Record record) {
         if (copyQueue_ == VK_NULL_HANDLE) return submitAndWait(record);
@@ -161,9 +162,9 @@ private:
     VkQueue copyQueue_ = VK_NULL_HANDLE;  // null: copies go to queue_
     VkCommandPool copyPool_ = VK_NULL_HANDLE;
     VkCommandBuffer copyCommands_ = VK_NULL_HANDLE;
-    VkFence copyFence_ = VK_NULL_HANDLE;              // of the copies that run
+    VkFence copyFence_ = VK_NULL_HANDLE;              // signalled when the running copies are done
     VkSemaphore copiesDone_ = VK_NULL_HANDLE;         // signalled by copies, waited for by what is submitted next
-    bool copiesRun_ = false, copiesAwaited_ = false;  // since when nobody has waited: the fence, the semaphore
+    bool copiesRun_ = false, copiesAwaited_ = false;  // the fence, the semaphore: nothing has waited for it since
     std::optional<uint32_t> copyFamily_;
     double timestampNanoseconds_ = 0;
     DeviceInfo info_;

@@ -13,7 +13,7 @@
 
 namespace vcp {
 
-/// Warnings and errors of the validation layers. Any thread may add; a spin lock, for there are few or none.
+/// Collects warnings and errors of the validation layers. Any thread may add; a spin lock, for there are few or none.
 class ValidationLog {
 public:
     void add(std::string message);
@@ -26,9 +26,9 @@ private:
 
 class Instance {
 public:
-    /// Vulkan 1.2. With `validation`: core and synchronization checks into log(). Errors: Device.
+    /// Makes an instance of Vulkan 1.2. With `validation`: core and synchronization checks into log(). Errors: Device.
     static Result<std::unique_ptr<Instance>> create(bool validation, const std::vector<std::string>& extensions);
-    /// The host's instance, which it keeps.
+    /// Wraps the host's instance, which the host keeps.
     static std::unique_ptr<Instance> borrow(VkInstance instance);
     ~Instance();
     Instance(const Instance&) = delete;
@@ -50,9 +50,9 @@ private:
 
 DeviceInfo describeDevice(VkPhysicalDevice device, uint32_t index);
 
-/// Index of the device that `choice` means among `devices` (pure; see RendererOptions::device). An empty
-/// choice takes the usable device of the best type: discrete, integrated, virtual, other, cpu; the first
-/// of equals. Errors: Device, naming what there is.
+/// Returns the index of the device that `choice` means among `devices` (pure; see RendererOptions::device). An empty
+/// choice takes the usable device of the best type: discrete, integrated, virtual, other, cpu; among equals the first.
+/// Errors: Device, naming the devices there are.
 Result<uint32_t> chooseDevice(const std::vector<DeviceInfo>& devices, const std::string& choice);
 
 }  // namespace vcp

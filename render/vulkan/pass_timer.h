@@ -1,4 +1,4 @@
-// Clock readings of the queue between passes.
+// Reads the queue's clock between passes.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@ namespace vcp {
 
 class PassTimer {
 public:
-    /// `marks`: readings a recording. Without a clock on the queue nothing is made and all times are 0. Errors: Device.
+    /// `marks`: readings of a recording. Without a clock on the queue nothing is made, times are 0. Errors: Device.
     static Result<PassTimer> create(const Device& device, uint32_t marks);
     PassTimer() = default;
     PassTimer(PassTimer&& other) noexcept { *this = std::move(other); }
@@ -18,11 +18,11 @@ public:
     ~PassTimer();
 
     [[nodiscard]] bool hasClock() const { return pool_ != VK_NULL_HANDLE; }
-    /// Before the first mark of a recording.
+    /// Records the reset, before the first mark of a recording.
     void reset(VkCommandBuffer commands) const;
-    /// When all before it is done.
+    /// Records a reading of the clock when all before it is done.
     void mark(VkCommandBuffer commands, uint32_t i) const;
-    /// Milliseconds between consecutive marks. Precondition: what was recorded is done. Errors: Device.
+    /// Returns the milliseconds between consecutive marks. Precondition: what was recorded is done. Errors: Device.
     [[nodiscard]] Result<std::vector<double>> read() const;
 
 private:

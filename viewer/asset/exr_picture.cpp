@@ -33,15 +33,15 @@ Error wrong(ErrorCode code, std::string message) { return {.code = code, .messag
 
 constexpr uint32_t kDeep = 0x800, kSeveralParts = 0x1000;
 constexpr size_t kMostAttributes = 4096, kMostChannels = 64;
-/// The library holds a chunk of all channels, and a row of tiles: they have at most this, or so many times the picture.
+/// Buffers for a chunk of all channels, or a row of tiles, which the library holds: at most this, or so many pictures.
 constexpr uint64_t kBufferBytes = uint64_t{64} << 20, kBufferPictures = 4;
-/// A chunk has its place in a table, and names its lines and its size.
+/// Each chunk has an entry in a table, and names its lines and its size.
 constexpr uint64_t kLeastChunkBytes = 16;
-/// How many bytes of texels a byte of the file may stand for: deflate's most is 1032, of two bytes out of four. Flat
-/// DWA has more.
+/// How many bytes of texels a byte of the file may stand for: deflate reaches 1032 at most, of two bytes out of four.
+/// Flat DWA has more.
 constexpr uint64_t kMostExpansion = 4096, kMostDwaExpansion = 65536;
 constexpr uint8_t kDwaa = 8;
-/// Of every compression by its number.
+/// Lines of a chunk for each compression, by its number.
 constexpr std::array<uint32_t, 10> kLinesOfChunk = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 
 Error damaged(std::string detail) {
@@ -66,7 +66,7 @@ constexpr Known kKnown[] = {
     {"displayWindow", "box2i", 16},   {"lineOrder", "lineOrder", 1},     {"pixelAspectRatio", "float", 4},
     {"screenWindowCenter", "v2f", 8}, {"screenWindowWidth", "float", 4}, {"tiles", "tiledesc", 9}};
 
-/// The number of names, with 16 bytes each, before an empty one; nothing where that is not all that there is.
+/// Counts the names, with 16 bytes each, before an empty one; nothing where the list has anything else.
 std::optional<size_t> countChannels(std::span<const std::byte> list) {
     for (size_t count = 0; !list.empty(); ++count) {
         const auto end = std::find(list.begin(), list.end(), std::byte{0});
@@ -78,8 +78,8 @@ std::optional<size_t> countChannels(std::span<const std::byte> list) {
     return std::nullopt;
 }
 
-/// What a header says, read before the library allocates by it. Attributes that the library does not need get a type
-/// that it does not know, so that it passes over as many bytes as they say.
+/// Reads a header before the library allocates by it. Attributes that the library does not need get a type that it does
+/// not know, so that it skips as many bytes as they say.
 class HeaderWalk {
 public:
     explicit HeaderWalk(std::span<const std::byte> file) : file_(file) {}
@@ -121,7 +121,7 @@ private:
         at_ += bytes;
         return true;
     }
-    /// Up to a zero byte; names have 255 letters at most.
+    /// Returns a word up to a zero byte; names have 255 letters at most.
     std::optional<std::string_view> word() {
         const auto rest = file_.subspan(at_, std::min<size_t>(256, file_.size() - at_));
         const auto end = std::find(rest.begin(), rest.end(), std::byte{0});
@@ -130,7 +130,7 @@ private:
         return std::string_view(reinterpret_cast<const char*>(rest.data()), size_t(end - rest.begin()));
     }
     Result<void> attribute(const Known& known, std::span<const std::byte> value) {
-        // The library joins lists of channels, and takes the last of what comes twice.
+        // The library joins lists of channels, and takes the last of attributes that come twice.
         if (std::ranges::find(seen_, known.name) != seen_.end())
             return damaged(fmt::format("it has {} twice", known.name));
         seen_.push_back(known.name);
@@ -203,12 +203,12 @@ private:
 
     std::span<const std::byte> file_;
     std::vector<std::byte> header_;
-    std::vector<std::pair<size_t, size_t>> masked_;  ///< types: first byte, bytes
+    std::vector<std::pair<size_t, size_t>> masked_;  ///< types that are masked: first byte, bytes
     size_t at_ = 0;
     std::array<int32_t, 4> window_{};
     std::array<uint32_t, 2> tile_{};
     std::vector<std::string_view> seen_;
-    uint64_t texelBytes_ = sizeof(float);  ///< of all channels, as floats
+    uint64_t texelBytes_ = sizeof(float);  ///< bytes of a texel in all channels, as floats
     uint8_t compression_ = 0;
     bool hasWindow_ = false, hasTiles_ = false;
 };
@@ -236,7 +236,7 @@ private:
     uint64_t at_ = 0;
 };
 
-/// The channels whose mean is the height; empty: none that says so.
+/// Returns the channels whose mean is the height; empty where none can be it.
 std::vector<std::string> channelsOf(const Imf::ChannelList& list) {
     if (list.findChannel("Y") != nullptr) return {"Y"};
     std::vector<std::string> found;
@@ -247,7 +247,7 @@ std::vector<std::string> channelsOf(const Imf::ChannelList& list) {
     return found.size() == 1 ? found : std::vector<std::string>{};
 }
 
-/// Throws what the library throws.
+/// Decodes the picture; throws what the library throws.
 Result<FloatPicture> decoded(std::span<const std::byte> file, std::span<const std::byte> header, glm::ivec2 size) {
     MemoryStream stream(file, header);
     Imf::InputFile input(stream, 0);

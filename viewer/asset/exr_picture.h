@@ -1,4 +1,4 @@
-// EXR pictures of one value a texel: what height maps of floats come in.
+// Reads EXR pictures of one value a texel, in which height maps of floats are stored.
 #pragma once
 
 #include <cstddef>

@@ -47,7 +47,7 @@ void readBytes(png_structp png, png_bytep to, size_t count) {
     bytes->left.remove_prefix(count);
 }
 
-/// Size and form; rows become 8 or 16 bits a channel, without alpha.
+/// Reads size and form; rows become 8 or 16 bits a channel, without alpha.
 bool readStart(PngReader& reader) {
     if (setjmp(png_jmpbuf(reader.png))) return false;
     png_set_read_fn(reader.png, &reader.bytes, readBytes);
@@ -87,7 +87,8 @@ Result<meso::HeightMap> exrHeights(std::span<const std::byte> file, double range
     return heightsOf(*picture, range);
 }
 
-/// The bytes may be hostile. Errors, without file: as checkPng(), InvalidInput (damaged), Limit (above `kMaxGridEdge`).
+/// Decodes a PNG, which may be hostile. Errors, without file: as checkPng(), InvalidInput (damaged), Limit (above
+/// `kMaxGridEdge`).
 Result<meso::HeightMap> pngHeights(std::string_view file, double range) {
     const auto chunks = checkPng(file);
     if (!chunks) return chunks.error();

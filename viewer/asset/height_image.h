@@ -15,11 +15,11 @@ namespace vcp {
 /// texels), Unsupported (kinds of EXR).
 Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double range);
 
-/// decodeHeights() of a file of at most 512 MiB. Errors: Io, and those, all with the file's name.
+/// Does decodeHeights() of a file of at most 512 MiB. Errors: Io, and those, all with the file's name.
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range);
 
-/// Values of any size: the least lies on the slab's bottom, the greatest `range` above it, in steps of 1/65535; where
-/// all are the same, all lie on the bottom.
+/// Makes heights of values of any size: the least lies on the slab's bottom, the greatest `range` above it, in steps of
+/// 1/65535; where all are the same, all lie on the bottom.
 meso::HeightMap heightsOf(const FloatPicture& picture, double range);
 
 }  // namespace vcp

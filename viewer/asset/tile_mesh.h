@@ -13,8 +13,8 @@ namespace vcp {
 
 struct TileMeshOptions {
     char up = 'z';  ///< the mesh's axis that points out of the base surface
-    /// After how much the mesh repeats along the tile's x and y, in the mesh's units; without one, the mesh stands
-    /// alone in the middle of a square tile, nine tenths of it wide.
+    /// The length after which the mesh repeats along the tile's x and y, in the mesh's units; without it, the mesh
+    /// stands alone in the middle of a square tile, nine tenths of it wide.
     std::optional<glm::dvec2> period;
 };
 

@@ -22,10 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Mesh, Embree's tree and the oracle's, with what they need while they are built.
+// Bytes for the mesh, Embree's tree and the oracle's, with what they need while they are built.
 constexpr uint64_t kJudgeBytesPerTriangle = 400;
 
-/// Says what is being done and the fraction of this model; an error when the caller wants to stop.
+/// Reports what is being done and the fraction of this model; returns an error when the caller wants to stop.
 using Report = std::function<Result<void>(const std::string&, double)>;
 
 /// A mesh to build, and where its datasets go.
@@ -40,7 +40,7 @@ struct Variant {
     fs::path file;
 };
 
-/// What a child hands back as it lies in memory: parent and child are the same program.
+/// Passes a value from child to parent as it lies in memory: both are the same program.
 template <class T>
 std::string bytesOf(const T& value) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -110,7 +110,7 @@ Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject,
     return {};
 }
 
-/// In a child: the distance between a dataset and the mesh that it was built from.
+/// Runs in a child: measures the distance between a dataset and the mesh that it was built from.
 Result<SurfaceDistance> distanceOf(const fs::path& file, const MeshBvh& mesh, const BenchBuildOptions& options,
                                    const std::function<bool(double)>& progress) {
     auto cache = PageCache::open(file);
@@ -123,7 +123,7 @@ Result<SurfaceDistance> distanceOf(const fs::path& file, const MeshBvh& mesh, co
     return measureSurfaceDistance(*cache, mesh, measuring);
 }
 
-/// In a child: the median time of Embree's tree (0 without Embree), then a SurfaceDistance for each file.
+/// Runs in a child: returns the median time of Embree's tree (0 without Embree), then a SurfaceDistance for each file.
 Result<std::string> judge(const BenchBuildOptions& options, const fs::path& model, const std::vector<fs::path>& files,
                           const ChildProgress& progress) {
     const auto cancelled = [] { return Error{ErrorCode::Cancelled, "cancelled"}; };
@@ -152,7 +152,7 @@ Result<std::string> judge(const BenchBuildOptions& options, const fs::path& mode
     return value;
 }
 
-/// Embree's time and the distances, into the rows.
+/// Writes Embree's time and the distances into the rows.
 Result<void> judgeVariants(const BenchBuildOptions& options, const Subject& subject, std::vector<Variant>& variants,
                            const Report& report) {
     if (variants.front().row.triangles * kJudgeBytesPerTriangle > defaultMemoryBytes()) return {};
@@ -174,7 +174,7 @@ Result<void> judgeVariants(const BenchBuildOptions& options, const Subject& subj
     return {};
 }
 
-/// The default first: its cell is that of the others, which differ in the tolerance alone.
+/// Measures the default first: its cell is that of the others, which differ only in the tolerance.
 Result<std::vector<BenchBuildRow>> measure(const BenchBuildOptions& options, const Subject& subject,
                                            const Report& report) {
     std::vector<double> errors = {0};

@@ -19,13 +19,13 @@ struct BenchBuildOptions {
     std::vector<std::filesystem::path> models;
     std::vector<uint64_t> generated;  ///< scans of so many triangles beside the models, made by `makeScan`
     std::vector<double> errors;       ///< tolerances in cells; each model is built with each, beside the default
-    int repetitions = 3;              ///< of build and of Embree; the medians count
+    int repetitions = 3;              ///< repetitions of build and of Embree; the medians count
     unsigned threads = 0;             ///< 0: one a processor
     uint64_t memoryBytes = 0;         ///< as for vcp build
     std::filesystem::path temp;       ///< as for vcp build; generated scans lie here too
     std::filesystem::path out;        ///< .vcp files are left here; empty: a temporary folder
     double cell = 0;                  ///< as for vcp build
-    uint64_t samples = 50'000;        ///< of the distance between a model and its surface; 0: not measured
+    uint64_t samples = 50'000;        ///< samples of the distance between a model and its surface; 0: not measured
     std::filesystem::path makeScan;   ///< the program make_scan
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -37,37 +37,37 @@ struct BenchBuildRow {
     uint64_t triangles = 0;
     double seconds = 0;  ///< mesh file to .vcp file
     double trianglesPerSecond = 0;
-    uint64_t peakRssBytes = 0;  ///< of the process that builds, largest of the repetitions
+    uint64_t peakRssBytes = 0;  ///< largest peak over the repetitions, of the process that builds
     uint64_t fileBytes = 0;
     double embreeBvhSeconds = 0;  ///< the mesh in memory to its tree, without reading; 0 where it was not measured
     double ratioToEmbree = 0;     ///< embreeBvhSeconds / seconds
-    double cpuSeconds = 0;        ///< of all threads, user and system
+    double cpuSeconds = 0;        ///< user and system time of all threads
     uint64_t memoryBytes = 0;     ///< the cap; 0: the default
     uint64_t tempBytes = 0;
-    uint64_t leaves = 0, hardLeaves = 0;      ///< of the finest level
+    uint64_t leaves = 0, hardLeaves = 0;      ///< leaves of the finest level
     double cell = 0;                          ///< world units
-    double errorCells = 0;                    ///< tolerated, in cells
-    double certifiedCells = 0;                ///< certified, in cells
+    double errorCells = 0;                    ///< tolerated error in cells
+    double certifiedCells = 0;                ///< certified error in cells
     std::optional<SurfaceDistance> distance;  ///< measured; world units
 
     [[nodiscard]] double bytesPerTriangle() const {
         return static_cast<double>(fileBytes) / static_cast<double>(triangles > 0 ? triangles : 1);
     }
-    /// The larger of the two directions, in cells. `distance` must be there.
+    /// Returns the larger of the two directions, in cells. Precondition: `distance` is there.
     [[nodiscard]] Quantiles distanceCells() const;
 };
 
 struct BenchBuildReport {
     std::vector<BenchBuildRow> rows;
-    std::vector<Error> failures;  ///< of models that have no rows; the others were measured nevertheless
+    std::vector<Error> failures;  ///< errors of models that have no rows; the others were measured nevertheless
 };
 
-/// "1M", "250k", "1234567": a scan of so many triangles.
+/// Returns "1M", "250k" or "1234567" for a scan of so many triangles.
 std::string scanSizeName(uint64_t triangles);
 
-/// Blocks; no other thread of this process may run. Embree and the distance are left out where the mesh would not
-/// fit half of the memory. What loadMesh, buildOctree and make_scan report, or Limit (a child was killed), becomes a
-/// failure. Errors: Usage (nothing to measure), Io (the folder cannot be made), Cancelled.
+/// Runs the benchmark. Blocks; no other thread of this process may run. Embree and the distance are left out where the
+/// mesh would not fit half of the memory. Errors of loadMesh, buildOctree and make_scan, or Limit (a child was killed),
+/// become a failure. Errors: Usage (nothing to measure), Io (the folder cannot be made), Cancelled.
 Result<BenchBuildReport> benchBuild(const BenchBuildOptions& options);
 
 /// The report as one JSON object {"rows": [...]}, as CSV with a header line, and as a Markdown table.
@@ -75,8 +75,8 @@ std::string benchBuildJson(const BenchBuildReport& report);
 std::string benchBuildCsv(const BenchBuildReport& report);
 std::string benchBuildMarkdown(const BenchBuildReport& report);
 
-/// Pictures by file name without extension: cost and memory against triangles, and, where the distance was measured,
-/// bytes against it.
+/// Returns plots by file name without extension: cost and memory against triangles, and, where the distance was
+/// measured, bytes against it.
 std::vector<std::pair<std::string, std::string>> benchBuildPlots(const BenchBuildReport& report);
 
 }  // namespace vcp

@@ -34,7 +34,7 @@ Json toJson(const BenchBuildRow& row) {
                  {"cell", row.cell},
                  {"error_cells", row.errorCells},
                  {"certified_max_cells", row.certifiedCells}};
-    // Columns are the same for all rows; what was not measured is null.
+    // Columns are the same for all rows; values that were not measured are null.
     const auto add = [&](const std::string& prefix, const std::optional<Quantiles>& cells) {
         json[prefix + "p50_cells"] = cells ? Json(cells->p50) : Json();
         json[prefix + "p99_cells"] = cells ? Json(cells->p99) : Json();
@@ -116,7 +116,7 @@ std::vector<std::pair<std::string, std::string>> benchBuildPlots(const BenchBuil
             add(bytes, row.model,
                 {row.distanceCells().p99, row.bytesPerTriangle(), fmt::format("{:.3g}", row.errorCells)});
     }
-    // In the order of the error, the default among the others.
+    // The points are sorted by error, with the default among the others.
     for (PlotSeries& series : bytes.series) std::ranges::sort(series.points, {}, &PlotPoint::x);
     std::vector<std::pair<std::string, std::string>> plots = {{"bench_build_cost", plotSvg(cost)},
                                                               {"bench_build_memory", plotSvg(memory)}};

@@ -28,7 +28,7 @@ double secondsSince(Clock::time_point start) { return std::chrono::duration<doub
 struct RayView {
     std::string_view name;
     double elevation;  ///< degrees below the horizon
-    double part;       ///< of the tile that the rays enter
+    double part;       ///< part of the tile that the rays enter
     bool isShadow = false;
 };
 constexpr std::array<RayView, 8> kViews = {{{"overhead", 89, 1},
@@ -55,14 +55,14 @@ Result<std::unique_ptr<Subject>> subjectOf(const std::string& name) {
     auto shape = shapeOf(subject->asset);
     if (!shape) return shape.error();
     subject->shape = *std::move(shape);
-    // What is measured is built here, not copied from the file.
+    // The measured arrays are built here, not copied from the file.
     Asset& a = subject->asset;
     a.field.reset(), a.occupancy.reset(), a.distances.reset(), a.compressed.reset(), a.boxes.reset(), a.patches.reset();
     subject->texel = subject->asset.heights ? 1.0 / subject->asset.heights->size.x : 1.0 / 128;
     return subject;
 }
 
-/// Rays of a view, a jittered grid, the same for every method.
+/// Returns the rays of a view, a jittered grid, the same for every method.
 std::vector<MarchRay> raysOf(const Subject& subject, const RayView& view, int count) {
     std::mt19937 random(29);
     std::uniform_real_distribution<double> unit(0, 1);
@@ -71,7 +71,7 @@ std::vector<MarchRay> raysOf(const Subject& subject, const RayView& view, int co
     std::vector<MarchRay> rays;
     for (int i = 0; i < side * side; ++i) {
         const double x = (i % side + unit(random)) / side, y = (i / side + unit(random)) / side;
-        // A camera's spread: half a right angle across, a little up and down.
+        // The rays spread as a camera's: half a right angle across, a little up and down.
         const double turn = (0.3 + 0.8 * x + (view.part > 1 ? 5 * unit(random) : 0)),
                      elevation = view.elevation * (0.9 + 0.2 * y) * std::numbers::pi / 180;
         const double down = std::min(elevation, 0.4999 * std::numbers::pi);
@@ -79,7 +79,7 @@ std::vector<MarchRay> raysOf(const Subject& subject, const RayView& view, int co
                      {std::cos(down) * std::cos(turn), std::cos(down) * std::sin(turn), -std::sin(down)},
                      64};
         if (view.isShadow) {
-            // From above what a steep ray hits, towards a light.
+            // The ray starts at what a steep ray from above hits, and goes towards a light.
             const TruthHit hit = subject.shape->trace(ray.origin, glm::normalize(glm::dvec3(0.1, 0.2, -1)), 64);
             if (!hit.hit) continue;
             const glm::dvec3 from =
@@ -136,8 +136,8 @@ std::vector<Entry> entries() {
     return all;
 }
 
-/// Rounds over the methods, one after the other, so that whatever else the machine does falls on all; the first is a
-/// warm-up.
+/// Marches in rounds over the methods, one after the other, so that whatever else the machine does falls on all; the
+/// first round is a warm-up.
 std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const std::vector<MarchRay>& rays,
                                    int rounds) {
     std::vector<MesoMarched> all(methods.size());
@@ -196,7 +196,7 @@ Result<Measured> measuredOf(const Subject& subject, const Entry& entry) {
     return method;
 }
 
-/// Table 3: texels of the plain map over those of lookup and atlas, at the paper's resolution.
+/// Compares with Table 3: texels of the plain map over those of lookup and atlas, at the paper's resolution.
 Result<void> compareCompression(std::vector<MesoPublished>& published) {
     struct Row {
         const char* asset;
@@ -232,14 +232,14 @@ bool isAsked(const std::vector<std::string>& asked, std::string_view name) {
 
 Error cancelled() { return {.code = ErrorCode::Cancelled, .message = "cancelled"}; }
 
-/// All methods that are asked for over all views; the rows of a method stand together.
+/// Measures all requested methods over all views; the rows of a method stand together.
 Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
                                          const std::function<bool(const std::string&)>& told) {
     const auto isMeasured = [&](const Entry& e) {
         return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) &&
                methodFits(e.options.name, subject.asset);
     };
-    // The peer is measured with them, asked for or not.
+    // The peer is measured with them, requested or not.
     const std::string_view peerName = mesoPeer(subject.asset.heights.has_value());
     std::vector<Measured> methods;
     std::vector<bool> isShown;

@@ -1,12 +1,12 @@
 // vcp bench meso: run time and work against error of the mesostructure marchers, on the CPU or on a device, all with
 // the same rays (docs/mesostructure.md).
 //
-// Two truths, both in double: of the shape (a formula's root, the bilinear height field, the mesh), which the classes
-// and the errors are against; and of the method's own data where they are samples (`solver_*`), which says what the
-// solving alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times are the processor's
-// (of all threads of a software device; a GPU's are its queue's), taken in rounds over all methods after a warm-up, and
-// each method's is divided by that of one peer in the same round. The median of these ratios is what a machine that
-// does other things as well says reliably.
+// There are two truths, both in double: that of the shape (a formula's root, the bilinear height field, the mesh),
+// which the classes and the errors are against; and that of the method's own data where they are samples (`solver_*`),
+// which says what the solving alone costs. On the CPU rays go one by one in one thread, on a device all at once. Times
+// are the processor's (of all threads of a software device; a GPU's are its queue's), taken in rounds over all methods
+// after a warm-up, and each method's is divided by that of one peer in the same round. The median of these ratios is
+// reliable even on a machine that does other things as well.
 #pragma once
 
 #include <array>
@@ -31,8 +31,8 @@ struct BenchMesoOptions {
     bool sweep = false;                 ///< each method at several values of its knob
     int rays = 2000;                    ///< a view
     int repetitions = 3;                ///< rounds over the methods
-    bool published = false;             ///< beside the paper's tables; its Table 3 is made anew
-    uint64_t checkRays = 0;             ///< rays of the conservative test an asset; 0: not made
+    bool published = false;             ///< compares with the paper's tables; its Table 3 is made anew
+    uint64_t checkRays = 0;             ///< rays of the conservative test for each asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
 };
@@ -41,15 +41,15 @@ enum class MesoClass { Hit, Miss, Missed, False, WrongFeature, Unresolved };
 inline constexpr std::array<std::string_view, 6> kMesoClassNames = {"hit",   "miss",          "missed",
                                                                     "false", "wrong_feature", "unresolved"};
 
-/// What became of rays against one truth; fractions sum to 1. Errors along the ray, of hits that are not of a wrong
-/// feature (off by more than 2 texels), in texels.
+/// The outcome of rays against one truth; fractions sum to 1. Errors are along the ray, in texels, for hits that are
+/// not of a wrong feature (off by more than 2 texels).
 struct MesoJudged {
     std::array<double, 6> fractions{};
     double p50 = 0, p95 = 0, p99 = 0, max = 0;
     double normalP50 = 0, normalP95 = 0;  ///< degrees, of the methods that give normals
 
     [[nodiscard]] double fraction(MesoClass c) const { return fractions[static_cast<size_t>(c)]; }
-    /// Missed, false, of a wrong feature or unresolved.
+    /// The fraction that is missed, false, of a wrong feature or unresolved.
     [[nodiscard]] double wrong() const { return 1 - fraction(MesoClass::Hit) - fraction(MesoClass::Miss); }
 };
 
@@ -65,13 +65,13 @@ struct BenchMesoRow {
     double fetchesMean = 0, iterationsMean = 0, iterationsP95 = 0, surfaceTestsMean = 0;
     std::array<double, 4>
         iterationBins{};  ///< parts of the rays: up to 10, 34, 59 iterations, and more (the bins of the paper's Fig. 7)
-    double divergence8 = 0;  ///< mean over groups of 8 rays of most over mean iterations
+    double divergence8 = 0;  ///< mean, over groups of 8 rays, of most over mean iterations
     uint64_t bytes = 0;
     double preprocessSeconds =
-        0;  ///< of building the method's arrays from the shape, also where an asset file holds them
+        0;  ///< time to build the method's arrays from the shape, even where an asset file holds them
 };
 
-/// The conservative test: rays from anywhere, against what the map of their cell says.
+/// The conservative test: rays from anywhere against what the map says at their cell.
 struct MesoCheck {
     std::string asset, map;
     uint64_t rays = 0, oversteps = 0;
@@ -85,18 +85,19 @@ struct MesoPublished {
     std::string what, asset, of;  ///< `of`: what ours is counted in
     double least = 0, most = 0;
     double ours = 0;
-    double oursTime = 0;  ///< of times; 0: none
+    double oursTime = 0;  ///< our ratio of times; 0: none
 
-    /// Within 25 % of what the paper's models span.
+    /// Whether ours is within 25 % of what the paper's models span.
     [[nodiscard]] bool isNear() const { return ours >= 0.75 * least && ours <= 1.25 * most; }
 };
 
 /// What a method needs for a right picture of an asset: its cheapest knob with at most 0.1 % wrong rays over all views
-/// together and p95 of the error within 0.25 texels in each. By fetches and by time, which may be at different knobs.
+/// together and p95 of the error within 0.25 texels in each. Given by fetches and by time, which may be at different
+/// knobs.
 struct MesoHeadline {
     std::string asset, method;
     std::string fetchesKnob, timeKnob;
-    double fetches = 0;      ///< a ray, mean over the views
+    double fetches = 0;      ///< fetches of a ray, mean over the views
     double ratioToPeer = 0;  ///< mean over the views
 };
 
@@ -106,36 +107,36 @@ struct BenchMesoReport {
     std::vector<MesoPublished> published;
 };
 
-/// The method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height fields; the
-/// plain distance map for solids, which relief mapping has no picture of.
+/// Names the method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height
+/// fields; the plain distance map for solids, which relief mapping cannot draw.
 std::string_view mesoPeer(bool isHeightField);
 std::vector<std::string> mesoMethodNames();
 std::vector<std::string> mesoViewNames();
 
-/// Errors: Usage (no such asset, method or view), those of the builders, Cancelled.
+/// Runs the benchmark. Errors: Usage (no such asset, method or view), those of the builders, Cancelled.
 Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options);
 
-/// The conservative test of all kinds of maps over a grid of 32 cells: `rays` rays from outside the surface in cells
-/// that are not occupied, each against the shape. Errors: the builders'.
+/// Tests that all kinds of maps over a grid of 32 cells are conservative: `rays` rays from outside the surface, in
+/// cells that are not occupied, each against the shape. Errors: the builders'.
 Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const meso::Shape& shape, double texel,
                                              uint64_t rays);
 
-/// Of the rays whose truth is known; `texel` in tile units.
+/// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,
                      double texel);
-/// The mean work, its bins and divergence into the row.
+/// Writes the mean work, its bins and divergence into the row.
 void countWork(const std::vector<meso::MarchResult>& results, BenchMesoRow& row);
 
-/// Tables 1 and 2 and the secant's claim, of the rows that there are.
+/// Compares with Tables 1 and 2 and the secant's claim, as far as the rows allow.
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);
 
-/// Methods with a knob that qualifies, by asset in the order of the rows.
+/// Returns the methods with a knob that qualifies, by asset in the order of the rows.
 std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows);
 
 std::string benchMesoJson(const BenchMesoReport& report);
 std::string benchMesoCsv(const BenchMesoReport& report);
 std::string benchMesoMarkdown(const BenchMesoReport& report);
-/// File names without extension, and SVG.
+/// Returns plots: file names without extension, and SVG.
 std::vector<std::pair<std::string, std::string>> benchMesoPlots(const BenchMesoReport& report);
 
 }  // namespace vcp

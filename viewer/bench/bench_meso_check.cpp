@@ -17,9 +17,9 @@ namespace {
 
 using namespace meso;
 
-constexpr int kCells = 32;  ///< of the maps, along x
+constexpr int kCells = 32;  ///< cells of the maps, along x
 
-/// What a map says of a ray in one of its cells that are not occupied: how far it may go.
+/// How far a map lets a ray go in one of its cells that are not occupied.
 struct CheckedMap {
     std::string name;
     std::function<double(glm::dvec3 from, glm::dvec3 direction, glm::ivec3 cell)> length;
@@ -54,7 +54,7 @@ void addBoxes(std::vector<CheckedMap>& maps, const Occupancy& occupancy) {
                     }});
 }
 
-/// The paper's rule last.
+/// Makes the maps; that of the paper's rule is last.
 Result<std::vector<CheckedMap>> mapsOf(const Occupancy& occupancy, const Shape& shape) {
     std::vector<CheckedMap> maps;
     VCP_TRY(addDistances(maps, "1x1", occupancy, {.cones = {1, 1}}, shape));
@@ -68,7 +68,7 @@ Result<std::vector<CheckedMap>> mapsOf(const Occupancy& occupancy, const Shape& 
     return maps;
 }
 
-/// Any direction; every fourth one within 10^-6 of a border of azimuths, which are multiples of 15 degrees.
+/// Returns any direction; every fourth one is within 10^-6 of a border of azimuths, which are multiples of 15 degrees.
 glm::dvec3 directionFrom(std::mt19937_64& random) {
     std::normal_distribution<double> bell;
     const glm::dvec3 any = glm::normalize(glm::dvec3(bell(random), bell(random), bell(random)));
@@ -95,7 +95,7 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Sha
     std::uniform_real_distribution<double> unit(0, 1);
     std::vector<double> lengths(maps->size());
     uint64_t asked = 0;
-    // A tile that is all surface has hardly a cell to ask.
+    // A tile that is all surface has hardly a cell to test.
     for (uint64_t tries = 0; asked < rays && tries < 100 * rays; ++tries) {
         const glm::dvec3 from(unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z),
             direction = directionFrom(random);

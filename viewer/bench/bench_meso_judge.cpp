@@ -1,4 +1,4 @@
-// What became of rays, and what they cost.
+// Judges the outcome of rays, and counts their cost.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

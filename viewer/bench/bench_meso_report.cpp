@@ -76,7 +76,7 @@ std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string tit
     return plotSvg(plot);
 }
 
-/// Of a method on an asset, summed over the views; count 0 where it was not measured.
+/// The cost of a method on an asset, summed over the views; count 0 where it was not measured.
 struct Cost {
     double ratio = 0, fetches = 0, tests = 0, count = 0;
 };
@@ -243,7 +243,7 @@ std::vector<std::pair<std::string, std::string>> benchMesoPlots(const BenchMesoR
         std::vector<const BenchMesoRow*> rows;
         for (const BenchMesoRow& row : report.rows)
             if (row.asset == asset) rows.push_back(&row);
-        // No wrong ray in a view counts as half a one.
+        // A view without a wrong ray counts as half a wrong ray.
         const auto wrong = [](const BenchMesoRow& row) {
             return std::max(row.shape.wrong(), 0.5 / double(std::max<uint64_t>(row.rays, 1)));
         };

@@ -19,7 +19,7 @@ namespace {
 constexpr int kPollMilliseconds = 100;
 constexpr size_t kLongestComplaint = 4096;
 
-// What the child says: frames of a kind, a length and so many bytes.
+// What the child sends: frames of a kind, a length and so many bytes.
 enum class Frame : char { Progress = 'p', Value = 'v', Failure = 'e' };
 constexpr size_t kFrameHeader = 1 + sizeof(uint64_t);
 
@@ -106,7 +106,7 @@ Error unpacked(std::string text) {
 }
 
 [[noreturn]] void beChild(const ChildWork& work, int stop, int out) {
-    // A parent that is gone is noticed at the next report, not by a signal.
+    // The child notices at its next report that the parent is gone, not by a signal.
     std::signal(SIGPIPE, SIG_IGN);
     const auto send = [&](Frame kind, const std::string& payload) {
         return writeAll(out, std::string(1, static_cast<char>(kind)) + sized(payload));
@@ -120,9 +120,9 @@ Error unpacked(std::string text) {
     ::_exit(told ? 0 : 1);
 }
 
-/// What the parent has heard.
+/// What the parent has received.
 struct Heard {
-    std::string bytes;  // not yet a whole frame
+    std::string bytes;  // bytes that are not yet a whole frame
     std::string what;
     double fraction = 0;
     std::optional<Result<std::string>> result;
@@ -147,7 +147,7 @@ struct Heard {
     }
 };
 
-/// Hands on what arrives until the other end is closed; keeps asking `goOn`, and calls `stop` once it says false.
+/// Passes on what arrives until the other end is closed; keeps calling `goOn`, and calls `stop` once it returns false.
 void listen(int from, const std::function<void(const char*, size_t)>& hear, const std::function<bool()>& goOn,
             const std::function<void()>& stop) {
     bool stopping = false;

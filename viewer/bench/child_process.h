@@ -1,7 +1,7 @@
-// Work in a child process, so that its peak of memory and its time are its own: what a benchmark measures.
+// Runs work in a child process, so that its peak of memory and its time are its own: what a benchmark measures.
 //
-// The child is a fork that goes on in this program. It tells how far it is and what came of it through a pipe; a
-// second pipe, whose other end the parent holds, tells it to stop, also when the parent is gone.
+// The child is a fork that continues in this program. It reports its progress and its result through a pipe; a second
+// pipe, whose other end the parent holds, tells it to stop, even when the parent is gone.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace vcp {
 
-/// Told what is being done and the fraction of it; false asks to stop.
+/// Receives what is being done and the fraction of it; returns false to ask to stop.
 using ChildProgress = std::function<bool(const std::string& what, double fraction)>;
 
-/// In the child. It may start threads. What it returns reaches the parent as it is.
+/// Runs in the child. It may start threads. What it returns reaches the parent unchanged.
 using ChildWork = std::function<Result<std::string>(const ChildProgress&)>;
 
 struct ChildOutcome {
     std::string value;
     double cpuSeconds = 0;      ///< user and system, all threads
-    uint64_t peakRssBytes = 0;  ///< of the child; begins with the parent's few megabytes
+    uint64_t peakRssBytes = 0;  ///< the child's peak; begins with the parent's few megabytes
 };
 
 /// Runs `work` in a child and waits. `progress` (may be empty) is called here, at least ten times a second.
@@ -30,8 +30,8 @@ struct ChildOutcome {
 /// mostly for memory); Io (no child can be made).
 Result<ChildOutcome> runInChild(const ChildWork& work, const ChildProgress& progress = {});
 
-/// Runs a program and waits; its stdout goes nowhere. `progress` as above; a false ends the program with SIGTERM.
-/// Errors: Io (it cannot be started, or did not end with status 0: its first line on stderr is the message);
+/// Runs a program and waits; its stdout is discarded. `progress` as above; returning false ends the program with
+/// SIGTERM. Errors: Io (it cannot be started, or did not end with status 0: its first line on stderr is the message);
 /// Cancelled.
 Result<void> runProgram(const std::vector<std::string>& arguments, const std::function<bool()>& progress = {});
 

@@ -21,7 +21,7 @@ constexpr double kLongestRest = 60;
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-/// Where the camera is after a part of the way.
+/// Returns the camera after a part of the way.
 OrbitCamera cameraAt(const OrbitCamera& start, glm::dvec3 centre, double part) {
     OrbitCamera camera = start;
     camera.orbit(centre, 2 * std::numbers::pi * part, 0);
@@ -46,7 +46,7 @@ public:
         return true;
     }
 
-    /// All is read and drawn, and a second frame at full size has been timed: the first one compiles.
+    /// Waits until all is read and drawn, and a second frame at full size has been timed: the first one compiles.
     Result<void> settle() {
         for (bool again = true;;) {
             const auto drew = turn();
@@ -95,7 +95,7 @@ Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Bo
         report.seconds = now - began;
         if (!*drew && report.seconds > 2 * options.seconds) break;
     }
-    // At rest from here on: until the frame at full size is there.
+    // The camera rests from here on, until the frame at full size is there.
     const double stopped = seconds();
     while (!report.fullSizeAfterMs && seconds() - stopped <= kLongestRest) {
         const auto drew = motion.turn();
@@ -109,7 +109,7 @@ std::string motionJson(const MotionReport& report) {
     nlohmann::ordered_json sizes = nlohmann::ordered_json::object();
     for (const auto& [reduction, frames] : report.byReduction)
         sizes[reduction == 1 ? "1" : fmt::format("1/{}", reduction)] = frames;
-    nlohmann::ordered_json after;  // null: never
+    nlohmann::ordered_json after;  // null: it was never drawn
     if (report.fullSizeAfterMs) after = *report.fullSizeAfterMs;
     const nlohmann::ordered_json json = {{"width", report.size.x},
                                          {"height", report.size.y},

@@ -1,8 +1,8 @@
-// Frames in motion: a Viewer driven as a window drives it, while the camera turns once about the dataset and comes as
-// near as a third of the distance; by the wall clock, without a window and without showing the pictures.
+// Measures frames in motion: a Viewer is driven as a window drives it, while the camera turns once about the dataset
+// and comes as near as a third of the distance; by the wall clock, without a window and without showing the pictures.
 //
-// What is measured follows the machine: each frame is of the time that has passed, so a slow one sees fewer. All that
-// the first view wants is read before, and what comes into view is read meanwhile.
+// The measurement follows the machine: each frame shows the time that has passed, so a slow machine draws fewer. All
+// that the first view wants is read before, and what comes into view is read meanwhile.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@ struct MotionOptions {
 };
 
 struct MotionReport {
-    double seconds = 0;                   ///< that the motion took
+    double seconds = 0;                   ///< time that the motion took
     std::vector<double> frameMs;          ///< from one frame to the next, in order
     std::map<int, uint64_t> byReduction;  ///< frames drawn at 1, 1/2, ... of width and height
     double stillMs = 0;                   ///< a frame at full size before
@@ -35,11 +35,11 @@ struct MotionReport {
     [[nodiscard]] double framesPerSecond() const {
         return seconds > 0 ? static_cast<double>(frameMs.size()) / seconds : 0;
     }
-    /// The smallest time that `part` of the frames took at most; 0 without frames.
+    /// Returns the smallest time that `part` of the frames did not exceed; 0 without frames.
     [[nodiscard]] double quantileMs(double part) const;
 };
 
-/// Errors: those of Viewer; Cancelled.
+/// Runs the measurement. Errors: those of Viewer; Cancelled.
 Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
                                    const MotionOptions& options);
 

@@ -20,16 +20,16 @@ constexpr size_t kMostCameras = 10000;
 constexpr size_t kLargestFile = 64 << 20;
 constexpr int kDeepest = 4;  // a camera's coordinates are nested 3 deep
 
-/// Of four keys in a row, for a time from 0 to 1 between the middle two.
+/// Returns the weights of four keys in a row, for a time from 0 to 1 between the middle two.
 std::array<double, 4> catmullRomWeights(double t) {
     return {0.5 * t * (-1 + t * (2 - t)), 0.5 * (2 + t * t * (-5 + 3 * t)), 0.5 * t * (1 + t * (4 - 3 * t)),
             0.5 * t * t * (t - 1)};
 }
 
-/// One of two quaternions that are the same turn: the one nearer to `to`.
+/// Returns one of two quaternions that are the same turn: the one nearer to `to`.
 glm::dquat nearer(const glm::dquat& turn, const glm::dquat& to) { return glm::dot(turn, to) < 0 ? -turn : turn; }
 
-/// What of a camera is blended.
+/// The quantities of a camera that are blended.
 struct Key {
     glm::dvec3 focus{0};
     double logDistance = 0;
@@ -50,7 +50,7 @@ std::vector<Key> blendable(std::span<const OrbitCamera> cameras) {
     return keys;
 }
 
-/// Beyond the ends the path goes straight on.
+/// Returns a key; beyond the ends the path goes straight on.
 Key keyAt(const std::vector<Key>& keys, std::ptrdiff_t i) {
     const auto last = static_cast<std::ptrdiff_t>(keys.size()) - 1;
     const auto at = [&](std::ptrdiff_t k) { return keys[static_cast<size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))]; };
@@ -59,7 +59,7 @@ Key keyAt(const std::vector<Key>& keys, std::ptrdiff_t i) {
     return at(i);
 }
 
-/// An error of camera `number` of a path, with the line where it or its field stands.
+/// Returns an error of camera `number` of a path, with the line where it or its field stands.
 Error inPath(Error error, std::string_view text, size_t number) {
     std::string pointer = fmt::format("/{}", number), field;
     if (error.element.starts_with('"')) {

@@ -12,20 +12,20 @@
 
 namespace vcp {
 
-/// `count` cameras once around: `from`, turned about its up axis through `pivot`.
+/// Returns `count` cameras once around: `from`, turned about its up axis through `pivot`.
 std::vector<OrbitCamera> turntable(const OrbitCamera& from, glm::dvec3 pivot, int count);
 
-/// `count` cameras from the first of `keys` to the last, at equal times between each two: a Catmull-Rom spline of what
-/// they look at, the logarithm of the distance to it, and the orientation, straight at both ends. So two cameras are
-/// joined by a straight line, and cameras about one point by an arc. The projection is that of the key before.
-/// Precondition: a key.
+/// Returns `count` cameras from the first of `keys` to the last, at equal times between each two: a Catmull-Rom spline
+/// of what they look at, the logarithm of the distance to it, and the orientation, straight at both ends. So two
+/// cameras are joined by a straight line, and cameras about one point by an arc. The projection is that of the key
+/// before. Precondition: there is a key.
 std::vector<OrbitCamera> cameraPath(std::span<const OrbitCamera> keys, int count);
 
-/// A JSON array of what cameraToJson writes, 1 to 10000. `name` stands for the file in errors. May be hostile. Errors:
-/// InvalidInput.
+/// Reads a JSON array of what cameraToJson writes, 1 to 10000. `name` stands for the file in errors. The text may be
+/// hostile. Errors: InvalidInput.
 Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const std::string& name);
 
-/// camerasFromJson of a file of at most 64 MiB. Errors: also Io.
+/// Does camerasFromJson of a file of at most 64 MiB. Errors: also Io.
 Result<std::vector<OrbitCamera>> readCameras(const std::filesystem::path& path);
 
 }  // namespace vcp

@@ -11,7 +11,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int kDeepest = 16;
-// What a scene or a path of cameras may have of them: nothing else has a line of its own.
+// How deep the values of a scene or a path of cameras nest: deeper ones have no line of their own.
 constexpr int kDeepestLine = 5;
 constexpr size_t kLongestKey = 64, kMostItems = 1024;
 

@@ -1,4 +1,4 @@
-// Where the values of a JSON text stand, for errors that name the line.
+// Finds where the values of a JSON text stand, for errors that name the line.
 #pragma once
 
 #include <map>
@@ -9,16 +9,16 @@
 
 namespace vcp {
 
-/// The line of each value of a JSON text, by its JSON pointer; of a member the line of its key. Of texts that nest
-/// deeply, have long keys or many items, not all are kept.
+/// The line of each value of a JSON text, by its JSON pointer; for a member the line of its key. In texts that nest
+/// deeply, have long keys or many items, not all lines are kept.
 class LinesOf {
 public:
     /// Precondition: the text is valid JSON.
     explicit LinesOf(std::string_view text) : text_(text) { value("", 0, true); }
 
-    /// A member that is there twice, by its JSON pointer; its line is that of the second.
+    /// The JSON pointer of a member that is there twice, with the line of the second.
     [[nodiscard]] const std::optional<std::pair<std::string, size_t>>& twice() const { return twice_; }
-    /// The line of a value, or of what holds it where its own is not kept.
+    /// Returns the line of a value, or of what holds it where its own is not kept.
     [[nodiscard]] size_t operator()(std::string pointer) const;
 
 private:

@@ -34,7 +34,7 @@ glm::dvec2 tangents(double fovY, glm::ivec2 size) {
     return {y * size.x / std::max(size.y, 1), y};
 }
 
-/// Pixel to [-1, 1] on both axes, y up.
+/// Converts a pixel to [-1, 1] on both axes, y up.
 glm::dvec2 normalised(glm::dvec2 pixel, glm::ivec2 size) {
     const glm::dvec2 extent = glm::max(glm::dvec2(size), glm::dvec2(1));
     return {2 * pixel.x / extent.x - 1, 1 - 2 * pixel.y / extent.y};
@@ -115,7 +115,7 @@ std::optional<glm::dvec2> OrbitCamera::pixelOf(glm::dvec3 point, glm::ivec2 size
 void OrbitCamera::orbit(glm::dvec3 pivot, double yaw, double pitch) {
     const glm::dvec3 axis = axisOf(up);
     const double elevation = std::asin(std::clamp(glm::dot(forwardVector(), axis), -1.0, 1.0));
-    // A top view starts at the pole itself and may leave it, not pass it.
+    // A top view starts at the pole itself; it may leave the pole, but not pass it.
     const double limit = std::max(0.5 * std::numbers::pi - kPoleMargin, std::abs(elevation));
     pitch = std::clamp(elevation + pitch, -limit, limit) - elevation;
     const glm::dquat turn = glm::angleAxis(yaw, axis) * glm::angleAxis(pitch, rightVector());
@@ -158,7 +158,7 @@ void OrbitCamera::zoomAbout(glm::dvec3 point, double factor) {
     const double depth = depthOf(point) * factor;
     if (projection == Projection::Orthographic) {
         if (focusDistance * factor < nearest) return;
-        // Only sideways: an orthographic eye that came closer would cut the scene.
+        // The eye moves only sideways: an orthographic eye that came closer would cut the scene.
         position += (moved - position) - forwardVector() * glm::dot(moved - position, forwardVector());
         focusDistance *= factor;
         return;
@@ -177,7 +177,7 @@ void OrbitCamera::fit(const Box& box, glm::ivec2 size, const PictureMargins& cov
     double flat = 0;
     for (const glm::dvec3& corner : cornersOf(box)) {
         const glm::dvec3 local = glm::conjugate(orientation) * (corner - centre);
-        // Nearer than the middle of the box, what is off the axis is farther off.
+        // For points nearer than the middle of the box, the offset from the axis appears larger.
         const glm::dvec2 off = glm::abs(glm::dvec2(local) + middle * local.z) / tangent;
         distance = std::max(distance, std::max(off.x, off.y) + local.z);
         flat = std::max({flat, std::abs(local.x) / tangent.x, std::abs(local.y) / tangent.y});
@@ -281,7 +281,7 @@ public:
         return json_[field].get<double>();
     }
 
-    /// The index of a word among those allowed.
+    /// Returns the index of a word among those allowed.
     size_t word(const char* field, std::initializer_list<const char*> allowed) {
         if (!json_.contains(field)) return 0;
         size_t index = 0;
@@ -327,7 +327,7 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
     } catch (const Json::parse_error& e) {
         return notJson(text, e.byte, name);
     } catch (const Json::exception&) {
-        // A number beyond the range of a double.
+        // The text has a number beyond the range of a double.
         return Error{ErrorCode::InvalidInput, "not a camera: a number is out of range", name};
     }
     if (!json.is_object()) return Error{ErrorCode::InvalidInput, "not a camera: must be a JSON object", name};
@@ -364,7 +364,7 @@ Result<OrbitCamera> readCamera(const std::filesystem::path& path) {
     auto camera = cameraFromJson(*text, path.string());
     if (camera) return camera;
     Error error = camera.error();
-    // A field stands in quotes; what is no camera has no line.
+    // A field stands in quotes; a text that is no camera has no line.
     if (error.element.starts_with('"'))
         error.element = fmt::format(
             "line {}: {}", LinesOf(*text)("/" + error.element.substr(1, error.element.size() - 2)), error.element);

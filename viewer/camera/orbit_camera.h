@@ -36,7 +36,7 @@ struct Box {
 
     [[nodiscard]] glm::dvec3 centre() const { return 0.5 * (low + high); }
     [[nodiscard]] double diagonal() const;
-    /// Turned inside out: what is joined with it is what it then is.
+    /// A box turned inside out: joined with another box, it becomes that box.
     static Box nothing() {
         return {glm::dvec3(std::numeric_limits<double>::infinity()),
                 glm::dvec3(-std::numeric_limits<double>::infinity())};
@@ -44,7 +44,7 @@ struct Box {
     [[nodiscard]] Box joined(const Box& other) const { return {glm::min(low, other.low), glm::max(high, other.high)}; }
 };
 
-/// Of a box that is placed: the box about its corners.
+/// Returns the box about the corners of a placed box.
 Box placedBox(const Box& box, const Similarity& placement);
 
 enum class UpAxis { Y, Z };
@@ -52,8 +52,8 @@ enum class UpAxis { Y, Z };
 /// Standard views of a box. `Fit` is the view a dataset opens with: the front.
 enum class View { Fit, Front, Back, Left, Right, Top, Bottom, Isometric };
 
-/// What of a picture is covered along its sides, pixels: the rest is where something fitted into it goes. All of it
-/// where less than half is left either way.
+/// How much of a picture is covered along its sides, in pixels: what is fitted goes into the rest. Where less than half
+/// is left either way, the whole picture is used.
 struct PictureMargins {
     double left = 0, right = 0, top = 0, bottom = 0;
 };
@@ -61,7 +61,7 @@ struct PictureMargins {
 struct OrbitCamera {
     glm::dvec3 position{0};
     glm::dquat orientation{1, 0, 0, 0};  ///< world from camera, unit
-    double focusDistance = 1;            ///< of the point of interest along the view axis, world units, > 0
+    double focusDistance = 1;            ///< distance to the point of interest along the view axis, world units, > 0
     double fovY = 0.7853981633974483;    ///< full vertical angle, radians, in (0, pi)
     Projection projection = Projection::Perspective;
     UpAxis up = UpAxis::Y;
@@ -71,19 +71,19 @@ struct OrbitCamera {
     [[nodiscard]] glm::dvec3 forwardVector() const { return orientation * glm::dvec3(0, 0, -1); }
     [[nodiscard]] glm::dvec3 focus() const { return position + forwardVector() * focusDistance; }
 
-    /// Height of what the picture shows at the focus, world units; everywhere in orthographic projection.
+    /// Height of what the picture shows at the focus, world units; the same everywhere in orthographic projection.
     [[nodiscard]] double viewHeight() const;
 
-    /// Distance of a point from the eye's plane along the view axis; negative behind the eye.
+    /// Returns a point's distance from the eye's plane along the view axis; negative behind the eye.
     [[nodiscard]] double depthOf(glm::dvec3 point) const;
 
-    /// What the renderer needs.
+    /// Returns the camera as the renderer needs it.
     [[nodiscard]] Camera current() const;
 
-    /// The ray through a point of a picture of `size` pixels.
+    /// Returns the ray through a point of a picture of `size` pixels.
     [[nodiscard]] CameraRay rayThrough(glm::dvec2 pixel, glm::ivec2 size) const;
 
-    /// Where a point is in the picture; nothing when it is behind the eye.
+    /// Returns where a point is in the picture; nothing when it is behind the eye.
     [[nodiscard]] std::optional<glm::dvec2> pixelOf(glm::dvec3 point, glm::ivec2 size) const;
 
     /// Turns about `pivot`: by `yaw` radians about the up axis, then by `pitch` about the camera's x axis.
@@ -97,8 +97,8 @@ struct OrbitCamera {
     /// moves with it. Stops where doubles could no longer tell the eye from the point.
     void zoomAbout(glm::dvec3 point, double factor);
 
-    /// Moves along the view axis and sideways so that the box just fits into what of the picture is not covered, its
-    /// middle in the middle of that.
+    /// Moves along the view axis and sideways so that the box just fits into the part of the picture that is not
+    /// covered, with its middle in the middle of that part.
     void fit(const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 
     /// Turns to a standard view and fits.
@@ -116,21 +116,21 @@ struct OrbitCamera {
     void standUp(UpAxis axis);
 };
 
-/// World from camera for an eye that looks along `forward`, with `up` as near to the picture's up as it gets.
+/// Returns world from camera for an eye that looks along `forward`, with `up` as near to the picture's up as possible.
 /// Precondition: the two are not parallel.
 glm::dquat facing(glm::dvec3 forward, glm::dvec3 up);
 
-/// Between two cameras, `part` in [0, 1] of the way: the focus moves on a line, the distance to it geometrically,
-/// the orientation on the shorter arc. 0 and 1 are `from` and `to` themselves; the projection is `to`'s.
+/// Returns a camera `part` in [0, 1] of the way: the focus moves on a line, the distance to it geometrically, the
+/// orientation on the shorter arc. 0 and 1 give `from` and `to`; the projection is `to`'s.
 OrbitCamera between(const OrbitCamera& from, const OrbitCamera& to, double part);
 
-/// A view's name on the command line ("fit", "front", "iso", ...).
+/// Returns the view of a name on the command line ("fit", "front", "iso", ...).
 std::optional<View> viewNamed(std::string_view name);
 
-/// All names of views, comma-separated, for messages.
+/// Returns all names of views, comma-separated, for messages.
 std::string viewNames();
 
-/// One line of JSON:
+/// Returns one line of JSON:
 /// {"position":[x,y,z],"target":[x,y,z],"up":[x,y,z],"up_axis":"y","fov_degrees":45,"projection":"perspective"}.
 /// Doubles survive a round trip to within rounding.
 std::string cameraToJson(const OrbitCamera& camera);
@@ -140,7 +140,7 @@ std::string cameraToJson(const OrbitCamera& camera);
 /// missing, of a wrong type, not finite; target at the eye; up along the view).
 Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& name);
 
-/// cameraFromJson of a file of at most 1 MiB. Errors: also Io.
+/// Does cameraFromJson of a file of at most 1 MiB. Errors: also Io.
 Result<OrbitCamera> readCamera(const std::filesystem::path& path);
 
 }  // namespace vcp

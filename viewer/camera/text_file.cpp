@@ -12,12 +12,12 @@ namespace vcp {
 
 namespace {
 
-/// A descriptor of this program by the name that a shell gives it: "<(...)" is one.
+/// Whether a path is a descriptor of this program by the name that a shell gives it: "<(...)" is one.
 bool isOwnDescriptor(const std::string& path) {
     return path == "/dev/stdin" || path.starts_with("/dev/fd/") || path.starts_with("/proc/self/fd/");
 }
 
-/// A pipe that stands for a file; nothing where it is something else, or not there.
+/// Opens a pipe that stands for a file; returns null where it is something else, or not there.
 std::unique_ptr<std::FILE, FileCloser> ownPipe(const std::filesystem::path& path) {
     struct stat status {};
     if (!isOwnDescriptor(path.string()) || ::stat(path.c_str(), &status) != 0 || !S_ISFIFO(status.st_mode)) return {};

@@ -1,4 +1,4 @@
-// The arguments that say how a mesh is built, and what a person is told while it is.
+// The arguments that say how a mesh is built, and what is shown while it is.
 #pragma once
 
 #include <functional>
@@ -16,13 +16,13 @@ namespace vcp {
 
 void addBuildSettings(CLI::App& app, BuildSettings& settings);
 
-/// What a display is told of a build.
+/// Returns what a display shows of a build.
 ProgressDetails detailsOf(const BuildProgress& at);
 
-/// Shows a build's progress on stderr until the function goes; the function is false once Ctrl-C came.
+/// Shows a build's progress on stderr for as long as the function lives; the function returns false once Ctrl-C came.
 std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style);
 
-/// openScene with its progress on stderr, cancelled by Ctrl-C.
+/// Does openScene with its progress on stderr, cancelled by Ctrl-C.
 Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, const BuildSettings& build,
                                    const SourceSettings& source, ProgressStyle style);
 

@@ -22,7 +22,7 @@ namespace vcp {
 
 namespace {
 
-/// A report in its forms; plots by file name without extension.
+/// A report in its forms; plots are by file name without extension.
 struct BenchTexts {
     std::string json, csv, markdown;
     std::vector<std::pair<std::string, std::string>> plots = {};
@@ -82,7 +82,7 @@ Result<void> makeFolder(const std::string& folder) {
     return {};
 }
 
-/// Files into --out, and JSON or the table on stdout.
+/// Writes files into --out, and JSON or the table on stdout.
 Result<int> publish(const BenchCommand& command, const std::string& name, const BenchTexts& texts) {
     if (!command.out.empty()) {
         const std::filesystem::path folder = command.out;
@@ -104,7 +104,7 @@ auto progressTo(ProgressDisplay& display) {
     };
 }
 
-/// make_scan lies beside vcp.
+/// Returns the path of make_scan, which lies beside vcp.
 Result<std::filesystem::path> findMakeScan() {
     std::error_code failed;
     const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
@@ -145,7 +145,7 @@ Result<int> runBuild(const BuildBenchCommand& command) {
         command, "bench_build",
         {benchBuildJson(*report), benchBuildCsv(*report), benchBuildMarkdown(*report), benchBuildPlots(*report)});
     if (!published || report->failures.empty()) return published;
-    // What could be measured is there; the first of what could not is the error.
+    // What could be measured is published; the first failure is the error.
     return report->failures.front();
 }
 

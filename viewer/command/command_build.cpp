@@ -107,7 +107,7 @@ std::string summary(const BuildEstimate& estimate) {
     return text;
 }
 
-/// What the build would need; nothing is written.
+/// Reports what the build would need; nothing is written.
 Result<int> tell(const BuildOptions& options, bool asJson) {
     const auto estimate = estimateBuild(options);
     if (!estimate) return estimate.error();
@@ -118,7 +118,7 @@ Result<int> tell(const BuildOptions& options, bool asJson) {
     return 0;
 }
 
-/// Options that do not go with the method.
+/// Refuses options that do not go with the method.
 Result<void> checkMethod(const BuildCommand& command) {
     const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
     const BuildSettings& s = command.settings;

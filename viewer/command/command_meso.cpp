@@ -1,4 +1,4 @@
-// vcp meso: mesostructure assets, built and told about.
+// vcp meso: builds mesostructure assets, and shows what they hold.
 #include <array>
 #include <charconv>
 #include <chrono>
@@ -35,7 +35,7 @@ struct InfoMeso {
     ReportOptions report;
 };
 
-/// "4x2", "64x64x16", "4,2": whole numbers, all above 0. Empty when malformed.
+/// Parses "4x2", "64x64x16", "4,2": whole numbers, all above 0. Returns nothing when malformed.
 std::vector<int> wholeNumbers(std::string_view text, char between) {
     std::vector<int> numbers;
     while (true) {
@@ -183,7 +183,7 @@ Result<int> runBuild(const BuildMeso& command) {
         if (error.file.empty() && error.code != ErrorCode::Usage) error.file = command.source;
         return error;
     };
-    // The extent is what --grid N is measured by.
+    // The shape gives the extent, by which --grid N is measured.
     const auto shape = shapeOf(asset);
     if (!shape) return named(shape.error());
     const auto cells = cellsOf(command.grid, (*shape)->extent());

@@ -39,7 +39,7 @@ struct RenderMeso {
     ReportOptions report;
 };
 
-/// Numbers with commas between; empty when malformed.
+/// Parses numbers with commas between; returns none when malformed.
 std::vector<double> numbersOf(const std::string& text) {
     std::vector<double> numbers;
     for (size_t at = 0; at <= text.size();) {
@@ -56,7 +56,7 @@ std::vector<double> numbersOf(const std::string& text) {
 
 Error wrong(std::string message) { return {.code = ErrorCode::Usage, .message = std::move(message)}; }
 
-/// One value for all, or one an asset.
+/// Returns an asset's value: one value serves all assets, or there is one for each.
 template <class T>
 Result<T> valueOf(const std::vector<T>& values, size_t i, size_t count, T otherwise, const char* option) {
     if (values.empty()) return otherwise;
@@ -118,7 +118,7 @@ Result<std::vector<MesoSurfaceDescription>> descriptionsOf(const RenderMeso& c) 
     for (size_t i = 0; i < c.assets.size(); ++i) {
         auto d = descriptionOf(c, i);
         if (!d) return d.error();
-        // A base is drawn once: with the first asset on it, and not beside a quad where that has sunk a little.
+        // A base is drawn once: with its first asset, and not beside a quad where that lies a little lower.
         const auto hides = [&](const MesoSurfaceDescription& other) {
             if (other.base != d->base) return false;
             if (other.place == d->place && other.scale == d->scale) return true;
@@ -154,7 +154,7 @@ Result<Camera> cameraOf(const RenderMeso& c, const Box& bounds, glm::ivec2 size)
     return camera;
 }
 
-/// One method's picture.
+/// The picture of one method.
 struct Panel {
     Picture picture;
     Json json;
@@ -228,7 +228,7 @@ Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
     if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
     FrameRequest request;
     request.camera = *camera;
-    if (command.errorPixels > 0) request.errorPixels = command.errorPixels;  // without, surfaces have no look from far
+    if (command.errorPixels > 0) request.errorPixels = command.errorPixels;  // else surfaces are always marched
     request.width = uint32_t(size->x), request.height = uint32_t(size->y);
     request.shading.mode = command.heat ? ShadingMode::Steps : ShadingMode::Lit;
     request.shading.lightFollowsCamera = false, request.shading.lightDirection = glm::vec3(*light);
@@ -251,7 +251,7 @@ Result<int> report(const RenderMeso& command, const std::vector<Panel>& panels,
     return 0;
 }
 
-/// What the picture may replace: nothing that is read.
+/// Returns what the picture may replace: no file that is read.
 OutputRules rulesOf(const RenderMeso& command, const std::vector<MesoSurfaceDescription>& descriptions) {
     SceneFile scene;
     scene.datasets.push_back({command.scan, {}});
@@ -265,7 +265,7 @@ Result<int> runRender(const RenderMeso& command) {
     if (command.methods.size() > 1 && !command.depth.empty()) return wrong("--depth is of one method");
     auto descriptions = descriptionsOf(command);
     if (!descriptions) return descriptions.error();
-    // What is wrong is said before anything is made.
+    // Errors are reported before anything is made.
     const OutputRules rules = rulesOf(command, *descriptions);
     VCP_TRY(checkOutput(command.out, OutputKind::Png, rules));
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();

@@ -44,7 +44,7 @@ struct RenderCommand {
     RenderSettings render;
     ReportOptions report;
 
-    /// With --json somebody wants figures, and the first frame, which compiles, would not be one.
+    /// Figures are wanted with --json, and the first frame, which compiles, would not be one.
     [[nodiscard]] int framesToTime() const { return frames > 0 ? frames : report.json ? 5 : 0; }
     [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty(); }
     [[nodiscard]] bool isTiled(const FrameRequest& request) const {
@@ -55,8 +55,8 @@ struct RenderCommand {
 /// What the frames cost and showed.
 struct Drawing {
     UpdateResult update;
-    FrameStats stats;         ///< of the last frame
-    double firstFrameMs = 0;  ///< with what is compiled on first use
+    FrameStats stats;         ///< statistics of the last frame
+    double firstFrameMs = 0;  ///< time of the first frame, with what is compiled on first use
     std::vector<double> frameMs;
 
     /// Of the timed frames; of the first when none was timed.
@@ -66,7 +66,7 @@ struct Drawing {
     }
 };
 
-/// Without --settle: what is there as soon as the coarsest page is.
+/// Without --settle: updates until the coarsest page is there, and shows what there is.
 Result<UpdateResult> updateUntilDrawable(Renderer& renderer, const FrameRequest& request) {
     for (;;) {
         auto update = renderer.update(request);
@@ -153,7 +153,7 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
                        error, update.settled ? "settled" : "not settled");
 }
 
-/// The cameras of a sequence, or the one camera.
+/// Returns the cameras of a sequence, or the one camera.
 Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
     std::vector<OrbitCamera> cameras{camera};
     if (command.turntable > 0) {
@@ -185,7 +185,7 @@ Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& d
             {"bytes_read", total.update.bytesRead}};
 }
 
-/// Pictures in tiles and sequences, with progress; what is finished when it is cancelled stays.
+/// Makes pictures in tiles and sequences, with progress; when it is cancelled, finished pictures stay.
 Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras,
                        const RenderCommand& command, const OutputRules& rules) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
@@ -214,7 +214,7 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
                                                       formatSeconds(1e-3 * total.ms)));
 }
 
-/// Options of the output that do not go together.
+/// Refuses options of the output that do not go together.
 Result<void> checkOptions(const RenderCommand& command) {
     const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
     if (command.output == kStandardOutput && command.isSequence())
@@ -227,7 +227,7 @@ Result<void> checkOptions(const RenderCommand& command) {
     return {};
 }
 
-/// What the files may replace: nothing that is read, and not each other.
+/// Returns what the files may replace: no file that is read, and not each other.
 OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
     OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
     for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
@@ -236,7 +236,7 @@ OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesys
     return rules;
 }
 
-/// Finds what would be refused before anything is built or drawn.
+/// Finds what would be refused, before anything is built or drawn.
 Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules, size_t pictures) {
     for (const std::string& name : {command.output, command.depth, command.normals}) {
         if (name.empty()) continue;

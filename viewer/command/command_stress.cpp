@@ -66,7 +66,7 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
     options.renderer.ramBytes = parseBytes(command.ram).value();
     options.orders = parseOrders(command.order).value();
     options.renderer.order = options.orders[0];
-    // Reads that are made to stall or fail late are waited for by more threads, as from a server.
+    // Where reads are made to stall or fail late, more threads wait for them, as for a server.
     const bool isSlow = open.isRemote || options.faults.stallSeconds > 0 || options.faults.latencySeconds > 0;
     options.renderer.loaderThreads = isSlow ? 8 : open.loaderThreads();
     return options;

@@ -1,4 +1,4 @@
-// vcp verify: is every byte of a .vcp intact; with --against, how far are its surface and the mesh apart.
+// vcp verify: is every byte of a .vcp intact? With --against: how far are its surface and the mesh apart?
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -38,7 +38,7 @@ bool showBytes(void* user, uint64_t done) {
     return !interrupted();
 }
 
-/// Header, directory and every byte of the file.
+/// Checks header, directory and every byte of the file.
 Result<Dataset> checkBytes(const ByteReader& reader, ProgressStyle style) {
     auto dataset = readDataset(reader);
     if (!dataset) return dataset;
@@ -76,7 +76,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     return measureSurfaceDistance(*cache, bvh, options);
 }
 
-/// Measured distances are kept in single precision; no more than that is forgiven.
+/// Whether a distance is within its bound; measured ones are kept in single precision, whose rounding is forgiven.
 bool isWithin(const SurfaceDistance& distance) {
     const double bound = distance.certifiedErrorMax * (1 + 1e-6);
     return distance.meshToSurface.max <= bound && distance.surfaceToMesh.max <= bound;
@@ -120,7 +120,7 @@ Error exceeds(const VerifyCommand& command, const SurfaceDistance& distance) {
             command.file};
 }
 
-/// With --json a program learns from `ok` that the file is broken, and a person from stderr.
+/// Reports a broken file: with --json a program learns it from `ok`, and a person from stderr.
 Result<int> broken(const VerifyCommand& command, const Error& error) {
     if (command.report.json && error.code != ErrorCode::Cancelled)
         VCP_TRY(printJson({{"ok", false}, {"error", error.line()}}));

@@ -45,7 +45,7 @@ Json toJson(const WindowReport& report) {
             {"problem", report.problem}};
 }
 
-/// What can be said before a window is opened: a mesh that is not there, a .vcp that is none.
+/// Finds errors before a window is opened: a missing mesh, a .vcp that is none.
 Result<void> checkInputs(const ViewCommand& command) {
     std::vector<std::string> inputs = command.inputs;
     const auto kind = kindOf(inputs);
@@ -75,7 +75,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     VCP_TRY(checkInputs(command));
     const auto settingsPath = userSettingsPath();
     WindowOptions options;
-    // Settings that cannot be read are those of the first time.
+    // Where the settings cannot be read, the defaults are used.
     if (settingsPath) {
         const auto user = readUserSettings(*settingsPath);
         if (user)
@@ -94,7 +94,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     const auto report = showWindow(options);
     if (!report) return report.error();
     if (settingsPath) {
-        // What was seen was seen: it is no failure that it cannot be remembered.
+        // The session itself worked: that it cannot be remembered is no failure.
         const auto saved = saveChanges(report->changes, *settingsPath);
         if (!saved || !saved->empty()) warn(saved ? *saved : saved.error().line());
     }

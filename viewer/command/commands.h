@@ -37,7 +37,7 @@ Command addBench(CLI::App& vcp);
 Command addDevices(CLI::App& vcp);
 Command addMeso(CLI::App& vcp);
 
-/// Standard output as the name of an output.
+/// The name of an output that stands for standard output.
 inline constexpr const char* kStandardOutput = "-";
 
 /// Options that many commands have.
@@ -52,22 +52,22 @@ struct ReportOptions {
 void addJsonOption(CLI::App& app, ReportOptions& options);
 void addProgressOption(CLI::App& app, ReportOptions& options);
 
-/// --overwrite: also what is there and is of another kind, or write-protected, is replaced.
+/// Adds --overwrite: files that are there may be replaced even if they are of another kind, or write-protected.
 void addOverwriteOption(CLI::App& app, bool& overwrite);
 
-/// Empty where `name` ends in `extension` or has none, or is "-" and `mayBePipe`; else what to write instead.
+/// Returns nothing where `name` ends in `extension`, or is "-" and `mayBePipe`; else what to write instead.
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe);
 
 /// Writes lines of text to stdout, shown as terminal_text.h says, with a newline behind. Errors: Io (stdout is closed
 /// or full).
 Result<void> printLine(const std::string& text);
-/// The same for what is said of an output: on stderr when the output itself goes to stdout.
+/// Does so with a line about an output: on stderr when the output itself goes to stdout.
 Result<void> printLineAbout(const std::string& output, const std::string& text);
 Result<void> printJson(const Json& json);
-/// `json`: valid JSON.
+/// Writes `json`, which is valid JSON, to stdout.
 Result<void> printJsonText(const std::string& json);
 
-/// A line on stderr that begins with "warning: ".
+/// Writes a line on stderr that begins with "warning: ".
 void warnOnTerminal(const std::string& warning);
 
 }  // namespace vcp

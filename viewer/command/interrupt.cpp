@@ -6,7 +6,7 @@ namespace vcp {
 
 namespace {
 
-// A signal handler can reach nothing but a global.
+// This is global, since a signal handler can reach nothing else.
 std::atomic<bool> came{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 

@@ -1,13 +1,13 @@
-// Ctrl-C during a long task, or the terminal's end: the first one asks it to stop and clean up, the second one ends the
-// process.
+// Handles Ctrl-C during a long task, or the terminal's end: the first one asks the task to stop and clean up, the
+// second one ends the process.
 #pragma once
 
 #include <csignal>
 
 namespace vcp {
 
-/// Takes SIGINT, SIGTERM and, unless it is ignored as by nohup, SIGHUP while it lives, then gives them back. One at a
-/// time.
+/// Takes over SIGINT, SIGTERM and, unless it is ignored as by nohup, SIGHUP while it lives, then restores them. One at
+/// a time.
 class InterruptScope {
 public:
     InterruptScope();
@@ -21,7 +21,7 @@ private:
     struct sigaction hangUp_ {};
 };
 
-/// True once a signal came within a scope. Any thread.
+/// Returns true once a signal came within a scope. Any thread.
 bool interrupted();
 
 }  // namespace vcp

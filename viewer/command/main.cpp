@@ -16,14 +16,14 @@ namespace {
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
-/// One line on stderr, whatever the message contains; what was typed wrongly may be an address with a password.
+/// Writes one line on stderr, whatever the message contains; mistyped text may be an address with a password.
 void complain(const std::string& what) {
     std::string message = shownAddress(what);
     std::replace(message.begin(), message.end(), '\n', ' ');
     std::fprintf(stderr, "vcp: %s\n", terminalText(message).c_str());
 }
 
-/// `vcp help`, `vcp help CMD`, `vcp help bench rays`.
+/// Adds `vcp help`, `vcp help CMD`, `vcp help bench rays`.
 Command addHelp(CLI::App& vcp) {
     auto words = std::make_shared<std::vector<std::string>>();
     CLI::App* app = vcp.add_subcommand("help", "Say how a command is used");
@@ -53,7 +53,7 @@ std::string commandPath(const CLI::App& vcp) {
     return path;
 }
 
-/// The files that a command was given, shortened; empty without any.
+/// Returns the files that a command was given, shortened; empty without any.
 std::string inputsOf(const CLI::App& vcp) {
     const CLI::App* at = &vcp;
     while (!at->get_subcommands().empty()) at = at->get_subcommands().front();

@@ -19,7 +19,7 @@ void addLength(CLI::App& app, const char* name, float& value, const char* what) 
     });
 }
 
-/// Values by name; the first one is the default.
+/// Parses values by name; the first one is the default.
 template <class Value>
 void addChoice(CLI::App& app, const char* name, Value& value, const std::string& what,
                const std::vector<std::pair<std::string, Value>>& values) {

@@ -7,11 +7,11 @@
 
 namespace vcp {
 
-/// Of the structure: what a file is built with.
+/// Adds the options of the structure that a file is built with.
 void addPaperStructureOptions(CLI::App& app, PaperOptions& options);
-/// The interpolation that merging is judged by: that of the march where both are of one command.
+/// Adds the interpolation that merging is judged by: where a command has both, that of the march.
 void addPaperSchemeOption(CLI::App& app, PaperScheme& scheme);
-/// Of the march: what may change from picture to picture.
+/// Adds the options of the march, which may change from picture to picture.
 void addPaperMarchOptions(CLI::App& app, PaperMarch& march);
 
 }  // namespace vcp

@@ -21,7 +21,7 @@ int terminalColumns(std::FILE* out) {
     return size.ws_col;
 }
 
-// What stands still is said again after so long, with its new counts.
+// Progress that stands still is shown again after so long, with its new counts.
 constexpr double kJsonSeconds = 2, kPlainSeconds = 30, kBarSeconds = 0.5;
 
 }  // namespace
@@ -40,7 +40,7 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
     if (style_ == ProgressStyle::None) return;
     fraction = std::clamp(fraction, 0.0, 1.0);
     const double elapsed = seconds();
-    // A moment's work says little about the rest.
+    // The first moments say little about the rest.
     const bool isKnown = elapsed > 1 && fraction > 0.01;
     const double left = isKnown ? elapsed * (1 - fraction) / fraction : 0;
     std::string facts;
@@ -88,7 +88,7 @@ void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std
     const std::string bar = head + "[" + std::string(static_cast<size_t>(filled), '=') +
                             std::string(static_cast<size_t>(room - filled), ' ') + "]" + tail;
     lastBar_ = bar.substr(0, static_cast<size_t>(columns));
-    // A character of several bytes is cut off whole.
+    // A character of several bytes is cut off as a whole.
     while (lastBar_.size() < bar.size() && (static_cast<uint8_t>(bar[lastBar_.size()]) & 0xc0) == 0x80)
         lastBar_.pop_back();
     std::fprintf(out_, "\r%s\x1b[K", lastBar_.c_str());

@@ -1,6 +1,6 @@
-// How a long task tells a person or a program how far it is: on stderr, as a bar, plain lines or JSON lines.
+// Shows a person or a program the progress of a long task: on stderr, as a bar, plain lines or JSON lines.
 //
-// One thread. The bar is erased by finish() and by the destructor, so that an error line after it stands alone.
+// Used by one thread. finish() and the destructor erase the bar, so that an error line after it stands alone.
 #pragma once
 
 #include <chrono>
@@ -20,15 +20,15 @@ enum class ProgressStyle {
     None,
 };
 
-/// "bar", "plain", "json", "none".
+/// Parses "bar", "plain", "json" or "none".
 std::optional<ProgressStyle> progressStyleNamed(std::string_view name);
 
-/// A bar when stderr is a terminal, else nothing.
+/// Returns a bar when stderr is a terminal, else no display.
 ProgressStyle defaultProgressStyle();
 
 /// What a build adds to its progress.
 struct ProgressDetails {
-    uint64_t triangles = 0;  ///< read so far; 0: nothing to say
+    uint64_t triangles = 0;  ///< triangles read so far; 0: not shown
     uint64_t tempBytes = 0;
 };
 
@@ -39,7 +39,7 @@ public:
     ProgressDisplay& operator=(const ProgressDisplay&) = delete;
     ~ProgressDisplay() { finish(); }
 
-    /// `fraction` of the whole, 0 to 1. Cheap; writes only what is new.
+    /// Shows `fraction` of the whole, 0 to 1. Cheap; writes only what is new.
     void update(std::string_view stage, double fraction, const ProgressDetails& details = {});
 
     void finish();

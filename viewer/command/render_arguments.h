@@ -1,4 +1,4 @@
-// The arguments that say how a dataset is shown: of `vcp render` and `vcp view`.
+// The arguments of `vcp render` and `vcp view` that say how a dataset is shown.
 #pragma once
 
 #include "viewer/command/commands.h"

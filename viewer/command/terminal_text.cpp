@@ -14,7 +14,7 @@ struct Character {
     bool valid = false;
 };
 
-/// The first character of a text that is not empty. What is not UTF-8 counts as one byte.
+/// Returns the first character of a text that is not empty. A byte that is not UTF-8 counts as one character.
 Character firstOf(std::string_view text) {
     const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
     const uint8_t lead = byte(0);
@@ -26,7 +26,7 @@ Character firstOf(std::string_view text) {
         if ((byte(i) & 0xc0) != 0x80) return {};
         code = code << 6 | (byte(i) & 0x3fu);
     }
-    // Too long a form, halves of surrogate pairs and what lies beyond Unicode are no characters.
+    // Overlong forms, halves of surrogate pairs and codes beyond Unicode are no characters.
     constexpr uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};
     if (code < kLeast[bytes] || (code >= 0xd800 && code < 0xe000) || code > 0x10ffff) return {};
     return {code, bytes, true};
@@ -67,7 +67,7 @@ std::string terminalText(std::string_view text) { return escaped(text, false, by
 std::string terminalLines(std::string_view text) { return escaped(text, true, byBytes); }
 
 std::string terminalJson(std::string_view json) {
-    // None of these has more than 16 bits, and outside strings there are only line breaks.
+    // None of these characters has more than 16 bits, and outside of strings there are only line breaks.
     return escaped(json, true, [](const Character& c, std::string_view) {
         return fmt::format("\\u{:04x}", c.valid ? c.code : 0xfffdu);
     });

@@ -1,5 +1,5 @@
-// Text on its way to a terminal. Names of files, keys of scenes and words of meshes are anyone's: shown as they are,
-// they could move the cursor, rename the window or turn what stands beside them around.
+// Makes text safe for a terminal. Names of files, keys of scenes and words of meshes can be anything: shown as they
+// are, they could move the cursor, rename the window or reverse the text beside them.
 #pragma once
 
 #include <string>
@@ -7,16 +7,16 @@
 
 namespace vcp {
 
-/// The text with each character that is not simply shown spelled out by its bytes, as "\x1b": control characters (C0,
-/// DEL and C1), those that turn the direction of writing or break lines, and bytes that are not UTF-8. Valid UTF-8, and
-/// the same when escaped again.
+/// Returns the text with each character that cannot simply be shown spelled out by its bytes, as "\x1b": control
+/// characters (C0, DEL and C1), those that turn the direction of writing or break lines, and bytes that are not UTF-8.
+/// The result is valid UTF-8, and escaping it again changes nothing.
 std::string terminalText(std::string_view text);
 
-/// The same, but line breaks stay.
+/// Does the same, but keeps line breaks.
 std::string terminalLines(std::string_view text);
 
-/// JSON whose strings hold such characters, as another that means the same: "\u001b". Precondition: valid JSON in
-/// UTF-8.
+/// Returns JSON that means the same, with such characters in its strings written as "\u001b". Precondition: valid JSON
+/// in UTF-8.
 std::string terminalJson(std::string_view json);
 
 }  // namespace vcp

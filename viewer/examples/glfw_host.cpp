@@ -24,7 +24,7 @@ vcp::widget::View& viewOf(GLFWwindow* window) {
     return *static_cast<vcp::widget::View*>(glfwGetWindowUserPointer(window));
 }
 
-// The cursor in pixels of the framebuffer, which need not be those of the window.
+// Returns the cursor in pixels of the framebuffer, which need not be those of the window.
 void cursor(GLFWwindow* window, double& x, double& y) {
     int w = 1, h = 1, fw = 1, fh = 1;
     glfwGetCursorPos(window, &x, &y);
@@ -38,7 +38,7 @@ uint32_t modifiers(int mods) {
     return ((mods & GLFW_MOD_SHIFT) ? VCP_SHIFT : 0) | ((mods & GLFW_MOD_CONTROL) ? VCP_CONTROL : 0);
 }
 
-// What a callback throws waits here: GLFW is C, nothing may pass through it.
+// An exception of a callback waits here: GLFW is C, so no exception may pass through it.
 std::exception_ptr thrown;
 
 template <class F>

@@ -1,5 +1,5 @@
-// On a Vulkan device of the host's, into an image of the host's: host_device FILE.vcp. Reads the image back, and says
-// how many of its pixels differ from the background in the corner.
+// Draws on a Vulkan device of the host's, into an image of the host's: host_device FILE.vcp. Reads the image back, and
+// says how many of its pixels differ from the background in the corner.
 #include <vulkan/vulkan.h>
 
 #include <cstdio>
@@ -20,7 +20,7 @@ void check(VkResult result, const char* call) {
 }
 #define VK(call, ...) check(call(__VA_ARGS__), #call)
 
-// What a host has anyway: instance, device, queue, an image in linear memory that it can look into.
+// What a host already has: instance, device, queue, and an image in linear memory that it can read.
 struct Host {
     VkInstance instance = nullptr;
     VkPhysicalDevice physical = nullptr;

@@ -49,7 +49,7 @@ protected:
     void keyPressEvent(QKeyEvent* e) override { key(e, true); }
     void keyReleaseEvent(QKeyEvent* e) override { key(e, false); }
     bool event(QEvent* e) override {
-        // The surface goes with the native window, and the view before it.
+        // The surface is destroyed with the native window, and the view before it.
         if (e->type() == QEvent::PlatformSurface && static_cast<QPlatformSurfaceEvent*>(e)->surfaceEventType() ==
                                                         QPlatformSurfaceEvent::SurfaceAboutToBeDestroyed)
             timer_.stop(), view_.reset();
@@ -89,7 +89,7 @@ private:
     QTimer timer_;
 };
 
-// What an event's handler throws must not pass through Qt.
+// An exception of an event's handler must not pass through Qt.
 class Application : public QApplication {
 public:
     using QApplication::QApplication;

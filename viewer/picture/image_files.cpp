@@ -33,7 +33,7 @@ void appendPng(png_structp png, png_bytep data, size_t size) {
     bytes->insert(bytes->end(), data, data + size);
 }
 
-/// `rows` in the byte order of PNG (16-bit values big endian). Empty when libpng fails (memory).
+/// Encodes `rows` in the byte order of PNG (16-bit values big endian). Returns nothing when libpng fails (memory).
 std::vector<uint8_t> encodePng(const std::vector<uint8_t>& rows, int bits, int colourType, uint32_t width,
                                uint32_t height) {
     std::vector<uint8_t> bytes;

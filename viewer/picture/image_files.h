@@ -1,4 +1,4 @@
-// Depth and normals as files, each whole or absent (octree/output_file.h).
+// Writes depth and normals as files, each whole or absent (octree/output_file.h).
 //
 //   .pfm   32-bit float, lower row first, little endian (scale -1), as the format wants it. Depth: one
 //          channel, world units along the ray, infinity where nothing was hit. Normals: three channels, world
@@ -24,15 +24,15 @@ struct DepthRange {
 };
 DepthRange depthRange(std::span<const float> depth);
 
-/// `depth` has width * height values, upper row first. Errors: Unsupported (neither .pfm nor .png), Io.
+/// Writes depth: width * height values, upper row first. Errors: Unsupported (neither .pfm nor .png), Io.
 Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t height,
                         const std::filesystem::path& path, const OutputRules& rules = {});
 
-/// Likewise for unit normals.
+/// Does the same for unit normals.
 Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height,
                           const std::filesystem::path& path, const OutputRules& rules = {});
 
-/// True when writeDepth and writeNormals know the extension.
+/// Returns true when writeDepth and writeNormals know the extension.
 bool isImagePlanePath(const std::filesystem::path& path);
 
 }  // namespace vcp

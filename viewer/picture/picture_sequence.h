@@ -1,6 +1,6 @@
-// Pictures as files, drawn tile by tile: one, or a numbered sequence. What `vcp render` and the window write.
+// Draws pictures into files, tile by tile: one, or a numbered sequence. `vcp render` and the window use it.
 //
-// Each file is written beside itself and renamed when it is whole: of a sequence that ends early there are the pictures
+// Each file is written beside its name and renamed when it is whole: a sequence that ends early leaves the pictures
 // that were finished, and nothing else.
 #pragma once
 
@@ -22,21 +22,21 @@ struct PictureFiles {
 };
 
 struct PictureSequenceOptions {
-    FrameRequest request;         ///< of each picture, but for the camera
-    std::vector<Camera> cameras;  ///< a picture each; at least one
+    FrameRequest request;         ///< request of each picture, without the camera
+    std::vector<Camera> cameras;  ///< one for each picture; at least one
     PictureFiles files;
     bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on
     uint32_t tile = 2048;     ///< edge in pixels, at least 16
     OutputRules rules = {};   ///< what the files may replace
-    /// As TiledPicture's.
+    /// Called as TiledPictureOptions::problem is.
     std::function<void(const Error& problem)> problem;
 };
 
-/// "turn.png" and 7: "turn-0007.png".
+/// Returns "turn-0007.png" for "turn.png" and 7.
 std::filesystem::path numbered(const std::filesystem::path& path, size_t number);
 
-/// Pictures in the making; without the last step the one that was begun leaves nothing. Rows are written as they are
-/// drawn; depth and normals are kept until their picture is whole, 4 and 12 bytes a pixel. One thread.
+/// Pictures in the making; a picture without its last step leaves nothing. Rows are written as they are drawn; depth
+/// and normals are kept until their picture is whole, 4 and 12 bytes a pixel. Used by one thread.
 class PictureSequence {
 public:
     PictureSequence(Renderer& renderer, PictureSequenceOptions options)
@@ -44,18 +44,18 @@ public:
     PictureSequence(const PictureSequence&) = delete;
     PictureSequence& operator=(const PictureSequence&) = delete;
 
-    /// Draws the next tile where all that it wants is there; never waits for reads. True when the last file is
-    /// written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; nothing more is to be asked of it
-    /// then.
+    /// Draws the next tile where all that it wants is there; never waits for reads. Returns true when the last file is
+    /// written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; after one, it must not be called
+    /// again.
     Result<bool> step();
-    /// Whether the last step() missed pages.
+    /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return picture_ && picture_->isWaiting(); }
-    /// Of the whole sequence, 0 to 1.
+    /// The fraction of the whole sequence, 0 to 1.
     [[nodiscard]] double fraction() const;
-    /// Pictures whose files are written.
+    /// The number of pictures whose files are written.
     [[nodiscard]] size_t finished() const { return finished_; }
     [[nodiscard]] size_t pictures() const { return o_.cameras.size(); }
-    /// Of the pictures that are finished, together.
+    /// Statistics of all finished pictures together.
     [[nodiscard]] const TiledPictureStats& stats() const { return stats_; }
 
 private:
@@ -70,7 +70,7 @@ private:
     PictureSequenceOptions o_;
     size_t finished_ = 0;
     TiledPictureStats stats_;
-    // Of the picture in the making.
+    // The parts of the picture in the making.
     std::unique_ptr<TiledPicture> picture_;
     std::unique_ptr<PngRows> png_;
     std::vector<float> depth_;

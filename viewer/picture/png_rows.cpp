@@ -33,14 +33,14 @@ struct PngRows::Encoder {
                      complaint.empty() ? std::string("cannot write: ") + std::strerror(errno) : "PNG: " + complaint);
     }
 
-    // libpng leaves by longjmp: nothing with a destructor may live in these three.
+    // libpng leaves by longjmp: nothing with a destructor may live in these three functions.
     bool begin() {
         if (setjmp(png_jmpbuf(png)) != 0) return false;
         png_init_io(png, file);
         png_set_IHDR(png, info, width, height, 8, PNG_COLOR_TYPE_RGBA, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                      PNG_FILTER_TYPE_DEFAULT);
         png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
-        // Speed over the last few percent of size.
+        // Speed matters more here than the last few percent of size.
         png_set_compression_level(png, 3);
         png_set_filter(png, 0, PNG_FILTER_SUB);
         png_write_info(png, info);

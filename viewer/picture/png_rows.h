@@ -1,4 +1,4 @@
-// A PNG file written a few rows at a time: pictures larger than memory.
+// Writes a PNG file a few rows at a time, for pictures larger than memory.
 #pragma once
 
 #include <cstdint>
@@ -12,19 +12,19 @@
 
 namespace vcp {
 
-/// One thread. The file appears with finish(), whole; without it, nothing is left (octree/output_file.h).
+/// For one thread. The file appears with finish(), whole; without it, nothing is left (octree/output_file.h).
 class PngRows {
 public:
-    /// 8-bit RGBA, `width` and `height` from 1 to 2^20. Errors: Io, Usage.
+    /// Begins a file of 8-bit RGBA, `width` and `height` from 1 to 2^20. Errors: Io, Usage.
     static Result<std::unique_ptr<PngRows>> create(const std::filesystem::path& path, uint32_t width, uint32_t height,
                                                    const OutputRules& rules = {});
     ~PngRows();
     PngRows(const PngRows&) = delete;
     PngRows& operator=(const PngRows&) = delete;
 
-    /// Whole rows, from the upper one on: a multiple of 4 * width bytes. Errors: Io; Usage (too many).
+    /// Adds whole rows, from the upper one on: a multiple of 4 * width bytes. Errors: Io; Usage (too many).
     Result<void> add(std::span<const uint8_t> rgba);
-    /// Errors: Io; Usage (rows are missing).
+    /// Finishes the file. Errors: Io; Usage (rows are missing).
     Result<void> finish();
 
 private:

@@ -7,10 +7,10 @@ namespace vcp {
 
 namespace {
 
-// What the shade pass averages over reaches 2 pixels far; squares of 4 x 4 pixels and tiles of 8 x 8 stay in step.
+// The shade pass averages over 2 pixels around; squares of 4 x 4 pixels and tiles of 8 x 8 stay aligned.
 constexpr uint32_t kOverlap = 8;
 
-/// Copies what `inner` covers of a tile's pixels, `words` values each, into a band.
+/// Copies the part of a tile's pixels that `inner` covers, `words` values each, into a band.
 template <class Value, class Rect>
 void copyInto(std::vector<Value>& band, uint32_t bandWidth, const std::vector<Value>& pixels, const Rect& outer,
               const Rect& inner, uint32_t words) {
@@ -28,7 +28,7 @@ TiledPicture::Rect TiledPicture::inner() const {
     return {x_, y_, std::min(options_.tile, whole_.width - x_), std::min(options_.tile, whole_.height - y_)};
 }
 
-/// The tile and what is averaged over about it, within the whole.
+/// Returns the tile with the pixels around it that are averaged over, within the whole.
 TiledPicture::Rect TiledPicture::outer() const {
     const uint32_t by = whole_.shading.occlusionRays > 0 ? kOverlap : 0;
     const Rect r = inner();

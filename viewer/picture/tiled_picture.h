@@ -1,4 +1,4 @@
-// Pictures larger than the device draws at once: tile after tile, each with the pages that it wants, handed on in
+// Draws pictures larger than the device draws at once: tile after tile, each with the pages that it wants, handed on in
 // bands of rows.
 //
 // A tile shows what the same part of the whole shows, to the rounding of rays; where the budget is too small for the
@@ -19,7 +19,7 @@ namespace vcp {
 struct TiledPictureOptions {
     uint32_t tile = 2048;  ///< edge in pixels, at least 16
     bool depth = false, normals = false;
-    /// Told of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
+    /// Called with the error of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
     std::function<void(const Error& problem)> problem;
 };
 
@@ -32,12 +32,12 @@ struct PictureBand {
 
 struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
-    double ms = 0;           ///< of drawing alone
-    double errorPixels = 0;  ///< largest of the tiles'
-    UpdateResult update;     ///< of the last tile
+    double ms = 0;           ///< time of drawing alone
+    double errorPixels = 0;  ///< largest over the tiles
+    UpdateResult update;     ///< the last tile's
 };
 
-/// A picture in the making, tile by tile. What it is given stays until it is done.
+/// A picture in the making, tile by tile. What it is given must stay until it is done.
 class TiledPicture {
 public:
     using Take = std::function<Result<void>(const PictureBand&)>;
@@ -46,10 +46,10 @@ public:
     TiledPicture(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 
-    /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. True when the
-    /// last band was taken. Errors: those of Renderer; those of `take`; the first page that cannot be read.
+    /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. Returns true
+    /// when the last band was taken. Errors: those of Renderer; those of `take`; the first page that cannot be read.
     Result<bool> step();
-    /// Whether the last step() missed pages.
+    /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return isWaiting_; }
     [[nodiscard]] double fraction() const;
     [[nodiscard]] const TiledPictureStats& stats() const { return stats_; }
@@ -67,7 +67,7 @@ private:
     FrameRequest whole_;
     TiledPictureOptions options_;
     Take take_;
-    uint32_t x_ = 0, y_ = 0;  // of the next tile
+    uint32_t x_ = 0, y_ = 0;  // place of the next tile
     PictureBand band_;
     bool isWaiting_ = false;
     TiledPictureStats stats_;

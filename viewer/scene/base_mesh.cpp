@@ -29,7 +29,7 @@ Result<meso::BaseSurface> finished(meso::BaseSurface made, const std::string& na
     return made;
 }
 
-/// The lines that say what a base is: v, vt, f. Others are passed over.
+/// Reads the lines that define a base: v, vt, f. Other lines are skipped.
 class ObjBase {
 public:
     ObjBase(ByteSource source, double tiles) : source_(std::move(source)), tiles_(tiles) {}
@@ -87,7 +87,7 @@ private:
         coordinates_.push_back(uv * tiles_);
         return {};
     }
-    /// A number from 1, or below 0 counted from the end.
+    /// Reads a number that counts from 1, or, below 0, from the end.
     template <class T>
     bool at(std::string_view word, const std::vector<T>& of, uint32_t& index) const {
         int64_t number = 0;

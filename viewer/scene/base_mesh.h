@@ -1,4 +1,4 @@
-// Base surfaces for mesostructure from mesh files.
+// Reads base surfaces for mesostructure from mesh files.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace vcp {
 /// above 1 MiB); Limit (above 5 million triangles).
 Result<meso::BaseSurface> readBaseMesh(const std::filesystem::path& path, double tiles);
 
-/// The same of an OBJ that is open, from its start.
+/// Does the same with an OBJ that is open, from its start.
 Result<meso::BaseSurface> readBaseObj(ByteSource source, double tiles);
 
 }  // namespace vcp

@@ -20,22 +20,22 @@ struct BuildSettings {
     std::string memory;
     std::string temp;
 
-    /// What the builder is to do with `inputs`, without output and progress. The values have been checked
-    /// while parsing.
+    /// Returns what the builder should do with `inputs`, without output and progress. Precondition: the values have
+    /// been checked while parsing.
     [[nodiscard]] BuildOptions optionsFor(const std::vector<std::string>& inputs) const;
 };
 
 /// One scene file (.json), .vcp files and addresses, or meshes.
 enum class InputKind { Scene, Datasets, Meshes };
-/// Errors: Usage (kinds are mixed; several scenes).
+/// Returns the kind of the inputs. Errors: Usage (kinds are mixed; several scenes).
 Result<InputKind> kindOf(const std::vector<std::string>& inputs);
 
-/// The .vcp to show for `inputs`: themselves when they are one, else built into the default cache. `progress` as in
-/// BuildOptions. Any thread. Errors: those of MeshCache. Precondition: one .vcp or address, or meshes.
+/// Returns the .vcp to show for `inputs`: the input itself when it is one, else the mesh built into the default cache.
+/// `progress` as in BuildOptions. Any thread. Errors: those of MeshCache. Precondition: one .vcp or address, or meshes.
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, const BuildSettings& settings,
                                          const std::function<bool(const BuildProgress&)>& progress);
 
-/// Files that meshes name, as datasetFor met them: material files, images, buffers. None for what is no mesh.
+/// Returns the files that meshes named in datasetFor: material files, images, buffers. None for other inputs.
 std::vector<std::filesystem::path> sideFilesOf(const std::vector<std::string>& inputs, const BuildSettings& settings);
 
 }  // namespace vcp

@@ -62,7 +62,7 @@ DatasetOpening::DatasetOpening(std::vector<std::string> inputs, BuildSettings bu
 }
 
 DatasetOpening::~DatasetOpening() {
-    // What was opened lives on.
+    // A dataset that was opened stays usable.
     if (!done_) cancel();
     thread_.join();
 }
@@ -75,7 +75,7 @@ DatasetOpening::Progress DatasetOpening::progress() const {
 Result<OpenedScene> DatasetOpening::take() { return *std::exchange(opened_, std::nullopt); }
 
 Result<OpenedScene> DatasetOpening::open() {
-    // It goes with the work: what it shows is taken away before what went wrong is told.
+    // The display goes with the work: it is taken away before an error is shown.
     const auto told = std::exchange(told_, nullptr);
     return openScene(inputs_, build_, source_, [&](const BuildProgress& at) {
         const bool goesOn = !told || told(at);

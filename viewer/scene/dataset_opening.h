@@ -1,4 +1,4 @@
-// Opens what a person points at, at once or in a thread of its own: meshes are built into the cache first.
+// Opens what a person names, at once or in a thread of its own: meshes are built into the cache first.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 
 namespace vcp {
 
-/// "statue.ply", or "statue.ply and 2 more"; of addresses no user and password.
+/// Returns "statue.ply", or "statue.ply and 2 more"; addresses without user and password.
 std::string nameOf(const std::vector<std::string>& inputs);
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
@@ -24,8 +24,8 @@ std::string nameOf(const std::vector<std::string>& inputs);
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
                               const SourceAccess& source, const std::function<bool(const BuildProgress&)>& progress);
 
-/// One thread may call; destroying it before it is done cancels and waits for the build, or the exchange with a server,
-/// to notice.
+/// An opening in a thread of its own. One thread may call; destroying it before it is done cancels and waits for the
+/// build, or the exchange with a server, to notice.
 class DatasetOpening {
 public:
     struct Progress {
@@ -34,8 +34,8 @@ public:
         uint64_t triangles = 0;
     };
 
-    /// `inputs`: as openScene takes them. `told`: called in the thread, false cancels; gone when it is done; may be
-    /// empty.
+    /// `inputs`: as openScene takes them. `told`: called in the thread with the progress, false cancels; destroyed when
+    /// the work is done; may be empty.
     DatasetOpening(std::vector<std::string> inputs, BuildSettings build, const SourceAccess& source,
                    std::function<bool(const BuildProgress&)> told);
     ~DatasetOpening();
@@ -46,7 +46,7 @@ public:
     [[nodiscard]] Progress progress() const;
     void cancel() { *cancelled_ = true; }
     [[nodiscard]] bool isDone() const { return done_; }
-    /// Once, when it is done. Errors: those of openScene; Cancelled.
+    /// Returns what was opened; call it once, when it is done. Errors: those of openScene; Cancelled.
     Result<OpenedScene> take();
 
 private:
@@ -55,13 +55,13 @@ private:
     std::vector<std::string> inputs_;
     BuildSettings build_;
     SourceAccess source_;
-    std::function<bool(const BuildProgress&)> told_;  // of the thread
+    std::function<bool(const BuildProgress&)> told_;  // used by the thread
     const std::shared_ptr<std::atomic<bool>> cancelled_ =
-        std::make_shared<std::atomic<bool>>(false);  // readers ask it, which live longer
+        std::make_shared<std::atomic<bool>>(false);  // shared with readers, which live longer
     std::atomic<bool> done_ = false;
     mutable std::mutex mutex_;
     Progress progress_;                          // guarded by mutex_
-    std::optional<Result<OpenedScene>> opened_;  // of the thread until done_
+    std::optional<Result<OpenedScene>> opened_;  // belongs to the thread until done_
     std::thread thread_;
 };
 

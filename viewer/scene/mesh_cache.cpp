@@ -25,10 +25,10 @@ namespace {
 constexpr std::string_view kExtension = ".vcp";
 constexpr std::string_view kListExtension = ".files";
 
-// Part of the key: raised when the same options come to build other bytes.
+// A part of the key: it is raised when the same options build other bytes.
 constexpr int kCacheGeneration = 2;
 
-// Unfinished builds older than this have no builder any more.
+// An unfinished build older than this is abandoned.
 constexpr auto kLeftoverAge = std::chrono::hours(24);
 
 Error ioError(const fs::path& path, const std::string& what, std::error_code code) {
@@ -39,7 +39,7 @@ std::string hashOf(const std::string& text) {
     return fmt::format("{:016x}", hashBytes(std::as_bytes(std::span(text))));
 }
 
-/// What a mesh is known by: path, size, times of last change.
+/// Returns what identifies a mesh: path, size, times of last change.
 Result<std::string> identity(const fs::path& mesh) {
     std::error_code failed;
     const fs::path absolute = fs::canonical(mesh, failed);
@@ -48,7 +48,7 @@ Result<std::string> identity(const fs::path& mesh) {
     return fmt::format("{}\n{}\n", absolute.string(), fileStamp(absolute));
 }
 
-/// Hash of what is known of a dataset before it is built.
+/// Returns a hash of what is known of a dataset before it is built.
 Result<std::string> keyOf(const BuildOptions& options) {
     std::string text =
         fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell, options.error,
@@ -61,7 +61,7 @@ Result<std::string> keyOf(const BuildOptions& options) {
     return hashOf(text);
 }
 
-/// Under which it is kept, with the files that its meshes name.
+/// Returns the name under which it is kept, from its key and the files that its meshes name.
 std::string nameOf(const std::string& key, const std::vector<fs::path>& sideFiles) {
     if (sideFiles.empty()) return key;
     std::string text = key + '\n';
@@ -73,7 +73,7 @@ fs::path listOf(const fs::path& folder, const std::string& key) {
     return folder / fmt::format("{}{}", key, kListExtension);
 }
 
-/// Paths, each with a zero behind. Empty where there is none.
+/// Reads paths, each with a zero behind. Returns none where there is no list.
 std::vector<fs::path> readList(const fs::path& path) {
     std::vector<fs::path> files;
     std::ifstream file(path, std::ios::binary);
@@ -81,7 +81,7 @@ std::vector<fs::path> readList(const fs::path& path) {
     return files;
 }
 
-/// Whole or not at all. Where it cannot be written the mesh is built again next time.
+/// Writes a list whole or not at all. Where it cannot be written, the mesh is built again next time.
 void writeList(const fs::path& path, const std::vector<fs::path>& files) {
     std::error_code ignored;
     if (files.empty()) {
@@ -93,7 +93,7 @@ void writeList(const fs::path& path, const std::vector<fs::path>& files) {
     (void)writeFile(path, OutputKind::Text, std::as_bytes(std::span(text)), {.overwrite = true});
 }
 
-/// Errors: InvalidInput, where what was read is not what is there.
+/// Checks that the inputs did not change while they were read. Errors: InvalidInput.
 Result<void> checkUnchanged(const BuildOptions& options, const std::string& keyBefore, const BuildReport& report) {
     const auto changed = [](const fs::path& file) {
         return Error{ErrorCode::InvalidInput, "was changed while it was read; open it again once it is whole",
@@ -132,7 +132,7 @@ std::vector<CachedFile> filesIn(const fs::path& folder) {
     return files;
 }
 
-/// 16 hexadecimal digits and an extension of ours. Other files in the folder are not ours to remove.
+/// Whether a name is 16 hexadecimal digits and an extension of ours. Other files in the folder must not be removed.
 bool isOurName(const fs::path& path, std::string_view extension) {
     const std::string stem = path.stem().string();
     return path.extension() == extension && stem.size() == 16 &&
@@ -154,7 +154,7 @@ Result<fs::path> defaultCacheFolder() {
 bool looksLikeDataset(const fs::path& path) {
     std::array<char, 8> start{};
     const FileHeader header;
-    // A pipe may be a mesh: what is read of it is gone.
+    // A mesh may be a pipe, whose bytes are gone once they are read.
     const auto file = openRegularStream(path);
     if (file && std::fread(start.data(), 1, start.size(), file->get()) == start.size() &&
         std::equal(start.begin(), start.end(), header.magic))
@@ -180,7 +180,7 @@ Result<fs::path> MeshCache::dataset(BuildOptions options, const Builder& build) 
     fs::path path = folder_ / fmt::format("{}{}", nameOf(*key, readList(list)), kExtension);
     std::error_code failed;
     if (isWhole(path)) {
-        // The list last: what is used less recently than any dataset is of none.
+        // The list comes last: a list used longer ago than every dataset belongs to none.
         for (const fs::path& used : {path, list}) fs::last_write_time(used, fs::file_time_type::clock::now(), failed);
         return path;
     }

@@ -19,10 +19,10 @@
 
 namespace vcp {
 
-/// $XDG_CACHE_HOME/vcp, else $HOME/.cache/vcp. Errors: Io when neither is set.
+/// Returns $XDG_CACHE_HOME/vcp, else $HOME/.cache/vcp. Errors: Io when neither is set.
 Result<std::filesystem::path> defaultCacheFolder();
 
-/// True when the file starts like a .vcp, or has that extension. False also when it cannot be read.
+/// Returns true when the file starts like a .vcp, or has that extension. Returns false also when it cannot be read.
 bool looksLikeDataset(const std::filesystem::path& path);
 
 class MeshCache {
@@ -34,15 +34,15 @@ public:
 
     using Builder = std::function<Result<BuildReport>(const BuildOptions&)>;
 
-    /// The dataset for `options.inputs`: from the folder when it is there and whole, else built by `build`
-    /// (normally buildOctree); `options.output` is ignored. Errors: Io (folder cannot be made, input
-    /// missing); InvalidInput (a file was changed while it was read); what the builder reports.
+    /// Returns the dataset for `options.inputs`: from the folder when it is there and whole, else built by `build`
+    /// (normally buildOctree); `options.output` is ignored. Errors: Io (folder cannot be made, input missing);
+    /// InvalidInput (a file was changed while it was read); what the builder reports.
     Result<std::filesystem::path> dataset(BuildOptions options, const Builder& build);
 
-    /// Files that the meshes named when they were built: material files, images, buffers. None before.
+    /// Returns the files that the meshes named when they were built: material files, images, buffers. None before.
     [[nodiscard]] std::vector<std::filesystem::path> sideFilesOf(const BuildOptions& options) const;
 
-    /// Where the dataset for `options` is or would be. Errors: Io (input missing).
+    /// Returns where the dataset for `options` is or would be. Errors: Io (input missing).
     [[nodiscard]] Result<std::filesystem::path> pathFor(const BuildOptions& options) const;
 
     /// Removes the datasets used least recently until the folder is within its limit, and leftovers of builds

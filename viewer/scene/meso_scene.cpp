@@ -48,7 +48,7 @@ Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
 
 using Texture = std::shared_ptr<const MesoTexture>;
 
-/// Pictures that several surfaces name are read once.
+/// Reads pictures; one that several surfaces name is read once.
 class Textures {
 public:
     Result<Texture> colours(const std::string& file) { return read(file, colours_, readColourTexture); }

@@ -1,4 +1,4 @@
-// Mesostructure surfaces from what a person says of them: asset, method, base. What scenes and `vcp meso render` hand
+// Makes mesostructure surfaces from a person's description: asset, method, base. Scenes and `vcp meso render` hand them
 // to the renderer (Renderer::setSurfaces).
 #pragma once
 
@@ -13,17 +13,17 @@
 
 namespace vcp {
 
-/// A procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those of
-/// readAsset.
+/// Opens a procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those
+/// of readAsset.
 Result<meso::Asset> openMesoAsset(const std::string& name);
 
-/// Where a scene file says something; no file: somebody else said it.
+/// The place of a value in a scene file; without a file the value comes from elsewhere.
 struct ScenePlace {
     std::string file;
     size_t line = 0;
-    std::string key;  ///< empty: in that line
+    std::string key;  ///< key of the value; empty: the line as a whole
 
-    /// An error of what was said there: where a person's arguments would be wrong, the file is.
+    /// Turns an error of that value into one of the file, where it would be one of a person's arguments.
     [[nodiscard]] Error blamed(Error error) const;
 };
 
@@ -31,10 +31,10 @@ struct MesoSurfaceDescription {
     std::string asset;  ///< as openMesoAsset
     meso::MethodOptions method;
     std::string base = "quad";  ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
-    double tiles = 4;           ///< along the base (makeBaseSurface, readBaseMesh)
-    double heightScale = 1;     ///< of the slab; 1: as high as the asset is to its tile's edge
+    double tiles = 4;           ///< tile edges along the base (makeBaseSurface, readBaseMesh)
+    double heightScale = 1;     ///< height of the slab; 1: in the asset's own proportion to its tile's edge
     glm::dvec3 place{0};        ///< the base's origin, world
-    double scale = 1;           ///< of the base, mesh files too
+    double scale = 1;           ///< scale of the base, of mesh files too
     UpAxis up = UpAxis::Z;      ///< which way the base's z points; mesh files stay as they are
     glm::vec3 colour{0.8f};     ///< encoded
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/scene/tile_texture.h); empty: none
@@ -43,16 +43,16 @@ struct MesoSurfaceDescription {
     ScenePlace from = {};
 };
 
-/// A direction or place in a world where z is up, in one where y may be.
+/// Turns a direction or place from a world where z is up to one where `up` is.
 inline glm::dvec3 turnedUp(glm::dvec3 p, UpAxis up) { return up == UpAxis::Z ? p : glm::dvec3(p.x, p.z, -p.y); }
 
 struct MesoScene {
     std::vector<MesoSurface> surfaces;
     Box bounds = Box::nothing();
-    std::vector<std::string> warnings;  ///< what shells and maps have that a picture may show
+    std::vector<std::string> warnings;  ///< properties of shells and maps that a picture may show
 };
 
-/// Errors: those of the assets, methods, bases and shells, with the file where there is one.
+/// Makes the surfaces. Errors: those of the assets, methods, bases and shells, with the file where there is one.
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions);
 
 }  // namespace vcp

@@ -12,13 +12,13 @@
 
 namespace vcp {
 
-/// How servers are asked.
+/// How servers are accessed.
 struct SourceAccess {
     std::string caFile;                ///< PEM; empty: the system's
     std::string cache;                 ///< folder that keeps what a server sends; empty: nothing is kept
     uint64_t cacheBytes = 4ull << 30;  ///< limit of that folder
-    /// Ends what a server is asked for, within some 50 ms, once it says so: while a dataset is opened, and in its later
-    /// reads. Any thread asks.
+    /// Makes requests to a server end, within some 50 ms, once it returns true: while a dataset is opened, and in its
+    /// later reads. Any thread calls it.
     std::function<bool()> cancelled = {};
 };
 
@@ -26,7 +26,7 @@ struct SourceAccess {
 /// HttpReader::open and CachingReader::open.
 Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access);
 
-/// A dataset opened for showing: of a large directory the beginning, more as pages are asked for.
+/// A dataset opened for showing: of a large directory the beginning is read, and more as pages are asked for.
 struct OpenDataset {
     std::shared_ptr<const ByteReader> reader;
     std::shared_ptr<const Dataset> dataset;
@@ -34,13 +34,13 @@ struct OpenDataset {
     bool isRemote = false;
 
     [[nodiscard]] Box bounds() const;
-    /// Threads that read pages: from a server most of them wait.
+    /// Returns the number of threads that read pages: with a server most of them wait.
     [[nodiscard]] uint32_t loaderThreads() const { return isRemote ? 8 : 2; }
-    /// Pages read together up to so many bytes (FilePageSource).
+    /// Returns up to how many bytes pages are read together (FilePageSource).
     [[nodiscard]] uint64_t runBytes() const { return isRemote ? 256 << 10 : 0; }
 };
 
-/// Errors: those of openReader and readDatasetStart.
+/// Opens a dataset. Errors: those of openReader and readDatasetStart.
 Result<OpenDataset> openDataset(const std::string& where, const SourceAccess& access);
 
 }  // namespace vcp

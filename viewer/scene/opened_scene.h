@@ -17,11 +17,11 @@ struct OpenedScene {
         Similarity placement;
     };
     std::vector<Part> parts;                       ///< at least one, or a surface
-    MesoScene surfaces;                            ///< made of those of the file
+    MesoScene surfaces;                            ///< made from the file's surfaces
     SceneFile file;                                ///< light, camera and sections of a scene file; empty without one
-    std::vector<std::filesystem::path> filesRead;  ///< which no output may replace; addresses stand among them
+    std::vector<std::filesystem::path> filesRead;  ///< files that no output may replace; may include addresses
 
-    /// Of all datasets where they are placed, and of the surfaces.
+    /// Returns the box about all datasets where they are placed, and the surfaces.
     [[nodiscard]] Box bounds() const;
     [[nodiscard]] std::vector<PlacedDataset> placed() const;
 };

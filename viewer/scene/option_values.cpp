@@ -29,7 +29,7 @@ bool takeNumber(std::string_view& text, Number& number) {
     return true;
 }
 
-/// Numbers between commas: all of `text`, `count` of them.
+/// Parses numbers between commas: all of `text`, `count` of them.
 template <size_t count>
 std::optional<std::array<double, count>> takeList(std::string_view text) {
     std::array<double, count> list{};
@@ -116,7 +116,7 @@ std::optional<uint64_t> parseCount(std::string_view text) {
         constexpr std::string_view kPrefixes = "KMG";
         const size_t power = kPrefixes.find(text.front() & ~0x20);
         if (power == std::string_view::npos || text.size() > 1) return std::nullopt;
-        // One product, rounded once: 1.1M is whole.
+        // There is a single product, rounded once, so that 1.1M is whole.
         constexpr double kFactors[] = {1e3, 1e6, 1e9};
         number *= kFactors[power];
     }

@@ -1,4 +1,4 @@
-// Values of command-line options, and numbers as a person reads them. Pure text; no I/O.
+// Parses values of command-line options, and formats numbers for people. Pure text; no I/O.
 #pragma once
 
 #include <cstdint>
@@ -14,52 +14,52 @@ namespace vcp {
 /// A length: world units ("0.25", "1e-3"), or a part of the bounding box's diagonal ("0.01%").
 struct Length {
     double value = 0;         ///< world units, or a fraction (0.01% is 1e-4)
-    bool isRelative = false;  ///< of the diagonal
+    bool isRelative = false;  ///< `value` is a part of the diagonal
 };
 
-/// Nothing when the text is not a positive, finite length.
+/// Parses a length. Returns nothing when the text is not a positive, finite length.
 std::optional<Length> parseLength(std::string_view text);
 
-/// "4096", "512K", "512M", "4G", "1T", also with "iB" or "B" behind; factors of 1024. Nothing when malformed,
-/// zero, or beyond 2^60.
+/// Parses "4096", "512K", "512M", "4G", "1T", also with "iB" or "B" behind; factors of 1024. Returns nothing when
+/// malformed, zero, or beyond 2^60.
 std::optional<uint64_t> parseBytes(std::string_view text);
-/// What is wrong with a budget of the pool or of memory, which is of 1 MiB at least; empty: nothing.
+/// Returns what is wrong with a budget of the pool or of memory, which must be at least 1 MiB; empty: nothing is.
 std::string budgetProblem(const std::string& text);
 
-/// As parseBytes, or a part of `whole`: "50%".
+/// Parses as parseBytes, or a part of `whole`: "50%".
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole);
 
-/// "10000", "250k", "1.5M", "1G": a whole number, with factors of 1000. Nothing when malformed, zero, beyond 10^15,
-/// or not whole.
+/// Parses "10000", "250k", "1.5M", "1G": a whole number, with factors of 1000. Returns nothing when malformed, zero,
+/// beyond 10^15, or not whole.
 std::optional<uint64_t> parseCount(std::string_view text);
 
-/// "1920x1200": each from 1 to 16384.
+/// Parses "1920x1200": each from 1 to 16384.
 std::optional<glm::ivec2> parseSize(std::string_view text);
 
-/// A plane that cuts: kept is where dot(normal, x) >= offset.
+/// A plane that cuts: what has dot(normal, x) >= offset is kept.
 struct PlaneText {
     glm::dvec3 normal{0};
     double offset = 0;        ///< world units, or a part of the bounding box along its axis
     bool isRelative = false;  ///< then the normal is an axis
 };
 
-/// What to keep: "x<0.2", "z>50%" (of the bounding box), or four numbers "a,b,c,d" for ax + by + cz >= d. Nothing
-/// when malformed.
+/// Parses what to keep: "x<0.2", "z>50%" (of the bounding box), or four numbers "a,b,c,d" for ax + by + cz >= d.
+/// Returns nothing when malformed.
 std::optional<PlaneText> parsePlane(std::string_view text);
 
-/// Three numbers, "1,0,-0.5", not all zero. Nothing when malformed.
+/// Parses three numbers, "1,0,-0.5", not all zero. Returns nothing when malformed.
 std::optional<glm::dvec3> parseDirection(std::string_view text);
 
-/// "1 087 716".
+/// Returns a text such as "1 087 716".
 std::string formatCount(uint64_t count);
 
-/// "13.2 MB", in powers of 1000 as file managers show it.
+/// Returns a text such as "13.2 MB", in powers of 1000 as file managers show it.
 std::string formatBytes(uint64_t bytes);
 
-/// Up to 4 significant digits: "0.01234", "1.5e-07".
+/// Returns up to 4 significant digits: "0.01234", "1.5e-07".
 std::string formatLength(double length);
 
-/// "0.82 s", "3 min 05 s".
+/// Returns a text such as "0.82 s" or "3 min 05 s".
 std::string formatSeconds(double seconds);
 
 }  // namespace vcp

@@ -21,7 +21,7 @@ constexpr NamedShading kShadings[] = {
     {"fetches", ShadingMode::Fetches}, {"level", ShadingMode::Level}, {"error", ShadingMode::Error},
 };
 
-// From the left, almost along a surface that faces the camera: relief of a millimetre casts its shade.
+// This light comes from the left, almost along a surface that faces the camera: relief of a millimetre casts shade.
 constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
 
 }  // namespace
@@ -69,7 +69,7 @@ std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const
     std::vector<SectionPlane> planes;
     for (const std::string& text : sections) {
         const PlaneText plane = parsePlane(text).value();
-        // An axis' own offset: from the box's lower side on, whichever side is kept.
+        // An axis' offset counts from the box's lower side, whichever side is kept.
         const glm::dvec3 axis = glm::abs(plane.normal);
         const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) +
                                                      plane.offset * glm::dot(axis, bounds.high - bounds.low)

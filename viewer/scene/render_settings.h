@@ -29,21 +29,21 @@ struct RenderSettings {
     PaperMarch march;
     SourceSettings source;
 
-    /// Errors: Usage, where options do not go with the dataset's method.
+    /// Checks that the settings go with the dataset's method. Errors: Usage.
     [[nodiscard]] Result<void> checkFor(const Dataset& dataset) const;
 
-    /// For a local file; a server wants more loader threads.
+    /// Returns the renderer's options for a local file; a server needs more loader threads.
     [[nodiscard]] RendererOptions rendererOptions() const;
     [[nodiscard]] Shading shadingChosen() const;
     [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
-    /// The view, or the camera file. Errors: those of readCamera.
+    /// Returns the camera of the view, or of the camera file. Errors: those of readCamera.
     [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size,
                                                 const PictureMargins& covered = {}) const;
 };
 
-/// What RenderSettings::shading may say.
+/// Returns the names that RenderSettings::shading may have.
 std::vector<std::string> shadingNames();
 
 }  // namespace vcp

@@ -24,7 +24,7 @@ using Json = nlohmann::json;
 constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
 constexpr int kDeepest = 16;
-// So far apart that double precision resolves a millimetre where units are metres, and further.
+// Within this range double precision resolves a millimetre where units are metres, and more.
 constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
 
 bool isDeeperThan(const Json& json, int depth) {
@@ -33,7 +33,7 @@ bool isDeeperThan(const Json& json, int depth) {
     return std::any_of(json.begin(), json.end(), [&](const Json& each) { return isDeeperThan(each, depth - 1); });
 }
 
-/// Takes a scene apart and remembers the first thing that is wrong.
+/// Takes a scene apart and remembers the first error.
 class SceneReader {
 public:
     SceneReader(const LinesOf& lines, const std::string& name, std::filesystem::path folder)
@@ -107,7 +107,7 @@ private:
         return v;
     }
 
-    /// Of any length above zero.
+    /// Makes a vector unit; it may have any length above zero.
     static glm::dvec3 unit(glm::dvec3 v) {
         return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
     }
@@ -161,7 +161,7 @@ private:
         else
             made.asset = assetNamed(json["asset"], at + "/asset");
         made.from = {name_, lines_(at), {}};
-        // A base that is none by name is a mesh.
+        // A base that is not a name of a shape is a mesh.
         const auto bases = meso::baseSurfaceNames();
         const auto isMesh = [&](const std::string& name) { return std::ranges::find(bases, name) == bases.end(); };
         if (json.contains("surface")) made.base = named(json["surface"], at + "/surface", isMesh);
@@ -180,7 +180,7 @@ private:
         return made;
     }
 
-    /// A name, or a file, which is taken from the scene's folder.
+    /// Reads a name, or a file, which is relative to the scene's folder.
     template <class IsFile>
     std::string named(const Json& json, const std::string& at, IsFile isFile) {
         if (!json.is_string() || json.get<std::string>().empty())
@@ -300,7 +300,7 @@ private:
     std::optional<Error> error_;
 };
 
-/// Where a text stops being JSON, numbers that no double holds among it.
+/// Finds where a text stops being JSON; numbers that no double can hold count as a mistake.
 class FirstMistake : public nlohmann::detail::json_sax_acceptor<Json> {
 public:
     bool parse_error(size_t byte, const std::string&, const Json::exception& e) {
@@ -312,7 +312,7 @@ public:
     bool isNumber = false;
 };
 
-/// Nothing: it is JSON.
+/// Returns the error; nothing where the text is JSON.
 std::optional<Error> notJson(std::string_view text, const std::string& name) {
     FirstMistake mistake;
     if (Json::sax_parse(text, &mistake)) return std::nullopt;

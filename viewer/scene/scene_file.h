@@ -38,14 +38,14 @@ struct SceneFile {
     bool sectionCaps = false;
 };
 
-/// At most so many datasets in one scene.
+/// A scene has at most so many datasets.
 constexpr size_t kMostSceneDatasets = 256;
 
-/// The files that a scene names: datasets and meshes but for addresses, assets, bases and textures.
+/// Returns the files that a scene names: datasets and meshes without addresses, assets, bases and textures.
 std::vector<std::filesystem::path> filesOf(const SceneFile& scene);
 
-/// similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9. Errors:
-/// Usage.
+/// Does similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9.
+/// Errors: Usage.
 Result<Similarity> scenePlacement(std::span<const double, 16> rows);
 
 /// Whether a name stands for a scene file: it ends in .json.
@@ -54,7 +54,7 @@ bool isSceneName(const std::string& name);
 /// Relative files are taken from `folder`. `name` stands for the file in errors. May be hostile. Errors: InvalidInput.
 Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
-/// sceneFromJson of a file of at most 1 MiB. Errors: also Io, Limit.
+/// Does sceneFromJson of a file of at most 1 MiB. Errors: also Io, Limit.
 Result<SceneFile> readScene(const std::filesystem::path& path);
 
 }  // namespace vcp

@@ -13,7 +13,7 @@ struct SourceSettings {
     std::string cache;
     std::string cacheLimit = "4G";
 
-    std::function<bool()> cancelled;  ///< asked during exchanges with a server; may be empty
+    std::function<bool()> cancelled;  ///< called during exchanges with a server; may be empty
 
     operator SourceAccess() const;
 };

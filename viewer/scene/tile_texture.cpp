@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint32_t kMostEdge = 4096;
 
-/// A channel of what is stored as 8 bits.
+/// Returns a channel of a texel that is stored as 8 bits.
 int byteOf(Rgba8 texel, int channel) { return int(texel >> (8 * channel) & 0xff); }
 
 template <class ToVector>
@@ -38,7 +38,7 @@ Result<MesoTexture> readColourTexture(const std::filesystem::path& path) {
 
 Result<MesoTexture> readNormalTexture(const std::filesystem::path& path) {
     return readTexture(path, [](Rgba8 texel) {
-        // 128 is 0, as far as bytes go.
+        // 128 stands for 0, as exactly as bytes allow.
         const glm::vec3 n = (glm::vec3(byteOf(texel, 0), byteOf(texel, 1), byteOf(texel, 2)) - 128.0f) / 127.0f;
         return n.z > 0 ? glm::vec4(glm::normalize(n), 0) : glm::vec4(0, 0, 1, 0);
     });

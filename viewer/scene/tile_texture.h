@@ -1,4 +1,4 @@
-// Textures over a mesostructure's tile from pictures.
+// Reads textures over a mesostructure's tile from pictures.
 #pragma once
 
 #include <filesystem>
@@ -13,9 +13,9 @@ namespace vcp {
 /// an edge).
 Result<MesoTexture> readColourTexture(const std::filesystem::path& path);
 
-/// The same of normals in the OpenGL convention: red, green and blue from 0 to 255 are x (to the right), y (up in the
-/// picture) and z (out of it) from -1 to 1; no gamma. Vectors are made unit; what does not point out of the picture is
-/// (0, 0, 1).
+/// Does so with normals in the OpenGL convention: red, green and blue from 0 to 255 are x (to the right), y (up in the
+/// picture) and z (out of it) from -1 to 1; no gamma. Vectors are made unit; one that does not point out of the picture
+/// becomes (0, 0, 1).
 Result<MesoTexture> readNormalTexture(const std::filesystem::path& path);
 
 }  // namespace vcp

@@ -13,15 +13,15 @@ namespace {
 
 constexpr std::chrono::milliseconds kProgressEvery{100};
 
-/// A build in a thread of its own, so that the host hears of it in the one that called.
+/// Runs a build in a thread of its own, so that the host hears of it in the thread that called.
 class BuildRun {
 public:
     explicit BuildRun(BuildOptions options) : options_(std::move(options)) {
         options_.progress = [this](const BuildProgress& at) { return hear(at); };
     }
 
-    /// Until it is done. `tell` returns false to cancel, and is not called again then; nor is it once this has
-    /// returned.
+    /// Reports until the build is done. `tell` returns false to cancel, and is not called again then, nor after this
+    /// has returned.
     template <class Tell>
     Result<BuildReport> run(Tell tell) {
         std::jthread thread([this] {
@@ -41,7 +41,7 @@ public:
                 cancelled_ = !goesOn;
                 news_.wait_for(lock, kProgressEvery, [this] { return done_ || !heard_.empty(); });
                 isOver = done_;
-                // Where nothing is new the last is told again, so that a host may cancel in a stage that takes long.
+                // Where nothing is new, the last report is repeated, so that a host may cancel in a long stage.
                 if (isOver || !heard_.empty()) untold = std::exchange(heard_, {});
             }
             for (const BuildProgress& at : untold) goesOn = goesOn && tell(at);
@@ -54,7 +54,7 @@ public:
 private:
     bool hear(const BuildProgress& at) {
         const std::lock_guard lock(mutex_);
-        // A host that is slow misses steps of a stage, never a stage.
+        // A host that is slow misses steps of a stage, but never a stage.
         if (heard_.empty() || heard_.back().stage != at.stage)
             heard_.push_back(at);
         else
@@ -68,14 +68,14 @@ private:
     std::condition_variable news_;
     std::vector<BuildProgress> heard_;  // guarded by mutex_, like the next two
     bool cancelled_ = false, done_ = false;
-    std::optional<Result<BuildReport>> report_;  // of the thread until done_
+    std::optional<Result<BuildReport>> report_;  // belongs to the thread until done_
 };
 
 Result<BuildOptions> buildOptions(const vcp_build_options& given) {
     BuildOptions options;
     if (given.input_count == 0 || !given.inputs) return wrong("there is nothing to build from");
     for (uint32_t i = 0; i < given.input_count; ++i) {
-        // Standard input is the program's own, not the library's to read.
+        // Standard input belongs to the program, so the library must not read it.
         const std::string input = textOf(given.inputs[i]);
         if (input.empty() || input == "-") return wrong("an input has no path");
         options.inputs.emplace_back(input);
@@ -92,7 +92,7 @@ Result<BuildOptions> buildOptions(const vcp_build_options& given) {
     return options;
 }
 
-/// False where the host cancels. What its callback throws ends the build as well.
+/// Tells the host; returns false where it cancels. An exception of its callback ends the build as well.
 bool tellHost(const vcp_build_options& given, const BuildProgress& at) {
     if (!given.progress) return true;
     const vcp_progress progress{sizeof(vcp_progress), at.stage.c_str(), at.fraction, at.triangles, at.seconds};

@@ -54,14 +54,14 @@ Result<SourceAccess> accessFor(const vcp_open_options* given) {
     return access;
 }
 
-/// What is opened meanwhile can be cancelled by another thread.
+/// Lets another thread cancel what is being opened.
 class Opening {
 public:
     explicit Opening(vcp_context& context) : context_(context) { set(isCancelled_); }
     ~Opening() { set(nullptr); }
     Opening(const Opening&) = delete;
     Opening& operator=(const Opening&) = delete;
-    /// For readers, which live longer.
+    /// Returns a function for readers, which live longer.
     [[nodiscard]] std::function<bool()> cancelled() const {
         return [token = isCancelled_] { return token->load(); };
     }

@@ -4,10 +4,10 @@ namespace vcp::widget {
 
 namespace {
 
-// No struct of ours is near as large: what says so was not set.
+// No struct of ours is nearly as large: a larger size means that it was not set.
 constexpr uint32_t kLargestStruct = 4096;
 
-/// Bytes of the character of UTF-8 at a place; 0 where there is none.
+/// Returns the bytes of the UTF-8 character at a place; 0 where there is none.
 size_t characterAt(const std::string& text, size_t at) {
     const auto byte = [&](size_t i) { return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u; };
     const unsigned first = byte(0);
@@ -18,7 +18,7 @@ size_t characterAt(const std::string& text, size_t at) {
                                                           : 0;
     for (size_t i = 1; i < length; ++i)
         if ((byte(i) & 0xC0) != 0x80) return 0;
-    // Longer than it need be, half of a pair of UTF-16, or beyond the last.
+    // Overlong, half of a pair of UTF-16, or beyond the last character.
     const unsigned second = byte(1);
     const bool isWrong = (first == 0xE0 && second < 0xA0) || (first == 0xED && second >= 0xA0) ||
                          (first == 0xF0 && second < 0x90) || (first == 0xF4 && second >= 0x90);
@@ -102,7 +102,7 @@ Result<void> giveStruct(void* out, const void* value, size_t size) {
 void copyText(char* to, size_t size, const std::string& text) {
     if (!to || size == 0) return;
     size_t length = std::min(size - 1, text.size());
-    // No character is cut in two.
+    // A character is never cut in two.
     while (length > 0 && length < text.size() && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
     std::memcpy(to, text.data(), length);
     to[length] = '\0';

@@ -1,4 +1,4 @@
-// What the handles of vcp.h are, and what every call of it does first and last.
+// What the handles of vcp.h are, and what every call does first and last.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 #include "viewer/widget/vcp.h"
 
 namespace vcp::widget {
-/// For hosts, which take texts for UTF-8: names of files and what stands in them may be anything. What is none becomes
+/// Makes a text valid UTF-8 for hosts: names of files and their content may be anything. Invalid bytes become
 /// U+FFFD.
 std::string utf8Of(const std::string& text);
 }  // namespace vcp::widget
@@ -36,7 +36,7 @@ struct vcp_context {
     std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
     bool hasWindows = false;
     uint64_t gpuBytes = 0, ramBytes = 0;
-    std::unique_ptr<vcp::Renderer> renderer;  // of a view that nobody looks at; all others are added to it
+    std::unique_ptr<vcp::Renderer> renderer;  // the renderer of a view that is never shown; all others are added to it
     std::vector<vcp_view*> views;
     std::optional<vcp::OpenedScene> open;
     std::string name;
@@ -56,15 +56,15 @@ struct vcp_view {
     std::string lastError;
     bool hasWindow = false;
     vcp::UpAxis up = vcp::UpAxis::Y;
-    bool isUpdated = false;  // since it was made
+    bool isUpdated = false;  // it was updated since it was made
     bool wasSettled = false;
-    bool hasSceneLight = false, hasSceneSections = false;  // of the scene file that is open
+    bool hasSceneLight = false, hasSceneSections = false;  // whether the open scene file has them
     uint32_t losses = 0;
-    vcp::NextStep next;  // of the last update, less what was drawn since
+    vcp::NextStep next;  // result of the last update, without what was drawn since
     glm::dvec2 cursor{0};
     glm::dvec3 fly{0};
 
-    /// It shows what the context has open.
+    /// Shows in the view what the context has open.
     void showScene();
     void redrawIsNeeded() {
         if (context->callbacks.needs_redraw) context->callbacks.needs_redraw(context->callbacks.user, this);
@@ -73,7 +73,7 @@ struct vcp_view {
 
 namespace vcp::widget {
 
-/// What a call came to.
+/// The result of a call.
 struct Outcome {
     vcp_status status = VCP_OK;
     std::string text;
@@ -88,7 +88,7 @@ struct Outcome {
 
 inline Error wrong(std::string what) { return {.code = ErrorCode::Usage, .message = std::move(what)}; }
 
-/// The outcome of `call`, whatever it throws.
+/// Returns the outcome of `call`, whatever it throws.
 template <class Call>
 Outcome outcomeOf(Call call) noexcept {
     try {
@@ -102,7 +102,7 @@ Outcome outcomeOf(Call call) noexcept {
     }
 }
 
-/// The context's turn: one call at a time.
+/// A call's turn at the context: one call at a time.
 class Turn {
 public:
     explicit Turn(vcp_context& context)
@@ -113,7 +113,7 @@ public:
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
     [[nodiscard]] bool isTaken() const { return taken_; }
-    /// The context is gone.
+    /// Called when the context was destroyed.
     void drop() { taken_ = false; }
 
 private:
@@ -121,10 +121,10 @@ private:
     bool taken_;
 };
 
-/// Keeps the text and tells the host.
+/// Keeps the text of the error and tells the host.
 vcp_status report(vcp_context& context, std::string& lastError, Outcome outcome) noexcept;
 
-/// A call for a context: call(Turn&).
+/// Runs a call for a context: call(Turn&).
 template <class Call>
 vcp_status inTurn(vcp_context* context, Call call) noexcept {
     if (!context) return VCP_USAGE;
@@ -134,7 +134,7 @@ vcp_status inTurn(vcp_context* context, Call call) noexcept {
     return report(*context, context->lastError, std::move(outcome));
 }
 
-/// A call for a view.
+/// Runs a call for a view.
 template <class Call>
 vcp_status inTurn(vcp_view* view, Call call) noexcept {
     if (!view) return VCP_USAGE;
@@ -144,14 +144,14 @@ vcp_status inTurn(vcp_view* view, Call call) noexcept {
     return report(*view->context, view->lastError, std::move(outcome));
 }
 
-/// Bytes of a struct of the host's, which may be older or younger than ours. Errors: Usage.
+/// Returns the size of a struct of the host's, which may be older or newer than ours. Errors: Usage.
 Result<uint32_t> structSize(const void* given);
-/// Errors: Usage, where what we do not know is not zero.
+/// Copies a struct. Errors: Usage, where fields that we do not know are not zero.
 Result<void> takeStruct(const void* given, void* value, size_t size);
 Result<void> giveStruct(void* out, const void* value, size_t size);
 
-/// The host's struct over `value`, which stays what it is beyond the host's size; nothing where it is null. Errors:
-/// Usage.
+/// Copies the host's struct over `value`, which keeps what is beyond the host's size; does nothing where it is null.
+/// Errors: Usage.
 template <class T>
 Result<T> taken(const T* given, T value = {}) {
     if (given) VCP_TRY(takeStruct(given, &value, sizeof(T)));
@@ -165,7 +165,7 @@ Result<void> give(T* out, const T& value) {
     return giveStruct(out, &value, sizeof(T));
 }
 
-/// As much of a text as there is room for.
+/// Copies as much of a text as there is room for.
 void copyText(char* to, size_t size, const std::string& text);
 
 inline std::string textOf(const char* text) { return text ? text : ""; }

@@ -1,4 +1,4 @@
-// The module `vcp` for Python: vcp.hpp with NumPy arrays. Calls that take long let other threads of Python run.
+// The module `vcp` for Python: vcp.hpp with NumPy arrays. During calls that take long, other threads of Python run.
 #include <pybind11/functional.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -24,7 +24,7 @@ py::dict toDict(const vcp_camera& camera) {
                     "up"_a = triple(camera.up), "fov_y"_a = camera.fov_y, "orthographic"_a = camera.orthographic != 0);
 }
 
-/// The view's camera with what the keywords change.
+/// Returns the view's camera, changed by the keywords.
 vcp_camera changed(vcp_camera camera, const py::kwargs& fields) {
     const auto set = [](double* to, const py::handle& value) {
         const auto from = value.cast<Triple>();
@@ -69,7 +69,7 @@ py::object pickOf(View& view, double x, double y) {
                     "error"_a = p.error, "level"_a = p.level, "dataset"_a = p.dataset);
 }
 
-/// (height, width, 4) of uint8, and (height, width) of float32.
+/// Returns (height, width, 4) of uint8, and (height, width) of float32.
 py::tuple frameOf(View& view) {
     const Frame frame = view.read();
     py::array_t<uint8_t> rgba({py::ssize_t(frame.height), py::ssize_t(frame.width), py::ssize_t(4)});
@@ -88,7 +88,7 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
     options.memory_bytes = memoryBytes;
     options.threads = threads;
     std::exception_ptr thrown;
-    // False cancels; so does an exception, which is passed on.
+    // Returning false cancels; so does an exception, which is passed on.
     const auto tell = [&](const vcp_progress& at) {
         const py::gil_scoped_acquire python;
         try {
@@ -115,7 +115,7 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
 /// One path, or several with a matrix of 16 numbers each, row by row, or none.
 using Paths = std::variant<std::string, std::vector<std::pair<std::string, std::optional<std::array<double, 16>>>>>;
 
-/// A view that keeps its context.
+/// Opens a view that keeps its context alive.
 std::unique_ptr<View> openView(const Paths& paths, uint32_t width, uint32_t height, uint64_t gpuBytes,
                                const std::string& device, bool zIsUp) {
     vcp_context_options options = sized<vcp_context_options>();

@@ -1,8 +1,9 @@
 /* vcp.h: the viewer of .vcp files as a part of your own program, in C.
  *
- *   vcp_context   a device, its budgets and a dataset, or several in their places; as many as you like, independent of
- * each other vcp_view      a picture of what the context has open: in a window of yours, in your memory or in your
- * Vulkan image; the views of a context share its device, its budgets and what is read
+ *   vcp_context   a device, its budgets and a dataset, or several in their places; as many as you like, independent
+ *                 of each other
+ *   vcp_view      a picture of what the context has open: in a window of yours, in your memory or in your Vulkan
+ *                 image; the views of a context share its device, its budgets and what is read
  *
  *   vcp_context_create(&options, &context);          vcp_context_open(context, "statue.vcp", NULL);
  *   vcp_view_create(context, &viewOptions, &view);
@@ -68,7 +69,7 @@ enum {
 
 /* The status in a word or two; never NULL. */
 VCP_API const char* vcp_status_text(vcp_status status);
-/* "0.1.0". */
+/* The version of the library, such as "0.1.0". */
 VCP_API const char* vcp_version(void);
 
 /* ---- Context ---- */
@@ -76,30 +77,30 @@ VCP_API const char* vcp_version(void);
 typedef int32_t vcp_log_level;
 enum { VCP_LOG_INFO = 0, VCP_LOG_WARNING = 1, VCP_LOG_ERROR = 2 };
 
-/* Each may be NULL. */
+/* Functions that the context calls. Each may be NULL. */
 typedef struct vcp_callbacks {
     uint32_t struct_size;
-    void* user; /* handed back */
+    void* user; /* your pointer, handed back */
     void (*log)(void* user, vcp_log_level level, const char* text);
-    /* A call failed; text is what last_error says. Like that of `log`, it lives until the callback returns. */
+    /* A call failed; `text` is what last_error says. Like the text of `log`, it lives until the callback returns. */
     void (*error)(void* user, vcp_status status, const char* text);
-    /* The view's picture would differ: update it soon. From calls that change the view, and from updates of
-     * others that share its pages. */
+    /* The view's picture would differ: update it soon. Called from calls that change the view, and from updates of
+     * other views that share its pages. */
     void (*needs_redraw)(void* user, vcp_view* view);
     /* An update found nothing missing, loading or queued, for the first time since it was otherwise. */
     void (*settled)(void* user, vcp_view* view);
 } vcp_callbacks;
 
-/* A Vulkan device of yours. It outlives the context, has Vulkan 1.2, and the instance was made for that version; no
- * feature is needed. For views in windows it has VK_KHR_swapchain. A device that is lost is not made anew: VCP_DEVICE
- * from then on. */
+/* A Vulkan device of yours. It must outlive the context and have Vulkan 1.2, and its instance must have been made for
+ * that version; no feature is needed. For views in windows it needs VK_KHR_swapchain. A lost device is not made anew:
+ * calls give VCP_DEVICE from then on. */
 typedef struct vcp_host_device {
     uint32_t struct_size;
-    uint32_t queue_family; /* computes; for windows and images it has graphics as well */
+    uint32_t queue_family; /* it can compute; for windows and images it must have graphics too */
     struct VkInstance_T* instance;
     struct VkPhysicalDevice_T* physical_device;
     struct VkDevice_T* device;
-    struct VkQueue_T* queue; /* used within calls for this context, in their thread; not by you at that time */
+    struct VkQueue_T* queue; /* used within calls for this context, in their thread; you may not use it then */
 } vcp_host_device;
 
 typedef struct vcp_context_options {
@@ -112,16 +113,16 @@ typedef struct vcp_context_options {
     uint32_t loader_threads; /* 0: 2, for what is on a server 8 */
     uint32_t without_colour; /* 1: colours are neither read nor kept */
     const vcp_callbacks* callbacks; /* NULL: none; copied */
-    char* error_text;               /* NULL, or where it is written why there is no context */
+    char* error_text;               /* NULL, or a buffer for why there is no context */
     size_t error_text_size;
 } vcp_context_options;
 
 VCP_API vcp_status vcp_context_create(const vcp_context_options* options, vcp_context** context);
-/* VCP_USAGE while it has views. While another thread opens something: VCP_BUSY, and that call ends soon, with
- * VCP_CANCELLED; then call again. NULL: nothing is done. */
+/* Destroys a context. VCP_USAGE while it has views. While another thread opens something: VCP_BUSY, and that call ends
+ * soon, with VCP_CANCELLED; then call again. NULL: nothing is done. */
 VCP_API vcp_status vcp_context_destroy(vcp_context* context);
-/* The last line of what went wrong for the context; "" when nothing has. Lives until the next call. VCP_BUSY leaves it
- * as it is; do not read it while another thread's call is under way. */
+/* Returns the last error of the context as a line of text; "" when there was none. It lives until the next call.
+ * VCP_BUSY leaves it as it is; do not read it while another thread's call is under way. */
 VCP_API const char* vcp_context_last_error(const vcp_context* context);
 
 typedef struct vcp_open_options {
@@ -160,25 +161,25 @@ typedef struct vcp_dataset_info {
     uint64_t triangles;
     double bounds_min[3], bounds_max[3];
     double cell;            /* edge of the finest cells */
-    double certified_error; /* of the finest level: at most so far from the mesh */
-    uint32_t datasets;      /* so many are open */
+    double certified_error; /* certified error of the finest level: it is at most so far from the mesh */
+    uint32_t datasets;      /* number of open datasets */
     uint32_t reserved;
 } vcp_dataset_info;
 
-/* Of all that is open together, in the world: most levels, all triangles, the box about all, the smallest cell, the
- * largest error. VCP_USAGE where nothing is open. */
+/* Describes all that is open together, in the world: most levels, all triangles, the box about all, the smallest cell,
+ * the largest error. VCP_USAGE where nothing is open. */
 VCP_API vcp_status vcp_context_dataset(vcp_context* context, vcp_dataset_info* info);
 
 typedef struct vcp_device_info {
     uint32_t struct_size;
-    uint32_t software; /* 1: a processor does it all */
+    uint32_t software; /* 1: a processor does all of the work */
     char name[256];
 } vcp_device_info;
 VCP_API vcp_status vcp_context_device(vcp_context* context, vcp_device_info* info);
 
-/* Other budgets, from now on; 0: as it is. VCP_LIMIT where the coarsest page has no room: all stays as it was. */
+/* Sets other budgets, from now on; 0: as it is. VCP_LIMIT where the coarsest page has no room: all stays as it was. */
 VCP_API vcp_status vcp_context_set_budgets(vcp_context* context, uint64_t gpu_bytes, uint64_t ram_bytes);
-/* Waits until something was read, there is nothing to read, or the time is over. */
+/* Waits until something was read, nothing is left to read, or the time is over. */
 VCP_API vcp_status vcp_context_wait(vcp_context* context, double seconds);
 
 /* ---- View ---- */
@@ -203,26 +204,26 @@ typedef struct vcp_view_options {
     void* create_surface_user;
     uint32_t width, height; /* pixels of the framebuffer; 0: minimized */
     double moving_frame_ms; /* while the camera moves, frames that would take longer are drawn smaller; 0: never */
-    double move_seconds;    /* that a smooth move takes; 0: at once */
+    double move_seconds;    /* time that a smooth move takes; 0: at once */
     uint32_t z_is_up;       /* 0: y is up */
-    char* error_text;       /* NULL, or where it is written why there is no view */
+    char* error_text;       /* NULL, or a buffer for why there is no view */
     size_t error_text_size;
 } vcp_view_options;
 
 VCP_API vcp_status vcp_view_create(vcp_context* context, const vcp_view_options* options, vcp_view** view);
-/* Before its window goes. NULL: nothing is done. */
+/* Destroys a view; call it before its window is destroyed. NULL: nothing is done. */
 VCP_API vcp_status vcp_view_destroy(vcp_view* view);
-/* As vcp_context_last_error, for the view. */
+/* Returns the view's last error, as vcp_context_last_error does the context's. */
 VCP_API const char* vcp_view_last_error(const vcp_view* view);
 
-/* Pixels of the framebuffer, at most 16384 a side; 0: minimized, nothing is drawn. */
+/* Sets the size in pixels of the framebuffer, at most 16384 a side; 0: minimized, nothing is drawn. */
 VCP_API vcp_status vcp_view_resize(vcp_view* view, uint32_t width, uint32_t height);
 
 typedef int32_t vcp_button;
 enum { VCP_LEFT = 0, VCP_MIDDLE = 1, VCP_RIGHT = 2 };
 enum { VCP_SHIFT = 1, VCP_CONTROL = 2 };
 
-/* Left: orbit about what is under the cursor; with shift, or the others: pan; with control: turn the light. */
+/* Left: orbits about what is under the cursor; with shift, or other buttons: pans; with control: turns the light. */
 VCP_API vcp_status vcp_view_mouse_press(vcp_view* view, vcp_button button, double x, double y, uint32_t modifiers);
 VCP_API vcp_status vcp_view_mouse_move(vcp_view* view, double x, double y);
 VCP_API vcp_status vcp_view_mouse_release(vcp_view* view, vcp_button button);
@@ -231,9 +232,9 @@ VCP_API vcp_status vcp_view_mouse_scroll(vcp_view* view, double x, double y, dou
 
 typedef int32_t vcp_action;
 enum {
-    VCP_FIT = 0,          /* all of the dataset into the picture */
-    VCP_RESET = 1,        /* the view it opened with */
-    VCP_TOGGLE_LIGHT = 2, /* follows the camera, or stays */
+    VCP_FIT = 0,          /* fits all of the dataset into the picture */
+    VCP_RESET = 1,        /* goes back to the view it opened with */
+    VCP_TOGGLE_LIGHT = 2, /* the light follows the camera, or stays */
     VCP_TOGGLE_SHADOWS = 3,
     VCP_TOGGLE_OCCLUSION = 4,
     VCP_TOGGLE_SECTION = 5, /* cuts through the middle */
@@ -246,14 +247,14 @@ enum {
     VCP_VIEW_RIGHT = 12,
     VCP_VIEW_TOP = 13,
     VCP_VIEW_ISOMETRIC = 14,
-    VCP_CENTRE = 15 /* what was last under the cursor comes to the middle */
+    VCP_CENTRE = 15 /* what was last under the cursor moves to the middle */
 };
 VCP_API vcp_status vcp_view_act(vcp_view* view, vcp_action action);
 /* A key of a keyboard, as the character on it in capitals: what it does in the window of `vcp view` (F fit, R reset, M
  * shading, G fly with W A S D E Q, ...). Others do nothing. */
 VCP_API vcp_status vcp_view_key(vcp_view* view, uint32_t key, uint32_t pressed);
 
-/* position, target and up in the dataset's coordinates; of several, in the world's. */
+/* position, target and up are in the dataset's coordinates; with several datasets, in the world's. */
 typedef struct vcp_camera {
     uint32_t struct_size;
     uint32_t orthographic; /* 1: parallel rays; the height shown is that at the target */
@@ -264,10 +265,10 @@ typedef struct vcp_camera {
 } vcp_camera;
 
 VCP_API vcp_status vcp_view_get_camera(vcp_view* view, vcp_camera* camera);
-/* VCP_USAGE, and nothing changes: a number that is not finite, target at the position, up along the view, fov_y not
- * between 1e-5 and 3.12. */
+/* Sets the camera. VCP_USAGE, and nothing changes, where a number is not finite, target is at the position, up is along
+ * the view, or fov_y is not between 1e-5 and 3.12. */
 VCP_API vcp_status vcp_view_set_camera(vcp_view* view, const vcp_camera* camera);
-/* The same, smoothly. */
+/* Moves the camera there smoothly; errors as for vcp_view_set_camera. */
 VCP_API vcp_status vcp_view_move_camera(vcp_view* view, const vcp_camera* camera);
 
 typedef int32_t vcp_shading;
@@ -287,16 +288,16 @@ enum {
 typedef struct vcp_look {
     uint32_t struct_size;
     vcp_shading shading;
-    double error_pixels;                           /* refined until the certified error is below, in pixels; above 0 */
+    double error_pixels;                           /* certified error at which refining ends, in pixels; above 0 */
     uint32_t shadows;                              /* 1: hard shadows */
-    uint32_t occlusion_rays;                       /* a pixel, at most 64; 0: no ambient occlusion */
+    uint32_t occlusion_rays;                       /* rays a pixel, at most 64; 0: no ambient occlusion */
     double occlusion_radius;                       /* 0: a tenth of the diagonal */
     uint32_t light_in_world;                       /* 0: the light follows the camera */
     uint32_t transparent;                          /* 1: the background is black with alpha 0 */
-    float light[3];                                /* towards it; camera axes (right, up, back), or the world's */
+    float light[3];                                /* towards the light; camera axes (right, up, back), or world */
     float background_top[3], background_bottom[3]; /* linear, 0 to 1 */
     uint32_t section_count;                        /* at most 6 planes; what lies beyond them is cut away */
-    double sections[6][4];                         /* n, d: kept is where dot(n, x) >= d */
+    double sections[6][4];                         /* n, d: what has dot(n, x) >= d is kept */
 } vcp_look;
 
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
@@ -318,7 +319,7 @@ VCP_API vcp_status vcp_view_render(vcp_view* view);
  * what there is then is rendered. */
 VCP_API vcp_status vcp_view_settle(vcp_view* view, double seconds);
 
-/* The last picture. Where frames are drawn smaller while the camera moves, it is smaller than the view. */
+/* The last picture. While the camera moves, frames may be drawn smaller; then it is smaller than the view. */
 typedef struct vcp_frame {
     uint32_t struct_size;
     uint32_t width, height; /* written */
@@ -342,7 +343,7 @@ typedef struct vcp_host_image {
     uint64_t signal; /* VkSemaphore to signal when it is written, or 0 */
 } vcp_host_image;
 
-/* Copies the last picture into it, scaled to it; what was in the image is lost. */
+/* Copies the last picture into your image, scaled to it; what was in the image is lost. */
 VCP_API vcp_status vcp_view_copy_to_image(vcp_view* view, const vcp_host_image* image);
 
 typedef struct vcp_pick {
@@ -350,29 +351,29 @@ typedef struct vcp_pick {
     uint32_t hit; /* 0: nothing is there, and the rest is zero */
     double position[3];
     double normal[3]; /* unit, towards the eye */
-    double distance;  /* from the eye's ray's origin */
-    double error;     /* certified: the mesh is at most so far from `position`'s surface */
-    uint32_t level;   /* of the page that was asked: the finest there is */
+    double distance;  /* from the origin of the eye's ray */
+    double error;     /* certified error: the mesh is at most so far from `position`'s surface */
+    uint32_t level;   /* level of the page that was hit: the finest there is */
     uint32_t dataset; /* number of the dataset that was hit, in the order in which they were placed */
 } vcp_pick;
 
-/* What is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads from the
- * file or the server what it needs: may wait. */
+/* Finds what is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads what
+ * it needs from the file or the server, so it may wait. */
 VCP_API vcp_status vcp_view_pick(vcp_view* view, double x, double y, vcp_pick* pick);
 
-/* Of the last update and the last picture. */
+/* Statistics of the last update and the last picture. */
 typedef struct vcp_stats {
     uint32_t struct_size;
     uint32_t settled, drawable;
     uint32_t relaxed;       /* 1: the budget is too small for the look's error_pixels */
     uint32_t reduction;     /* the picture has 1/reduction of the width and height */
-    uint32_t device_losses; /* that were made good */
-    uint64_t frames;        /* rendered */
+    uint32_t device_losses; /* device losses that were repaired */
+    uint64_t frames;        /* frames rendered so far */
     double frame_ms;
     double error_pixels; /* largest projected certified error in the picture */
     uint64_t rays, hit_pixels;
     uint64_t resident_bytes, pool_bytes, bytes_read;
-    uint64_t read_failures; /* tried again */
+    uint64_t read_failures; /* reads that failed and were tried again */
     uint32_t pages_resident, pages_drawn, pages_wanted, pages_missing;
     uint32_t coarsest_level, finest_level;
 } vcp_stats;
@@ -384,7 +385,7 @@ VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);
 typedef struct vcp_progress {
     uint32_t struct_size;
     const char* stage; /* "reading", "sorting", "level 1 of 6", "writing", "done"; lives until the callback returns */
-    double fraction;   /* of the whole, 0 to 1, never less than before; 1: done */
+    double fraction;   /* fraction of the whole, 0 to 1, never less than before; 1: done */
     uint64_t triangles;
     double seconds;
 } vcp_progress;
@@ -400,8 +401,8 @@ typedef struct vcp_build_options {
     uint64_t memory_bytes;     /* cap; 0: a part of what the machine has */
     uint32_t threads;          /* 0: one a processor */
     uint32_t resume;           /* 1: goes on where an interrupted build of the same output was */
-    /* About ten times a second, and of every stage, in the calling thread; 0 cancels, and then it is not called again.
-     */
+    /* Called about ten times a second, and at every stage, in the calling thread. Returning 0 cancels, and then it is
+     * not called again. */
     int (*progress)(void* user, const vcp_progress* progress);
     void* user;
     char* error_text;
@@ -415,7 +416,7 @@ typedef struct vcp_build_report {
     double cell, certified_error, seconds;
 } vcp_build_report;
 
-/* Blocks. `report` may be NULL. */
+/* Builds a .vcp file. Blocks. `report` may be NULL. */
 VCP_API vcp_status vcp_build(const vcp_build_options* options, vcp_build_report* report);
 
 #ifdef __cplusplus

@@ -1,6 +1,6 @@
-// vcp.hpp: vcp.h for C++17, header only. Handles that clean up after themselves, functions as members, errors as
-// exceptions of type vcp::widget::Error; callbacks are std::function. What calls mean, and in which threads, says
-// vcp.h.
+// vcp.hpp: vcp.h for C++17, header only. Handles clean up after themselves, functions are members, errors are
+// exceptions of type vcp::widget::Error; callbacks are std::function. vcp.h says what calls mean, and in which threads
+// they may be made.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,7 @@ private:
 /// Throws where `status` is not VCP_OK; `lastError`: vcp_context_last_error or vcp_view_last_error.
 template <class Handle>
 void check(vcp_status status, const Handle* handle, const char* (*lastError)(const Handle*)) {
-    // Whose turn it is may be writing the text just now.
+    // The thread whose turn it is may be writing the text just now.
     if (status == VCP_BUSY) throw Error(status, "a call for this context has not ended yet");
     if (status != VCP_OK) throw Error(status, lastError(handle));
 }
@@ -63,10 +63,10 @@ struct Frame {
     std::vector<float> depth;
 };
 
-/// Shared by its views and copies: destroyed with the last of them.
+/// A context that its views and copies share: destroyed with the last of them.
 class Context {
 public:
-    /// `options.callbacks` is not looked at.
+    /// `options.callbacks` is ignored.
     explicit Context(vcp_context_options options = sized<vcp_context_options>(), Callbacks callbacks = {})
         : shared_(std::make_shared<Shared>()) {
         shared_->callbacks = std::move(callbacks);
@@ -91,7 +91,7 @@ public:
     void open(const std::string& path, const vcp_open_options* options = nullptr) {
         check(vcp_context_open(handle(), path.c_str(), options));
     }
-    /// Several together, each in its place.
+    /// Opens several datasets together, each in its place.
     void open(const std::vector<Placed>& datasets, const vcp_open_options* options = nullptr) {
         std::vector<vcp_placed> placed;
         for (const Placed& dataset : datasets) {
@@ -104,7 +104,7 @@ public:
     }
     [[nodiscard]] vcp_dataset_info dataset() const { return got(vcp_context_dataset); }
     [[nodiscard]] vcp_device_info device() const { return got(vcp_context_device); }
-    /// 0: as it is.
+    /// Sets budgets; 0: as it is.
     void setBudgets(uint64_t gpuBytes, uint64_t ramBytes = 0) {
         check(vcp_context_set_budgets(handle(), gpuBytes, ramBytes));
     }
@@ -121,7 +121,7 @@ private:
         ~Shared() { vcp_context_destroy(handle); }
     };
 
-    // No exception crosses the library.
+    // No exception may cross the library.
     template <class F, class... T>
     static void call(const F& f, T... values) noexcept {
         if (f) f(values...);
@@ -146,7 +146,7 @@ public:
         view_.reset(made);
     }
     View(View&&) = default;
-    /// The view of before goes before its context.
+    /// The former view is destroyed before its context.
     View& operator=(View&& other) noexcept {
         if (this == &other) return *this;
         view_.reset();
@@ -154,7 +154,7 @@ public:
         view_ = std::move(other.view_);
         return *this;
     }
-    /// Without a window.
+    /// Makes a view without a window.
     View(Context context, uint32_t width, uint32_t height) : View(std::move(context), offscreen(width, height)) {}
 
     void resize(uint32_t width, uint32_t height) { check(vcp_view_resize(handle(), width, height)); }
@@ -177,7 +177,7 @@ public:
 
     vcp_step update() { return got(vcp_view_update); }
     void render() { check(vcp_view_render(handle())); }
-    /// False where the time was over before it was settled.
+    /// Returns false where the time was over before it was settled.
     bool settle(double seconds) {
         const vcp_status status = vcp_view_settle(handle(), seconds);
         if (status != VCP_CANCELLED) check(status);
@@ -229,7 +229,7 @@ private:
     std::unique_ptr<vcp_view, Destroy> view_;
 };
 
-/// Meshes to one .vcp file. `options.inputs` and `output` come from the arguments; `progress` returns false to cancel.
+/// Builds one .vcp file. `options.inputs` and `output` come from the arguments; `progress` returns false to cancel.
 inline vcp_build_report build(const std::vector<std::string>& inputs, const std::string& output,
                               const std::function<bool(const vcp_progress&)>& progress = {},
                               vcp_build_options options = sized<vcp_build_options>()) {

@@ -127,7 +127,7 @@ Result<void> copyToImage(vcp_view& view, const vcp_host_image* given) {
     const auto image = taken(given);
     if (!image) return image.error();
     ImageTarget target;
-    // Handles are pointers or numbers, as the machine has it.
+    // A handle is a pointer or a number, depending on the machine.
     std::memcpy(&target.image, &image->image, sizeof(target.image));
     std::memcpy(&target.wait, &image->wait, sizeof(target.wait));
     std::memcpy(&target.signal, &image->signal, sizeof(target.signal));
@@ -294,7 +294,7 @@ vcp_stats statsOf(const Viewer& viewer) {
     return stats;
 }
 
-/// A call that may change what the view shows: call() returns a Result<void>.
+/// Runs a call that may change what the view shows: call() returns a Result<void>.
 template <class Call>
 vcp_status changing(vcp_view* view, Call call) noexcept {
     return inTurn(view, [&](vcp_view& v) -> Result<void> {
@@ -359,7 +359,7 @@ void vcp_view::showScene() {
     camera.up = up;
     camera.look(vcp::View::Fit, scene.bounds(), size.x > 0 && size.y > 0 ? size : kUsualSize);
     viewer->show(scene.placed(), scene.surfaces, scene.file.camera.value_or(camera), context->name);
-    // What lit and cut one scene does not light and cut the next.
+    // The light and planes of one scene do not apply to the next.
     if (std::exchange(hasSceneLight, scene.file.light.has_value()) || hasSceneLight) {
         vcp::Shading shading = viewer->shading();
         const vcp::SceneLight light = scene.file.light.value_or(vcp::SceneLight{true, vcp::Shading{}.lightDirection});

@@ -5,7 +5,7 @@
 
 #include "render/vulkan/check.h"
 
-// What these three headers of Vulkan want of the window systems' own, which need not be installed.
+// These declarations are what three headers of Vulkan need of the window systems' own, which need not be installed.
 struct xcb_connection_t;
 using xcb_window_t = uint32_t;
 using xcb_visualid_t = uint32_t;
@@ -24,7 +24,7 @@ namespace vcp::widget {
 
 namespace {
 
-/// vkCreateXcbSurfaceKHR and its like.
+/// Calls vkCreateXcbSurfaceKHR and its like.
 template <class Create, class Info>
 VkResult create(VkInstance instance, const char* function, const Info& info, VkSurfaceKHR* surface) {
     const auto call = reinterpret_cast<Create>(vkGetInstanceProcAddr(instance, function));
@@ -58,7 +58,7 @@ VkResult createWayland(VkInstance instance, void* display, uint64_t window, VkSu
 VkResult createByHost(const vcp_view_options& options, VkInstance instance, VkSurfaceKHR* surface) {
     uint64_t made = 0;
     const int32_t result = options.create_surface(options.create_surface_user, instance, &made);
-    // A handle is a pointer or a number, as the machine has it.
+    // A handle is a pointer or a number, depending on the machine.
     std::memcpy(surface, &made, sizeof(*surface));
     return result == VK_SUCCESS && made == 0 ? VK_ERROR_INITIALIZATION_FAILED : static_cast<VkResult>(result);
 }

@@ -1,4 +1,4 @@
-// Vulkan surfaces of the host's windows.
+// Makes Vulkan surfaces of the host's windows.
 #pragma once
 
 #include "render/renderer.h"
@@ -6,10 +6,10 @@
 
 namespace vcp::widget {
 
-/// Instance extensions for windows, of those that vcp.h knows and this machine has. Errors: Device.
+/// Returns the instance extensions for windows that vcp.h knows and this machine has. Errors: Device.
 Result<std::vector<std::string>> windowExtensions();
 
-/// Nothing for views without a window. Errors: Usage.
+/// Returns how to make a view's surface; nothing for views without a window. Errors: Usage.
 Result<std::optional<SurfaceSource>> surfaceSource(const vcp_view_options& options);
 
 }  // namespace vcp::widget

@@ -18,7 +18,7 @@ namespace {
 constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
                                     ImGuiWindowFlags_NoSavedSettings;
 constexpr ImGuiWindowFlags kBare = kFixed | ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar;
-// Values are dragged, not typed: keys are the window's.
+// Values are dragged, not typed: keys belong to the window.
 constexpr ImGuiSliderFlags kNoTyping = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
 constexpr ImGuiColorEditFlags kColour =
     ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions | ImGuiColorEditFlags_Float;
@@ -26,7 +26,7 @@ constexpr ImGuiColorEditFlags kColour =
 constexpr float kPanelWidth = 250, kMargin = 8;
 constexpr float kScaleBarLargest = 160;
 constexpr size_t kMostBoxes = 2000;
-constexpr double kUrgentDoublings = 5;  // of the tolerated error, until a ray that asks is red
+constexpr double kUrgentDoublings = 5;  // doublings of the tolerated error, until a ray that asks is red
 constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160),
                 kMeasured = IM_COL32(255, 210, 60, 255);
 constexpr ImU32 kHandle = IM_COL32(90, 190, 255, 255), kGripped = IM_COL32(255, 210, 60, 255);
@@ -52,21 +52,21 @@ void wrapped(const std::string& line) {
     ImGui::PopTextWrapPos();
 }
 
-/// On a dark ground: what is behind may be as light as the text.
+/// Draws text on a dark ground: the picture behind may be as light as the text.
 void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
     const ImVec2 size = ImGui::CalcTextSize(line.data(), line.data() + line.size());
     list.AddRectFilled({at.x - 3, at.y - 1}, {at.x + size.x + 3, at.y + size.y + 1}, kShade, 3);
     list.AddText(vec(at), kInk, line.data(), line.data() + line.size());
 }
 
-/// Blue through green to red, as the false colours (shaders/shade.comp).
+/// Maps 0 to 1 from blue through green to red, as the false colours (shaders/shade.comp).
 ImU32 heatColour(float x, int alpha) {
     const glm::vec3 c =
         255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
     return IM_COL32(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z), alpha);
 }
 
-/// A line of the world, as far as it is before the eye.
+/// Draws the part of a line of the world that is before the eye.
 void drawSegment(ImDrawList& list, const Viewer& viewer, glm::dvec3 from, glm::dvec3 to, ImU32 colour, float width) {
     const OrbitCamera& camera = viewer.camera();
     const double near = 1e-3 * camera.focusDistance;
@@ -78,7 +78,7 @@ void drawSegment(ImDrawList& list, const Viewer& viewer, glm::dvec3 from, glm::d
     if (p && q) list.AddLine(vec(glm::vec2(*p)), vec(glm::vec2(*q)), colour, width);
 }
 
-/// Screens show colours encoded; the shading takes them linear.
+/// Edits a colour: screens show colours encoded, the shading takes them linear.
 bool colourEdit(const char* label, glm::vec3& linear) {
     float shown[3];
     for (int i = 0; i < 3; ++i) shown[i] = std::pow(linear[i], 1 / 2.2f);
@@ -87,7 +87,7 @@ bool colourEdit(const char* label, glm::vec3& linear) {
     return true;
 }
 
-/// The largest of 1, 2, 5 times a power of ten that is at most `most`.
+/// Returns the largest of 1, 2, 5 times a power of ten that is at most `most`.
 double roundLength(double most) {
     const double power = std::pow(10.0, std::floor(std::log10(most)));
     for (const double step : {5.0, 2.0})
@@ -234,7 +234,7 @@ void Interface::layOutLooks() {
     int mode = static_cast<int>(shading.mode);
     if (ImGui::Combo("shading", &mode, kModes, static_cast<int>(std::size(kModes))))
         shading.mode = static_cast<ShadingMode>(mode);
-    // On files that are drawn without, the switch does nothing.
+    // On files that are drawn without shadows, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
     ImGui::Checkbox("shadows", &shading.shadows);
     ImGui::SameLine();
@@ -323,7 +323,7 @@ void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
 }
 
 void Interface::layOutFiles() {
-    // Opening one changes the list.
+    // The list is copied, since opening a file changes it.
     const std::vector<std::string> recent = session_->user().recent;
     for (const std::string& file : recent) {
         if (ImGui::Selectable(shortened(file, 34).c_str())) session_->open({file});

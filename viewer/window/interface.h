@@ -1,7 +1,7 @@
 // The panels over the picture: status line, problem line, panel, keyboard map, scale bar, measured lines, start screen
-// and progress, laid out with Dear ImGui. What is clicked acts on the session at once.
+// and progress, laid out with Dear ImGui. A click acts on the session at once.
 //
-// Between InterfacePainter::begin and end; the same thread.
+// Used between InterfacePainter::begin and end, in the same thread.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace vcp {
 
-/// What of the window's doing the panels ask for.
+/// What the panels need of the window.
 struct InterfaceHost {
     std::function<void(const std::string&)> copyText;
     std::function<std::string()> pasteText;
@@ -25,14 +25,14 @@ public:
 
     bool showsHelp = false;
 
-    /// Lays everything out and tells the viewer what it covers. `scale`: pixels of the display a unit of the layout.
+    /// Lays everything out and tells the viewer what it covers. `scale`: pixels of the display per unit of the layout.
     void layOut(glm::ivec2 framebuffer, float scale);
 
     /// Copies the camera, or, with text on the clipboard, goes to the camera it describes.
     void copyCamera();
     void pasteCamera();
     void copyMeasurement();
-    /// As chosen in the panel.
+    /// Saves the picture as chosen in the panel.
     void savePicture();
     void saveTurntable();
     void savePath();
@@ -64,7 +64,7 @@ private:
     glm::vec2 size_{0};
     float scale_ = 1;
     float statusHeight_ = 0, panelWidth_ = 0;
-    int pictureSize_ = 0;  // of kPictureSizes
+    int pictureSize_ = 0;  // index in kPictureSizes
     PictureChoice picture_;
     int sequencePictures_ = 120;
 };

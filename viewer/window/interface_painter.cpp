@@ -15,7 +15,7 @@ namespace vcp {
 namespace {
 
 constexpr float kFontPixels = 13;
-// The backend cycles through so many vertex buffers. Frames wait for the queue: it needs no more than its least.
+// The backend cycles through so many vertex buffers. Frames wait for the queue, so its least number is enough.
 constexpr uint32_t kBuffers = 2;
 constexpr uint32_t kMostDescriptors = 8;
 
@@ -129,7 +129,7 @@ Result<void> InterfacePainter::uploadFont() {
     ImGui_ImplVulkan_DestroyFontUploadObjects();
     return upload;
 #else
-    return {};  // the backend does so by itself
+    return {};  // the backend recovers by itself
 #endif
 }
 

@@ -27,14 +27,14 @@ public:
     InterfacePainter(const InterfacePainter&) = delete;
     InterfacePainter& operator=(const InterfacePainter&) = delete;
 
-    /// Between frames. Errors: Device.
+    /// Sets the scale, between frames. Errors: Device.
     Result<void> setScale(float scale);
     [[nodiscard]] float scale() const { return scale_; }
 
     void begin(glm::ivec2 framebuffer);
-    /// True when what was laid out looks other than the frame before.
+    /// Ends the layout. Returns true when it looks other than the frame before.
     bool end();
-    /// Draws the last frame, in a window of its size.
+    /// Returns a function that draws the last frame, in a window of its size.
     [[nodiscard]] DrawOver drawOver();
 
 private:

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Digits after the point that an error leaves: one beyond its own first digit.
+/// Returns the digits after the point that an error leaves: one beyond its own first digit.
 int digitsFor(double error) {
     if (!(error > 0)) return 9;
     return static_cast<int>(std::clamp(1 - std::floor(std::log10(error)), 0.0, 15.0));
@@ -85,7 +85,7 @@ double lineError(const MeasuredLine& line) {
 
 double angleAt(const MeasuredLine& line, size_t i) {
     const glm::dvec3 a = line[i - 1].position - line[i].position, b = line[i + 1].position - line[i].position;
-    // Well-conditioned at all angles, unlike the arc cosine.
+    // This form is well-conditioned at all angles, unlike the arc cosine.
     return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 180 / std::numbers::pi;
 }
 

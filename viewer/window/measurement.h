@@ -15,29 +15,29 @@ namespace vcp {
 
 struct MeasuredPoint {
     glm::dvec3 position{0};  ///< world
-    double error = 0;        ///< certified, world units
-    uint32_t level = 0;      ///< that it was picked on
+    double error = 0;        ///< certified error, world units
+    uint32_t level = 0;      ///< level on which it was picked
 };
 
 using MeasuredLine = std::vector<MeasuredPoint>;
 
-/// From point `i` to the next. Precondition: there is a next one.
+/// Returns the length from point `i` to the next. Precondition: there is a next one.
 double segmentLength(const MeasuredLine& line, size_t i);
 double segmentError(const MeasuredLine& line, size_t i);
-/// Of all segments; 0 for a single point.
+/// Returns the length of all segments; 0 for a single point.
 double lineLength(const MeasuredLine& line);
 double lineError(const MeasuredLine& line);
-/// Between the segments that meet at point `i`, degrees in [0, 180]. Precondition: neither the first nor the last;
-/// its neighbours are elsewhere.
+/// Returns the angle between the segments that meet at point `i`, degrees in [0, 180]. Precondition: the point is
+/// neither the first nor the last, and its neighbours are elsewhere.
 double angleAt(const MeasuredLine& line, size_t i);
 
 class Measurement {
 public:
-    /// To the end of the current line.
+    /// Adds a point to the end of the current line.
     void add(const MeasuredPoint& point);
-    /// The next point begins a line.
+    /// Lets the next point begin a line.
     void finishLine() { lineIsOpen_ = false; }
-    /// Takes the last point back.
+    /// Removes the last point.
     void takeBack();
     void clear() { *this = {}; }
 
@@ -49,14 +49,14 @@ private:
     bool lineIsOpen_ = false;
 };
 
-/// For a person: coordinates to the digits that the error leaves.
+/// Returns the text for a person: coordinates to the digits that the error leaves.
 std::string measurementText(const Measurement& measurement);
 
-/// A row a point: line, point, x, y, z, error, level, segment, segment_error, total, angle_degrees; empty where there
-/// is none. Lines and points count from 1; segment and total end at the point.
+/// Returns a row for each point: line, point, x, y, z, error, level, segment, segment_error, total, angle_degrees;
+/// empty where there is none. Lines and points count from 1; segment and total end at the point.
 std::string measurementCsv(const Measurement& measurement);
 
-/// {"lines":[{"points":[{"position":[x,y,z],"error":e,"level":n}],"segments":[..],"length":l,"length_error":e,
+/// Returns {"lines":[{"points":[{"position":[x,y,z],"error":e,"level":n}],"segments":[..],"length":l,"length_error":e,
 /// "angles_degrees":[..]}]}, indented.
 std::string measurementJson(const Measurement& measurement);
 

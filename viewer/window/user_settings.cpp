@@ -32,11 +32,11 @@ using Json = nlohmann::ordered_json;
 constexpr size_t kLargestFile = 1 << 20;
 constexpr int kMostLinks = 40;
 constexpr int kMostDamaged = 100;
-// Half a minute.
+// The tries take half a minute.
 constexpr int kLockTries = 3000;
 constexpr std::chrono::milliseconds kLockPause{10};
 
-/// Reads fields of an object; what is wrong leaves the value as it is.
+/// Reads fields of an object; a field that is wrong leaves the value as it is.
 class Fields {
 public:
     explicit Fields(const Json& json) : json_(json) {}
@@ -102,7 +102,7 @@ UserSettings settingsFrom(const Json& json) {
 
 Json colourJson(glm::vec3 c) { return Json::array({c.x, c.y, c.z}); }
 
-/// The last one first; what is no name stays behind them.
+/// Adds names, the last one first; values that are no names stay behind them.
 void addRecent(Json& json, const std::vector<std::string>& opened) {
     if (!json.is_array()) json = Json::array();
     for (const std::string& name : opened) {
@@ -115,7 +115,7 @@ void addRecent(Json& json, const std::vector<std::string>& opened) {
     }
 }
 
-/// Files whose bookmarks were kept longest ago go first where there are too many.
+/// Adds bookmarks; where there are too many, the files whose bookmarks were kept longest ago lose theirs.
 void addBookmarks(Json& json, const std::map<std::string, std::map<int, OrbitCamera>>& bookmarks) {
     if (!json.is_object()) json = Json::object();
     for (const auto& [file, views] : bookmarks) {
@@ -151,7 +151,7 @@ Error notSaved(const fs::path& path, const std::string& why) {
     return {ErrorCode::Io, "settings cannot be remembered: " + why, path.string()};
 }
 
-/// With what the system says.
+/// Makes an error that ends with what the system says.
 Error notSaved(const fs::path& path, const char* what, int error) {
     return notSaved(path, fmt::format("{}: {}", what, std::generic_category().message(error)));
 }
@@ -159,12 +159,12 @@ Error notSaved(const fs::path& path, const char* what, int error) {
 struct FileText {
     bool exists = false;
     std::string text;
-    mode_t mode = 0600;  // of a file that is made anew
+    mode_t mode = 0600;  // the mode of a file that did not exist
 };
 
-/// Errors: Io (is there and cannot be read), InvalidInput (too large).
+/// Reads the file. Errors: Io (it exists and cannot be read), InvalidInput (too large).
 Result<FileText> readText(const fs::path& path) {
-    // A pipe in its place does not wait for a writer.
+    // A pipe in its place must not wait for a writer.
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!file.isOpen() && errno == ENOENT) return FileText{};
     struct stat status {};
@@ -185,7 +185,7 @@ Result<FileText> readText(const fs::path& path) {
     }
 }
 
-/// The file at the end of the links, whether it is there or not.
+/// Returns the file at the end of the links, whether it exists or not.
 Result<fs::path> linkTarget(fs::path path) {
     std::error_code failed;
     for (int links = 0; fs::is_symlink(path, failed); ++links) {
@@ -197,8 +197,8 @@ Result<fs::path> linkTarget(fs::path path) {
     return path;
 }
 
-/// Holds the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
-/// nothing but files that are open for writing: there it is a file of our own beside them.
+/// Locks the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
+/// only files that are open for writing: there a file of our own beside them is locked.
 class FolderLock {
 public:
     static Result<FolderLock> of(const fs::path& settings) {
@@ -214,12 +214,12 @@ public:
             refused = lock.file_.isOpen() ? lock.hold() : errno;
         }
         if (refused == EWOULDBLOCK) return notSaved(settings, "another process holds them, and does not let go");
-        // What cannot be locked anywhere is written as well as it can be.
+        // Where nothing can be locked, the settings are written without a lock.
         return lock;
     }
 
 private:
-    /// 0, or why not. A process that hangs is not waited for for ever.
+    /// Returns 0, or why it is not locked. It does not wait for ever for a process that hangs.
     int hold() const {
         for (int tries = 0; ::flock(file_.number(), LOCK_EX | LOCK_NB) != 0; ++tries) {
             if (errno != EWOULDBLOCK && errno != EINTR) return errno;
@@ -232,7 +232,7 @@ private:
     FileDescriptor file_;
 };
 
-/// A file that is made anew has `mode`; one that is replaced keeps its own.
+/// Writes under a name that is not taken, then renames.
 Result<void> replaceFile(const fs::path& path, const std::string& text, mode_t mode) {
     const auto failed = [&](const Error& error) { return notSaved(path, error.message); };
     auto file = OutputFile::create(path, OutputKind::JsonText, {.overwrite = true});
@@ -243,7 +243,7 @@ Result<void> replaceFile(const fs::path& path, const std::string& text, mode_t m
     return {};
 }
 
-/// Returns the name that it has now.
+/// Moves a file aside; returns the name that it has now.
 Result<fs::path> putAside(const fs::path& path) {
     fs::path aside = path;
     aside += ".damaged";

@@ -1,6 +1,6 @@
-// What `vcp view` remembers: recent files, bookmarks, looks. A small JSON file, which several windows share: each saves
-// what was changed in it by hand, into the file as it is by then, and leaves the rest, also what this version does not
-// know.
+// What `vcp view` remembers: recent files, bookmarks, looks. They are in a small JSON file, which several windows
+// share: each saves what was changed in it by hand, into the file as it is by then, and leaves the rest, even what this
+// version does not know.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ struct UserSettings {
     static constexpr size_t kMostBookmarkedFiles = 50;
 
     std::vector<std::string> recent;  ///< absolute paths and addresses without passwords, the last one first
-    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< of a path or address; numbers 1 to 9
+    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< for each path or address; numbers 1 to 9
     glm::ivec2 windowSize{1280, 800};
     bool panel = false;
     UpAxis up = UpAxis::Y;
@@ -38,10 +38,10 @@ struct UserSettings {
     void remember(const std::string& name);
 };
 
-/// What was done by hand in one window. What options, scene files and bookmarks set is none of it.
+/// What was done by hand in one window. Changes by options, scene files and bookmarks are not among it.
 struct SettingsChanges {
     std::vector<std::string> opened;                              ///< remembered names, in order
-    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< that were kept: UserSettings::bookmarks
+    std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< bookmarks that were kept: UserSettings::bookmarks
     std::optional<glm::ivec2> windowSize;
     std::optional<bool> panel, shadows, occlusion;
     std::optional<UpAxis> up;
@@ -52,18 +52,19 @@ struct SettingsChanges {
     [[nodiscard]] bool empty() const;
 };
 
-/// What a file is remembered as: an address without user and password, a path made absolute.
+/// Returns what a file is remembered as: an address without user and password, a path made absolute.
 std::string rememberedName(const std::string& input);
 
-/// $XDG_CONFIG_HOME/vcp/view.json, else $HOME/.config/vcp/view.json. Errors: Io when neither is set.
+/// Returns $XDG_CONFIG_HOME/vcp/view.json, else $HOME/.config/vcp/view.json. Errors: Io when neither is set.
 Result<std::filesystem::path> userSettingsPath();
 
-/// Defaults for what is missing, of a wrong type or out of range; may be hostile. Errors: Io (exists and cannot be
-/// read, is no regular file), InvalidInput (not JSON, larger than 1 MiB). A file that is not there gives the defaults.
+/// Reads settings, with defaults for what is missing, of a wrong type or out of range; the file may be hostile. Errors:
+/// Io (exists and cannot be read, is no regular file), InvalidInput (not JSON, larger than 1 MiB). Without a file all
+/// are defaults.
 Result<UserSettings> readUserSettings(const std::filesystem::path& path);
 
-/// Puts the changes into the file; makes it and its folder where needed; any number of processes at once. The file is
-/// replaced whole; where it is a symbolic link, its target is. One that is damaged is kept beside it, as
+/// Writes the changes into the file; makes it and its folder where needed; any number of processes may do so at once.
+/// The file is replaced whole; where it is a symbolic link, its target is. A damaged file is kept beside it, as
 /// view.json.damaged or with the next free number behind. Without changes nothing is done. Returns a warning, empty
 /// where there is none. Errors: Io.
 Result<std::string> saveChanges(const SettingsChanges& changes, const std::filesystem::path& path);

@@ -14,15 +14,15 @@ namespace vcp {
 
 namespace {
 
-// How often what goes on in other threads is looked at.
+// The seconds between looks at the work of other threads.
 constexpr double kOpeningPollSeconds = 0.1;
 constexpr double kPickPollSeconds = 0.01;
 
 constexpr int kMostExports = 10000;
 constexpr uint32_t kRememberedOcclusionRays = 8;
-constexpr uint32_t kSavedTile = 512;  // small: the window goes on between tiles
+constexpr uint32_t kSavedTile = 512;  // small, so that the window stays live between tiles
 
-/// The first number from 1 on that is free; of too many the last.
+/// Returns the first number from 1 on that is free; where there are too many, the last.
 template <class IsTaken>
 int freeNumber(IsTaken isTaken) {
     int number = 1;
@@ -55,7 +55,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
                                                          std::optional<SurfaceSource> surface) {
     ViewerOptions viewerOptions;
     viewerOptions.renderer = options.render.rendererOptions();
-    // Any shading may be chosen later.
+    // Colours are kept, since any shading may be chosen later.
     viewerOptions.renderer.colour = true;
     viewerOptions.renderer.surface = std::move(surface);
     viewerOptions.errorPixels = options.render.errorPixels;
@@ -81,7 +81,7 @@ ViewSession::~ViewSession() {
     endPick();
 }
 
-/// A server may take long; a cast may be about to read again.
+/// Ends the pick: a server may take long, and a cast may be about to read again.
 void ViewSession::endPick() {
     while (pick_.valid() && pick_.wait_for(std::chrono::milliseconds(10)) != std::future_status::ready)
         finest_->interrupt();
@@ -114,7 +114,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     OrbitCamera camera;
     camera.up = up_;
     camera.look(View::Fit, open.bounds(), size, viewer_->covered());
-    // What the command line says is for what it opens.
+    // The command line's settings apply only to what it opens.
     if (!std::exchange(wasShown_, true)) {
         const auto asked = options_.render.cameraFor(open.bounds(), size, viewer_->covered());
         if (asked)
@@ -131,7 +131,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     if (hasOwnSections) viewer_->setSections(open.file.sections);
     viewer_->setSectionCaps(options_.render.caps || (hasOwnSections && open.file.sectionCaps));
     if (open.file.light || std::exchange(hasSceneLight_, false)) {
-        // What lit one scene does not light the next.
+        // The light of one scene does not apply to the next.
         Shading shading = viewer_->shading();
         const Shading chosen = options_.render.shadingChosen();
         shading.lightFollowsCamera = open.file.light ? open.file.light->followsCamera : chosen.lightFollowsCamera;
@@ -168,7 +168,7 @@ Result<NextStep> ViewSession::update(double now) {
 }
 
 void ViewSession::act(ViewerAction action) {
-    // A camera of a scene or a bookmark brings its own axis: this alone is by hand.
+    // A camera of a scene or a bookmark brings its own axis: only this action is by hand.
     if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen())
         changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
     viewer_->act(action);
@@ -311,11 +311,11 @@ std::optional<ViewSession::SavingProgress> ViewSession::saving() const {
     return SavingProgress{saving_->name.string(), pictures.fraction(), pictures.finished(), pictures.pictures()};
 }
 
-/// What is there of it, in words.
+/// Ends saving; says in words which files there are.
 std::string ViewSession::endSaving() {
     Saving saving = *std::exchange(saving_, std::nullopt);
     const auto [finished, pictures] = std::pair(saving.pictures->finished(), saving.pictures->pictures());
-    saving.pictures.reset();  // with it goes what is half-written
+    saving.pictures.reset();  // a half-written file goes with it
     std::error_code failed;
     if (saving.isSequence && finished == 0) std::filesystem::remove(saving.name, failed);
     if (finished == 0) return fmt::format("{}: nothing is written", saving.name.string());
@@ -356,7 +356,8 @@ ViewSession::Looks ViewSession::looks() const {
             shading.backgroundTop, shading.backgroundBottom};
 }
 
-/// What options and scenes set is there when they are set; what differs from the last update is by hand.
+/// Notes changes by hand: what options and scenes set is in the last update already, so what differs from it is by
+/// hand.
 void ViewSession::noteChanges() {
     const Looks now = looks();
     const auto compare = [](const auto& value, const auto& before, auto& changed) {

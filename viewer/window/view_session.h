@@ -23,7 +23,7 @@
 
 namespace vcp {
 
-/// What is remembered stands in for options that were not given: `isGiven("--up")`.
+/// Uses remembered values for options that were not given: `isGiven("--up")`.
 void applyRemembered(RenderSettings& render, const UserSettings& user,
                      const std::function<bool(const char* option)>& isGiven);
 
@@ -31,8 +31,8 @@ struct SessionOptions {
     std::vector<std::string> inputs;  ///< what the window opens first
     BuildSettings build;
     RenderSettings render;
-    UserSettings user;  ///< as they are remembered; `render` goes before them
-    /// Gives each opening what is told of its progress (DatasetOpening). May be empty.
+    UserSettings user;  ///< the remembered settings; `render` takes precedence over them
+    /// Makes, for each opening, the function that is told its progress (DatasetOpening). May be empty.
     std::function<std::function<bool(const BuildProgress&)>()> makeProgress;
 };
 
@@ -45,43 +45,43 @@ struct PictureChoice {
 
 class ViewSession {
 public:
-    /// `surface`: of the window; without one nothing may be presented. Errors: those of Renderer::create.
+    /// `surface`: the window's; without one nothing may be presented. Errors: those of Renderer::create.
     static Result<std::unique_ptr<ViewSession>> create(const SessionOptions& options,
                                                        std::optional<SurfaceSource> surface);
     ~ViewSession();
 
     [[nodiscard]] Viewer& viewer() { return *viewer_; }
     [[nodiscard]] const Viewer& viewer() const { return *viewer_; }
-    /// As they are remembered, with what was changed since.
+    /// Returns the remembered settings, with what was changed since.
     [[nodiscard]] const UserSettings& user() const { return user_; }
-    /// What was changed by hand, to be saved when the window closes.
+    /// Returns what was changed by hand, to be saved when the window closes.
     [[nodiscard]] const SettingsChanges& changes();
     void togglePanel();
-    /// By hand, not by the window system.
+    /// Keeps a size that was set by hand, not by the window system.
     void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
 
     /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
     void open(std::vector<std::string> inputs);
-    /// Null when nothing is being opened.
+    /// Returns what is being opened; null when nothing is.
     [[nodiscard]] DatasetOpening* opening() { return opening_.get(); }
 
-    /// Viewer::update, and takes in what was opened or picked meanwhile.
+    /// Does Viewer::update, and takes in what was opened or picked meanwhile.
     Result<NextStep> update(double now);
 
-    /// Viewer::act, by hand; says so where that shows nothing.
+    /// Does Viewer::act, by hand; reports an action that shows nothing.
     void act(ViewerAction action);
 
-    /// What went wrong last, in one line; empty: nothing.
+    /// Returns the last error, in one line; empty: there is none.
     [[nodiscard]] std::string problem() const;
     void say(std::string problem) { problem_ = std::move(problem); }
     void dismissProblem();
-    /// A word about what was done ("copied"); it goes at the next press of a key or button.
+    /// Returns a word about what was done ("copied"); it goes at the next press of a key or button.
     [[nodiscard]] const std::string& note() const { return note_; }
     void note(std::string text) { note_ = std::move(text); }
 
     void keepBookmark(int number);
     void goToBookmark(int number);
-    /// Null without any.
+    /// Returns the bookmarks of what is shown; null without any.
     [[nodiscard]] const std::map<int, OrbitCamera>* bookmarks() const;
     /// Goes to a camera in JSON, as cameraToJson writes it.
     void pasteCamera(const std::string& json);
@@ -93,32 +93,32 @@ public:
     void showFeedback(bool show);
     [[nodiscard]] Measurement& measurement() { return measurement_; }
     [[nodiscard]] bool isPicking() const { return pick_.valid(); }
-    /// Picks on the finest level and adds the point; later, where it has to be read first.
+    /// Picks on the finest level and adds the point; it may have to be read first, and then comes later.
     void measureAt(glm::dvec2 pixel);
-    /// measurement-1.csv and .json in the working folder, or the next free number; says so.
+    /// Writes measurement-1.csv and .json into the working folder, or the next free number, and reports it.
     void exportMeasurement();
 
-    /// What is shown, into the working folder, tile by tile between frames of the window: one at a time, and what is
-    /// chosen later changes nothing of it. picture-1.png, or the next free number, and picture-1-depth.pfm.
+    /// Saves what is shown into the working folder, tile by tile between frames of the window: one picture at a time;
+    /// later choices do not affect it. picture-1.png, or the next free number, and picture-1-depth.pfm.
     void savePicture(const PictureChoice& choice);
-    /// Once around the middle of all, about the up axis, from the view as it is: turntable-1/picture-0001.png and so
-    /// on, a new folder.
+    /// Saves pictures once around the middle of all, about the up axis, from the current view:
+    /// turntable-1/picture-0001.png and so on, in a new folder.
     void saveTurntable(const PictureChoice& choice, int pictures);
-    /// From the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on. Says so where
-    /// there are fewer than two.
+    /// Saves pictures from the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on.
+    /// Reports where there are fewer than two bookmarks.
     void savePath(const PictureChoice& choice, int pictures);
     struct SavingProgress {
-        std::string name;  ///< of the file or folder
+        std::string name;  ///< name of the file or folder
         double fraction;   ///< 0 to 1
         size_t finished, pictures;
     };
-    /// Nothing where nothing is being saved.
+    /// Returns the progress; nothing where nothing is being saved.
     [[nodiscard]] std::optional<SavingProgress> saving() const;
-    /// Pictures of a sequence that are finished stay; nothing half-written does.
+    /// Stops saving. Finished pictures of a sequence stay; a half-written one does not.
     void cancelSaving();
 
 private:
-    /// What hands may change in the viewer, and what is remembered.
+    /// What a person may change in the viewer, and what is remembered.
     struct Looks {
         bool shadows, occlusion;
         double errorPixels;
@@ -145,8 +145,8 @@ private:
     UserSettings user_;
     SettingsChanges changes_;
     std::unique_ptr<Viewer> viewer_;
-    Looks seenLooks_;  // of the last update
-    UpAxis up_;        // of what is opened next
+    Looks seenLooks_;  // as of the last update
+    UpAxis up_;        // for what is opened next
     std::unique_ptr<DatasetOpening> opening_;
     std::string shown_;  // rememberedName of what is shown; empty: nothing
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
@@ -155,9 +155,9 @@ private:
     std::shared_ptr<ScenePick> finest_;
     std::future<Picked> pick_;
     struct Saving {
-        std::filesystem::path name;  // of the file; of the folder of a sequence
+        std::filesystem::path name;  // name of the file, or of a sequence's folder
         std::unique_ptr<Renderer> view;
-        std::unique_ptr<PictureSequence> pictures;  // by that view
+        std::unique_ptr<PictureSequence> pictures;  // drawn by that view
         bool isSequence = false;
         int turnsBefore = 2;  // updates without a tile: the window lays its progress out, then shows it
     };

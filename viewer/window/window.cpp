@@ -27,7 +27,7 @@ Error displayError(const std::string& what) {
             what + (why ? std::string(": ") + why : "") + "; `vcp render` makes a picture without a window"};
 }
 
-/// GLFW for as long as it lives, and its one window.
+/// Keeps GLFW for as long as it lives, and its one window.
 class WindowSystem {
 public:
     WindowSystem() = default;
@@ -62,7 +62,7 @@ public:
         return source;
     }
 
-    /// As open() takes it.
+    /// Returns the window's size as open() takes it.
     [[nodiscard]] glm::ivec2 size() const {
         glm::ivec2 window(0), framebuffer(0);
         glm::vec2 scale(1);
@@ -83,7 +83,7 @@ private:
     GLFWwindow* window_ = nullptr;
 };
 
-/// The session in its window: what the callbacks reach.
+/// The session in its window, which the callbacks reach.
 class ViewWindow {
 public:
     ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter,
@@ -116,7 +116,7 @@ public:
         glfwGetCursorPos(window_, &cursor_.x, &cursor_.y);
     }
 
-    /// Until the window is closed.
+    /// Runs until the window is closed.
     Result<WindowReport> run(std::chrono::steady_clock::time_point start) {
         const auto seconds = [start] {
             return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -124,7 +124,7 @@ public:
         WindowReport report;
         std::optional<glm::ivec2> shownSize;
         while (!glfwWindowShouldClose(window_)) {
-            // While something is built Ctrl-C is to clean up; the loop looks often enough then.
+            // While something is built, Ctrl-C must clean up; the loop wakes often enough then.
             if (!session_->opening())
                 catching_.reset();
             else if (!catching_ && options_->catchInterrupts)
@@ -141,7 +141,7 @@ public:
             if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
             if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
             wait(*next);
-            // By now the window system has made it as large as it wants it.
+            // By now the window system has given the window its size.
             if (!shownSize) shownSize = system_->size();
             if (options_->interrupted && options_->interrupted()) break;
         }
@@ -164,7 +164,7 @@ private:
                 }};
     }
 
-    /// Anew, on the device that stands in for a lost one.
+    /// Makes the painter anew, on the device that replaces a lost one.
     Result<void> makePainter() {
         const auto drawing = session_->viewer().renderer().windowDrawing();
         if (!drawing) return drawing.error();
@@ -329,7 +329,7 @@ private:
 
     void togglePanel() {
         session_->togglePanel();
-        layOut();  // what is fitted next keeps clear of it
+        layOut();  // what is fitted next must keep clear of the panels
     }
 
     void toggleFly() {
@@ -383,7 +383,7 @@ private:
     const WindowOptions* options_;
     std::shared_ptr<void> catching_;
     glm::ivec2 framebuffer_{0};
-    // Where the cursor was at the event in hand: asked for, it would be where it is by now, and a quick drag be lost.
+    // The cursor at the current event: queried later, it would have moved on, and a quick drag would be lost.
     glm::dvec2 cursor_{0};
     glm::dvec2 pressedAt_{0};
     double pressedTime_ = 0;

@@ -18,8 +18,8 @@ namespace vcp {
 
 struct WindowOptions {
     SessionOptions session;
-    std::optional<glm::ivec2> size;  ///< in the window system's units; absent: as it was last time
-    /// Ctrl-C is caught while what it gives is held: as long as something is being built. May be empty.
+    std::optional<glm::ivec2> size;  ///< in the window system's units; absent: the size it had last time
+    /// Returns an object; while it is held, Ctrl-C is caught: as long as something is being built. May be empty.
     std::function<std::shared_ptr<void>()> catchInterrupts;
     std::function<bool()> interrupted;  ///< true ends the window; may be empty
 };
@@ -27,16 +27,16 @@ struct WindowOptions {
 /// What happened while the window was open; times from the call of showWindow.
 struct WindowReport {
     std::optional<double> windowSeconds;        ///< something was on the screen
-    std::optional<double> firstPictureSeconds;  ///< of a dataset; absent when it was closed before
+    std::optional<double> firstPictureSeconds;  ///< first picture of a dataset; absent when it was closed before
     std::optional<double> settledSeconds;       ///< the first settled picture
     uint64_t framesDrawn = 0;
     ViewerStatus status;
-    std::string problem;      ///< what stood in the window when it was closed
+    std::string problem;      ///< the problem that the window showed when it was closed
     SettingsChanges changes;  ///< to be remembered
 };
 
-/// A window's size in units of a display that is not scaled, as it is made from (GLFW_SCALE_TO_MONITOR): where the
-/// window system counts pixels, `window` has grown by `scale`.
+/// Returns a window's size in units of a display that is not scaled, from which it is made (GLFW_SCALE_TO_MONITOR):
+/// where the window system counts pixels, `window` has grown by `scale`.
 inline glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::dvec2 scale) {
     if (window != framebuffer || !(scale.x > 0 && scale.y > 0)) return window;
     return glm::ivec2(glm::round(glm::dvec2(window) / scale));

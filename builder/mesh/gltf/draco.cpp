@@ -45,16 +45,16 @@ void limit(decltype(RLIMIT_AS) what, uint64_t value) {
     ::setrlimit(what, &bounds);
 }
 
-// In the child: its limits, and signals as a plain program has them. It lives no longer than its parent.
+// Runs in the child: sets its limits, and signals as a plain program has them. It lives no longer than its parent.
 void confine(uint64_t memoryBytes, uint64_t seconds, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(1);
     for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGPIPE, SIGTERM}) ::signal(signal, SIG_DFL);
-    ::signal(SIGINT, SIG_IGN);  // the parent decides
+    ::signal(SIGINT, SIG_IGN);  // the parent decides when to stop
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_CPU, seconds);
     limit(RLIMIT_AS, addressSpaceBytes() + memoryBytes);
-    // The C library's last words are of no use to the reader of one clear line.
+    // What the C library prints before it aborts does not help the reader of one clear line.
     const int nothing = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
     if (nothing >= 0) ::dup2(nothing, STDERR_FILENO);
 }
@@ -131,7 +131,7 @@ private:
         return error(ErrorCode::Io, what + ": " + std::generic_category().message(errno));
     }
 
-    // Waits for the child no longer than twice the time that it may compute.
+    // Reads from the child; waits no longer than twice the time that it may compute.
     Result<void> receive(void* to, size_t bytes) {
         char* p = static_cast<char*>(to);
         while (bytes > 0) {

@@ -18,28 +18,28 @@
 
 namespace vcp {
 
-/// Which attributes to send: by Draco's unique identifier, or, where `byIdentifier` is not set, the position and the
-/// first colour.
+/// Which attributes to send: chosen by Draco's unique identifier, or, where `byIdentifier` is not set, the position and
+/// the first colour.
 struct DracoSelection {
     bool byIdentifier = false;
     uint32_t position = 0;
     std::optional<uint32_t> colour, uv;
-    bool linearColour = false;  ///< colours are light, as in glTF, and are encoded as sRGB
+    bool linearColour = false;  ///< colours are linear, as in glTF, and are encoded as sRGB
 };
 
 /// Gives the compressed bytes; called in the child.
 using DracoBytes = std::function<Result<std::string>()>;
 
-/// `name` and `element` are for errors; `compressedBytes` scales the time limits (8 s, and 2 s a MiB). Errors:
-/// InvalidInput (no Draco data, damaged, only points), Limit (memory or time), Io.
+/// Decodes Draco's bytes. `name` and `element` are for errors; `compressedBytes` scales the time limits (8 s, and 2 s a
+/// MiB). Errors: InvalidInput (no Draco data, damaged, only points), Limit (memory or time), Io.
 Result<std::unique_ptr<MeshStream>> decodeDraco(const DracoBytes& bytes, uint64_t compressedBytes,
                                                 const DracoSelection& selection, uint64_t memoryBytes, std::string name,
                                                 std::string element);
 
-/// A .drc file; `source` stands at its start.
+/// Opens a .drc file; `source` stands at its start.
 Result<std::unique_ptr<MeshStream>> openDraco(ByteSource source, uint64_t memoryBytes);
 
-/// Does a file begin like Draco's?
+/// Returns whether a file begins like Draco's.
 bool looksLikeDraco(std::string_view start);
 
 }  // namespace vcp

@@ -24,7 +24,7 @@ constexpr size_t kBatch = 4096;
 
 [[noreturn]] void leave() { ::_exit(0); }
 
-// A parent that no longer reads ends the child by a signal.
+// Writes to the pipe; a parent that no longer reads ends the child by a signal.
 void send(int pipe, const void* data, size_t bytes) {
     const char* p = static_cast<const char*>(data);
     while (bytes > 0) {

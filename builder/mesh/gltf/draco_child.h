@@ -1,7 +1,7 @@
 // The part of draco.h that runs in the child process: decodes, and writes what the parent reads.
 //
-// First a DracoReply. When its `failed` is 0: `vertices` DracoVertex, then `faces` DracoFace. Else `messageBytes` of
-// text, and `failed` is an ErrorCode plus 1.
+// The child sends a DracoReply first. When its `failed` is 0, `vertices` DracoVertex and then `faces` DracoFace follow.
+// Otherwise `messageBytes` of text follow, and `failed` is an ErrorCode plus 1.
 #pragma once
 
 #include <cstdint>

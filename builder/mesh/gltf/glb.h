@@ -13,12 +13,12 @@ namespace vcp {
 
 inline constexpr std::string_view kGlbMark = "glTF";
 
-/// Reads up to the JSON, and says how many bytes that has. Errors: InvalidInput (not JSON, truncated), Unsupported
+/// Reads up to the JSON, and returns how many bytes that has. Errors: InvalidInput (not JSON, truncated), Unsupported
 /// (another version), Io.
 Result<uint64_t> readGlbHeader(ByteSource& source);
 
-/// The buffer that follows the JSON; null where none does. `path` is where the source was opened: what is not a plain
-/// file is spooled into `tempFolder`. Errors: Io.
+/// Opens the buffer that follows the JSON; null where none does. `path` is where the source was opened: a source other
+/// than a plain file is spooled into `tempFolder`. Errors: Io.
 Result<std::unique_ptr<RandomBytes>> openGlbBinary(ByteSource& source, const std::filesystem::path& path,
                                                    const std::filesystem::path& tempFolder);
 

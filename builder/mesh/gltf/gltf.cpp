@@ -21,7 +21,7 @@
 namespace vcp {
 namespace {
 
-constexpr uint64_t kMostImageBytes = uint64_t{256} << 20;  // embedded ones, together
+constexpr uint64_t kMostImageBytes = uint64_t{256} << 20;  // embedded images, together
 
 class GltfStream final : public MeshStream {
 public:
@@ -77,7 +77,7 @@ public:
     }
 
 private:
-    // Over every primitive that is shown.
+    // Calls `use` for every primitive that is shown.
     template <class Use>
     void eachPrimitive(Use use) const {
         for (const GltfPlacement& placement : placements_)
@@ -141,7 +141,7 @@ private:
                 return source;
             }
             const std::string element = fmt::format("image {}", number);
-            // A buffer that is shorter than it says is found out before anything is allocated.
+            // A buffer that is shorter than declared is noticed before anything is allocated.
             VCP_TRY(buffers_.read(*image.view, 0, nullptr, 0, element));
             std::string data(size, '\0');
             VCP_TRY(buffers_.read(*image.view, 0, data.data(), data.size(), element));
@@ -162,7 +162,7 @@ private:
         return source;
     }
 
-    // How much there will be, where the accessors say it.
+    // Plans the counts, where the accessors say them.
     Result<void> planCounts() {
         constexpr uint64_t kMost = uint64_t{1} << 48;
         uint64_t vertices = 0, faces = 0;
@@ -246,7 +246,7 @@ private:
             VCP_TRY(buffers_.read(view, 0, data.data(), data.size(), element));
             return data;
         };
-        // Opened here, so that the error of a buffer that is missing keeps its file.
+        // Opened here, so that the error of a missing buffer keeps its file.
         VCP_TRY(buffers_.read(view, 0, nullptr, 0, element));
         auto part = decodeDraco(bytes, size, selection, options_.decoderBytes, name_, element);
         if (!part) return part.error();
@@ -260,7 +260,7 @@ private:
         ++primitive_;
     }
 
-    // From the mesh's coordinates, numbers and attributes to those of the whole.
+    // Brings a chunk from the mesh's coordinates, numbers and attributes to those of the whole.
     Result<void> place(MeshChunk& chunk) {
         const GltfPrimitive& primitive = document_.meshes[placements_[placement_].mesh].primitives[primitive_];
         for (glm::dvec3& p : chunk.positions) {
@@ -338,7 +338,7 @@ private:
     glm::dmat4 worldFromMesh_{1};
     std::unique_ptr<MeshStream> part_;
     uint64_t partVertices_ = 0;
-    uint64_t vertices_ = 0;  // before the part
+    uint64_t vertices_ = 0;  // vertices before the part
     uint64_t triangles_ = 0;
 };
 

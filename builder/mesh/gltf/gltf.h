@@ -4,7 +4,7 @@
 //   of EXT_mesh_gpu_instancing), moved by the transforms of the nodes, in doubles. Triangles, strips and fans;
 //   points and lines are read over. Accessors of any component type, sparse ones too. Skins and morph targets
 //   stay at rest.
-// - Colours: COLOR_0 times the base colour of the material, which are light in glTF and colours here. The base
+// - Colours: COLOR_0 times the base colour of the material, which are linear in glTF and encoded here. The base
 //   colours alone count where they differ; then, and where only some primitives have COLOR_0, the rest is white.
 // - Images of the base colour: materials() carries them, with factors of 1, as they are in the vertex colours.
 // - Nothing outside the folder of the file is opened. KHR_draco_mesh_compression is decoded as draco.h says,
@@ -25,9 +25,9 @@ namespace vcp {
 
 bool looksLikeGltf(std::string_view start);
 
-/// `source` stands at the start of the file; `path` is where it was opened, for what lies beside it, or empty. Errors:
-/// as readGltfDocument(), InvalidInput (GLB chunks, buffers, no triangles), Io, and those of
-/// Draco and meshopt.
+/// Opens a glTF file. `source` stands at its start; `path` is where it was opened, for what lies beside it, or empty.
+/// Errors: as readGltfDocument(), InvalidInput (GLB chunks, buffers, no triangles), Io, and those of Draco and
+/// meshopt.
 Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::filesystem::path& path,
                                              const MeshOpenOptions& options);
 

@@ -99,7 +99,7 @@ Result<uint64_t> GltfBuffers::placeOfDecoded(uint32_t number) {
                       .message = fmt::format("decoding it takes {} MiB, more than the {} MiB that are allowed; save it "
                                              "without meshopt compression, or in smaller meshes",
                                              needed >> 20, room_.decoderBytes >> 20)});
-    // A buffer that is shorter than it says is found out before anything is allocated.
+    // A buffer that is shorter than declared is noticed before anything is allocated.
     auto buffer = open(from.buffer);
     if (!buffer) return buffer.error();
     std::string bytes(from.bytes, '\0');
@@ -184,7 +184,7 @@ Result<void> GltfAccessorReader::applySparse(size_t count, std::vector<double>& 
         if (index >= next_ + count) return {};
         if (lastSparse_ && index <= *lastSparse_) return sparseError("its sparse indices are not in increasing order");
         lastSparse_ = index;
-        if (index < next_) {  // of what was skipped
+        if (index < next_) {  // one of the skipped elements
             ++sparseUsed_;
             continue;
         }
@@ -196,7 +196,7 @@ Result<void> GltfAccessorReader::applySparse(size_t count, std::vector<double>& 
     }
 }
 
-// Reads ahead when none are left.
+// Returns the next sparse index; reads ahead when none are left.
 Result<void> GltfAccessorReader::nextSparseIndex() {
     const GltfSparse& sparse = *accessor_.sparse;
     if (sparseUsed_ < sparseIndices_.size()) return {};

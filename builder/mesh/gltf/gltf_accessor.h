@@ -13,7 +13,7 @@
 namespace vcp {
 
 /// Buffers are opened when they are first used, and stay open. So are views that meshopt compressed: each is decoded as
-/// a whole when it is first used, and kept in a Spool of all.
+/// a whole when it is first used, and kept in one Spool for all.
 class GltfBuffers {
 public:
     /// Where decoded views are put, and how much memory decoding one may take.
@@ -32,7 +32,7 @@ public:
     /// with the buffer's file.
     Result<void> read(uint32_t view, uint64_t offset, char* to, size_t count, const std::string& element);
 
-    /// Of the glTF file: those of buffers are added as they are opened.
+    /// The glTF file's side files; those of buffers are added as they are opened.
     std::vector<SideFile> sideFiles;
 
 private:
@@ -45,7 +45,7 @@ private:
     Room room_;
     std::vector<std::unique_ptr<RandomBytes>> open_;
     Spool decoded_;
-    std::vector<std::optional<uint64_t>> places_;  // in it, of each view
+    std::vector<std::optional<uint64_t>> places_;  // for each view, its place in it
 };
 
 class GltfAccessorReader {
@@ -56,7 +56,7 @@ public:
     [[nodiscard]] uint64_t left() const { return accessor_.count - next_; }
     [[nodiscard]] uint32_t components() const { return accessor_.components; }
 
-    /// Goes on at a later element; precondition: `count` <= left().
+    /// Continues at a later element; precondition: `count` <= left().
     void skip(uint64_t count) { next_ += count; }
 
     /// Replaces `out` by the next values, component by component: at most `most` elements, at least one unless none
@@ -78,9 +78,9 @@ private:
     std::vector<char> bytes_;
     uint64_t next_ = 0;
 
-    std::vector<uint64_t> sparseIndices_;  // those read ahead
-    size_t sparseUsed_ = 0;                // of them
-    uint64_t sparseRead_ = 0;              // of all
+    std::vector<uint64_t> sparseIndices_;  // indices that were read ahead
+    size_t sparseUsed_ = 0;                // how many of them are used
+    uint64_t sparseRead_ = 0;              // sparse indices read in all
     std::optional<uint64_t> lastSparse_;
 };
 

@@ -43,7 +43,7 @@ std::optional<GltfComponent> componentOf(uint64_t number) {
     }
 }
 
-// Extensions without which the surface is still the same.
+// Whether a surface is the same without an extension.
 bool changesNoSurface(std::string_view extension) {
     static constexpr std::array<std::string_view, 9> kRead{
         "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression",
@@ -143,7 +143,7 @@ private:
         document_.views.push_back(view);
     }
 
-    // Do `count` elements at an offset of a view lie in it?
+    // Checks that `count` elements at an offset of a view lie in it.
     void checkInView(const JsonFields& f, uint32_t number, uint64_t offset, uint64_t count, uint64_t elementBytes,
                      uint64_t stride) {
         const uint64_t room = document_.views[number].bytes;
@@ -178,7 +178,7 @@ private:
         }
         const Json* const sparse = f.find("sparse");
         if (sparse && accessor.components > 0) readSparse(f, *sparse, accessor);
-        // Of a mesh that Draco compressed, the accessors have no view either: kMostZeros is checked where zeros are
+        // The accessors of a mesh that Draco compressed have no view either, so kMostZeros is checked where zeros are
         // read.
         document_.accessors.push_back(accessor);
     }
@@ -241,7 +241,7 @@ private:
         if (check_.ok()) mesh.primitives.push_back(p);
     }
 
-    // Promises far more than it brings.
+    // Whether an accessor promises far more than it brings.
     static bool isEmpty(const GltfAccessor& a) {
         return !a.view && a.count > kMostZeros + kZerosPerValue * (a.sparse ? a.sparse->count : 0);
     }

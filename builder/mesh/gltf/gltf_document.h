@@ -133,13 +133,13 @@ struct GltfDocument {
     std::vector<GltfMaterial> materials;
     std::vector<GltfMesh> meshes;
     std::vector<GltfNode> nodes;
-    std::vector<uint32_t> roots;  ///< of the default scene, else of the first, else nodes without a parent
+    std::vector<uint32_t> roots;  ///< roots of the default scene, else of the first, else nodes without a parent
     glm::dvec3 centre{0};         ///< CESIUM_RTC: added to every position
     std::vector<std::string> warnings;
 };
 
-/// Reads `jsonBytes` of JSON at the cursor (up to the end for ByteSource::kUnknownSize). Memory: some 128 MiB of
-/// text, most of it in data URIs, and 4 million values. Errors: InvalidInput (JSON, or what it says), Unsupported (a
+/// Reads `jsonBytes` of JSON at the cursor (up to the end for ByteSource::kUnknownSize). Memory: some 128 MiB of text,
+/// most of it in data URIs, and 4 million values. Errors: InvalidInput (the JSON, or what it says), Unsupported (a
 /// required extension, glTF 1), Limit, Io.
 Result<GltfDocument> readGltfDocument(ByteSource& source, uint64_t jsonBytes);
 

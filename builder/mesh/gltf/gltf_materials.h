@@ -6,8 +6,8 @@
 
 namespace vcp {
 
-/// Fills images and materials of `document`, whose buffers and views were read. What is wrong with a texture
-/// becomes a warning; what is wrong with the JSON itself goes to `check`.
+/// Fills in images and materials of `document`, whose buffers and views were read. An error in a texture becomes a
+/// warning; an error in the JSON itself goes to `check`.
 void readGltfMaterials(const Json& json, GltfDocument& document, JsonCheck& check);
 
 }  // namespace vcp

@@ -14,7 +14,7 @@ using Mode = GltfMeshopt::Mode;
 using Filter = GltfMeshopt::Filter;
 
 constexpr uint64_t kMostStride = 256;
-constexpr uint64_t kExpansion = 64;         // of vertices: 64 times the same byte in two bits of four, from one byte
+constexpr uint64_t kExpansion = 64;         // for vertices: 64 times the same byte in two bits of four, from one byte
 constexpr uint64_t kLaterExpansion = 1024;  // from version 1 on: four times 256
 constexpr uint64_t kSmallTotal = uint64_t{1} << 20;
 
@@ -30,7 +30,7 @@ bool choose(const JsonFields& f, const char* key, const std::array<std::pair<std
 
 bool isIndices(Mode mode) { return mode != Mode::Attributes; }
 
-// What the decoders assert.
+// Returns the rule, of those that the decoders assert, that is broken.
 std::string brokenRule(const GltfMeshopt& m) {
     if (isIndices(m.mode)) {
         if (m.stride != 2 && m.stride != 4) return "indices of 2 or 4 bytes";
@@ -46,7 +46,7 @@ std::string brokenRule(const GltfMeshopt& m) {
     return {};
 }
 
-// The fewest bytes that can become so many.
+// Returns the fewest bytes that can become so many.
 uint64_t leastBytes(const GltfMeshopt& m, uint8_t version) {
     switch (m.mode) {
         case Mode::Triangles:

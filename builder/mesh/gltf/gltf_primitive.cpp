@@ -15,7 +15,7 @@
 namespace vcp {
 namespace {
 
-constexpr size_t kElements = 8192;  // read at once
+constexpr size_t kElements = 8192;  // elements read at once
 
 class PrimitiveStream final : public MeshStream {
 public:
@@ -43,7 +43,7 @@ public:
                 most = std::max(most, static_cast<uint64_t>(value));
             }
         }
-        if (most >= vertices_ || least > most) return {};  // reported when they are read in earnest
+        if (most >= vertices_ || least > most) return {};  // an error that is reported when they are read in earnest
         firstVertex_ = least;
         vertexEnd_ = most + 1;
         positions_.skip(firstVertex_);
@@ -137,7 +137,7 @@ private:
     }
 
     Result<void> emit(uint64_t a, uint64_t b, uint64_t c, MeshChunk& chunk) {
-        // What steers a strip.
+        // Such a triangle only steers the strip.
         if (primitive_.mode == GltfMode::Strip && (a == b || b == c || c == a)) return {};
         chunk.triangles.push_back({a, b, c});
         if (!uvValues_) return {};
@@ -165,11 +165,11 @@ private:
     std::optional<GltfAccessorReader> colours_, uvValues_, indices_;
     UvArray uvs_;
     std::vector<double> values_;
-    uint64_t firstVertex_ = 0;  // of those that are read
+    uint64_t firstVertex_ = 0;  // first vertex of those that are read
     uint64_t vertexEnd_ = 0;
     uint64_t corners_ = 0;
     uint64_t corner_ = 0;  // the next one
-    uint64_t first_ = 0;   // the last corner but one; of a fan its first
+    uint64_t first_ = 0;   // the last corner but one; in a fan its first
     uint64_t last_ = 0;
 };
 

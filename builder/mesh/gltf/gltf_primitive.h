@@ -10,15 +10,15 @@
 
 namespace vcp {
 
-/// Vertices first, then triangles. Of a primitive that has more vertices than corners (many may share one large
-/// accessor) only the range that its indices name. Colours where the primitive has COLOR_0, as stored colours (sRGB);
-/// texture coordinates, as stored, where the primitive names an accessor for them. Not for primitives that Draco
-/// compressed. `document` and `buffers` must outlive the stream, which does not fill its info(). Errors: InvalidInput
-/// (index out of range, not finite), Io; without file where `buffers` cannot know it.
+/// Reads vertices first, then triangles. Where a primitive has more vertices than corners (many may share one large
+/// accessor), only the range that its indices name is read. It has colours where the primitive has COLOR_0, as stored
+/// colours (sRGB); texture coordinates, as stored, where the primitive names an accessor for them. Not for primitives
+/// that Draco compressed. `document` and `buffers` must outlive the stream, which does not fill its info(). Errors:
+/// InvalidInput (index out of range, not finite), Io; without file where `buffers` cannot know it.
 Result<std::unique_ptr<MeshStream>> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers,
                                                       const GltfPrimitive& primitive,
                                                       const std::filesystem::path& tempFolder);
-/// Would it be read as the range of its indices?
+/// Returns whether it would be read as the range of its indices.
 bool isRange(const GltfDocument& document, const GltfPrimitive& primitive);
 
 }  // namespace vcp

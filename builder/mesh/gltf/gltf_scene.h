@@ -1,4 +1,4 @@
-// What a glTF scene shows: which mesh is shown where.
+// Which meshes a glTF scene shows, and where.
 #pragma once
 
 #include <vector>
@@ -16,9 +16,9 @@ struct GltfPlacement {
     glm::dmat4 worldFromNode{1};
 };
 
-/// The nodes with a mesh, depth first, in the order of the file. A node with several parents, which glTF does not
-/// allow but some exporters write, is shown once for each. Errors, without file: InvalidInput (a ring of nodes), Limit
-/// (more than 2^21 nodes so).
+/// Returns the nodes with a mesh, depth first, in the order of the file. A node with several parents, which glTF does
+/// not allow but some exporters write, is shown once for each. Errors, without file: InvalidInput (a ring of nodes),
+/// Limit (more than 2^21 nodes so).
 Result<std::vector<GltfPlacement>> placementsOf(const GltfDocument& document);
 
 /// The transforms of EXT_mesh_gpu_instancing, one after another; a single identity without.

@@ -1,5 +1,5 @@
-// The members of a JSON object, each checked for its type. What is wrong is remembered by a JsonCheck, the first
-// time; from then on defaults are returned, so that a reader asks once at the end instead of at every member.
+// The members of a JSON object, each checked for its type. A JsonCheck remembers the first error; from then on defaults
+// are returned, so that a reader asks once at the end instead of at every member.
 #pragma once
 
 #include <cmath>
@@ -42,7 +42,7 @@ public:
         return found == object_.end() ? nullptr : &*found;
     }
 
-    /// A whole number from 0 to 2^53.
+    /// Returns a whole number from 0 to 2^53.
     [[nodiscard]] std::optional<uint64_t> whole(const char* key) const {
         const Json* const value = find(key);
         if (!value) return std::nullopt;
@@ -60,7 +60,7 @@ public:
         return whole(key, 0);
     }
 
-    /// The number of one of `count` things.
+    /// Returns the number of one of `count` things.
     [[nodiscard]] std::optional<uint32_t> index(const char* key, size_t count) const {
         const auto value = whole(key);
         if (!value) return std::nullopt;
@@ -80,7 +80,7 @@ public:
         return {};
     }
 
-    /// A member that is an array; nothing when it is missing.
+    /// Returns a member that is an array; nothing when it is missing.
     [[nodiscard]] const Json* array(const char* key) const {
         const Json* const value = find(key);
         if (value && !value->is_array()) {
@@ -90,7 +90,7 @@ public:
         return value;
     }
 
-    /// `N` finite numbers, where the member exists. Returns whether it does.
+    /// Reads `N` finite numbers, where the member exists. Returns whether it does.
     template <class Numbers>
     bool numbers(const char* key, Numbers& out) const {
         const Json* const value = array(key);

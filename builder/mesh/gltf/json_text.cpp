@@ -14,7 +14,7 @@ namespace {
 constexpr uint64_t kMostValues = 4'000'000;
 constexpr int kMostLevels = 256;
 
-// The bytes of the source one by one; after an error it ends.
+// Gives the bytes of the source one by one; after an error it ends.
 struct Characters {
     Characters(ByteSource& bytes, uint64_t count) : source(bytes), left(count) { load(); }
 
@@ -60,7 +60,7 @@ private:
     Characters* from_;
 };
 
-struct TooMuch {};  // thrown by the callback; leaves this file as a Limit
+struct TooMuch {};  // thrown by the callback; becomes a Limit in this file
 
 }  // namespace
 

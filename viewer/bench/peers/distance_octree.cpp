@@ -28,7 +28,7 @@ private:
 
 class CrossingField final : public CornerField {
 public:
-    /// A cell that the surface crosses has all its corners this near.
+    /// The corners of a cell that the surface crosses are all this near.
     [[nodiscard]] float band() const override { return 1.7320509f; }
     [[nodiscard]] bool isSigned() const override { return true; }
     [[nodiscard]] bool keepCell(const CornerSamples& corners) const override {
@@ -44,7 +44,8 @@ public:
     }
 };
 
-/// The root in [a, b] of a function that is monotone there and changes sign: Newton's steps, halving where they leave.
+/// Returns the root in [a, b] of a function that is monotone there and changes sign: Newton's steps, halved where they
+/// leave.
 float rootBetween(const Cubic& f, float a, float b, float fa) {
     const auto [c0, c1, c2, c3] = f.c;
     float u = 0.5f * (a + b);
@@ -109,7 +110,7 @@ Result<DistanceCaster> DistanceCaster::create(const MeshBvh& mesh, const MeshSid
 
 Result<AnalyticCaster> AnalyticCaster::create(const MeshBvh& mesh, const MeshSides& sides,
                                               const CornerOctreeOptions& build) {
-    // Empty nodes are left at their exit, and farther by what may be stepped from there.
+    // Empty nodes are left at their exit, and beyond it by the distance that may be stepped from there.
     CornerOctreeOptions safe = build;
     safe.safeEmpty = true;
     auto tree = buildCornerOctree(mesh, &sides, CrossingField(), safe);

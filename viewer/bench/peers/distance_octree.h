@@ -23,7 +23,7 @@ namespace vcp {
 struct Trilinear {
     float k, x, y, z, xy, xz, yz, xyz;
 
-    /// Values at corners 4 x + 2 z + y.
+    /// Takes the values at corners 4 x + 2 z + y.
     explicit Trilinear(const std::array<float, 8>& v)
         : k(v[0]),
           x(v[4] - v[0]),
@@ -47,14 +47,14 @@ struct Cubic {
     std::array<float, 4> c;
     [[nodiscard]] float at(float u) const { return c[0] + u * (c[1] + u * (c[2] + u * c[3])); }
 };
-/// What the function is at p + u d.
+/// Returns what the function is at p + u d.
 Cubic cubicAlong(const Trilinear& f, glm::vec3 p, glm::vec3 d);
 /// The least root in [0, end]; infinite where there is none. Roots where the function only touches 0 may be missed.
 float firstRoot(const Cubic& f, float end);
 
 struct DistanceOptions {
-    float band = 3.4641016f;       ///< cells; of DistanceCaster
-    float mergeThreshold = 0.05f;  ///< cells; below 0: no merging; of DistanceCaster
+    float band = 3.4641016f;       ///< in cells; for DistanceCaster
+    float mergeThreshold = 0.05f;  ///< in cells; below 0: no merging; for DistanceCaster
 };
 
 class DistanceCaster {
@@ -64,7 +64,7 @@ public:
 
     [[nodiscard]] const RootGrid& frame() const { return tree_.frame; }
     [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
-    /// Any thread.
+    /// Casts a ray. Any thread.
     template <class Work>
     [[nodiscard]] GridHit cast(const GridRay& ray, Work& work) const;
 
@@ -83,7 +83,7 @@ public:
 
     [[nodiscard]] const RootGrid& frame() const { return tree_.frame; }
     [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
-    /// Any thread.
+    /// Casts a ray. Any thread.
     template <class Work>
     [[nodiscard]] GridHit cast(const GridRay& ray, Work& work) const;
 
@@ -125,7 +125,7 @@ GridHit DistanceCaster::cast(const GridRay& ray, Work& work) const {
         const auto size = static_cast<float>(1 << finder.level());
         const glm::vec3 at = (p - glm::vec3(finder.low())) / size;
         const float value = f.at(at);
-        // 0: of an empty node, whose side is not stored.
+        // 0 stands for an empty node, whose side is not stored.
         if (lastValue * value < 0) return {lastT + (t - lastT) * lastValue / (lastValue - value), f.gradient(at)};
         if (std::abs(value) < kHitDistance) return {t + std::abs(value), f.gradient(at)};
         lastT = t;
@@ -139,7 +139,7 @@ GridHit DistanceCaster::cast(const GridRay& ray, Work& work) const {
 template <class Work>
 GridHit AnalyticCaster::cast(const GridRay& ray, Work& work) const {
     GridHit hit;
-    // The side at the exit of the leaf before, where it adjoins; roots lost to rounding at the face are found by it.
+    // The side at the exit of the leaf before, where it adjoins: it finds roots that rounding loses at the face.
     float side = 0, sideAt = -1;
     walkOctree(tree_, ray, work, [&](const WalkedNode& node) {
         if (!CornerOctree::isLeaf(node.word)) return node.tExit + tree_.emptyDistance(node.word);

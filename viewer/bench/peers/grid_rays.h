@@ -1,7 +1,7 @@
 // A camera's rays in the coordinates of a root grid.
 //
-// Set-up of a ray is in double, what follows it in single precision: the ray starts where it enters the grid, so
-// that a far eye costs no accuracy.
+// A ray is set up in double, and what follows is in single precision: the ray starts where it enters the grid, so that
+// a far eye costs no accuracy.
 #pragma once
 
 #include <algorithm>
@@ -29,14 +29,14 @@ public:
         corner_ = b.forward - b.right * b.halfWidth + b.up * b.halfHeight + 0.5 * perX_ + 0.5 * perY_;
     }
 
-    /// Through the centre of pixel (x, y).
+    /// Returns the ray through the centre of pixel (x, y).
     [[nodiscard]] GridRay ray(int x, int y) const {
         return along(eye_, glm::normalize(corner_ + double(x) * perX_ + double(y) * perY_), high_);
     }
 
-    /// From `eye` along the unit vector `d`, cut to the box from 0 to `high`.
+    /// Returns the ray from `eye` along the unit vector `d`, cut to the box from 0 to `high`.
     static GridRay along(glm::dvec3 eye, glm::dvec3 d, glm::dvec3 high) {
-        // A direction of zero never divides by it.
+        // A component of zero is never divided by.
         for (int axis = 0; axis < 3; ++axis)
             if (std::abs(d[axis]) < 1e-20) d[axis] = 1e-20;
         const glm::dvec3 inverse = 1.0 / d;

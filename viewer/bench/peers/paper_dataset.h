@@ -14,7 +14,7 @@ struct PaperDataset {
     std::shared_ptr<const PageSource> source;
 };
 
-/// `mesh`: what the octree was built from. Errors: those of paperFile.
+/// Makes the dataset. `mesh`: what the octree was built from. Errors: those of paperFile.
 Result<PaperDataset> paperDataset(const PaperCaster& octree, const IndexedMesh& mesh);
 
 }  // namespace vcp

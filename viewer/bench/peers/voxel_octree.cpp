@@ -9,9 +9,9 @@ namespace vcp {
 
 namespace {
 
-constexpr double kTouch = 1e-6;  // cells; what touches a voxel's face is in it
+constexpr double kTouch = 1e-6;  // in cells; what touches a voxel's face is in it
 
-/// Extent of the unit voxel on either side of its centre, along an integer normal.
+/// Returns the extent of the unit voxel on either side of its centre, along an integer normal.
 float extentAlong(glm::vec3 n) { return 0.5f * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z)); }
 
 glm::ivec3 octantOffset(int octant) { return {octant & 1, octant >> 1 & 1, octant >> 2 & 1}; }
@@ -187,7 +187,7 @@ private:
 }  // namespace
 
 uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<glm::dvec3>& normals) {
-    // The whole voxel, where there is nothing to enclose.
+    // Where there is nothing to enclose, the slab is the whole voxel.
     uint32_t best = 127u << 7 | 62u << 14 | 31u << 20 | 31u << 26;
     double bestWidth = std::numeric_limits<double>::infinity();
     if (points.empty()) return best;
@@ -202,7 +202,7 @@ uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<gl
             high = std::max(high, glm::dot(p, glm::dvec3(n)));
         }
         const auto quantized = [&](double at) { return std::clamp((at / extent + 1) * 0.5, 0.0, 1.0) * 127; };
-        // A little apart, so that single precision rounds nothing out of the slab.
+        // The planes are moved a little apart, so that single precision rounds nothing out of the slab.
         const auto lowCode = static_cast<uint32_t>(std::max(std::floor(quantized(low) - 1e-3), 0.0));
         const auto highCode = static_cast<uint32_t>(std::min(std::ceil(quantized(high) + 1e-3), 127.0));
         const double width = (highCode - lowCode) * extent / glm::length(glm::dvec3(n));

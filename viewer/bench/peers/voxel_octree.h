@@ -31,15 +31,15 @@ inline Contour unpackContour(uint32_t code) {
     const auto component = [&](int shift) { return static_cast<float>(static_cast<int>(code >> shift & 63u) - 31); };
     const auto plane = [&](int shift) { return static_cast<float>(code >> shift & 127u) * (2.0f / 127) - 1; };
     const glm::vec3 normal(component(14), component(20), component(26));
-    // How far the voxel reaches along the normal.
+    // The voxel reaches so far along the normal.
     const float extent = 0.5f * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z));
     return {normal, plane(0) * extent, plane(7) * extent};
 }
-/// The narrowest of a few slabs that hold the points, which lie in the unit voxel about 0; rounded outwards.
+/// Packs the narrowest of a few slabs that hold the points, which lie in the unit voxel about 0; rounded outwards.
 /// `normals`: directions that are tried, of any length.
 uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<glm::dvec3>& normals);
 
-/// How many of the children below `octant` exist. A table: not every processor that we compile for counts bits.
+/// Returns how many children below `octant` exist. A table: not every processor that we compile for counts bits.
 inline uint32_t childrenBefore(uint32_t mask, int octant) {
     static constexpr std::array<uint8_t, 128> kBits = [] {
         std::array<uint8_t, 128> bits{};
@@ -55,13 +55,13 @@ public:
     bool hasContours = false;
     std::vector<int32_t> roots;          ///< node of the root level, or kEmptyWord
     std::vector<uint32_t> nodes;         ///< levels from coarse to fine, above the last
-    std::vector<uint8_t> masks;          ///< of the last level
-    std::vector<uint32_t> firstContour;  ///< of the last level
+    std::vector<uint8_t> masks;          ///< masks of the last level
+    std::vector<uint32_t> firstContour;  ///< first contours of the last level
     std::vector<uint32_t> contours;
     std::array<uint32_t, 32> levelStart{};  ///< first node of a level in the numbering of all, masks last
     uint64_t voxels = 0;
 
-    // Words: an inner node's number; or a leaf's, -2 - (8 * mask + octant).
+    // A word is an inner node's number; or for a leaf -2 - (8 * mask + octant).
     static constexpr int32_t kEmptyWord = -1;
     [[nodiscard]] int32_t rootWord(glm::ivec3 c) const { return roots[frame.rootIndex(c)]; }
     [[nodiscard]] static bool isInner(int32_t word) { return word >= 0; }
@@ -86,7 +86,7 @@ public:
     }
 };
 
-/// Errors: Limit where a level would have more than 2^24 nodes, or the cells are too small.
+/// Builds the octree. Errors: Limit where a level would have more than 2^24 nodes, or the cells are too small.
 Result<VoxelOctree> buildVoxelOctree(const IndexedMesh& mesh, double cell, bool contours, unsigned threads);
 
 class VoxelCaster {
@@ -96,7 +96,7 @@ public:
     [[nodiscard]] const RootGrid& frame() const { return tree_.frame; }
     [[nodiscard]] const VoxelOctree& tree() const { return tree_; }
     [[nodiscard]] uint64_t bytes() const { return tree_.bytes(); }
-    /// Any thread.
+    /// Casts a ray. Any thread.
     template <class Work>
     [[nodiscard]] GridHit cast(const GridRay& ray, Work& work) const;
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// A grid of nu by nv quads over (u, v) in [0, 1)^2 that closes in u, and in v where asked.
+/// Adds a grid of nu by nv quads over (u, v) in [0, 1)^2 that closes in u, and on request in v.
 template <class Position>
 IndexedMesh gridSurface(uint32_t nu, uint32_t nv, bool closesInV, const Position& position) {
     IndexedMesh mesh;
@@ -50,7 +50,7 @@ IndexedMesh torus() {
     });
 }
 
-/// Turned about an axis through the middle (Rodrigues).
+/// Turns a point about an axis through the middle (Rodrigues).
 glm::dvec3 turned(glm::dvec3 p, glm::dvec3 axis, double angle) {
     return p * std::cos(angle) + glm::cross(axis, p) * std::sin(angle) +
            axis * (glm::dot(axis, p) * (1 - std::cos(angle)));

@@ -1,4 +1,4 @@
-// Meshes of shapes whose answer is known: what the ray benchmark measures where no model is named.
+// Meshes of shapes whose answer is known: the ray benchmark measures them where no model is named.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace vcp {
 
-/// About 2 world units across; measured with cells of this edge, 128 of them go across the sphere.
+/// The shapes are about 2 world units across; with cells of this edge, 128 of them go across the sphere.
 inline constexpr double kAnalyticModelCell = 1.0 / 64;
 
 struct AnalyticModel {
@@ -18,11 +18,11 @@ struct AnalyticModel {
     IndexedMesh mesh;
 };
 
-/// `sphere`, `torus` (both so finely tessellated that they err by less than 0.002 cell), and `plate`: a box turned
-/// against the axes and 0.4 cell thick. Closed, oriented outwards.
+/// Returns `sphere`, `torus` (both so finely tessellated that they err by less than 0.002 cell), and `plate`: a box
+/// turned against the axes and 0.4 cell thick. All are closed and oriented outwards.
 std::vector<AnalyticModel> analyticModels();
 
-/// Binary PLY with double coordinates. Errors: Io.
+/// Writes a binary PLY with double coordinates. Errors: Io.
 Result<void> writePly(const IndexedMesh& mesh, const std::filesystem::path& path);
 
 }  // namespace vcp

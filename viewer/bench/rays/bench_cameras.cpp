@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kVerticalFov = 0.6;
 
-/// Direction from the target to the eye: points of a Fibonacci spiral, the first at +z.
+/// Returns the direction from the target to the eye: points of a Fibonacci spiral, the first at +z.
 glm::dvec3 viewDirection(int view, int views) {
     const double z = views > 1 ? 1 - 2.0 * view / (views - 1) : 1;
     const double angle = view * std::numbers::pi * (3 - std::sqrt(5.0));
@@ -20,7 +20,7 @@ glm::dvec3 viewDirection(int view, int views) {
     return {r * std::cos(angle), r * std::sin(angle), z};
 }
 
-/// An axis or diagonal of a cell, from -1 to 1: axes first, then the faces' diagonals.
+/// Returns an axis or diagonal of a cell, from -1 to 1: axes first, then the faces' diagonals.
 glm::dvec3 latticeDirection(int view) {
     static const std::vector<glm::dvec3> directions = [] {
         std::vector<glm::dvec3> all;
@@ -34,7 +34,7 @@ glm::dvec3 latticeDirection(int view) {
     return directions[static_cast<size_t>(view) % directions.size()];
 }
 
-/// The corner of the grid nearest to p.
+/// Returns the corner of the grid nearest to p.
 glm::dvec3 nearestCorner(const CellGrid& grid, glm::dvec3 p) {
     return grid.origin + grid.cell * glm::round((p - grid.origin) / grid.cell);
 }
@@ -55,13 +55,13 @@ Camera latticeCamera(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
     const CameraBasis basis = cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
     const glm::dvec3 corner = nearestCorner(grid, 0.5 * (mesh.low() + mesh.high()));
     const auto steps = std::ceil(1.5 * radius / (grid.cell * glm::length(d)));
-    // Through the corner goes the middle of a pixel.
+    // The ray through the middle of a pixel goes through the corner.
     camera.eye = corner - steps * grid.cell * d +
                  0.5 * pixel * ((size.x % 2 == 0 ? 1.0 : 0.0) * basis.right + (size.y % 2 == 0 ? 1.0 : 0.0) * basis.up);
     return camera;
 }
 
-/// A point of the mesh about the middle of what is seen from that side.
+/// Returns a point of the mesh near the middle of what is seen from that side.
 glm::dvec3 surfacePoint(const MeshBvh& mesh, glm::dvec3 centre, double radius, glm::dvec3 back, int view) {
     const glm::dvec3 side =
         glm::normalize(glm::cross(back, std::abs(back.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0)));

@@ -1,4 +1,4 @@
-// The cameras of the benchmarks: the same for every method, from the mesh alone.
+// The cameras of the benchmarks: the same for every method, made from the mesh alone.
 //
 //   whole   all of the mesh in the picture
 //   half    half as far
@@ -27,7 +27,7 @@ namespace vcp {
 /// How many pixels wide a finest cell is for the camera `cells`, at the point looked at.
 inline constexpr double kCellsCameraPixels = 8;
 
-/// The names; the first four are those of a comparison.
+/// Returns the names; the first four are those of a comparison.
 const std::vector<std::string>& benchCameraNames();
 
 /// A grid's corners: world position of one, and the edge of a cell.
@@ -36,9 +36,9 @@ struct CellGrid {
     double cell = 1;
 };
 
-/// View `view` of `views`, from directions spread evenly over the sphere; view 0 looks along -z. `lattice` takes its
-/// directions in turn: 6 axes, 12 diagonals of faces, 8 of the cube.
-/// Nothing for an unknown name.
+/// Returns view `view` of `views`, from directions spread evenly over the sphere; view 0 looks along -z. `lattice`
+/// takes its directions in turn: 6 axes, 12 diagonals of faces, 8 of the cube. Returns nothing for an unknown
+/// name.
 std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
                                   int view, int views);
 

@@ -80,7 +80,7 @@ private:
     double buildSeconds_ = 0;
 };
 
-/// A camera's rays in floats about the mesh's middle: right, up and forward scaled to a step of a pixel.
+/// A camera's rays in floats about the mesh's middle: right, up and forward, scaled to a step of a pixel.
 struct FloatCamera {
     glm::vec3 eye, corner, perX, perY;
 
@@ -104,7 +104,7 @@ struct FloatHit {
 
 constexpr int kTileWidth = 4, kTileHeight = 2;
 
-/// The tile of 8 rays at (x, y); those outside of the picture are switched off.
+/// Traces the tile of 8 rays at (x, y); those outside of the picture are switched off.
 void traceTile(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x, int y, std::vector<FloatHit>& out) {
     alignas(32) int valid[8];
     alignas(32) RTCRayHit8 r;
@@ -172,7 +172,7 @@ public:
             if (!std::isfinite(hits[i].t)) continue;
             const glm::dvec3 n(hits[i].normal);
             const double length = glm::length(n);
-            // What single precision rounds away.
+            // This much is lost to single precision.
             const double rounding = 4e-7 * (std::abs(double(hits[i].t)) + glm::length(glm::dvec3(rays.eye)));
             picture.hits[i] = SurfaceHit{hits[i].t, length > 0 ? n / length : n, rounding};
         }

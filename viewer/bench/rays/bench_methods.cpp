@@ -31,7 +31,7 @@ const std::vector<RayMethod> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
                                          {"embree"},
                                          {"embree-single"}};
 
-/// One rule of the paper's method changed. Those of the march first: they need no other octree.
+/// The paper's method with one rule changed. Rules of the march come first: they need no other octree.
 struct PaperRule {
     const char* name;
     void (*change)(PaperOptions&);
@@ -104,7 +104,7 @@ Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, d
     return makeEmbreeTracer(in_.mesh, method == "embree", in_.threads);
 }
 
-/// The octree is built anew only where another one is needed.
+/// Builds the octree anew only where another one is needed.
 Result<const PaperCaster*> RayMethods::paperOf(const PaperOptions& options) {
     PaperOptions structure = options;
     if (paper_) structure.march = paper_->options().march;

@@ -28,12 +28,12 @@
 
 namespace vcp {
 
-/// In the order of the table above.
+/// Returns the names, in the order of the table above.
 const std::vector<std::string>& rayMethodNames();
-/// The default alone, or all values that are swept; one 0 for a method without a knob.
+/// Returns the default alone, or all values that are swept; a single 0 for a method without a knob.
 std::vector<double> rayMethodKnobs(const std::string& method, bool sweep);
 
-/// One model's tracers. What several of them need is made once. One thread.
+/// One model's tracers. What several of them need is made once. Used by one thread.
 class RayMethods {
 public:
     struct Inputs {
@@ -44,11 +44,11 @@ public:
         std::string device;
         unsigned threads = 0;
         double cell = 1;          ///< finest edge of the .vcp, world units
-        PaperOptions paper = {};  ///< of `paper`; its epsilon is the knob
+        PaperOptions paper = {};  ///< options of `paper`; its epsilon is the knob
     };
     explicit RayMethods(Inputs inputs) : in_(std::move(inputs)) {}
 
-    /// Errors: Usage where this build lacks the method, Limit where a grid would be too large, Device.
+    /// Makes a tracer. Errors: Usage where this build lacks the method, Limit where a grid would be too large, Device.
     Result<std::unique_ptr<RayTracer>> make(const std::string& method, double knob);
 
 private:

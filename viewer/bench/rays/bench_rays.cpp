@@ -23,7 +23,7 @@ struct ModelFiles {
     std::string name;
 };
 
-/// What is built of one mesh with several cells has several names. `cell` 0: chosen from the mesh.
+/// Names the files: datasets of one mesh with several cells have several names. `cell` 0: chosen from the mesh.
 Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder, double cell) {
     if (model.extension() != ".vcp") {
         const std::string name = model.stem().string();
@@ -140,7 +140,7 @@ private:
     Result<void> runModel(const std::filesystem::path& path) {
         auto model = loadModel(path);
         if (!model) return model.error();
-        // Moved into its place: the tree points at it.
+        // The dataset was moved into its place: the tree points at it.
         BenchModel& m = *model;
         m.bvh = std::make_unique<MeshBvh>(m.mesh);
         VCP_TRY(m.cache->loadLevel(m.cache->dataset().header.levels - 1));
@@ -213,7 +213,7 @@ private:
 
     void judge(const BenchModel& model, const Camera& camera, const TracedPicture& traced,
                RayClassTable& classes) const {
-        // Of a picture with coarser pages, what is excused near silhouettes is the largest error allowed.
+        // In a picture with coarser pages, the largest allowed error is what is excused near silhouettes.
         double error = model.cache->dataset().header.certifiedErrorMax;
         // Peers promise nothing; they are excused as much as ours.
         for (const auto& hit : traced.hits)

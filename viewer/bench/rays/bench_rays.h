@@ -26,24 +26,24 @@ namespace vcp {
 struct BenchRaysOptions {
     /// Meshes, or .vcp files beside which the mesh of the same name lies; none: viewer/bench/rays/analytic_models.h.
     std::vector<std::filesystem::path> models;
-    std::vector<std::string> methods;  ///< empty: all that this build has, but paper-rules
+    std::vector<std::string> methods;  ///< empty: all that this build has, except paper-rules
     bool sweep = false;                ///< each method at several values of its knob, instead of its default alone
     std::vector<std::string> cameras = {"whole", "half", "close", "cells"};
     glm::ivec2 size{1920, 1200};
     int views = 1;  ///< directions each camera looks from, spread over the sphere; 8 for a survey
     int repetitions = 5;
-    unsigned threads = 0;       ///< of Embree and the measurement; 0: one a processor
-    std::string device;         ///< of `certified`, as for --device; empty: the best
+    unsigned threads = 0;       ///< threads of Embree and the measurement; 0: one a processor
+    std::string device;         ///< device of `certified`, as for --device; empty: the best
     std::filesystem::path out;  ///< .vcp files are kept here and used again; empty: a temporary folder
     double cell = 0;            ///< as for vcp build
     PaperOptions paper;         ///< the rules of the method `paper`
-    bool stability = false;     ///< also what single precision costs (bench_stability.h)
+    bool stability = false;     ///< also measures what single precision costs (bench_stability.h)
     int judgeEvery = 1;         ///< 1: every ray is compared with the mesh; n: every nth row and column
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
 };
 
-/// What became of the rays that were judged; of each hit its distance to the mesh and its error along the ray in
+/// What became of the rays that were judged: for each hit its distance to the mesh and its error along the ray in
 /// cells, and the angle between the normals.
 struct RaySummary {
     std::array<double, kRayClassNames.size()> fractions{};
@@ -63,21 +63,21 @@ struct BenchRaysRow {
     double nsPerRay = 0;
     double ratioToEmbree = 0;  ///< rays per second over those of Embree's packets on the same rays; 0 without Embree
     RaySummary classes;
-    double cell = 0;     ///< the model's finest edge, world units: that of all methods' rows
+    double cell = 0;     ///< the model's finest edge, world units: the same in all methods' rows
     RaysWork work;       ///< empty where the method does not count
-    uint64_t bytes = 0;  ///< of what is traced: pages, a peer's octree, or Embree's tree and buffers
+    uint64_t bytes = 0;  ///< bytes of what is traced: pages, a peer's octree, or Embree's tree and buffers
 };
 
 struct BenchRaysReport {
     std::vector<BenchRaysRow> rows;
-    std::vector<StabilityRow> stability;  ///< where it was asked for
+    std::vector<StabilityRow> stability;  ///< empty where it was not asked for
 };
 
 /// Whether this build can measure against Embree.
 bool benchHasEmbree();
 
-/// Blocks. Errors: Usage (unknown method or camera; a method this build lacks), what loadMesh and buildOctree
-/// report, Cancelled.
+/// Runs the benchmark. Blocks. Errors: Usage (unknown method or camera; a method this build lacks), what loadMesh and
+/// buildOctree report, Cancelled.
 Result<BenchRaysReport> benchRays(const BenchRaysOptions& options);
 
 /// The report as one JSON object {"rows": [...], "stability": [...]}, as CSV with a header line (the rows), and as
@@ -85,8 +85,8 @@ Result<BenchRaysReport> benchRays(const BenchRaysOptions& options);
 std::string benchRaysJson(const BenchRaysReport& report);
 std::string benchRaysCsv(const BenchRaysReport& report);
 std::string benchRaysMarkdown(const BenchRaysReport& report);
-/// Of each model error quantiles and wrong rays against time and against bytes, SVG by file name without extension;
-/// a point is a method at one value of its knob, the mean over cameras.
+/// Returns plots as SVG by file name without extension: for each model error quantiles and wrong rays against time and
+/// against bytes; a point is a method at one value of its knob, the mean over cameras.
 std::vector<std::pair<std::string, std::string>> benchRaysPlots(const BenchRaysReport& report);
 
 }  // namespace vcp

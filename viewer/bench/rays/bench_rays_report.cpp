@@ -99,7 +99,7 @@ const std::array<PlottedValue, 4> kPlotted = {
           return std::max(wrongRays(row.classes), 0.5 / static_cast<double>(std::max<uint64_t>(row.classes.judged, 1)));
       }}}};
 
-/// One series a method, one point a value of its knob: means over the rows, which differ by camera.
+/// Makes a plot: one series a method, one point a value of its knob: means over the rows, which differ by camera.
 std::string plotOf(const std::vector<const BenchRaysRow*>& rows, const PlottedValue& value, bool againstTime) {
     Plot plot{.title = rows.front()->model + ": " + value.title,
               .xName = againstTime ? "ns a ray" : "bytes",

@@ -24,10 +24,10 @@ namespace {
 
 using Hits = std::vector<std::optional<SurfaceHit>>;
 
-// A pixel's wish that no page but the finest fulfils.
+// The pixel error that only the finest page fulfils.
 constexpr double kFinestPixels = 0;
 
-/// In cells about the origin: a torus, and a box on the grid's planes inside of it.
+/// Returns the shape in cells about the origin: a torus, and inside it a box on the grid's planes.
 IndexedMesh shape() {
     constexpr uint32_t kAround = 96, kAcross = 40;
     constexpr double kRing = 22, kTube = 8, kHalf = 6, kTurn = 2 * std::numbers::pi;
@@ -51,7 +51,7 @@ IndexedMesh shape() {
     return mesh;
 }
 
-/// The shape with one cell at one origin, and who casts rays into it.
+/// The shape with one cell at one origin, and the casters of rays into it.
 class StabilityCase {
 public:
     StabilityCase(const StabilityOptions& options, double cell, double originCells)

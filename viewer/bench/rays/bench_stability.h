@@ -16,7 +16,7 @@ namespace vcp {
 /// One caster beside the reference in double.
 struct PrecisionRow {
     uint64_t hits = 0;
-    uint64_t otherOutcome = 0;  ///< of the rays: one hits and the other does not, or their hits are over 2 cells apart
+    uint64_t otherOutcome = 0;  ///< rays where one hits and the other does not, or their hits are over 2 cells apart
     Quantiles depthCells;       ///< along the ray, between the two hits
     uint64_t holes = 0;         ///< against the mesh (ray_classes.h)
     Quantiles distanceCells;    ///< from the hits to the mesh
@@ -36,14 +36,14 @@ struct StabilityOptions {
     int width = 192, height = 120;
     std::string device;  ///< as for --device
     unsigned threads = 0;
-    std::filesystem::path folder;                                       ///< for what is built; removed again
+    std::filesystem::path folder;                                       ///< for what is built; removed afterwards
     std::function<bool(const std::string&, double fraction)> progress;  ///< false cancels; may be empty
 };
 
-/// Blocks. Errors: what buildOctree and the renderer say, Cancelled.
+/// Runs the comparison. Blocks. Errors: what buildOctree and the renderer say, Cancelled.
 Result<std::vector<StabilityRow>> benchStability(const StabilityOptions& options);
 
-/// A section of the report; empty without rows.
+/// Returns a section of the report; empty without rows.
 std::string stabilityMarkdown(const std::vector<StabilityRow>& rows);
 
 }  // namespace vcp

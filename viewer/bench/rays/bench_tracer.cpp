@@ -56,12 +56,12 @@ private:
     unsigned threads_;
 };
 
-/// What the renderer is asked for, and what it promises of its hits.
+/// What the renderer is asked for, and what is certified of its hits.
 struct RendererKnob {
     std::string name;
     double errorPixels = 0.5;
     PaperMarch march = {};
-    double certifiedError = 0;  // world units; infinite: nothing is promised
+    double certifiedError = 0;  // world units; infinite: nothing is certified
 };
 
 class RendererTracer final : public RayTracer {
@@ -111,7 +111,7 @@ private:
         for (size_t i = 0; i < depth->size(); ++i) {
             const double t = (*depth)[i];
             if (std::isinf(t)) continue;
-            // Not a number where a ray gave up: the judge calls that unresolved.
+            // t is not a number where a ray gave up: the judge calls that unresolved.
             const double allowed = std::isinf(knob_.certifiedError) || std::isnan(t)
                                        ? knob_.certifiedError
                                        : std::max(knob_.certifiedError, errorPixels * perPixel * (parallel ? 1 : t));
@@ -120,7 +120,7 @@ private:
         return {};
     }
 
-    /// Ray by ray, read from pictures in false colours; rays of tiles that the beam pass proves empty do none.
+    /// Counts work ray by ray, from pictures in false colours; rays of tiles that the beam pass proves empty do none.
     Result<void> countWork(FrameRequest request, TracedPicture& picture) {
         const std::pair<ShadingMode, WorkHistogram*> modes[] = {{ShadingMode::Steps, &picture.work.steps},
                                                                 {ShadingMode::Cells, &picture.work.cells},

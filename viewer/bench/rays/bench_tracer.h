@@ -37,7 +37,7 @@ public:
     virtual Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) = 0;
 };
 
-/// The reference ray-caster over the finest level, `threads` threads, once whatever the repetitions.
+/// The reference ray-caster over the finest level, on `threads` threads, once, whatever the repetitions.
 Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, unsigned threads);
 
 /// The renderer at `errorPixels`. The file is opened again. Errors: Device, what opening a dataset reports.
@@ -52,7 +52,7 @@ Result<std::unique_ptr<RayTracer>> makePaperGpuTracer(std::shared_ptr<const Data
 /// Embree over the mesh, relative to its box's middle, in floats. Errors: Usage where this build has no Embree.
 Result<std::unique_ptr<RayTracer>> makeEmbreeTracer(const IndexedMesh& mesh, bool packets, unsigned threads);
 
-/// Seconds that Embree takes to build its tree. Errors: as above.
+/// Returns the seconds that Embree takes to build its tree. Errors: as above.
 Result<double> timeEmbreeBuild(const IndexedMesh& mesh, unsigned threads);
 
 }  // namespace vcp

@@ -17,16 +17,16 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// VCP, signed distance, voxel, sparse voxel octree with contours.
+/// The order is VCP, signed distance, voxel, sparse voxel octree with contours.
 using FourMethods = std::array<double, 4>;
 struct Published {
     const char* name;
     FourMethods values;
 };
-/// Table 1, MiB. Voxels have half the cell, but for Sponza, which is left out here: there they have the same.
+/// Table 1, MiB. Voxels have half the cell, except for Sponza, where they have the same; it is left out here.
 constexpr std::array<Published, 2> kMebibytes = {
     {{"Thai statue", {1075, 1075, 1096, 860}}, {"David", {980, 980, 960, 770}}}};
-/// Table 2, milliseconds a frame.
+/// Table 2, milliseconds of a frame.
 constexpr std::array<Published, 7> kMilliseconds = {{{"Thai 1", {8.6, 8.2, 8.0, 8.1}},
                                                      {"Thai 2", {11.7, 11.1, 10.6, 11.0}},
                                                      {"Thai 3", {20.4, 19.8, 19.4, 18.2}},
@@ -60,7 +60,7 @@ std::optional<OurModel> modelOf(const BenchRaysReport& report, const std::string
             model.normal[i] += row.classes.normalDegrees.p50;
             ++rows;
         }
-        // No rows: not a number, which is printed as nothing.
+        // Without rows a value is not a number, and is printed as nothing.
         for (FourMethods* values : {&model.bytes, &model.nanoseconds, &model.p50, &model.p99, &model.normal})
             (*values)[i] /= rows;
     }
@@ -82,7 +82,7 @@ std::string line(const std::string& name, const FourMethods& values, const char*
     return text + "\n";
 }
 
-/// Means over those that have a value.
+/// Means over the models that have a value.
 class MeanOfMethods {
 public:
     void add(const FourMethods& values) {

@@ -1,4 +1,4 @@
-// Where a benchmark keeps what it builds: in a folder of its own, so that nothing of the same name is replaced.
+// Where a benchmark keeps what it builds: in a folder of its own, so that no file of the same name is replaced.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace vcp {
 
-/// A folder for what is built: `built` in the caller's, or, where that is empty, one that goes with this object.
+/// A folder for what is built: `built` in the caller's, or, where that is empty, one removed with this object.
 class BenchFolder {
 public:
     explicit BenchFolder(const std::filesystem::path& wanted)
@@ -24,7 +24,7 @@ public:
     BenchFolder(const BenchFolder&) = delete;
     BenchFolder& operator=(const BenchFolder&) = delete;
 
-    /// Errors: Io.
+    /// Makes the folder. Errors: Io.
     [[nodiscard]] Result<void> make() const {
         std::error_code failed;
         std::filesystem::create_directories(path_, failed);

@@ -15,7 +15,7 @@ inline std::string csvCell(const nlohmann::ordered_json& value) {
     return text + "\"";
 }
 
-/// One column a field, in the order of the first row; all rows have the same fields.
+/// Makes a column for each field, in the order of the first row; all rows have the same fields.
 inline std::string csvOf(const nlohmann::ordered_json& rows) {
     std::string text;
     if (rows.empty()) return text;

@@ -35,7 +35,7 @@ std::string escaped(std::string_view text) {
     return safe;
 }
 
-/// 2.5M, 30k, 0.02.
+/// Returns a short text such as 2.5M, 30k or 0.02.
 std::string shortNumber(double value) {
     const double size = std::abs(value);
     if (size >= 1e9) return fmt::format("{:g}G", value * 1e-9);
@@ -44,7 +44,7 @@ std::string shortNumber(double value) {
     return fmt::format("{:g}", value);
 }
 
-/// From values to pixels.
+/// Maps values to pixels.
 class Axis {
 public:
     Axis(bool isLog, double firstPixel, double lastPixel) : isLog_(isLog), first_(firstPixel), last_(lastPixel) {}
@@ -57,7 +57,7 @@ public:
         high_ = high_ ? std::max(*high_, value) : value;
     }
 
-    /// Leaves air around the values; a linear axis begins at 0 where they are positive.
+    /// Leaves some space around the values; a linear axis begins at 0 where they are positive.
     void settle() {
         double low = low_.value_or(1), high = high_.value_or(1);
         if (isLog_) {
@@ -162,7 +162,7 @@ std::vector<double> plotMarks(double low, double high, bool isLog) {
     }
     const double rough = (high - low) / 6, power = std::pow(10.0, std::floor(std::log10(rough)));
     const double step = power * (rough <= power ? 1 : rough <= 2 * power ? 2 : rough <= 5 * power ? 5 : 10);
-    // Counted, not added up, so that 0 is 0.
+    // The marks are counted, not added up, so that 0 is exact.
     for (auto i = static_cast<int64_t>(std::ceil(low / step)); static_cast<double>(i) * step <= high; ++i)
         marks.push_back(static_cast<double>(i) * step);
     return marks;

@@ -16,7 +16,7 @@ struct PlotSeries {
     std::vector<PlotPoint> points;  ///< joined in this order
 };
 
-/// Something known, drawn as a dashed line across the plot.
+/// A known value, drawn as a dashed line across the plot.
 struct PlotLevel {
     std::string name;
     double y = 0;
@@ -29,12 +29,12 @@ struct Plot {
     std::vector<PlotLevel> levels = {};
 };
 
-/// Values where an axis puts its marks: 1, 2 and 5 times powers of ten that lie in [low, high]; on a logarithmic axis
-/// of many decades the powers alone.
+/// Returns the values where an axis has its marks: 1, 2 and 5 times powers of ten that lie in [low, high]; on a
+/// logarithmic axis of many decades only the powers.
 std::vector<double> plotMarks(double low, double high, bool isLog);
 
-/// The picture. What is not finite, or not positive on a logarithmic axis, is left out; a plot of nothing is an empty
-/// frame.
+/// Returns the picture. Values that are not finite, or not positive on a logarithmic axis, are left out; a plot of
+/// nothing is an empty frame.
 std::string plotSvg(const Plot& plot);
 
 }  // namespace vcp

@@ -33,7 +33,7 @@ public:
         for (size_t work = 0; work < rays_.size(); ++work) sum += static_cast<double>(work * rays_[work]);
         return empty() ? 0 : sum / static_cast<double>(rays());
     }
-    /// The least work that this part of the rays does not exceed.
+    /// Returns the least work that this part of the rays does not exceed.
     [[nodiscard]] uint32_t quantile(double part) const {
         const auto wanted = static_cast<uint64_t>(std::ceil(part * static_cast<double>(rays())));
         uint64_t sum = 0;

@@ -59,7 +59,7 @@ private:
         return !o_.run.progress || o_.run.progress(what, done_ + share_ * fraction);
     }
 
-    /// Of cells half as large as other benchmarks take: more to load.
+    /// Builds the models with cells half as large as other benchmarks take: more to load.
     Result<std::vector<std::string>> buildAnalyticModels() {
         VCP_TRY(folder_.make());
         std::vector<std::string> files;

@@ -18,13 +18,14 @@ struct BenchStreamOptions {
     std::vector<std::string> models;
     std::vector<std::string> paths = {"fly"};
     std::vector<uint64_t> budgets = {64ull << 20, 256ull << 20, 1ull << 30};
-    StressOptions run;  ///< of each; name, path and budget are set
+    StressOptions run;  ///< options of each run; name, path and budget are set for each
     SourceAccess access;
-    std::filesystem::path out;  ///< what is built of the analytic models is left here; empty: a temporary folder
+    std::filesystem::path out;  ///< the analytic models' datasets are left here; empty: a temporary folder
 };
 
-/// A row for each model, path and budget, in this order. A local file leaves the system's cache before each run, where
-/// the system lets it. Blocks. Errors: those of openDataset, of the build and of runStress. Violations are no errors.
+/// Returns a row for each model, path and budget, in this order. A local file is dropped from the system's cache before
+/// each run, where the system allows it. Blocks. Errors: those of openDataset, of the build and of runStress.
+/// Violations are no errors.
 Result<std::vector<StressReport>> benchStream(const BenchStreamOptions& options);
 
 /// The rows as one JSON object {"rows": [...]}, as CSV with a header line, and as a Markdown table.
@@ -32,8 +33,8 @@ std::string benchStreamJson(const std::vector<StressReport>& rows);
 std::string benchStreamCsv(const std::vector<StressReport>& rows);
 std::string benchStreamMarkdown(const std::vector<StressReport>& rows);
 
-/// Pictures by file name without extension, over the budget: frame times with loads over without, bytes read over
-/// needed.
+/// Returns plots by file name without extension, over the budget: frame times with loads over those without, bytes read
+/// over bytes needed.
 std::vector<std::pair<std::string, std::string>> benchStreamPlots(const std::vector<StressReport>& rows);
 
 }  // namespace vcp

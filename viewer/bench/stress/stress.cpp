@@ -18,9 +18,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A view that brings nothing new for so long does not settle.
+// A view to which nothing new has come for so long does not settle any more.
 constexpr double kHopelessSeconds = 60;
-// Pictures of an order of arrival.
+// The number of pictures drawn for an order of arrival.
 constexpr int kOrderDraws = 100;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -45,7 +45,7 @@ private:
     std::shared_ptr<const ByteReader> reader_;
 };
 
-/// What must hold after each update; what does not is noted once.
+/// The conditions that must hold after each update; one that does not is noted once.
 class Invariants {
 public:
     Invariants(uint64_t budgetBytes, uint64_t ramBytes, std::vector<std::string>& violations)
@@ -126,7 +126,7 @@ private:
         return request;
     }
 
-    /// One round: what it took in milliseconds is in `frameMs`.
+    /// Runs one round, and sets `frameMs` to the milliseconds that it took.
     Result<UpdateResult> frame(const FrameRequest& request, double& frameMs) {
         const auto began = Clock::now();
         auto update = renderer_->update(request);
@@ -156,7 +156,7 @@ private:
         return {};
     }
 
-    /// Updates until the view has settled; `each` sees every one.
+    /// Updates until the view has settled; `each` is called with every update.
     Result<UpdateResult> settle(const FrameRequest& request,
                                 const std::function<void(const UpdateResult&)>& each = {}) {
         auto changedAt = Clock::now();
@@ -176,7 +176,7 @@ private:
         }
     }
 
-    /// Draws what there is as soon as there is something, then refines.
+    /// Draws as soon as there is something to draw, then refines.
     Result<void> firstView() {
         const Camera whole = fitCamera(open_.bounds().low, open_.bounds().high, {0, -0.35, -1}, {0, 1, 0}, 0.6,
                                        double(o_.size.x) / o_.size.y);
@@ -245,7 +245,7 @@ private:
         return {};
     }
 
-    /// The same frames, each with all it wants; and what that is.
+    /// Draws the same frames, each with all pages that it wants, and notes which pages those are.
     Result<void> withoutLoads() {
         const bool colour = o_.renderer.colour && open_.dataset->hasColour();
         ResidencyPolicy wants(open_.dataset, colour,
@@ -259,7 +259,8 @@ private:
             double ms = 0;
             if (const auto update = frame(request, ms); !update) return update.error();
             times.push_back(static_cast<float>(ms));
-            // Twice: a still view looks at nothing ahead. Nothing is ever placed, so all it wants is wished for.
+            // It looks twice, since a still view looks at nothing ahead. No page is ever placed, so all it wants is
+            // wished for.
             for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
             for (const Wish& wish : wants.finish().wishes)
                 if (wish.request.isPage()) needed.insert(wish.request.number);
@@ -284,7 +285,7 @@ private:
         if (auto drawn = renderer_->render(request); !drawn) return drawn.error();
         const auto picture = renderer_->readPicture();
         if (!picture) return picture.error();
-        // A page given up by bad luck is drawn from its parent, and said so.
+        // A page that was given up by bad luck is drawn from its parent, and reported.
         invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0,
                             "the settled picture is not that of a run without faults");
         return {};

@@ -25,7 +25,7 @@
 namespace vcp {
 
 struct StressOptions {
-    std::string name;            ///< of the dataset, for the report
+    std::string name;            ///< name of the dataset, for the report
     std::string path = "orbit";  ///< a name of stress_path.h, or a file of cameras
     Faults faults;
     uint64_t seed = 1;
@@ -36,7 +36,7 @@ struct StressOptions {
     std::vector<LoadOrder> orders;  ///< compared on the path's last view; fewer than two: no comparison
     int views = 1;                  ///< more than one: so many share a pool
     double openSeconds = 0;         ///< what opening the dataset took: counted into the times below
-    /// Asked between frames; false cancels.
+    /// Called between frames; false cancels.
     std::function<bool(const std::string& what, double fraction)> progress;
 };
 
@@ -45,8 +45,8 @@ struct StressSample {
     double seconds = 0;  ///< since the start
     double frameMs = 0;  ///< update and drawing
     double errorPixels = 0;
-    uint64_t residentBytes = 0, pending = 0, loads = 0, evictions = 0;  ///< the last two: in this frame
-    double missing = 0;  ///< part of the pages that the view wants and has not, 0 to 1
+    uint64_t residentBytes = 0, pending = 0, loads = 0, evictions = 0;  ///< loads and evictions are those of this frame
+    double missing = 0;  ///< share of the pages that the view wants and that are missing, 0 to 1
 };
 
 struct StressReport {
@@ -54,15 +54,15 @@ struct StressReport {
     uint64_t seed = 0;
     int frames = 0;
     double firstPictureSeconds = 0, detail90Seconds = 0, settledSeconds = 0;
-    double pathSettledSeconds = 0;  ///< from the last frame of the path until it had settled
-    uint64_t bytesRead = 0;         ///< of the file, until every view of the path had settled
+    double pathSettledSeconds = 0;  ///< from the last frame of the path until its view had settled
+    uint64_t bytesRead = 0;         ///< bytes of the file that were read until every view of the path had settled
     uint64_t bytesNeeded = 0;       ///< stored bytes of the pages in these settled views, each once
     uint64_t requests = 0;          ///< reads of the source
     uint64_t failures = 0, pagesGivenUp = 0;
     uint64_t budgetBytes = 0, residentBytesMax = 0, ramBytes = 0, heldBytesMax = 0;
     uint64_t loads = 0, evictions = 0;
     bool relaxed = false;
-    double errorPixels = 0;  ///< of the settled last view
+    double errorPixels = 0;  ///< error of the settled last view
     Quantiles frameMs, frameMsNoLoads;
     std::vector<StressSample> samples;
     std::vector<OrderCurve> orders;
@@ -70,10 +70,10 @@ struct StressReport {
     std::vector<std::string> violations;  ///< invariants that were broken; must be empty
 };
 
-/// Blocks. Errors: those of Renderer, of a camera file, Cancelled. Violations are no errors.
+/// Runs the stress test. Blocks. Errors: those of Renderer, of a camera file, Cancelled. Violations are no errors.
 Result<StressReport> runStress(const OpenDataset& open, const StressOptions& options);
 
-/// The fields of the JSON (docs/streaming.md), one page of Markdown, and plots over time by file name.
+/// Return the fields of the JSON (docs/streaming.md), one page of Markdown, and plots over time by file name.
 std::string stressJson(const StressReport& report);
 std::string stressMarkdown(const StressReport& report);
 std::vector<std::pair<std::string, std::string>> stressPlots(const StressReport& report);

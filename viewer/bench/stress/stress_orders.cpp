@@ -21,7 +21,7 @@ double rmsDifference(const Picture& a, const Picture& b) {
     return std::sqrt(sum / std::max<double>(1, double(a.rgba.size()) * 0.75));
 }
 
-/// The pictures on the way of one order, until it has settled.
+/// Draws the pictures of one order on its way, until it has settled.
 class OrderRun {
 public:
     OrderRun(const OpenDataset& open, RendererOptions options, const FrameRequest& request, LoadOrder order, int draws)
@@ -50,7 +50,7 @@ public:
 
 private:
     Result<void> start() {
-        // Memory for one page on its way: none is read before those drawn so far could ask for others.
+        // There is memory for one page on its way: none is read before those drawn so far could ask for others.
         const auto source = std::make_shared<FilePageSource>(open_.reader, open_.dataset, 0);
         const bool colour = options_.colour && open_.dataset->hasColour();
         options_.loaderThreads = 1;
@@ -79,7 +79,7 @@ private:
         std::vector<OrderSample>& samples = curve_.samples;
         for (size_t i = 0; i < pictures_.size(); ++i) samples[i].error = rmsDifference(pictures_[i], curve_.settled);
         double area = 0;
-        // A picture stays until the next is drawn.
+        // A picture counts until the next one is drawn.
         for (size_t i = 0; i + 1 < samples.size(); ++i)
             area += samples[i].error * double(samples[i + 1].bytes - samples[i].bytes);
         curve_.meanError = area / std::max<double>(1, double(samples.back().bytes - samples.front().bytes));
@@ -105,7 +105,7 @@ Result<std::vector<OrderCurve>> compareOrders(
     const OpenDataset& open, const RendererOptions& options, const FrameRequest& request,
     const std::vector<LoadOrder>& orders, int draws,
     const std::function<bool(const std::string& what, double fraction)>& progress) {
-    // Every entry: the largest page says how much memory one takes.
+    // All entries are read: the largest page says how much memory one takes.
     auto dataset = readDataset(*open.reader);
     if (!dataset) return dataset.error();
     OpenDataset whole = open;

@@ -19,7 +19,7 @@ constexpr double kDiveCells = 32;
 constexpr int kTeleportFrames = 10;
 constexpr double kDefaultStallRate = 0.02;
 
-/// From 0 to below 1, the same everywhere.
+/// Random numbers from 0 to below 1, the same everywhere.
 class Random {
 public:
     explicit Random(uint64_t seed) : engine_(seed) {}
@@ -67,7 +67,7 @@ public:
         if (frame % kTeleportFrames == 0) {
             Camera camera = fit_;
             camera.eye = centre_ + random_.direction() * (reach_ * random_.between(0.05, 1));
-            // Mostly towards the middle, now and then anywhere.
+            // It looks mostly towards the middle, now and then anywhere.
             const glm::dvec3 aim = random_.unit() < 0.8 ? centre_ - camera.eye + random_.direction() * (0.2 * reach_)
                                                         : random_.direction();
             last_ = turned(camera, aim);

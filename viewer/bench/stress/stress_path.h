@@ -24,8 +24,8 @@ namespace vcp {
 struct StressPathOptions {
     std::string name = "orbit";
     Box bounds;
-    glm::dvec3 target{0};  ///< what dive goes to: a point of the surface
-    double cell = 1;       ///< finest
+    glm::dvec3 target{0};  ///< the point of the surface that dive goes to
+    double cell = 1;       ///< edge of the finest cell
     glm::ivec2 size{640, 400};
     int frames = 120;  ///< at least 1
     uint64_t seed = 1;
@@ -33,12 +33,12 @@ struct StressPathOptions {
 
 const std::vector<std::string>& stressPathNames();
 
-/// A camera for each frame; nothing for an unknown name.
+/// Returns a camera for each frame; nothing for an unknown name.
 std::optional<std::vector<Camera>> stressPath(const StressPathOptions& options);
 
-/// "error=0.1,corrupt=0.01,stall=500ms,stalls=0.05,latency=50ms,spread=20ms,bandwidth=2.5M": rates from 0 to 1;
-/// times with ms or s; stalls is the rate of stalls, 0.02 unless given; bandwidth in bytes a second. Nothing
-/// when malformed.
+/// Parses "error=0.1,corrupt=0.01,stall=500ms,stalls=0.05,latency=50ms,spread=20ms,bandwidth=2.5M": rates from 0 to 1;
+/// times with ms or s; stalls is the rate of stalls, 0.02 unless given; bandwidth in bytes a second. Returns nothing
+/// when the text is malformed.
 std::optional<Faults> parseFaults(std::string_view text);
 
 }  // namespace vcp

@@ -73,7 +73,7 @@ std::string row(const std::string& name, const Quantiles& q) {
     return fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, q.p50, q.p95, q.p99, q.max);
 }
 
-/// What one number or word says.
+/// Returns the fields that are one number or word each.
 Json summaryOf(const StressReport& r) {
     return {{"name", r.name},
             {"path", r.path},
@@ -103,7 +103,7 @@ Json summaryOf(const StressReport& r) {
             {"violations", r.violations}};
 }
 
-/// One field a column: `frame_ms` becomes `frame_ms_p50` and so on.
+/// Makes one field a column: `frame_ms` becomes `frame_ms_p50` and so on.
 Json flatOf(const StressReport& report) {
     const Json summary = summaryOf(report);
     Json flat;
@@ -130,7 +130,7 @@ std::string streamRow(const StressReport& r) {
         r.violations.empty() ? "" : fmt::format(" **broken: {}**", fmt::join(r.violations, "; ")));
 }
 
-/// A line for each model and path over the budgets.
+/// Draws a line over the budgets for each model and path.
 Plot overBudgets(const std::string& title, const std::string& yName, const std::vector<StressReport>& rows,
                  double (*valueOf)(const StressReport&)) {
     Plot plot{.title = title, .xName = "budget, MB", .yName = yName, .logX = true};

@@ -9,7 +9,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Views that load nothing new for so long do not settle.
+// Views to which nothing new has come for so long do not settle any more.
 constexpr double kHopelessSeconds = 60;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }

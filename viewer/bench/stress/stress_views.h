@@ -1,6 +1,6 @@
 // Several views of one dataset that share a pool and a budget, for vcp stress: each flies along the same path from
-// another place of it, all are drawn in turn. Then all stand still; where the budget suffices, each must show what it
-// would show alone.
+// another place of it, and all are drawn in turn. Then all stand still; where the budget suffices, each must show what
+// it would show alone.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ struct StressViews {
     std::vector<std::string> violations;
 };
 
-/// `path`: the frames of one view, at least one. Blocks. Errors: those of Renderer; Cancelled, where `progress` returns
-/// false.
+/// Flies the views. `path`: the frames of one view, at least one. Blocks. Errors: those of Renderer; Cancelled, where
+/// `progress` returns false.
 Result<StressViews> flyTogether(const OpenDataset& open, const RendererOptions& options,
                                 const std::vector<FrameRequest>& path, int views,
                                 const std::function<bool(const std::string& what, double fraction)>& progress);
