@@ -194,7 +194,7 @@ int main(int argc, char** argv) {
     }
     if (const auto result = run(*arguments); !result) {
         std::fprintf(stderr, "make_scan: %s\n", result.error().line().c_str());
-        return 1;
+        return result.error().code == ErrorCode::Usage ? 2 : 1;
     }
     return 0;
 }

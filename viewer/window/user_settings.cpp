@@ -170,7 +170,9 @@ Result<FileText> readText(const fs::path& path) {
     struct stat status {};
     if (!file.isOpen() || ::fstat(file.number(), &status) != 0)
         return Error{ErrorCode::Io, "cannot be read: " + std::generic_category().message(errno), path.string()};
-    if (!S_ISREG(status.st_mode)) return Error{ErrorCode::Io, "is no file of settings", path.string()};
+    if (!S_ISREG(status.st_mode))
+        return Error{ErrorCode::Io, S_ISFIFO(status.st_mode) ? "is a pipe, not a file" : "is no file of settings",
+                     path.string()};
     FileText read{true, {}, status.st_mode & 0777};
     char buffer[16384];
     for (;;) {

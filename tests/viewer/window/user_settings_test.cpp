@@ -110,7 +110,7 @@ TEST_F(UserSettingsTest, NoJsonIsSaid) {
 
 TEST_F(UserSettingsTest, PasswordsAreNotRemembered) {
     UserSettings settings;
-    settings.remember("https://user:secret@host/x.vcp?token=1");
+    settings.remember(rememberedName("https://user:secret@host/x.vcp?token=1"));
     EXPECT_EQ(settings.recent.front(), "https://host/x.vcp?token=1");
     EXPECT_EQ(rememberedName("https://user:secret@host/x.vcp"), "https://host/x.vcp");
     // Those of before go.
