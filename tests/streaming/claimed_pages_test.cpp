@@ -43,7 +43,7 @@ public:
             e.storedBytes = 16;
             e.pageBytes = 4096;
             while (page >= h.level[level].firstEntry + h.level[level].pages) ++level;
-            e.level = level;
+            e.level = static_cast<uint8_t>(level);
             e.morton = page - h.level[level].firstEntry;
             e.childMask = page == 0 ? 0xff : 0;
             e.firstChild = page == 0 ? 1 : 0;
