@@ -318,8 +318,9 @@ Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
 }
 
 Result<void> Device::submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence fence) {
-    const VkResult done =
-        ++submissions_ == faults_.lostAtSubmission ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue, 1, &submit, fence);
+    // A device that is lost stays lost, also one that is only said to be.
+    const bool isLost = lost_ || ++submissions_ == faults_.lostAtSubmission;
+    const VkResult done = isLost ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue, 1, &submit, fence);
     lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
     return done == VK_SUCCESS ? Result<void>() : vulkanError("vkQueueSubmit", done);
 }

@@ -41,7 +41,9 @@ std::string LinesOf::string() {
 void LinesOf::value(const std::string& pointer, int depth, bool keep) {
     skipSpace();
     if (keep) lines_.emplace(pointer, line_);
-    if (at_ >= text_.size() || depth > kDeepest) return;
+    // What nests deeper is no scene: the rest of the text has no lines.
+    if (depth > kDeepest) at_ = text_.size();
+    if (at_ >= text_.size()) return;
     if (text_[at_] == '"') {
         string();
     } else if (text_[at_] == '{' || text_[at_] == '[') {

@@ -45,6 +45,9 @@ Result<std::string> identity(const fs::path& mesh) {
     const fs::path absolute = fs::canonical(mesh, failed);
     if (failed) return ioError(mesh, "cannot be opened", failed);
     if (fs::is_directory(absolute, failed)) return Error{ErrorCode::Io, "is a folder, not a mesh", mesh.string()};
+    // A pipe would be waited for, and what comes through it has no identity.
+    if (!fs::is_regular_file(absolute, failed))
+        return Error{ErrorCode::Io, "is not a regular file; build it first, with `vcp build`", mesh.string()};
     return fmt::format("{}\n{}\n", absolute.string(), fileStamp(absolute));
 }
 
