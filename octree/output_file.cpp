@@ -90,8 +90,8 @@ Result<void> checkReplaced(const fs::path& output, const fs::path& target, Outpu
         return errno == ENOENT ? Result<void>() : systemError(output, "cannot write here", errno);
     if (S_ISDIR(there.st_mode)) return ioError(output, "is a folder; give a file name");
     if (!S_ISREG(there.st_mode))
-        return ioError(output, fmt::format("is {}, which is not replaced; give a file name, or - for standard output",
-                                           wordsFor(there.st_mode)));
+        return ioError(output, fmt::format("is {}, which is not replaced; give a file name{}", wordsFor(there.st_mode),
+                                           isMarked(kind) ? "" : ", or - for standard output"));
     for (const fs::path& input : rules.inputs) {
         struct stat read {};
         if (::stat(input.c_str(), &read) == 0 && read.st_dev == there.st_dev && read.st_ino == there.st_ino)
