@@ -24,7 +24,7 @@ public:
     [[nodiscard]] virtual const std::string& name() const = 0;
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
-    /// What read() gave for these bytes proved wrong: a copy of them is not used again.
+    /// Reports that what read() gave for these bytes proved wrong: a copy of them is not used again.
     virtual void distrust(uint64_t offset, uint64_t bytes) const {
         static_cast<void>(offset), static_cast<void>(bytes);
     }

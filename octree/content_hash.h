@@ -7,7 +7,7 @@
 
 namespace vcp {
 
-/// XXH3-64.
+/// Returns the XXH3-64 of the bytes.
 uint64_t hashBytes(std::span<const std::byte> bytes);
 
 }  // namespace vcp

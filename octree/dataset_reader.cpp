@@ -45,7 +45,7 @@ Result<FileHeader> readHeader(const ByteReader& reader) {
     return header;
 }
 
-/// `directoryHash`: of its bytes, where all of them are there.
+/// `directoryHash`: hash of the directory's bytes, where all of them are there.
 Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& header,
                                std::optional<uint64_t> directoryHash) {
     CommitRecord commit;
@@ -63,7 +63,7 @@ Result<void> checkCommitRecord(const ByteReader& reader, const FileHeader& heade
     return {};
 }
 
-/// Takes over the entries of blocks that follow what is there, each checked against its hash.
+/// Appends the entries of the blocks that follow those already there, each block checked against its hash.
 Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<const std::byte> blocks) {
     for (uint64_t from = 0; from < blocks.size(); from += kBlockBytes) {
         const std::span block = blocks.subspan(from, kBlockBytes);
@@ -79,7 +79,7 @@ Result<void> appendBlocks(Dataset& dataset, const std::string& file, std::span<c
     return {};
 }
 
-/// A file that only claims to have so many pages ends at the first block that does not match its hash.
+/// A file that claims more pages than it has fails at the first block that does not match its hash.
 Result<Dataset> readWhole(const ByteReader& reader, const FileHeader& header) {
     Dataset dataset{header, {}};
     XXH3_state_t hash;

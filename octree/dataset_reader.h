@@ -26,16 +26,16 @@ struct Dataset {
     [[nodiscard]] double edgeOf(const PageEntry& page) const;
 };
 
-/// Reads and checks header, directory and commit record; no page. Takes memory for what has come, whatever the header
-/// claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
+/// Reads and checks header, directory and commit record, but no page. Its memory depends on what has come, not on what
+/// the header claims. Errors: InvalidInput, Unsupported (version, method), Io; each names the file and the byte.
 Result<Dataset> readDataset(const ByteReader& reader);
 
 inline constexpr uint64_t kLeadBytes = 64 << 10;
 
-/// The same, but of a directory of more than 4 * leadBytes only the blocks within the first leadBytes of the file, so
-/// that what it takes does not depend on the file's size. Others follow with admitBlock. `leadBytes`: a multiple of
-/// kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are no addresses for so many
-/// pages.
+/// Does the same, but reads only the blocks within the first leadBytes of the file where the directory has more than 4
+/// * leadBytes, so that the bytes read do not depend on the file's size. The other blocks follow with admitBlock.
+/// `leadBytes`: a multiple of kBlockBytes, more than kDirectoryOffset. Errors: as readDataset; Limit, where there are
+/// no addresses for so many pages.
 Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes = kLeadBytes);
 constexpr uint64_t wholeDirectoryBytes(uint64_t leadBytes) { return 4 * leadBytes; }
 

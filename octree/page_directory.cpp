@@ -11,7 +11,7 @@ namespace vcp {
 
 namespace {
 
-/// Held by one at a time; others wait.
+/// A lock that one thread holds at a time; others wait.
 class Turn {
 public:
     explicit Turn(std::atomic_flag& taken) : taken_(taken) {
@@ -36,9 +36,9 @@ struct PageDirectory::Parts {
     static constexpr uint32_t kNoPage = 0;
 
     std::atomic_flag admitting;
-    SparseArray<std::atomic<uint8_t>> known;  // by block; 1 after its entries were written
+    SparseArray<std::atomic<uint8_t>> known;  // for each block: 1 after its entries were written
     std::atomic<uint64_t> blocksKnown{0};
-    SparseArray<uint32_t> afterParents;  // 1 more than each page's parent, of which it has one, as known blocks say
+    SparseArray<uint32_t> afterParents;  // for each page 1 more than its parent; 0: not known yet
 };
 
 PageDirectory::PageDirectory() = default;
@@ -81,7 +81,7 @@ uint64_t PageDirectory::blocksKnown() const {
     return parts_ ? parts_->blocksKnown.load(std::memory_order_acquire) : blocks();
 }
 
-/// Takes one block in: its entries for themselves, then with the parents and children that are known. Each page has one
+/// Takes one block in: checks its entries by themselves, then against the known parents and children. Each page has one
 /// parent, on the level above: so what is known is a tree, whatever the rest will be.
 class BlockAdmission {
 public:

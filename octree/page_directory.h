@@ -16,10 +16,10 @@ namespace vcp {
 
 struct Dataset;
 
-/// The entries of all pages, in the file's order: a vector of them. Of a large file they come in parts: at first those
-/// of some blocks are known (readDatasetStart), of others with admitBlock(). What is known stays as it is, and any
-/// thread may read it; the entry of a page that is not known must not be read. Entries that are not known take no
-/// memory.
+/// The entries of all pages, in the file's order: a vector of them. The directory of a large file comes in parts: at
+/// first the entries of some blocks are known (readDatasetStart), the others follow with admitBlock(). What is known
+/// stays as it is, and any thread may read it; the entry of a page that is not known must not be read. Entries that are
+/// not known take no memory.
 class PageDirectory {
 public:
     PageDirectory();
@@ -36,11 +36,11 @@ public:
     [[nodiscard]] const PageEntry* begin() const { return data(); }
     [[nodiscard]] const PageEntry* end() const { return data() + size(); }
     [[nodiscard]] const PageEntry* data() const { return parts_ ? sparse_.data() : entries_.data(); }
-    /// Of a directory that is known as a whole.
+    /// Appends an entry to a directory that is known as a whole.
     void push_back(const PageEntry& entry) { entries_.push_back(entry); }
     void resize(size_t pages) { entries_.resize(pages); }
 
-    /// So many pages, none of them known. Throws std::bad_alloc where there are no addresses for them.
+    /// Makes a directory of so many pages, none known yet. Throws std::bad_alloc where there are no addresses for them.
     void expect(size_t pages);
     [[nodiscard]] bool knows(uint64_t page) const { return !parts_ || knowsBlock(page / kEntriesPerBlock); }
     [[nodiscard]] bool knowsBlock(uint64_t block) const;
@@ -50,14 +50,14 @@ public:
 private:
     friend class BlockAdmission;
     struct Parts;
-    std::vector<PageEntry> entries_;         // where all is known
-    mutable SparseArray<PageEntry> sparse_;  // where it comes in parts
-    std::unique_ptr<Parts> parts_;           // nothing: all is known
+    std::vector<PageEntry> entries_;         // all entries, where the directory is known as a whole
+    mutable SparseArray<PageEntry> sparse_;  // entries where it comes in parts
+    std::unique_ptr<Parts> parts_;           // null: all is known
 };
 
 /// Checks a block of the directory, by its hash and against the blocks that are known, and makes its entries known;
-/// nothing where they are. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`. Any thread. Errors:
-/// InvalidInput.
+/// does nothing where they are known already. `bytes`: the kBlockBytes at blockOffset(block) of the file named `file`.
+/// Any thread. Errors: InvalidInput.
 Result<void> admitBlock(const Dataset& dataset, const std::string& file, uint64_t block,
                         std::span<const std::byte> bytes);
 

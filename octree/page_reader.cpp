@@ -14,7 +14,7 @@ namespace vcp {
 
 namespace {
 
-/// The stored bytes of a page, checked against their hash.
+/// Reads the stored bytes of a page and checks them against their hash.
 Result<std::vector<std::byte>> readStored(const ByteReader& reader, const std::string& element, uint64_t offset,
                                           uint32_t stored, uint64_t hash) {
     std::vector<std::byte> packed;
@@ -43,7 +43,7 @@ Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset,
     if (leaves != e.leaves || page.hardLeaves != e.hardLeaves)
         return fail(fmt::format("has {} leaves, {} of them hard; its directory entry says {} and {}", leaves,
                                 page.hardLeaves, e.leaves, e.hardLeaves));
-    // Both were rounded up to single precision, one in cells and one in world units.
+    // Both errors were rounded up to single precision, one in cells and one in world units.
     const double error = page.certifiedError * dataset.cellOf(e.level),
                  slack = 1e-6 * error + 4 * double(std::numeric_limits<float>::denorm_min());
     if (std::abs(error - e.certifiedError) > slack)

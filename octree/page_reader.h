@@ -23,8 +23,8 @@ struct PageBytes {
 };
 
 /// Reads, verifies (hash), decodes (page_codec.h) and checks (parsePage, parsePaperPage, against its entry) one page.
-/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded. The
-/// page's entry is known. Any thread.
+/// Safe on hostile bytes: allocates at most a few times the entry's pageBytes, which readDataset has bounded.
+/// Precondition: the page's entry is known. Any thread.
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t page, bool withColour);
 
 }  // namespace vcp

@@ -39,7 +39,7 @@ constexpr uint64_t blockOffset(uint64_t block) { return kDirectoryOffset + block
 /// How many blocks hold the entries of so many pages.
 constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock - 1) / kEntriesPerBlock; }
 
-/// What pages hold.
+/// What the pages hold.
 enum class Method : uint32_t {
     Certified,  ///< octree/page.h
     Paper,      ///< octree/paper_page.h: one level, one page, no certificate and no colour

@@ -26,14 +26,14 @@ enum class ShadingMode {
     Error,    ///< certified error of the page that was hit, 0 to 1 pixel
 };
 
-/// Cuts away what lies on the plane's far side: kept is where dot(normal, x) >= offset, world units.
+/// Cuts away what lies on the plane's far side: what has dot(normal, x) >= offset (world units) is kept.
 struct SectionPlane {
-    glm::dvec3 normal{1, 0, 0};  ///< of any length but 0
+    glm::dvec3 normal{1, 0, 0};  ///< any length but 0
     double offset = 0;
 
     bool operator==(const SectionPlane&) const = default;
 };
-/// At most so many planes at once (kMaxSections in frame_layout.h).
+/// A request has at most so many planes (kMaxSections in frame_layout.h).
 constexpr size_t kMostSections = 6;
 
 struct Shading {
@@ -42,7 +42,7 @@ struct Shading {
     glm::vec3 lightDirection{-0.35f, 0.55f, 0.75f};  ///< towards the light: in camera axes (right, up, back)
                                                      ///< where it follows the camera, else in world axes
     glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
-    glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; of cut solids
+    glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; colour of cut solids
     bool shadows = false;                            ///< hard shadows: a further ray a pixel
     uint32_t occlusionRays = 0;  ///< ambient occlusion: so many further rays a pixel, at most 64; 0: off
     double occlusionRadius = 0;  ///< how far they look, world units; 0: a tenth of the box's diagonal
@@ -62,19 +62,19 @@ struct PictureTile {
 };
 
 /// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/paper_page.h) are drawn by
-/// their own march, from their one page; they have no beam pass, no shadows, no ambient occlusion and no caps: what a
-/// request asks of these is left out.
+/// their own march, from their one page. They have no beam pass, no shadows, no ambient occlusion and no caps: where a
+/// request asks for these, they are left out.
 struct FrameRequest {
-    Camera camera;                        ///< of the whole, where the picture is a tile
+    Camera camera;                        ///< camera of the whole picture, where this one is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
     std::optional<PictureTile> tile;      ///< absent: the picture is the whole
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
     bool sectionCaps = false;            ///< fills what the planes cut open; right for closed surfaces
-    bool beam = true;                    ///< beam pass; the picture is the same without it, only later
+    bool beam = true;                    ///< beam pass; the picture is the same without it, only slower
     bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
-    PaperMarch march;                    ///< of datasets of the method `paper`
+    PaperMarch march;                    ///< march through datasets of the method `paper`
 
     bool operator==(const FrameRequest&) const = default;
 };

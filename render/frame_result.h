@@ -19,54 +19,54 @@ struct UpdateResult {
     double errorPixels = 0;      ///< largest projected certified error in the cut (inf without a page or certificate)
     uint64_t residentBytes = 0;  ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;      ///< decompressed page bytes the loader has delivered since open()
-    bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels says what it has
+    bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels is what it reaches
     uint64_t heldBytesMax =
         0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
     uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
     uint64_t reloads = 0;               ///< pages loaded twice in one still view: always 0
-    uint32_t deviceLosses = 0;          ///< since create(): each time all was made anew and pages are read again
+    uint32_t deviceLosses = 0;          ///< losses since create(): all was made anew and pages are read again
     uint64_t failures = 0;              ///< reads that failed and were, or will be, tried again
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
-    uint32_t pagesMissing = 0;                    ///< wanted, not resident
-    uint32_t pagesPending = 0;                    ///< wished for, being read, or waiting for an update
-    uint32_t coarsestLevel = 0, finestLevel = 0;  ///< of the pages in the cut
+    uint32_t pagesMissing = 0;                    ///< pages wanted, but not resident
+    uint32_t pagesPending = 0;                    ///< pages wished for, being read, or waiting for an update
+    uint32_t coarsestLevel = 0, finestLevel = 0;  ///< levels of the pages in the cut
     std::vector<Error> problems;                  ///< pages that cannot be read; each is reported once
 };
 
 struct FrameStats {
     uint64_t rays = 0;        ///< pixels
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
-    uint64_t hitPixels = 0;   ///< that any dataset or surface is hit in
+    uint64_t hitPixels = 0;   ///< pixels where any dataset or surface is hit
     double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0,
            msFeedback = 0;            ///< GPU timestamps; 0 where the device has none
     double msFrame = 0;               ///< from submission to completion, wall clock
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
-    uint64_t poolBytes = 0;           ///< allocated for the pool
-    uint64_t colourBytes = 0;         ///< of colour, in the pool
+    uint64_t poolBytes = 0;           ///< bytes allocated for the pool
+    uint64_t colourBytes = 0;         ///< bytes of colour in the pool
     uint32_t pagesInCut = 0;
-    uint32_t pipelines = 0;  ///< made since create()
-    double msSurfaces = 0;   ///< of surfaces with mesostructure; GPU timestamps
+    uint32_t pipelines = 0;  ///< pipelines made since create()
+    double msSurfaces = 0;   ///< GPU time of surfaces with mesostructure
     uint64_t unresolvedRays =
         0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
-    uint64_t farHits = 0;       ///< of pixels and surfaces, shown by what they are from far and not marched
-    uint64_t surfaceBytes = 0;  ///< of mesostructure on the device, beside the pool: assets and shells
-    uint64_t submissions = 0, hostWaits = 0;  ///< to the device by this frame, and how often the CPU waited for one
+    uint64_t farHits = 0;       ///< hits of pixels in surfaces, shown as seen from far and not marched
+    uint64_t surfaceBytes = 0;  ///< bytes of mesostructure on the device, beside the pool: assets and shells
+    uint64_t submissions = 0, hostWaits = 0;  ///< this frame's submissions, and how often the CPU waited for one
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 
 /// A page in the pool, for a picture of what is there.
 struct PageBox {
-    glm::dvec3 corner;                ///< world
-    std::array<glm::dvec3, 3> edges;  ///< from the corner, world
+    glm::dvec3 corner;                ///< world position
+    std::array<glm::dvec3, 3> edges;  ///< world vectors from the corner
     uint32_t level = 0;               ///< 0: the coarsest
-    bool isDrawn = false;             ///< in the cut of this view
+    bool isDrawn = false;             ///< the page is in the cut of this view
 };
 
 /// What the rays of the last frame that missed pages met, 24 x 16 over the picture, row by row from the upper left.
 struct FeedbackPicture {
     static constexpr uint32_t kWidth = 24, kHeight = 16;
-    /// Of the page that was hit, its certified error in pixels there, of several datasets' the largest; below 0:
-    /// nothing was hit. Above the request's errorPixels the ray asked for finer pages.
+    /// The certified error, in pixels at the hit, of the page that was hit; with several datasets, the largest. Below
+    /// 0: nothing was hit. Where it is above the request's errorPixels, the ray asked for finer pages.
     std::array<float, size_t{kWidth} * kHeight> errorPixels;
 };
 
@@ -76,8 +76,8 @@ struct PixelHit {
     glm::dvec3 position;     ///< world space
     glm::vec3 normal;        ///< unit, towards the viewer
     size_t dataset = 0;      ///< number of the dataset, in the order of open()
-    bool onCap = false;      ///< on what a section plane cut open
-    bool onSurface = false;  ///< on mesostructure; then `dataset` means nothing
+    bool onCap = false;      ///< the hit is on what a section plane cut open
+    bool onSurface = false;  ///< the hit is on mesostructure; then `dataset` means nothing
 };
 
 }  // namespace vcp

@@ -95,7 +95,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
                      .file = source_->name()};
     options_.budgetBytes = budgetBytes;
     options_.loader.heldBytes = ramBytes;
-    startLoader();  // what the old one held is gone
+    startLoader();  // what the old loader held is gone
     for (const Request request : std::exchange(tooLarge_, {})) policy_->restore(request);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
     auto carried = pool_ ? carryOut() : std::vector<CarriedPage>();
@@ -201,7 +201,7 @@ Result<void> Residency::place(uint64_t page, const PageBytes& bytes) {
     if (!*slot) return {};
     const std::span geometry = bytes.geometryBytes();
     PageHeader& header = headers_[page];
-    // Pages of the other method say all in a header of their own, which the shader reads.
+    // Pages of the other method have all they need in a header of their own, which the shader reads.
     if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
     VCP_TRY(pool_->write(**slot, 0, geometry));
     if (!bytes.colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), bytes.colourBytes()));

@@ -8,7 +8,7 @@
 
 namespace vcp {
 
-/// What draws over the picture in the window (a user interface) needs to make its pipelines.
+/// What a user interface needs to make pipelines that draw over the picture in the window.
 struct WindowDrawing {
     VkInstance instance;
     VkPhysicalDevice physical;
@@ -20,7 +20,7 @@ struct WindowDrawing {
 /// Records draws of an image of the window, inside of WindowDrawing::renderPass.
 using DrawOver = std::function<void(VkCommandBuffer commands, VkExtent2D size)>;
 
-/// An image of the host's on the renderer's device: colour, not multisampled, a format of the kind UNORM, usage
+/// An image of the host's on the renderer's device: a colour image, not multisampled, of a UNORM format, with usage
 /// TRANSFER_DST.
 struct ImageTarget {
     VkImage image = VK_NULL_HANDLE;

@@ -27,8 +27,8 @@ public:
 
     /// Memory that reading a page takes: its stored bytes, twice, and what it returns. Of a block: its bytes.
     [[nodiscard]] virtual uint64_t bytesToRead(Request request, bool withColour) const = 0;
-    /// What pages take as they are stored may be kept in memory to be read again: at most `bytes` from now on, whatever
-    /// is being read. Returns how many are kept. For one PageLoader, which has the memory.
+    /// Allows the source to keep stored pages in memory, to be read again: from now on at most `bytes`, whatever is
+    /// being read. Returns how many bytes are kept. Only the PageLoader that owns the memory calls it.
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}

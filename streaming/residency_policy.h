@@ -82,9 +82,9 @@ struct PolicyCounts {
 };
 
 struct PolicyOutcome {
-    DrawableCut drawable;      ///< of one view
+    DrawableCut drawable;      ///< what this view draws
     std::vector<Wish> wishes;  ///< of all views
-    uint64_t missing = 0;      ///< pages that any view wants
+    uint64_t missing = 0;      ///< pages that some view wants and that are not resident
 };
 
 class ResidencyPolicy {
@@ -114,7 +114,7 @@ public:
     bool giveUp(Request request);
     /// It can be read after all.
     void restore(Request request);
-    /// Forgets all pages: the pool's content was lost.
+    /// Forgets all pages, because the pool's content was lost.
     void clear();
     /// Sets another pool, which is empty; from the next look() on, views want what fits into it. Forgets all pages, but
     /// not which of them cannot be read.

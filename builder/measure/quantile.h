@@ -13,7 +13,7 @@ double quantile(std::vector<double> values, double part);
 /// there are none.
 double upperQuantile(std::vector<double> values, double part);
 
-/// p50, p95, p99 and max of a set of numbers; zeros of an empty one.
+/// p50, p95, p99 and max of a set of numbers; zeros for an empty set.
 struct Quantiles {
     double p50 = 0, p95 = 0, p99 = 0, max = 0;
 };

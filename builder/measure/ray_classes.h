@@ -87,7 +87,7 @@ private:
     double radius_;  ///< e, world units
 };
 
-/// Sums of judgements. Add from one thread, or one table a thread and merge.
+/// Sums judgements. Add from one thread, or use one table a thread and merge.
 class RayClassTable {
 public:
     void add(const RayJudgement& judgement);

@@ -20,10 +20,10 @@ struct DeviceInfo {
     std::string driver;  ///< name and version
     bool software = false;
     bool usable = false;  ///< Vulkan 1.2 with a compute queue
-    bool chosen = false;  ///< what an empty or the given choice selects
+    bool chosen = false;  ///< the device that the given choice, or an empty one, selects
 };
 
-/// Devices of this machine; `choice` as in RendererOptions::device marks the chosen one.
+/// Lists the devices of this machine; `choice`, as in RendererOptions::device, marks the chosen one.
 /// Errors: Device, where Vulkan cannot be loaded or there is no device, or where `choice` names none.
 Result<std::vector<DeviceInfo>> listDevices(const std::string& choice = {});
 
@@ -34,21 +34,21 @@ struct SurfaceSource {
     std::function<VkResult(VkInstance, VkSurfaceKHR*)> createSurface;
 };
 
-/// A device that the host made and keeps. Vulkan 1.2; no feature is needed. Where views have windows: the extension
-/// VK_KHR_swapchain, and a queue with graphics that can show pictures in them.
+/// A device that the host made and keeps. It needs Vulkan 1.2 and no feature. Where views have windows, it also needs
+/// the extension VK_KHR_swapchain, and a queue with graphics that can show pictures in them.
 struct HostDevice {
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkDevice device = VK_NULL_HANDLE;
-    VkQueue queue = VK_NULL_HANDLE;  ///< used by calls of the renderer, in the thread that calls, and at no other time
-    uint32_t queueFamily = 0;        ///< computes
+    VkQueue queue = VK_NULL_HANDLE;  ///< calls of the renderer use it, in the calling thread, and at no other time
+    uint32_t queueFamily = 0;        ///< the queue's family, which can compute
 };
 
 /// What goes wrong, or is lacking, on purpose: for tests.
 struct DeviceFaults {
     bool separateMemory = false;        ///< the CPU does not see the device's memory, as on a discrete GPU
     bool separateCopies = false;        ///< copies are submitted beside other work, as to a queue of their own
-    uint64_t memoryBytes = UINT64_MAX;  ///< more the device has not
+    uint64_t memoryBytes = UINT64_MAX;  ///< the device has no more memory than this
     uint64_t lostAtSubmission = 0;      ///< the device is lost at this submission of work, once; 0: never
 };
 
