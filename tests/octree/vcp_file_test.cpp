@@ -696,7 +696,9 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
     sweep(header, 0);
     for (const uint64_t page : {0, 1, 8}) sweep(entry, kDirectoryOffset + page * sizeof(PageEntry));
     EXPECT_GT(tried, 1000u);
-    if (test::kMemoryIsMeasured) EXPECT_LT(peakBytes() - before, 64u << 20);
+    if (test::kMemoryIsMeasured) {
+        EXPECT_LT(peakBytes() - before, 64u << 20);
+    }
 }
 
 TEST_F(VcpFile, VerifyReportsAndStops) {

@@ -139,7 +139,9 @@ TEST(Image, TextOfAPngIsNotInflated) {
     const long before = test::peakMiB();
     const auto read = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + profile));
     ASSERT_TRUE(read.ok()) << read.error().line();
-    if (test::kMemoryIsMeasured) EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
+    if (test::kMemoryIsMeasured) {
+        EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
+    }
     EXPECT_EQ(read->texels, decodeImage(plain)->texels);
     // Its gamma still counts: 0x40 as light is 0x89 as a colour.
     const auto linear = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + gamma));
