@@ -36,7 +36,7 @@ starts() {
     window=
     for _ in $(seq 200); do
         window=$(xdotool search --name "$name" 2>/dev/null | head -1) && [ -n "$window" ] && break
-        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself"
+        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself: $(tail -n 3 log)"
         sleep 0.1
     done
     [ -n "$window" ] || fail "no window"
@@ -61,7 +61,7 @@ colours() { convert "$1.png" -unique-colors -format %w info:; }
 waits_for() {
     local what=$1; shift
     for _ in $(seq 120); do
-        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself"
+        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself: $(tail -n 3 log)"
         "$@" && return
         sleep 0.5
     done
