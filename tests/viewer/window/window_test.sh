@@ -28,6 +28,13 @@ for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
 [ -s display ] || fail "Xvfb does not start"
 export DISPLAY=:$(cat display)
 
+# ended: says how vcp view ended when nobody ended it.
+ended() {
+    local status=0
+    wait $viewer || status=$?
+    fail "vcp view ended by itself with $status"
+}
+
 # starts NAME ARGUMENT...: opens a window whose title has NAME; sets viewer and window.
 starts() {
     local name=$1; shift
@@ -36,7 +43,7 @@ starts() {
     window=
     for _ in $(seq 200); do
         window=$(xdotool search --name "$name" 2>/dev/null | head -1) && [ -n "$window" ] && break
-        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself: $(tail -n 3 log)"
+        kill -0 $viewer 2>/dev/null || ended
         sleep 0.1
     done
     [ -n "$window" ] || fail "no window"
@@ -61,7 +68,7 @@ colours() { convert "$1.png" -unique-colors -format %w info:; }
 waits_for() {
     local what=$1; shift
     for _ in $(seq 120); do
-        kill -0 $viewer 2>/dev/null || fail "vcp view ended by itself: $(tail -n 3 log)"
+        kill -0 $viewer 2>/dev/null || ended
         "$@" && return
         sleep 0.5
     done
