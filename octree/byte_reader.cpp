@@ -43,14 +43,13 @@ private:
 }  // namespace
 
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) {
-    const auto opened = openRegular(path);
-    if (!opened) return opened.error();
-    FileDescriptor file(*opened);
+    auto file = openRegular(path);
+    if (!file) return file.error();
     struct stat info {};
-    if (::fstat(file.number(), &info) != 0)
+    if (::fstat(file->number(), &info) != 0)
         return Error{.code = ErrorCode::Io, .message = "its size cannot be asked", .file = path.string()};
     return std::shared_ptr<ByteReader>(
-        std::make_shared<LocalFile>(std::move(file), static_cast<uint64_t>(info.st_size), path.string()));
+        std::make_shared<LocalFile>(*std::move(file), static_cast<uint64_t>(info.st_size), path.string()));
 }
 
 Error brokenBytes(const std::string& file, std::string element, uint64_t byte, std::string message) {

@@ -22,6 +22,9 @@ public:
     [[nodiscard]] bool isOpen() const { return number_ >= 0; }
     [[nodiscard]] int number() const { return number_; }
 
+    /// Gives it away.
+    [[nodiscard]] int release() { return std::exchange(number_, -1); }
+
 private:
     int number_;
 };

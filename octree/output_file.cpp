@@ -62,19 +62,6 @@ std::vector<std::byte> startOf(int descriptor) {
     return start;
 }
 
-/// Follows a chain of links to its end, whether a file is there or not. Errors: Io (a circle).
-Result<fs::path> followed(const fs::path& path) {
-    fs::path at = path;
-    for (int links = 0; links < kMostLinks; ++links) {
-        std::error_code failed;
-        if (!fs::is_symlink(fs::symlink_status(at, failed))) return at;
-        const fs::path next = fs::read_symlink(at, failed);
-        if (failed) return ioError(path, "cannot follow the link: " + failed.message());
-        at = next.is_absolute() ? next : at.parent_path() / next;
-    }
-    return ioError(path, "is a link that leads nowhere");
-}
-
 const char* wordsFor(mode_t mode) {
     return S_ISDIR(mode)                    ? "a folder"
            : S_ISCHR(mode) || S_ISBLK(mode) ? "a device"
@@ -92,45 +79,40 @@ Result<void> checkReplaced(const fs::path& output, const fs::path& target, Outpu
     if (!S_ISREG(there.st_mode))
         return ioError(output, fmt::format("is {}, which is not replaced; give a file name{}", wordsFor(there.st_mode),
                                            isMarked(kind) ? "" : ", or - for standard output"));
-    for (const fs::path& input : rules.inputs) {
-        struct stat read {};
-        if (::stat(input.c_str(), &read) == 0 && read.st_dev == there.st_dev && read.st_ino == there.st_ino)
+    for (const fs::path& input : rules.inputs)
+        if (isSameFile(target, input))
             return ioError(output,
                            input == output
                                ? std::string("is an input, which is never written over; give another name")
                                : fmt::format("is the file {}, which is read; give another name", input.string()));
-    }
     if (rules.overwrite || there.st_size == 0) return {};
     if ((there.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0)
         return ioError(output, "is write-protected; give another name, or ask for overwriting");
-    const int file = ::open(target.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0) return systemError(output, "is there, and cannot be looked into", errno);
-    const std::vector<std::byte> start = startOf(file);
-    ::close(file);
-    if (beginsLike(kind, start)) return {};
+    const FileDescriptor file(::open(target.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    if (!file.isOpen()) return systemError(output, "is there, and cannot be looked into", errno);
+    if (beginsLike(kind, startOf(file.number()))) return {};
     return ioError(output,
                    fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
 }
 
 /// Removes what an interrupted writer left under that name. Errors: Io (another writer holds it).
 Result<bool> removeLeftover(const fs::path& output, const fs::path& partial) {
-    const int file = ::open(partial.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0) return false;
+    const FileDescriptor file(::open(partial.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    if (!file.isOpen()) return false;
     struct stat there {};
-    const bool isOurs = ::fstat(file, &there) == 0 && S_ISREG(there.st_mode) && there.st_nlink == 1;
-    const std::vector<std::byte> start = isOurs ? startOf(file) : std::vector<std::byte>();
+    const bool isOurs = ::fstat(file.number(), &there) == 0 && S_ISREG(there.st_mode) && there.st_nlink == 1;
+    const std::vector<std::byte> start = isOurs ? startOf(file.number()) : std::vector<std::byte>();
     const bool isLeft =
         start.size() >= kPartialMark.size() && std::memcmp(start.data(), kPartialMark.data(), kPartialMark.size()) == 0;
-    const NameLock lock = isLeft ? lockName(file, partial) : NameLock::Gone;
+    const NameLock lock = isLeft ? lockName(file.number(), partial) : NameLock::Gone;
     if (lock == NameLock::Taken) ::unlink(partial.c_str());
-    ::close(file);
     if (lock == NameLock::Held) return ioError(output, "another build is writing this file");
     return lock == NameLock::Taken;
 }
 
 struct Partial {
     fs::path name;
-    int file;
+    FileDescriptor file;
 };
 
 /// Creates a new file beside `target`, held by this process.
@@ -142,11 +124,10 @@ Result<Partial> createPartial(const fs::path& output, const fs::path& target, bo
             const auto removed = removeLeftover(output, name);
             if (!removed) return removed.error();
         }
-        const int file = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-        if (file < 0 && errno == EEXIST) continue;
-        if (file < 0) return systemError(output, "cannot write here", errno);
-        if (lockName(file, name) == NameLock::Taken) return Partial{std::move(name), file};
-        ::close(file);
+        FileDescriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+        if (!file.isOpen() && errno == EEXIST) continue;
+        if (!file.isOpen()) return systemError(output, "cannot write here", errno);
+        if (lockName(file.number(), name) == NameLock::Taken) return Partial{std::move(name), std::move(file)};
         return ioError(output, "another build is writing this file");
     }
     fs::path first = target;
@@ -202,6 +183,18 @@ bool isSameFile(const fs::path& a, const fs::path& b) {
            first.st_ino == second.st_ino;
 }
 
+Result<fs::path> linkTarget(const fs::path& path) {
+    fs::path at = path;
+    for (int links = 0; links < kMostLinks; ++links) {
+        std::error_code failed;
+        if (!fs::is_symlink(fs::symlink_status(at, failed))) return at;
+        const fs::path next = fs::read_symlink(at, failed);
+        if (failed) return ioError(path, "cannot follow the link: " + failed.message());
+        at = next.is_absolute() ? next : at.parent_path() / next;
+    }
+    return ioError(path, "is a link that leads nowhere");
+}
+
 Result<void> checkOutput(const fs::path& output, OutputKind kind, const OutputRules& rules) {
     if (output == "-" && !isMarked(kind)) return {};
     const auto file = OutputFile::create(output, kind, rules);
@@ -215,18 +208,18 @@ Result<OutputFile> OutputFile::create(const fs::path& output, OutputKind kind, c
             return ioError(
                 "standard output",
                 fmt::format("cannot take {}, which is not written front to back; give a file name", wordsFor(kind)));
-        made.file_ = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
-        if (made.file_ < 0) return systemError("standard output", "cannot be written", errno);
+        made.file_ = FileDescriptor(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3));
+        if (!made.file_.isOpen()) return systemError("standard output", "cannot be written", errno);
         return made;
     }
-    auto target = followed(output);
+    auto target = linkTarget(output);
     if (!target) return target.error();
     made.target_ = *std::move(target);
     VCP_TRY(checkReplaced(output, made.target_, kind, rules));
     auto partial = createPartial(output, made.target_, isMarked(kind));
     if (!partial) return partial.error();
     made.partial_ = std::move(partial->name);
-    made.file_ = partial->file;
+    made.file_ = std::move(partial->file);
     if (isMarked(kind)) VCP_TRY(made.write(0, std::as_bytes(std::span(kPartialMark))));
     return made;
 }
@@ -237,25 +230,25 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
       partial_(std::exchange(other.partial_, {})),
       kind_(other.kind_),
       rules_(std::move(other.rules_)),
-      file_(std::exchange(other.file_, -1)) {}
+      file_(std::move(other.file_)) {}
 
 OutputFile::~OutputFile() { close(); }
 
 void OutputFile::close() {
-    if (file_ >= 0) ::close(file_);
-    file_ = -1;
+    file_ = FileDescriptor();
     if (!partial_.empty()) ::unlink(partial_.c_str());
     partial_.clear();
 }
 
 Result<void> OutputFile::write(uint64_t offset, std::span<const std::byte> bytes) {
-    return writeAll(file_, offset, bytes, output_);
+    return writeAll(file_.number(), offset, bytes, output_);
 }
 
-Result<void> OutputFile::append(std::span<const std::byte> bytes) { return appendAll(file_, bytes, output_); }
+Result<void> OutputFile::append(std::span<const std::byte> bytes) { return appendAll(file_.number(), bytes, output_); }
 
 Result<void> OutputFile::sync() {
-    if (!partial_.empty() && ::fsync(file_) != 0) return systemError(output_, "cannot make the file durable", errno);
+    if (!partial_.empty() && ::fsync(file_.number()) != 0)
+        return systemError(output_, "cannot make the file durable", errno);
     return {};
 }
 
@@ -268,7 +261,7 @@ Result<void> OutputFile::commit() {
     VCP_TRY(checkReplaced(output_, target_, kind_, rules_));
     // The new file takes over the permissions of the file that it replaces.
     struct stat there {};
-    if (::stat(target_.c_str(), &there) == 0) (void)::fchmod(file_, there.st_mode & 0777);
+    if (::stat(target_.c_str(), &there) == 0) (void)::fchmod(file_.number(), there.st_mode & 0777);
     if (::rename(partial_.c_str(), target_.c_str()) != 0)
         return systemError(output_, "cannot rename the finished file", errno);
     partial_.clear();

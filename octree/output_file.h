@@ -21,6 +21,7 @@
 #include <string_view>
 #include <vector>
 
+#include "octree/file_descriptor.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -40,6 +41,10 @@ std::optional<OutputKind> outputKindOf(const std::filesystem::path& path);
 /// Whether a file that begins with `start` (its first 512 bytes, or all of it) may be of that kind.
 bool beginsLike(OutputKind kind, std::span<const std::byte> start);
 
+/// What a chain of links ends at, whether that is there or not; the path itself where it is no link. Errors: Io (a link
+/// that cannot be followed, a circle).
+Result<std::filesystem::path> linkTarget(const std::filesystem::path& path);
+
 /// Whether two names stand for one file: through links, hard links and any spelling. False where one is missing.
 bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
@@ -57,7 +62,7 @@ public:
     OutputFile& operator=(OutputFile&&) = delete;
 
     /// The descriptor is open for reading and writing (standard output for writing only), and owned by this object.
-    [[nodiscard]] int descriptor() const { return file_; }
+    [[nodiscard]] int descriptor() const { return file_.number(); }
     /// The output's name as it was given.
     [[nodiscard]] const std::filesystem::path& path() const { return output_; }
 
@@ -78,7 +83,7 @@ private:
     std::filesystem::path output_, target_, partial_;  ///< target_: output_ with links followed
     OutputKind kind_;
     OutputRules rules_;
-    int file_ = -1;
+    FileDescriptor file_;
 };
 
 /// Writes all of `bytes` as a file. Errors: those of OutputFile.

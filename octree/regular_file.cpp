@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <cerrno>
 
 #include "octree/durable_file.h"
@@ -22,7 +21,7 @@ const char* otherThanFile(mode_t mode) {
 
 }  // namespace
 
-Result<int> openRegular(const std::filesystem::path& path) {
+Result<FileDescriptor> openRegular(const std::filesystem::path& path) {
     const auto refuse = [&](const char* what) {
         return Error{.code = ErrorCode::Io, .message = what, .file = path.string()};
     };
@@ -31,22 +30,21 @@ Result<int> openRegular(const std::filesystem::path& path) {
     if (::stat(path.c_str(), &status) != 0) return systemError(path, "cannot open", errno);
     if (const char* other = otherThanFile(status.st_mode)) return refuse(other);
     // O_NONBLOCK: should it have become a pipe since, open() must not wait; it changes nothing for files.
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (file < 0) return systemError(path, "cannot open", errno);
-    const char* other = ::fstat(file, &status) != 0 ? "cannot be asked what it is" : otherThanFile(status.st_mode);
-    if (!other) return file;
-    ::close(file);
-    return refuse(other);
+    FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    if (!file.isOpen()) return systemError(path, "cannot open", errno);
+    const char* other =
+        ::fstat(file.number(), &status) != 0 ? "cannot be asked what it is" : otherThanFile(status.st_mode);
+    if (other) return refuse(other);
+    return file;
 }
 
 Result<std::unique_ptr<std::FILE, FileCloser>> openRegularStream(const std::filesystem::path& path) {
-    const auto file = openRegular(path);
+    auto file = openRegular(path);
     if (!file) return file.error();
-    std::unique_ptr<std::FILE, FileCloser> stream(::fdopen(*file, "rb"));
-    if (stream) return stream;
-    const int problem = errno;
-    ::close(*file);
-    return systemError(path, "cannot open", problem);
+    std::unique_ptr<std::FILE, FileCloser> stream(::fdopen(file->number(), "rb"));
+    if (!stream) return systemError(path, "cannot open", errno);
+    static_cast<void>(file->release());
+    return stream;
 }
 
 }  // namespace vcp

@@ -5,13 +5,14 @@
 #include <filesystem>
 #include <memory>
 
+#include "octree/file_descriptor.h"
 #include "octree/result.h"
 
 namespace vcp {
 
-/// Opens a regular file for reading without waiting; returns its descriptor, which the caller closes. Errors: Io, also
+/// Opens a regular file for reading without waiting; returns its descriptor. Errors: Io, also
 /// where it is a folder, a pipe, a socket or a device.
-Result<int> openRegular(const std::filesystem::path& path);
+Result<FileDescriptor> openRegular(const std::filesystem::path& path);
 
 struct FileCloser {
     void operator()(std::FILE* file) const { std::fclose(file); }

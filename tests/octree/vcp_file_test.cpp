@@ -10,7 +10,6 @@
 #include <thread>
 
 #include <sys/mount.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -143,13 +142,6 @@ protected:
     TestFolder folder_{"vcp_file_test"};
     Bytes bytes_;
 };
-
-/// Peak resident bytes since the process began.
-uint64_t peakBytes() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 TEST_F(VcpFile, IsReadBack) {
     auto file = openFile(path());
@@ -417,7 +409,7 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
 }
 
 TEST_F(VcpFile, HugeCountsAllocateNothing) {
-    const uint64_t before = peakBytes();
+    const uint64_t before = test::peakBytes();
     for (const uint64_t pages : {uint64_t{1} << 20, uint64_t{1} << 31, uint64_t{1} << 40, ~uint64_t{0}})
         expectRefused("page count", [&](Forgery& f) { f.header().pages = f.header().level[1].pages = pages; });
     // The largest count that the file's size allows: the directory does not fit.
@@ -429,7 +421,7 @@ TEST_F(VcpFile, HugeCountsAllocateNothing) {
         h.level[2] = {9, 64, 0};
         h.level[3] = {73, h.pages - 73, h.certifiedErrorMax};
     });
-    EXPECT_LT(peakBytes() - before, 16u << 20);
+    EXPECT_LT(test::peakBytes() - before, 16u << 20);
 }
 
 TEST_F(VcpFile, DirectoryLiesAreFound) {
@@ -491,7 +483,7 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
 }
 
 TEST_F(VcpFile, LyingPageSizesAllocateNothing) {
-    const uint64_t before = peakBytes();
+    const uint64_t before = test::peakBytes();
     Forgery forgery{bytes_};
     forgery.entry(1).pageBytes = 1u << 28;
     forgery.entry(2).colourBytes = 1u << 28;
@@ -504,7 +496,7 @@ TEST_F(VcpFile, LyingPageSizesAllocateNothing) {
         ASSERT_FALSE(read.ok());
         EXPECT_NE(read.error().line().find("does not decode"), std::string::npos) << read.error().line();
     }
-    EXPECT_LT(peakBytes() - before, 64u << 20);
+    EXPECT_LT(test::peakBytes() - before, 64u << 20);
 }
 
 /// Puts other content, rightly hashed, where a page was.
@@ -670,7 +662,7 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
         {"colourBytes", 52, '4'},    {"firstChild", 56, '4'},  {"leaves", 60, '4'},    {"hardLeaves", 64, '4'},
         {"certifiedError", 68, 'f'}, {"childMask", 72, '1'},   {"level", 73, '1'},     {"reserved", 74, '1'},
         {"reserved", 79, '1'}};
-    const uint64_t before = peakBytes();
+    const uint64_t before = test::peakBytes();
     uint64_t tried = 0;
     const auto sweep = [&](const std::vector<Field>& fields, uint64_t base) {
         for (const Field& field : fields)
@@ -697,7 +689,7 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
     for (const uint64_t page : {0, 1, 8}) sweep(entry, kDirectoryOffset + page * sizeof(PageEntry));
     EXPECT_GT(tried, 1000u);
     if (test::kMemoryIsMeasured) {
-        EXPECT_LT(peakBytes() - before, 64u << 20);
+        EXPECT_LT(test::peakBytes() - before, 64u << 20);
     }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <sys/resource.h>
+#include <cstdint>
 
 namespace vcp::test {
 
@@ -12,10 +13,10 @@ inline constexpr bool kMemoryIsMeasured = false;
 inline constexpr bool kMemoryIsMeasured = true;
 #endif
 
-inline long peakMiB() {
+inline uint64_t peakBytes() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss >> 10;
+    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace vcp::test

@@ -30,7 +30,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr size_t kLargestFile = 1 << 20;
-constexpr int kMostLinks = 40;
 constexpr int kMostDamaged = 100;
 // The tries take half a minute.
 constexpr int kLockTries = 3000;
@@ -187,18 +186,6 @@ Result<FileText> readText(const fs::path& path) {
     }
 }
 
-/// Returns the file at the end of the links, whether it exists or not.
-Result<fs::path> linkTarget(fs::path path) {
-    std::error_code failed;
-    for (int links = 0; fs::is_symlink(path, failed); ++links) {
-        if (links == kMostLinks) return notSaved(path, "too many links");
-        const fs::path to = fs::read_symlink(path, failed);
-        if (failed) return notSaved(path, "the link cannot be read");
-        path = to.is_absolute() ? to : path.parent_path() / to;
-    }
-    return path;
-}
-
 /// Locks the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
 /// only files that are open for writing: there a file of our own beside them is locked.
 class FolderLock {
@@ -304,7 +291,7 @@ Result<std::string> saveChanges(const SettingsChanges& changes, const fs::path& 
     fs::create_directories(path.parent_path(), failed);
     if (failed) return notSaved(path, failed.message());
     const auto target = linkTarget(path);
-    if (!target) return target.error();
+    if (!target) return notSaved(path, target.error().message);
     const auto lock = FolderLock::of(*target);
     if (!lock) return lock.error();
     const auto before = readText(*target);

@@ -136,11 +136,11 @@ TEST(Image, TextOfAPngIsNotInflated) {
     for (size_t kept = 0; kept < plain.size(); ++kept)
         EXPECT_EQ(withoutText(plain.substr(0, kept)), plain.substr(0, kept)) << kept;
 
-    const long before = test::peakMiB();
+    const uint64_t before = test::peakBytes();
     const auto read = decodeImage(test::pngFile(2, 1, 8, 2, row, bombs + profile));
     ASSERT_TRUE(read.ok()) << read.error().line();
     if (test::kMemoryIsMeasured) {
-        EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
+        EXPECT_LT(test::peakBytes() - before, 64u << 20) << "of some 800";
     }
     EXPECT_EQ(read->texels, decodeImage(plain)->texels);
     // Its gamma still counts: 0x40 as light is 0x89 as a colour.

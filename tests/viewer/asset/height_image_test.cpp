@@ -335,10 +335,10 @@ TEST(PngHeights, EveryDepthInterlacedAndPalette) {
 
 TEST(PngHeights, TextIsNotInflatedAndSizesAreChecked) {
     const std::string bombs = test::pngFile(2, 1, 8, 0, std::string("\0\1\2", 3), test::textBombs(100));
-    const long before = test::peakMiB();
+    const uint64_t before = test::peakBytes();
     const auto map = heightsOfPng(bombs);
     ASSERT_TRUE(map) << map.error().line();
-    EXPECT_LT(test::peakMiB() - before, 64) << "of some 800";
+    EXPECT_LT(test::peakBytes() - before, 64u << 20) << "of some 800";
     EXPECT_EQ(map->texels, (std::vector<uint16_t>{257, 514}));
     const auto refused = [](const std::string& file, ErrorCode code, const char* part) {
         const auto heights = heightsOfPng(file);
