@@ -165,6 +165,13 @@ private:
                 .message =
                     "the unfinished build here is of other inputs or options; without --resume it is started again",
                 .file = folder.path().string()};
+        for (const SideFile& each : done_.sideFiles)
+            if (fileStamp(each.path) != each.stamp)
+                return Error{.code = ErrorCode::Usage,
+                             .message = fmt::format("was changed since the unfinished build in {} read it; without "
+                                                    "--resume that is started again",
+                                                    folder.path().string()),
+                             .file = each.path.string()};
         return {};
     }
 
@@ -177,7 +184,9 @@ private:
         if (!fields) return fields.error();
         fields->update({{"stage", stage}, {"pass", pass_}, {"bin", bin}});
         if (!journal_.active())
-            fields->update({{"build", buildFingerprint(options_)}, {"measures", jsonOf(measures_)}});
+            fields->update({{"build", buildFingerprint(options_)},
+                            {"measures", jsonOf(measures_)},
+                            {"side files", jsonOf(report_.sideFiles)}});
         if (!partitionRecorded_ && files_.current) {
             (*fields)["partition"] = plan_.finest.first();
             partitionRecorded_ = true;
@@ -189,6 +198,7 @@ private:
 
     Result<void> resumeMeasures() {
         measures_ = done_.measures;
+        report_.sideFiles = done_.sideFiles;
         if (done_.stage != "read") return {};
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
         VCP_TRY(files_.reopen(done_, space_));

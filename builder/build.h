@@ -77,8 +77,7 @@ struct BuildFigures {
 
 struct BuildReport : BuildFigures {
     std::vector<std::string> warnings;  ///< one line for each thing that was left out of the inputs
-    std::vector<SideFile>
-        sideFiles;  ///< files that the inputs name, each once; a build that was resumed may not know them
+    std::vector<SideFile> sideFiles;    ///< files that the inputs name, each once
 };
 
 /// Returns the folder where a build keeps its temporary files.

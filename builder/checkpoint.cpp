@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 2;
+constexpr int kTempVersion = 3;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -93,6 +93,20 @@ SoupMeasures measuresFrom(Fields& all) {
     return m;
 }
 
+/// Reads pairs of a path, which may have any bytes, and a stamp.
+std::vector<SideFile> sideFilesFrom(Fields& all) {
+    std::vector<SideFile> files;
+    for (const json& pair : all.list("side files")) {
+        const bool isPair = pair.is_array() && pair.size() == 2 && pair[0].is_array();
+        all.require(isPair);
+        if (!isPair) continue;
+        std::string path;
+        for (const json& byte : pair[0]) path += static_cast<char>(all.countOf(byte));
+        files.emplace_back(path, all.textOf(pair[1]));
+    }
+    return files;
+}
+
 Recorded::Files filesFrom(Fields& all) {
     Recorded::Files files;
     for (const auto& [name, bytes] : all.object("files").items()) files.bins[name] = all.countOf(bytes);
@@ -154,6 +168,15 @@ json jsonOf(const SoupMeasures& m) {
             {"materials", m.hasMaterials}};
 }
 
+json jsonOf(const std::vector<SideFile>& files) {
+    json pairs = json::array();
+    for (const SideFile& each : files) {
+        const std::string& path = each.path.native();
+        pairs.push_back({json(std::vector<uint8_t>(path.begin(), path.end())), each.stamp});
+    }
+    return pairs;
+}
+
 Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& file) {
     Recorded recorded;
     if (journal.is_null()) return recorded;
@@ -162,6 +185,7 @@ Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& 
     recorded.build = all.text("build");
     all.require(recorded.stage == "read" || recorded.stage == "levels");
     recorded.measures = measuresFrom(all);
+    recorded.sideFiles = sideFilesFrom(all);
     recorded.files = filesFrom(all);
     if (recorded.stage == "levels") readLevels(all, recorded);
     if (all.areWhole()) return recorded;

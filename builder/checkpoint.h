@@ -24,6 +24,7 @@ namespace vcp {
 std::string buildFingerprint(const BuildOptions& options);
 
 nlohmann::json jsonOf(const SoupMeasures& measures);
+nlohmann::json jsonOf(const std::vector<SideFile>& files);
 
 /// What the journal's lines say together.
 struct Recorded {
@@ -36,6 +37,7 @@ struct Recorded {
     std::string stage;  ///< "": nothing is recorded; "read", "levels"
     std::string build;  ///< fingerprint
     SoupMeasures measures;
+    std::vector<SideFile> sideFiles;  ///< as they were before they were read
     Files files;
     std::vector<uint64_t> partition;  ///< with "levels": where the finest level's bins begin
     int pass = 0;

@@ -13,6 +13,7 @@ std::string fileStamp(const std::filesystem::path& path);
 
 struct SideFile {
     explicit SideFile(std::filesystem::path file) : path(std::move(file)), stamp(fileStamp(path)) {}
+    SideFile(std::filesystem::path file, std::string noted) : path(std::move(file)), stamp(std::move(noted)) {}
 
     std::filesystem::path path;
     std::string stamp;  ///< stamp from before it was read; the file may not have been found

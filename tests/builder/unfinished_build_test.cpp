@@ -13,6 +13,7 @@
 #include "builder/build.h"
 #include "builder/spill/journal.h"
 #include "tests/support/test_folder.h"
+#include "tests/support/test_meshes.h"
 
 namespace vcp {
 namespace {
@@ -39,7 +40,7 @@ protected:
     fs::path temp() const { return folder_ / "out.vcp.build"; }
     BuildOptions options() const {
         BuildOptions o;
-        o.inputs = {folder_ / "ball.ply"};
+        o.inputs = {input_};
         o.output = output();
         o.cell = 0.03;  // three levels
         o.threads = 2;
@@ -100,6 +101,7 @@ protected:
     }
 
     TestFolder folder_{"vcp_unfinished_build_test"};
+    fs::path input_ = folder_ / "ball.ply";
     std::string whole_;
     std::map<std::string, std::string> left_;
 };
@@ -258,6 +260,48 @@ TEST_F(UnfinishedBuild, JournalsThatSaySomethingElse) {
         fs::remove_all(temp());
         fs::remove(output());
     }
+}
+
+/// What an OBJ names is part of what is built: as it was, or not at all. Names may have any bytes.
+TEST_F(UnfinishedBuild, WhatAMeshNamesIsRemembered) {
+    input_ = folder_ / "ball.obj";
+    const fs::path materials = folder_ / "red\xff.mtl";
+    std::ofstream(materials) << "newmtl red\nKd 1 0 0\n";
+    std::ofstream(input_) << "mtllib red\xff.mtl\nusemtl red\n";
+    test::writeObj(test::sphereMesh(glm::dvec3(0), 1, 24), folder_ / "shape.obj");
+    std::ofstream(input_, std::ios::app) << contentOf(folder_ / "shape.obj");
+    const auto straight = buildOctree(options());
+    ASSERT_TRUE(straight) << straight.error().line();
+    ASSERT_EQ(straight->sideFiles.size(), 1u);
+    whole_ = contentOf(output());
+    fs::remove(output());
+
+    stopAt("level 2 of");
+    const auto resumed = resume();
+    ASSERT_TRUE(resumed) << resumed.error().line();
+    EXPECT_TRUE(contentOf(output()) == whole_);
+    ASSERT_EQ(resumed->sideFiles.size(), 1u);
+    EXPECT_EQ(resumed->sideFiles[0].path, straight->sideFiles[0].path);
+    fs::remove(output());
+
+    stopAt("level 2 of");
+    fs::create_symlink(materials, output());
+    BuildOptions overwriting = options();
+    overwriting.resume = overwriting.overwrite = true;
+    const auto over = buildOctree(overwriting);
+    ASSERT_FALSE(over);
+    EXPECT_NE(over.error().line().find("which is read"), std::string::npos) << over.error().line();
+    fs::remove(output());
+
+    restore();
+    std::ofstream(materials) << "newmtl red\nKd 0 1 0\n";
+    const auto changed = resume();
+    ASSERT_FALSE(changed);
+    EXPECT_EQ(changed.error().code, ErrorCode::Usage);
+    EXPECT_TRUE(fs::path(changed.error().file) == straight->sideFiles[0].path) << changed.error().line();
+    EXPECT_NE(changed.error().message.find("without --resume"), std::string::npos);
+    EXPECT_TRUE(fs::exists(temp())) << "what there is stays";
+    EXPECT_FALSE(fs::exists(output()));
 }
 
 }  // namespace
