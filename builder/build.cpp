@@ -38,7 +38,7 @@ public:
           memory_(plan),
           meter_(options.progress),
           space_(tempFolderOf(options), plan.tempBytes),
-          arena_(static_cast<int>(threads)) {
+          arena_(int(threads)) {
         // Without this TBB gives no more threads than processors, and warns about it.
         if (threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))
             more_.emplace(tbb::global_control::max_allowed_parallelism, threads);
@@ -96,12 +96,10 @@ private:
             VCP_TRY(read());
         else
             VCP_TRY(resumeMeasures());
-        auto frame = chooseFrame(options_, measures_);
-        if (!frame) return frame.error();
-        auto error = chooseError(options_, measures_, *frame);
-        if (!error) return error.error();
-        plan_.frame = *frame;
-        plan_.errorTarget = *error;
+        VCP_TRY_ASSIGN(auto frame, chooseFrame(options_, measures_));
+        VCP_TRY_ASSIGN(auto error, chooseError(options_, measures_, frame));
+        plan_.frame = frame;
+        plan_.errorTarget = error;
         plan_.pageBytes = memory_.pageBytes;
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());
@@ -147,13 +145,10 @@ private:
         if (!folder.exists()) return {};
         VCP_TRY(folder.take());
         if (options_.resume) {
-            const auto journal = Journal::read(folder);
-            if (!journal) return journal.error();
+            VCP_TRY_ASSIGN(const auto journal, Journal::read(folder));
             // Whatever the journal says, it shows earlier work.
-            isResumed_ = !journal->is_null();
-            auto done = recordedFrom(*journal, folder.path() / kJournalName);
-            if (!done) return done.error();
-            done_ = std::move(*done);
+            isResumed_ = !journal.is_null();
+            VCP_TRY_ASSIGN(done_, recordedFrom(journal, folder.path() / kJournalName));
         }
         if (!isResumed_) {
             folder.clear();
@@ -180,18 +175,17 @@ private:
     Result<void> checkpoint(const char* stage, size_t bin, bool always = false) {
         if (!always && meter_.seconds() - lastCheckpoint_ < options_.checkpointSeconds) return {};
         VCP_TRY(space_.folder().take());
-        auto fields = files_.sync();
-        if (!fields) return fields.error();
-        fields->update({{"stage", stage}, {"pass", pass_}, {"bin", bin}});
+        VCP_TRY_ASSIGN(auto fields, files_.sync());
+        fields.update({{"stage", stage}, {"pass", pass_}, {"bin", bin}});
         if (!journal_.active())
-            fields->update({{"build", buildFingerprint(options_)},
-                            {"measures", jsonOf(measures_)},
-                            {"side files", jsonOf(report_.sideFiles)}});
+            fields.update({{"build", buildFingerprint(options_)},
+                           {"measures", jsonOf(measures_)},
+                           {"side files", jsonOf(report_.sideFiles)}});
         if (!partitionRecorded_ && files_.current) {
-            (*fields)["partition"] = plan_.finest.first();
+            fields["partition"] = plan_.finest.first();
             partitionRecorded_ = true;
         }
-        VCP_TRY(journal_.record(space_.folder(), *fields));
+        VCP_TRY(journal_.record(space_.folder(), fields));
         lastCheckpoint_ = meter_.seconds();
         return {};
     }
@@ -228,15 +222,13 @@ private:
     Result<void> read() {
         if (!progress("reading", 0)) return cancelled();
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
-        auto measures = readInputs(
-            options_, space_, memory_.vertexBytes, *files_.soup,
-            [this](double fraction, uint64_t triangles) {
-                measures_.triangles = triangles;
-                return progress("reading", kReadingShare * fraction);
-            },
-            report_.warnings, report_.sideFiles);
-        if (!measures) return measures.error();
-        measures_ = *measures;
+        VCP_TRY_ASSIGN(measures_, readInputs(
+                                      options_, space_, memory_.vertexBytes, *files_.soup,
+                                      [this](double fraction, uint64_t triangles) {
+                                          measures_.triangles = triangles;
+                                          return progress("reading", kReadingShare * fraction);
+                                      },
+                                      report_.warnings, report_.sideFiles));
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         releaseMemory();
         VCP_TRY(checkFreeSpace());
@@ -286,9 +278,7 @@ private:
         double begins = kReadingShare;
         const Dealing dealing{*files_.soup, snapper, plan_.gridOf(pass_ - 1),
                               [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
-        auto partition = arena_.execute([&] { return choosePartition(dealing, memory_.binTriangles); });
-        if (!partition) return partition.error();
-        plan_.finest = std::move(*partition);
+        VCP_TRY_ASSIGN(plan_.finest, arena_.execute([&] { return choosePartition(dealing, memory_.binTriangles); }));
         begins += kDealingShare / 2;
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
@@ -378,18 +368,17 @@ private:
         const std::string stage = vertices ? std::string("sorting")
                                            : fmt::format("level {} of {}", plan_.levels() - pass_, plan_.frame.levels);
         if (!progress(stage, at(0))) return cancelled();
-        auto soup = files_.current->load(bin);
-        if (!soup) return soup.error();
+        VCP_TRY_ASSIGN(auto soup, files_.current->load(bin));
         // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
-        if (soup->empty()) return {};
+        if (soup.empty()) return {};
         Result<void> result;
         arena_.execute([&] {
-            if (vertices) keepThin(*soup, bin);
-            LatticeMesh mesh = meshOf(*soup, hasColour());
-            std::vector<LatticeTriangle>().swap(*soup);
+            if (vertices) keepThin(soup, bin);
+            LatticeMesh mesh = meshOf(soup, hasColour());
+            std::vector<LatticeTriangle>().swap(soup);
             if (vertices) computeNormals(mesh);
             if (!vertices)
-                result = buildPages(settings(), mesh, first, end, files_.spools[static_cast<size_t>(pass_)],
+                result = buildPages(settings(), mesh, first, end, files_.spools[size_t(pass_)],
                                     [&](double part) { return progress(stage, at(part)); });
             if (result && step) result = step->run(bin, mesh);
         });
@@ -429,11 +418,10 @@ private:
 
     Result<void> write() {
         FileHeader header = headerOf(measures_, plan_.frame, plan_.errorTarget, hasColour());
-        auto bytes = assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
-            return progress("writing", 1 - kWritingShare + kWritingShare * part);
-        });
-        if (!bytes) return bytes.error();
-        report_.fileBytes = *bytes;
+        VCP_TRY_ASSIGN(report_.fileBytes,
+                       assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
+                           return progress("writing", 1 - kWritingShare + kWritingShare * part);
+                       }));
         report_.triangles = header.triangles;
         report_.degenerateTriangles = header.degenerateTriangles;
         report_.vertices = header.vertices;
@@ -451,7 +439,7 @@ private:
     void finishReport() {
         rusage usage{};
         getrusage(RUSAGE_SELF, &usage);
-        report_.peakRssBytes = static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+        report_.peakRssBytes = uint64_t(usage.ru_maxrss) * 1024;
         report_.tempBytes = space_.peakDiskBytes();
         report_.seconds = meter_.seconds();
     }
@@ -485,16 +473,14 @@ std::filesystem::path tempFolderOf(const BuildOptions& options) {
 
 Result<BuildReport> buildOctree(const BuildOptions& options) {
     if (options.inputs.empty()) return Error{.code = ErrorCode::Usage, .message = "no input mesh given"};
-    const unsigned threads = options.threads > 0
-                                 ? options.threads
-                                 : static_cast<unsigned>(std::max(1, tbb::this_task_arena::max_concurrency()));
-    auto plan = planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads);
-    if (!plan) return plan.error();
+    const unsigned threads =
+        options.threads > 0 ? options.threads : unsigned(std::max(1, tbb::this_task_arena::max_concurrency()));
+    VCP_TRY_ASSIGN(auto plan,
+                   planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads));
     BuildOptions expanded = options;
-    auto inputs = expandInputs(options.inputs);
-    if (!inputs) return inputs.error();
-    expanded.inputs = std::move(*inputs);
-    auto report = Builder(expanded, *plan, threads).run();
+    VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
+    expanded.inputs = std::move(inputs);
+    auto report = Builder(expanded, plan, threads).run();
     if (report || !report.error().file.empty() || report.error().code == ErrorCode::Cancelled) return report;
     Error error = report.error();
     error.file = options.inputs.front().string();

@@ -101,7 +101,7 @@ std::vector<SideFile> sideFilesFrom(Fields& all) {
         all.require(isPair);
         if (!isPair) continue;
         std::string path;
-        for (const json& byte : pair[0]) path += static_cast<char>(all.countOf(byte));
+        for (const json& byte : pair[0]) path += char(all.countOf(byte));
         files.emplace_back(path, all.textOf(pair[1]));
     }
     return files;
@@ -124,7 +124,7 @@ void readLevels(Fields& all, Recorded& recorded) {
     const auto& bins = recorded.partition;
     all.require(!bins.empty() && bins[0] == 0 && std::is_sorted(bins.begin(), bins.end(), std::less_equal<>()));
     const json& pass = all.at("pass");
-    const int levels = static_cast<int>(std::min<size_t>(recorded.files.spools.size(), kMaxLevels));
+    const int levels = int(std::min<size_t>(recorded.files.spools.size(), kMaxLevels));
     const bool isPass = pass.is_number_integer() && pass >= -1 && pass <= levels;
     all.require(isPass);
     recorded.pass = isPass ? pass.get<int>() : 0;
@@ -146,7 +146,7 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
 
 std::string buildFingerprint(const BuildOptions& options) {
     std::string text = fmt::format("{} {} {:a} {:a} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
-                                   options.errorIsRelative, static_cast<int>(options.colour), options.format);
+                                   options.errorIsRelative, int(options.colour), options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);

@@ -27,7 +27,7 @@ void addPassages(std::deque<PageSpool>& levels) {
         for (const PageEntry& page : levels[level].entries()) {
             PageEntry passage;
             passage.morton = page.morton >> 3;
-            passage.level = static_cast<uint8_t>(level - 1);
+            passage.level = uint8_t(level - 1);
             if (!missing.empty() && missing.back().morton == passage.morton) continue;
             if (!std::binary_search(parents.begin(), parents.end(), passage, byMorton)) missing.push_back(passage);
         }
@@ -43,9 +43,9 @@ void linkChildren(std::deque<PageSpool>& levels) {
         size_t child = 0;
         const std::vector<PageEntry>& children = levels[level + 1].entries();
         for (PageEntry& page : levels[level].entries()) {
-            page.firstChild = static_cast<uint32_t>(first + child);
+            page.firstChild = uint32_t(first + child);
             for (; child < children.size() && children[child].morton >> 3 == page.morton; ++child)
-                page.childMask |= static_cast<uint8_t>(1u << (children[child].morton & 7));
+                page.childMask |= uint8_t(1u << (children[child].morton & 7));
             if (page.childMask == 0) page.firstChild = 0;
         }
         first += children.size();
@@ -53,7 +53,7 @@ void linkChildren(std::deque<PageSpool>& levels) {
 }
 
 void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
-    header.levels = static_cast<uint32_t>(levels.size());
+    header.levels = uint32_t(levels.size());
     header.pages = 0;
     for (size_t level = 0; level < levels.size(); ++level) {
         LevelRow& row = header.level[level];
@@ -94,18 +94,17 @@ Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& head
     addPassages(levels);
     linkChildren(levels);
     describeLevels(levels, header);
-    auto writer = VcpWriter::create(output, header.pages, rules);
-    if (!writer) return writer.error();
+    VCP_TRY_ASSIGN(auto writer, VcpWriter::create(output, header.pages, rules));
     uint64_t done = 0;
     for (const PageSpool& level : levels)
         for (const PageEntry& entry : level.entries()) {
-            auto page = entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passagePage(header.log2Cells));
-            if (!page) return page.error();
-            VCP_TRY((*writer)->append(entry, *page));
+            VCP_TRY_ASSIGN(auto page,
+                           entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passagePage(header.log2Cells)));
+            VCP_TRY(writer->append(entry, page));
             if (!progress(double(++done) / double(header.pages + 1)))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = output.string()};
         }
-    return (*writer)->commit(header);
+    return writer->commit(header);
 }
 
 }  // namespace vcp

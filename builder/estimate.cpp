@@ -26,10 +26,8 @@ public:
     Measurer(SoupMeasures& measures, uint64_t maxVertices) : measures_(measures), maxVertices_(maxVertices) {}
 
     void add(const MeshChunk& chunk) {
-        const size_t room =
-            static_cast<size_t>(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
-        positions_.insert(positions_.end(), chunk.positions.begin(),
-                          chunk.positions.begin() + static_cast<ptrdiff_t>(room));
+        const size_t room = size_t(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
+        positions_.insert(positions_.end(), chunk.positions.begin(), chunk.positions.begin() + ptrdiff_t(room));
         for (const glm::dvec3& p : chunk.positions) {
             measures_.boundsMin = glm::min(measures_.boundsMin, p);
             measures_.boundsMax = glm::max(measures_.boundsMax, p);
@@ -63,13 +61,11 @@ private:
 }  // namespace
 
 uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory) {
-    const auto bytes = static_cast<uint64_t>(kTempBytesPerTriangle * static_cast<double>(triangles));
+    const auto bytes = uint64_t(kTempBytesPerTriangle * double(triangles));
     return bytes > heldInMemory ? bytes : 0;
 }
 
-uint64_t expectedFileBytes(uint64_t triangles) {
-    return static_cast<uint64_t>(kFileBytesPerTriangle * static_cast<double>(triangles));
-}
+uint64_t expectedFileBytes(uint64_t triangles) { return uint64_t(kFileBytesPerTriangle * double(triangles)); }
 
 uint64_t freeBytesAt(const std::filesystem::path& path) {
     std::error_code failed;
@@ -83,23 +79,19 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     BuildEstimate estimate;
     const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
     estimate.memoryBytes = options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes();
-    auto plan = planMemory(estimate.memoryBytes, threads);
-    if (!plan) return plan.error();
+    VCP_TRY_ASSIGN(auto plan, planMemory(estimate.memoryBytes, threads));
     SoupMeasures& m = estimate.measures;
     m.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
     m.boundsMax = -m.boundsMin;
     uint64_t measured = 0;
     MeshChunk chunk;
-    auto inputs = expandInputs(options.inputs);
-    if (!inputs) return inputs.error();
-    for (const auto& path : *inputs) {
-        auto stream = openMesh(path, meshOptionsOf(options));
-        if (!stream) return stream.error();
-        Measurer measurer(m, plan->vertexBytes / sizeof(glm::dvec3));
+    VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
+    for (const auto& path : inputs) {
+        VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
+        Measurer measurer(m, plan.vertexBytes / sizeof(glm::dvec3));
         for (;;) {
-            auto more = (*stream)->next(chunk);
-            if (!more) return more.error();
-            if (!*more) break;
+            VCP_TRY_ASSIGN(auto more, stream->next(chunk));
+            if (!more) break;
             measurer.add(chunk);
             if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles}))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
@@ -115,13 +107,11 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "its triangles have no area",
                      .file = options.inputs.front().string()};
-    m.area *= static_cast<double>(m.triangles) / static_cast<double>(measured);
-    auto frame = chooseFrame(options, m);
-    if (!frame) return frame.error();
-    estimate.frame = *frame;
-    estimate.tempBytes = expectedTempBytes(m.triangles, plan->tempBytes);
+    m.area *= double(m.triangles) / double(measured);
+    VCP_TRY_ASSIGN(estimate.frame, chooseFrame(options, m));
+    estimate.tempBytes = expectedTempBytes(m.triangles, plan.tempBytes);
     estimate.fileBytes = expectedFileBytes(m.triangles);
-    estimate.seconds = kSecondsPerTriangle * static_cast<double>(m.triangles) / threads;
+    estimate.seconds = kSecondsPerTriangle * double(m.triangles) / threads;
     estimate.freeTempBytes = freeBytesAt(tempFolderOf(options));
     estimate.freeOutputBytes = freeBytesAt(options.output);
     return estimate;

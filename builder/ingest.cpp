@@ -124,26 +124,24 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     SoupWriter writer(soup);
     MeshChunk chunk;
     for (const auto& path : options.inputs) {
-        auto stream = openMesh(path, meshOptionsOf(options));
-        if (!stream) return stream.error();
-        const auto materialBase = static_cast<uint32_t>(soup.materials.size());
+        VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
+        const auto materialBase = uint32_t(soup.materials.size());
         VertexJoin join(space, vertexBytes, [&](const WorldTriangle<double>& t) { return writer.add(t); });
         for (;;) {
-            auto more = (*stream)->next(chunk);
-            if (!more) return more.error();
-            if (!*more) break;
+            VCP_TRY_ASSIGN(auto more, stream->next(chunk));
+            if (!more) break;
             hasVertexColours |= !chunk.colours.empty();
             VCP_TRY(join.add(chunk, materialBase));
-            const uint64_t bytes = doneBytes + (*stream)->bytesRead();
+            const uint64_t bytes = doneBytes + stream->bytesRead();
             // A pipe does not say how many bytes will come.
             const double fraction = totalBytes > 0 ? std::min(double(bytes) / double(totalBytes), 1.0) : 0;
             if (!progress(fraction, writer.triangles()))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
         }
-        doneBytes += (*stream)->bytesRead();
-        soup.materials.insert(soup.materials.end(), (*stream)->materials().begin(), (*stream)->materials().end());
-        warnings.insert(warnings.end(), (*stream)->warnings().begin(), (*stream)->warnings().end());
-        for (const SideFile& each : (*stream)->sideFiles())
+        doneBytes += stream->bytesRead();
+        soup.materials.insert(soup.materials.end(), stream->materials().begin(), stream->materials().end());
+        warnings.insert(warnings.end(), stream->warnings().begin(), stream->warnings().end());
+        for (const SideFile& each : stream->sideFiles())
             if (named.insert(each.path).second) sideFiles.push_back(each);
         VCP_TRY(join.finish(path.string()));
         vertices += join.vertices();
@@ -182,7 +180,7 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
     frame.log2Cells = kLog2Cells;
     const glm::dvec3 extent = m.boundsMax - m.boundsMin;
     const double longest = std::max(extent.x, std::max(extent.y, extent.z));
-    const double useful = static_cast<double>(m.triangles - m.degenerateTriangles);
+    const double useful = double(m.triangles - m.degenerateTriangles);
     frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
     // Doubles far from zero have few digits left for the cell.
     const double resolution =
@@ -198,7 +196,7 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
         return badInput(options,
                         fmt::format("all of it is smaller than 1/{} cell; use a smaller --cell", kLatticePerCell));
     const double cellsAcross = longest / frame.cell + 2;
-    while (std::ldexp(1.0, static_cast<int>(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
+    while (std::ldexp(1.0, int(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
     frame.origin = m.boundsMin - glm::dvec3(frame.cell);
     return frame;
 }

@@ -24,7 +24,7 @@ float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
     const glm::dvec3 u = glm::dvec3(t.corner[1] - t.corner[0]), v = glm::dvec3(t.corner[2] - t.corner[0]);
     const double area = glm::length(glm::cross(u, v)) / (double(kLatticePerCell) * kLatticePerCell);
     const glm::dvec2 p = glm::dvec2(uv[1]) - glm::dvec2(uv[0]), q = glm::dvec2(uv[2]) - glm::dvec2(uv[0]);
-    return area > 0 ? static_cast<float>(std::sqrt(std::abs(p.x * q.y - p.y * q.x) / area)) : 0.0f;
+    return area > 0 ? float(std::sqrt(std::abs(p.x * q.y - p.y * q.x) / area)) : 0.0f;
 }
 
 }  // namespace
@@ -56,7 +56,7 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
     // Points 0 to 2 are corners; 3 to 5 are middles of the edges from them.
     const auto add = [&](int a, int b, int c) {
         Piece& p = pieces[count++] = piece;
-        p.triangle.stray = piece.triangle.stray + static_cast<float>(kLatticeRounding);
+        p.triangle.stray = piece.triangle.stray + float(kLatticeRounding);
         const int from[3] = {a, b, c};
         for (int i = 0; i < 3; ++i) {
             const int k = (from[i] + turn) % 3, next = (k + 1) % 3;
@@ -101,7 +101,7 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
         t.colour[i] = triangle.colour[i];
         piece.uv[i] = triangle.uv[i];
     }
-    t.stray = static_cast<float>(kLatticeRounding);
+    t.stray = float(kLatticeRounding);
     piece.material = triangle.material;
     if (colours_ && piece.material > 0) piece.footprint = footprintOf(t, piece.uv);
     return piece;

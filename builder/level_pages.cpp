@@ -45,11 +45,11 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
                          triangles.size(), encoded.leaves)};
     BuiltPage page;
     page.entry.morton = code;
-    page.entry.level = static_cast<uint8_t>(settings.grid.level);
+    page.entry.level = uint8_t(settings.grid.level);
     page.entry.leaves = encoded.leaves;
     page.entry.hardLeaves = encoded.hardLeaves;
-    page.entry.certifiedError = std::nextafter(static_cast<float>(encoded.certifiedError * settings.cell),
-                                               std::numeric_limits<float>::infinity());
+    page.entry.certifiedError =
+        std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
     if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
     return page;
 }
@@ -69,7 +69,7 @@ uint64_t workOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
         const double perimeter = glm::distance(p[0], p[1]) + glm::distance(p[1], p[2]) + glm::distance(p[2], p[0]);
         touched += 0.875 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) + 1.5 * perimeter + 4;
     }
-    return pageWorkBytes(triangles.size(), static_cast<uint64_t>(touched));
+    return pageWorkBytes(triangles.size(), uint64_t(touched));
 }
 
 /// Lets pages be built while there is memory for them.
@@ -134,9 +134,8 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
                                                 "smaller --cell or a larger --memory",
                                                 bins.of(i).size(), ((work[i] - most) * 3 / 2 >> 20) + 1)};
         VCP_TRY(settings.makeRoom());
-        auto page = buildPage(settings, mesh, bins.pages[i], bins.of(i));
-        if (!page) return page.error();
-        VCP_TRY(inOrder.put(i, std::move(*page)));
+        VCP_TRY_ASSIGN(auto page, buildPage(settings, mesh, bins.pages[i], bins.of(i)));
+        VCP_TRY(inOrder.put(i, std::move(page)));
         isBuilt[i] = true;
     }
     Admission admission(left(settings.pageBytes));

@@ -28,8 +28,6 @@ LevelSettings LevelPlan::settingsOf(int level) const {
     return settings;
 }
 
-double LevelPlan::timeBefore(int pass) const {
-    return 1 - std::pow(1.0 / 3, static_cast<double>(frame.levels) - 1 - pass);
-}
+double LevelPlan::timeBefore(int pass) const { return 1 - std::pow(1.0 / 3, double(frame.levels) - 1 - pass); }
 
 }  // namespace vcp

@@ -16,10 +16,10 @@ struct LevelPlan {
     double errorTarget = 0;  ///< tolerance of the finest level, world units
     uint64_t pageBytes = 0;  ///< memory for a bin's mesh and its pages
 
-    [[nodiscard]] int levels() const { return static_cast<int>(frame.levels); }
+    [[nodiscard]] int levels() const { return int(frame.levels); }
     /// Returns the level whose grid and bins a pass works on.
     [[nodiscard]] int levelOf(int pass) const { return pass < levels() ? pass : levels() - 1; }
-    [[nodiscard]] PageGrid gridOf(int level) const { return {frame.log2Cells, static_cast<uint32_t>(level)}; }
+    [[nodiscard]] PageGrid gridOf(int level) const { return {frame.log2Cells, uint32_t(level)}; }
     [[nodiscard]] PagePartition partitionOf(int level) const;
     /// Returns a level's settings, without the room that temporary files can make.
     [[nodiscard]] LevelSettings settingsOf(int level) const;

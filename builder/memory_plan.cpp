@@ -33,8 +33,7 @@ uint64_t groupLimit() {
 }  // namespace
 
 uint64_t defaultMemoryBytes() {
-    const uint64_t machine =
-        static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+    const uint64_t machine = uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE));
     return std::min(machine, groupLimit()) / 2;
 }
 

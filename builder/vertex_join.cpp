@@ -50,8 +50,7 @@ Result<void> VertexJoin::append(std::span<const Vertex> vertices) {
         if (inChunk == 0) XXH3_64bits_reset(hash_.get());
         const auto part = std::as_bytes(vertices.first(std::min<uint64_t>(vertices.size(), chunkVertices_ - inChunk)));
         XXH3_64bits_update(hash_.get(), part.data(), part.size());
-        const auto at = later_.append(part);
-        if (!at) return at.error();
+        VCP_TRY(later_.append(part));
         vertices = vertices.subspan(part.size() / sizeof(Vertex));
         if (later_.size() / sizeof(Vertex) % chunkVertices_ == 0) hashes_.push_back(XXH3_64bits_digest(hash_.get()));
     }
@@ -106,9 +105,8 @@ Result<void> VertexJoin::resolve(Waiting& w) {
 Result<void> VertexJoin::process(uint64_t chunk) {
     const std::span<const RawBins::Block> blocks = waiting_.raw().blocks(chunk);
     for (const RawBins::Block& block : std::vector(blocks.begin(), blocks.end())) {
-        auto records = waiting_.read(block);
-        if (!records) return records.error();
-        for (Waiting& w : *records) VCP_TRY(resolve(w));
+        VCP_TRY_ASSIGN(auto records, waiting_.read(block));
+        for (Waiting& w : records) VCP_TRY(resolve(w));
     }
     return {};
 }

@@ -87,13 +87,9 @@ Result<Arguments> parse(int argc, char** argv) {
                 return Error{ErrorCode::Usage, "--shape is statue or dog, not '" + std::string(shape) + "'"};
             arguments.isDog = shape == "dog";
         } else if (option == "--triangles") {
-            const auto value = number(option, argv[++i], kMinTriangles, kMaxTriangles);
-            if (!value) return value.error();
-            arguments.scan.triangles = *value;
+            VCP_TRY_ASSIGN(arguments.scan.triangles, number(option, argv[++i], kMinTriangles, kMaxTriangles));
         } else if (option == "--seed") {
-            const auto value = number(option, argv[++i], 0, UINT64_MAX);
-            if (!value) return value.error();
-            arguments.scan.seed = *value;
+            VCP_TRY_ASSIGN(arguments.scan.seed, number(option, argv[++i], 0, UINT64_MAX));
         } else
             return Error{ErrorCode::Usage, "unknown option '" + std::string(option) + "'; see make_scan --help"};
     }
@@ -124,9 +120,8 @@ public:
             output.descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
             if (output.descriptor_ < 0) return ioError(path, "cannot be written");
         } else {
-            auto file = OutputFile::create(path, kind);
-            if (!file) return file.error();
-            output.file_ = std::make_unique<OutputFile>(*std::move(file));
+            VCP_TRY_ASSIGN(auto file, OutputFile::create(path, kind));
+            output.file_ = std::make_unique<OutputFile>(std::move(file));
         }
         return output;
     }
@@ -168,13 +163,12 @@ Result<void> run(const Arguments& arguments) {
                      std::string("what is written is ") +
                          (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") +
                          ", or be - for a pipe"};
-    auto output = Output::open(arguments.out, kind);
-    if (!output) return output.error();
+    VCP_TRY_ASSIGN(auto output, Output::open(arguments.out, kind));
     auto result = arguments.isDog
                       ? writeObj(dog(arguments.scan.triangles),
-                                 [&](std::string_view text) { return output->write(std::as_bytes(std::span(text))); })
-                      : writeStatue(arguments, *output);
-    if (result) result = output->finish();
+                                 [&](std::string_view text) { return output.write(std::as_bytes(std::span(text))); })
+                      : writeStatue(arguments, output);
+    if (result) result = output.finish();
     return result;
 }
 

@@ -271,9 +271,8 @@ glm::ivec3 gridFor(const Asset& asset, glm::ivec3 asked) {
 }
 
 Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
-    const auto shape = shapeOf(asset);
-    if (!shape) return shape.error();
-    asset.extent = (*shape)->extent();
+    VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
+    asset.extent = shape->extent();
     const glm::ivec3 cells = gridFor(asset, options.cells);
     if (asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
         return Error{.code = ErrorCode::Usage,
@@ -281,29 +280,22 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
                                             cells.x, cells.y, asset.heights->size.x, asset.heights->size.y)};
     if (options.samples < 1 || options.samples > 16)
         return Error{.code = ErrorCode::Usage, .message = "samples a cell must be from 1 to 16"};
-    auto occupancy = occupy(**shape, cells);
-    if (!occupancy) return occupancy.error();
+    VCP_TRY_ASSIGN(auto occupancy, occupy(*shape, cells));
     if (!asset.heights) {
-        auto field = sampleField(**shape, cells * options.samples);
-        if (!field) return field.error();
-        occupyField(*field, *occupancy);
-        asset.field = *std::move(field);
+        VCP_TRY_ASSIGN(auto field, sampleField(*shape, cells * options.samples));
+        occupyField(field, occupancy);
+        asset.field = std::move(field);
     }
-    asset.occupancy = *std::move(occupancy);
-    auto distances = buildDistanceMap(*asset.occupancy, options.distances, shape->get());
-    if (!distances) return distances.error();
-    asset.distances = *std::move(distances);
+    asset.occupancy = std::move(occupancy);
+    VCP_TRY_ASSIGN(auto distances, buildDistanceMap(*asset.occupancy, options.distances, shape.get()));
+    asset.distances = std::move(distances);
     asset.factors = options.factors;
     if (!asset.factors.empty()) {
-        auto compressed = compressMap(*asset.distances, asset.factors);
-        if (!compressed) return compressed.error();
-        asset.compressed = *std::move(compressed);
+        VCP_TRY_ASSIGN(asset.compressed, compressMap(*asset.distances, asset.factors));
     }
     if (options.withBoxes) asset.boxes = buildOctantBoxes(*asset.occupancy);
     if (!options.withPatches) return {};
-    auto patches = buildPatches(**shape, *asset.occupancy, options.crossings);
-    if (!patches) return patches.error();
-    asset.patches = *std::move(patches);
+    VCP_TRY_ASSIGN(asset.patches, buildPatches(*shape, *asset.occupancy, options.crossings));
     return {};
 }
 
@@ -327,37 +319,35 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
     commit.fileBytes = header.fileBytes, commit.headerHash = header.hash;
     commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(AssetCommit, hash)));
 
-    auto file = OutputFile::create(path, OutputKind::Asset, rules);
-    if (!file) return file.error();
-    if (::ftruncate(file->descriptor(), static_cast<off_t>(header.fileBytes)) != 0)
+    VCP_TRY_ASSIGN(auto file, OutputFile::create(path, OutputKind::Asset, rules));
+    if (::ftruncate(file.descriptor(), off_t(header.fileBytes)) != 0)
         return systemError(path, "cannot write here", errno);
-    VCP_TRY(file->write(sizeof header, std::as_bytes(std::span(table))));
-    for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(file->write(table[i].offset, chunks[i].second));
-    VCP_TRY(file->sync());
-    VCP_TRY(file->write(0, std::as_bytes(std::span(&header, 1))));
-    VCP_TRY(file->write(end, std::as_bytes(std::span(&commit, 1))));
-    VCP_TRY(file->commit());
+    VCP_TRY(file.write(sizeof header, std::as_bytes(std::span(table))));
+    for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(file.write(table[i].offset, chunks[i].second));
+    VCP_TRY(file.sync());
+    VCP_TRY(file.write(0, std::as_bytes(std::span(&header, 1))));
+    VCP_TRY(file.write(end, std::as_bytes(std::span(&commit, 1))));
+    VCP_TRY(file.commit());
     return header.fileBytes;
 }
 
 Result<Asset> readAsset(const std::filesystem::path& path) {
-    const auto reader = openFile(path);
-    if (!reader) return reader.error();
-    if ((*reader)->size() > kMaxFileBytes)
+    VCP_TRY_ASSIGN(const auto reader, openFile(path));
+    if (reader->size() > kMaxFileBytes)
         return Error{
             .code = ErrorCode::Limit, .message = "is larger than any mesostructure asset", .file = path.string()};
     // The header is read first, so that a large file of another kind is not read.
-    if ((*reader)->size() >= sizeof(AssetHeader)) {
+    if (reader->size() >= sizeof(AssetHeader)) {
         AssetHeader header;
-        VCP_TRY((*reader)->read(0, std::as_writable_bytes(std::span(&header, 1))));
+        VCP_TRY(reader->read(0, std::as_writable_bytes(std::span(&header, 1))));
         if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0)
             return Error{.message = "not a mesostructure asset; make one with `vcp meso build`",
                          .file = path.string(),
                          .element = "header",
                          .byte = 0};
     }
-    Bytes bytes((*reader)->size());
-    VCP_TRY((*reader)->read(0, bytes));
+    Bytes bytes(reader->size());
+    VCP_TRY(reader->read(0, bytes));
     return parseAsset(bytes, path.string());
 }
 

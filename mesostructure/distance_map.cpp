@@ -311,9 +311,7 @@ Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceO
     map.steps.resize(size_t(options.cones.count()) * grid.count());
     Occupancy fine;
     if (options.rule != DistanceRule::AnyPoint) {
-        auto made = occupy(*shape, grid.cells * options.refine);
-        if (!made) return made.error();
-        fine = *std::move(made);
+        VCP_TRY_ASSIGN(fine, occupy(*shape, grid.cells * options.refine));
     }
     for (int cone = 0; cone < options.cones.count(); ++cone) {
         std::vector<float> lengths;

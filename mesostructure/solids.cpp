@@ -251,9 +251,8 @@ Result<Solid> makeSolid(std::string_view name, uint32_t seed) {
 }
 
 Result<std::unique_ptr<Shape>> solidShape(const std::string& name, uint32_t seed) {
-    auto solid = makeSolid(name, seed);
-    if (!solid) return solid.error();
-    return std::unique_ptr<Shape>(std::make_unique<SolidShape>(*std::move(solid)));
+    VCP_TRY_ASSIGN(auto solid, makeSolid(name, seed));
+    return std::unique_ptr<Shape>(std::make_unique<SolidShape>(std::move(solid)));
 }
 
 }  // namespace vcp::meso

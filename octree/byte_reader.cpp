@@ -19,12 +19,12 @@ public:
 
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
         while (!bytes.empty()) {
-            const ssize_t n = ::pread(file_.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+            const ssize_t n = ::pread(file_.number(), bytes.data(), bytes.size(), off_t(offset));
             if (n < 0 && errno == EINTR) continue;
             if (n < 0) return fail(offset, std::string("read failed: ") + std::strerror(errno));
             if (n == 0) return fail(offset, "the file ends here; it was truncated");
-            offset += static_cast<uint64_t>(n);
-            bytes = bytes.subspan(static_cast<size_t>(n));
+            offset += uint64_t(n);
+            bytes = bytes.subspan(size_t(n));
         }
         return {};
     }
@@ -43,13 +43,12 @@ private:
 }  // namespace
 
 Result<std::shared_ptr<ByteReader>> openFile(const std::filesystem::path& path) {
-    auto file = openRegular(path);
-    if (!file) return file.error();
+    VCP_TRY_ASSIGN(auto file, openRegular(path));
     struct stat info {};
-    if (::fstat(file->number(), &info) != 0)
+    if (::fstat(file.number(), &info) != 0)
         return Error{.code = ErrorCode::Io, .message = "its size cannot be asked", .file = path.string()};
     return std::shared_ptr<ByteReader>(
-        std::make_shared<LocalFile>(*std::move(file), static_cast<uint64_t>(info.st_size), path.string()));
+        std::make_shared<LocalFile>(std::move(file), uint64_t(info.st_size), path.string()));
 }
 
 Error brokenBytes(const std::string& file, std::string element, uint64_t byte, std::string message) {

@@ -2,9 +2,7 @@
 
 namespace vcp {
 
-Clearance::Clearance(int cells) : cells_(cells), side_(cells + 2) {
-    grown_.emplace_back(static_cast<size_t>(side_) * side_, 0);
-}
+Clearance::Clearance(int cells) : cells_(cells), side_(cells + 2) { grown_.emplace_back(size_t(side_) * side_, 0); }
 
 void Clearance::occupy(glm::ivec3 lower, int edge) {
     const uint64_t bits = columns(lower.x, edge);
@@ -14,8 +12,8 @@ void Clearance::occupy(glm::ivec3 lower, int edge) {
 
 int Clearance::of(glm::ivec3 lower, int edge) {
     for (int radius = 1; radius <= cells_; ++radius) {
-        if (static_cast<int>(grown_.size()) <= radius) grow();
-        if (meets(grown_[static_cast<size_t>(radius)], lower, edge)) return radius - 1;
+        if (int(grown_.size()) <= radius) grow();
+        if (meets(grown_[size_t(radius)], lower, edge)) return radius - 1;
     }
     return cells_;
 }
@@ -33,7 +31,7 @@ void Clearance::grow() {
     const std::vector<uint64_t>& in = grown_.back();
     const uint64_t all = columns(0, cells_);
     std::vector<uint64_t> wide(in.size(), 0), out(in.size(), 0);
-    const size_t side = static_cast<size_t>(side_);
+    const size_t side = size_t(side_);
     for (size_t i = 1; i + 1 < in.size(); ++i) {
         const uint64_t column = in[i - 1] | in[i] | in[i + 1];
         wide[i] = (column | column << 1 | column >> 1) & all;

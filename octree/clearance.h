@@ -26,7 +26,7 @@ private:
     [[nodiscard]] uint64_t columns(int x, int edge) const {
         return (edge >= 64 ? ~uint64_t{0} : (uint64_t{1} << edge) - 1) << x;
     }
-    [[nodiscard]] size_t row(int y, int z) const { return static_cast<size_t>(y + 1 + side_ * (z + 1)); }
+    [[nodiscard]] size_t row(int y, int z) const { return size_t(y + 1 + side_ * (z + 1)); }
 
     int cells_, side_;
     std::vector<std::vector<uint64_t>> grown_;  ///< one bit a cell, one word a row along x; a border of empty rows

@@ -19,9 +19,8 @@ struct NodePlace {
     [[nodiscard]] glm::ivec3 lower() const { return {x, y, z}; }
     [[nodiscard]] NodePlace child(uint32_t octant) const {
         const uint16_t half = edge / 2;
-        return {static_cast<uint16_t>(x + (octant & 1u ? half : 0)),
-                static_cast<uint16_t>(y + (octant & 2u ? half : 0)),
-                static_cast<uint16_t>(z + (octant & 4u ? half : 0)), half};
+        return {uint16_t(x + (octant & 1u ? half : 0)), uint16_t(y + (octant & 2u ? half : 0)),
+                uint16_t(z + (octant & 4u ? half : 0)), half};
     }
 };
 
@@ -34,7 +33,7 @@ inline std::vector<NodePlace> placesOf(const PageView& page) {
         if (nodeType(word) != kNodeInternal) return;
         for (uint32_t o = 0; o < 8; ++o) places[size_t{8} * (word & kNodePayloadMask) + o] = place.child(o);
     };
-    fill(page.header.root, {0, 0, 0, static_cast<uint16_t>(kSubcellsPerCell << page.header.log2Cells)});
+    fill(page.header.root, {0, 0, 0, uint16_t(kSubcellsPerCell << page.header.log2Cells)});
     for (size_t i = 0; i < places.size(); ++i) fill(page.nodes[i], places[i]);
     return places;
 }
@@ -72,7 +71,7 @@ struct CodecPage {
     /// Calls `visit(word, source word, place)` for the root and every node, in order, until something is wrong.
     template <class Visit>
     void forEachNode(Visit&& visit) {
-        const uint16_t edge = static_cast<uint16_t>(kSubcellsPerCell << header.log2Cells);
+        const uint16_t edge = uint16_t(kSubcellsPerCell << header.log2Cells);
         visit(header.root, source != nullptr ? source->header.root : 0u, NodePlace{0, 0, 0, edge});
         for (size_t i = 0; i < nodes.size() && !wrong; ++i) visit(nodes[i], sourceWord(i), places[i]);
     }

@@ -32,7 +32,7 @@ public:
             if (nodeType(word) == kNodeSoft) codeLeaf(word, place);
             if (nodeType(word) == kNodeHard) codeTriangles(hardLeafTriangles(page_, word));
         };
-        visit(page_.header.root, {0, 0, 0, static_cast<uint16_t>(kSubcellsPerCell << page_.header.log2Cells)});
+        visit(page_.header.root, {0, 0, 0, uint16_t(kSubcellsPerCell << page_.header.log2Cells)});
         for (size_t i = 0; i < places.size(); ++i) visit(page_.nodes[i], places[i]);
         return used_ == faces_.size() + vertices_.size();
     }
@@ -41,7 +41,7 @@ private:
     void codeLeaf(uint32_t word, const NodePlace& place) {
         const uint32_t axis = word >> kSoftAxisShift & 3u, first = word & kLeafIndexMask;
         for (int end = 0; end < 2; ++end) {
-            const uint32_t face = first + static_cast<uint32_t>(end);
+            const uint32_t face = first + uint32_t(end);
             if (faceDone_[face]) continue;
             faceDone_[face] = 1;
             ++used_;
@@ -116,12 +116,12 @@ private:
         int32_t green = 0;
         size_t size = 0;
         for (const size_t i : {size_t{1}, size_t{0}, size_t{2}, size_t{3}}) {
-            const int32_t before = static_cast<int32_t>(foretold >> 8 * i & 255u), lead = i == 0 || i == 2 ? green : 0;
-            int32_t more = static_cast<int32_t>(colour >> 8 * i & 255u) - before - lead;
+            const int32_t before = int32_t(foretold >> 8 * i & 255u), lead = i == 0 || i == 2 ? green : 0;
+            int32_t more = int32_t(colour >> 8 * i & 255u) - before - lead;
             channel_[kind][i][size].code(coder_, more);
             if (i == 1) green = std::clamp(more, -255, 255);
-            size = std::min<size_t>(2, static_cast<size_t>(std::bit_width(static_cast<unsigned>(std::abs(more)))) / 2);
-            result |= (static_cast<uint32_t>(before + lead + more) & 255u) << 8 * i;
+            size = std::min<size_t>(2, size_t(std::bit_width(unsigned(std::abs(more)))) / 2);
+            result |= (uint32_t(before + lead + more) & 255u) << 8 * i;
         }
         colour = result;
     }

@@ -23,7 +23,7 @@ public:
     /// `cells`: the page's edge in cells.
     explicit CornerStore(int cells)
         : side_(cells + 1),
-          number_(cells <= kMaxArrayCells ? static_cast<size_t>(side_) * side_ * side_ : 0, 0),
+          number_(cells <= kMaxArrayCells ? size_t(side_) * side_ * side_ : 0, 0),
           within_(16),
           values_(1) {}
 
@@ -31,7 +31,7 @@ public:
     Value& at(glm::ivec3 p) {
         uint32_t& number = inArray(p) ? number_[index(p)] : within_.findOrAdd(positionKey(p));
         if (number == 0) {
-            number = static_cast<uint32_t>(values_.size());
+            number = uint32_t(values_.size());
             values_.emplace_back();
         }
         return values_[number];
@@ -57,8 +57,8 @@ public:
             return;
         }
         const size_t here = index(p);
-        size_t stride = static_cast<size_t>(edge >> kMaxSubcellDepth);
-        for (int axis = 0; axis < 3; ++axis, stride *= static_cast<size_t>(side_)) {
+        size_t stride = size_t(edge >> kMaxSubcellDepth);
+        for (int axis = 0; axis < 3; ++axis, stride *= size_t(side_)) {
             beside[axis][0] = &values_[p[axis] >= edge ? number_[here - stride] : 0];
             beside[axis][1] = &values_[p[axis] + edge < kSubcellsPerCell * side_ ? number_[here + stride] : 0];
         }
@@ -71,8 +71,8 @@ private:
         return !number_.empty() && ((p.x | p.y | p.z) & (kSubcellsPerCell - 1)) == 0;
     }
     [[nodiscard]] size_t index(glm::ivec3 p) const {
-        return static_cast<size_t>((p.x >> kMaxSubcellDepth) +
-                                   side_ * ((p.y >> kMaxSubcellDepth) + side_ * (p.z >> kMaxSubcellDepth)));
+        return size_t((p.x >> kMaxSubcellDepth) +
+                      side_ * ((p.y >> kMaxSubcellDepth) + side_ * (p.z >> kMaxSubcellDepth)));
     }
 
     int side_;

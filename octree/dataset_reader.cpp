@@ -16,13 +16,9 @@
 
 namespace vcp {
 
-double Dataset::cellOf(uint32_t level) const {
-    return std::ldexp(header.cell, static_cast<int>(header.levels - 1 - level));
-}
+double Dataset::cellOf(uint32_t level) const { return std::ldexp(header.cell, int(header.levels - 1 - level)); }
 
-double Dataset::edgeOf(const PageEntry& page) const {
-    return std::ldexp(cellOf(page.level), static_cast<int>(header.log2Cells));
-}
+double Dataset::edgeOf(const PageEntry& page) const { return std::ldexp(cellOf(page.level), int(header.log2Cells)); }
 
 glm::dvec3 Dataset::originOf(const PageEntry& page) const {
     return glm::dvec3(header.origin[0], header.origin[1], header.origin[2]) +
@@ -97,25 +93,23 @@ Result<Dataset> readWhole(const ByteReader& reader, const FileHeader& header) {
 }  // namespace
 
 Result<Dataset> readDataset(const ByteReader& reader) {
-    const auto header = readHeader(reader);
-    if (!header) return header.error();
-    return readWhole(reader, *header);
+    VCP_TRY_ASSIGN(const auto header, readHeader(reader));
+    return readWhole(reader, header);
 }
 
 Result<Dataset> readDatasetStart(const ByteReader& reader, uint64_t leadBytes) {
-    const auto header = readHeader(reader);
-    if (!header) return header.error();
-    if (blocksOf(header->pages) * kBlockBytes <= wholeDirectoryBytes(leadBytes)) return readWhole(reader, *header);
-    Dataset dataset{*header, {}};
+    VCP_TRY_ASSIGN(const auto header, readHeader(reader));
+    if (blocksOf(header.pages) * kBlockBytes <= wholeDirectoryBytes(leadBytes)) return readWhole(reader, header);
+    Dataset dataset{header, {}};
     std::vector<std::byte> lead(leadBytes - kDirectoryOffset);
     VCP_TRY(reader.read(kDirectoryOffset, lead));
-    VCP_TRY(checkCommitRecord(reader, *header, {}));
+    VCP_TRY(checkCommitRecord(reader, header, {}));
     try {
-        dataset.pages.expect(header->pages);
+        dataset.pages.expect(header.pages);
     } catch (const std::bad_alloc&) {
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("a directory of {} pages needs more addresses than this process may have",
-                                            header->pages),
+                                            header.pages),
                      .file = reader.name()};
     }
     for (uint64_t b = 0; b < lead.size() / kBlockBytes; ++b)

@@ -19,7 +19,7 @@ Result<void> untilAllAreTaken(std::span<const std::byte> bytes, const std::files
         const ssize_t n = write(bytes);
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) return systemError(file, "write failed", n == 0 ? EIO : errno, whenFull);
-        bytes = bytes.subspan(static_cast<size_t>(n));
+        bytes = bytes.subspan(size_t(n));
     }
     return {};
 }
@@ -37,7 +37,7 @@ Result<void> writeAll(int descriptor, uint64_t offset, std::span<const std::byte
                       const std::filesystem::path& file, const char* whenFull) {
     const uint64_t end = offset + bytes.size();
     return untilAllAreTaken(bytes, file, whenFull, [&](std::span<const std::byte> left) {
-        return ::pwrite(descriptor, left.data(), left.size(), static_cast<off_t>(end - left.size()));
+        return ::pwrite(descriptor, left.data(), left.size(), off_t(end - left.size()));
     });
 }
 

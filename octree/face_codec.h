@@ -15,9 +15,9 @@ namespace vcp {
 /// Corner c of the face at `end` of `axis` of the unit cube.
 inline glm::ivec3 faceCorner(uint32_t axis, int end, int c) {
     glm::ivec3 corner;
-    corner[static_cast<int>(axis)] = end;
-    corner[static_cast<int>((axis + 1) % 3)] = c & 1;
-    corner[static_cast<int>((axis + 2) % 3)] = c >> 1;
+    corner[int(axis)] = end;
+    corner[int((axis + 1) % 3)] = c & 1;
+    corner[int((axis + 2) % 3)] = c >> 1;
     return corner;
 }
 
@@ -58,7 +58,7 @@ private:
     using Direction = glm::ivec3;
 
     static uint64_t leafKey(glm::ivec3 lower, int edge) {
-        return positionKey(lower) | uint64_t(std::countr_zero(static_cast<unsigned>(edge))) << 48;
+        return positionKey(lower) | uint64_t(std::countr_zero(unsigned(edge))) << 48;
     }
 
     void codeRun(std::vector<Leaf>& order, uint32_t first) {
@@ -74,7 +74,7 @@ private:
             *order[i].word |= axis << kSoftAxisShift | nextFace_;
             codeFace(order[i].place, axis, 0, sourceFace);
             glm::ivec3 beside = order[i].place.lower();
-            beside[static_cast<int>(axis)] += order[i].place.edge;
+            beside[int(axis)] += order[i].place.edge;
             const uint32_t* next = leaves_.find(leafKey(beside, order[i].place.edge));
             bool goesOn = false;
             if (next != nullptr && !done_[*next]) {
@@ -183,9 +183,7 @@ private:
     void codeNew(uint32_t& code, const Foretold& f, glm::ivec3 position, int edge) {
         // The side is coded first, then the direction, then the distance: each helps to predict the next.
         const int certainty =
-            f.neighbours == 0
-                ? 0
-                : std::min(4, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(f.distance) / 32))) + 1);
+            f.neighbours == 0 ? 0 : std::min(4, int(std::bit_width(unsigned(std::abs(f.distance) / 32))) + 1);
         uint32_t side = code >> 31;
         codeSide(side, f.distance < 0 ? 1u : 0u, sideNew_[certainty], false);
         const bool negative = (side ^ flip_) != 0;
@@ -200,12 +198,12 @@ private:
                        f.neighbours;
         }
         if (negative) foretold = -foretold;
-        foretold = std::clamp(foretold, 0, static_cast<int>(kPackedDistanceMax));
-        int32_t more = static_cast<int32_t>(code & kPackedDistanceMax) - foretold;
+        foretold = std::clamp(foretold, 0, int(kPackedDistanceMax));
+        int32_t more = int32_t(code & kPackedDistanceMax) - foretold;
         distance_[context][sizes].code(coder_, more);
         const int distance = foretold + more;
-        if (distance < 0 || distance > static_cast<int>(kPackedDistanceMax)) page_.wrong = true;
-        code = (static_cast<uint32_t>(distance) & kPackedDistanceMax) | u << 11 | v << 21 | side << 31;
+        if (distance < 0 || distance > int(kPackedDistanceMax)) page_.wrong = true;
+        code = (uint32_t(distance) & kPackedDistanceMax) | u << 11 | v << 21 | side << 31;
         corners_.at(position) = {code ^ flip_ << 31, edge, glm::i16vec3(n)};
     }
 
@@ -223,17 +221,16 @@ private:
     /// Returns how well it was foretold, 0 (best) to 3.
     uint32_t codeDirection(uint32_t& u, uint32_t& v, Direction normal, int context) {
         const glm::ivec2 foretold = gridPoint(normal);
-        int32_t du = static_cast<int32_t>(u) - foretold.x, dv = static_cast<int32_t>(v) - foretold.y;
-        if (Coder::kEncodes) unfold(static_cast<int32_t>(u), static_cast<int32_t>(v), foretold, du, dv);
+        int32_t du = int32_t(u) - foretold.x, dv = int32_t(v) - foretold.y;
+        if (Coder::kEncodes) unfold(int32_t(u), int32_t(v), foretold, du, dv);
         direction_[context][0].code(coder_, du);
-        const uint32_t size = std::min(3, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(du)))) / 2);
+        const uint32_t size = std::min(3, int(std::bit_width(unsigned(std::abs(du)))) / 2);
         direction_[context][1 + size].code(coder_, dv);
         const glm::ivec2 point = folded(foretold + glm::ivec2(du, dv));
         if (std::min(point.x, point.y) < 0 || std::max(point.x, point.y) > 1023) page_.wrong = true;
-        u = static_cast<uint32_t>(point.x) & 1023u;
-        v = static_cast<uint32_t>(point.y) & 1023u;
-        return std::max(size, static_cast<uint32_t>(std::min(
-                                  3, static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(dv)))) / 2)));
+        u = uint32_t(point.x) & 1023u;
+        v = uint32_t(point.y) & 1023u;
+        return std::max(size, uint32_t(std::min(3, int(std::bit_width(unsigned(std::abs(dv)))) / 2)));
     }
 
     // Points beyond an edge of the octahedron's square lie on the other half of that edge.
@@ -264,7 +261,7 @@ private:
     static int steps(int slope) { return slope * 1182 / 4096; }
 
     static int signedDistance(uint32_t code) {
-        const int d = static_cast<int>(code & kPackedDistanceMax);
+        const int d = int(code & kPackedDistanceMax);
         return code >> 31 ? -d : d;
     }
     static Direction oriented(uint32_t code) {
@@ -274,19 +271,19 @@ private:
     /// Decodes the direction of a code. Square root, division and product are correctly rounded wherever doubles are,
     /// and no product can be fused with a sum.
     static Direction unpacked(uint32_t code) {
-        int x = 2 * static_cast<int>(code >> 11 & 1023u) - 1023, y = 2 * static_cast<int>(code >> 21 & 1023u) - 1023;
+        int x = 2 * int(code >> 11 & 1023u) - 1023, y = 2 * int(code >> 21 & 1023u) - 1023;
         const int z = 1023 - std::abs(x) - std::abs(y);
         const int fold = std::max(-z, 0);
         x += x >= 0 ? -fold : fold;
         y += y >= 0 ? -fold : fold;
-        const double scale = 4096.0 / std::sqrt(static_cast<double>(x * x + y * y + z * z));
-        return {static_cast<int>(x * scale), static_cast<int>(y * scale), static_cast<int>(z * scale)};
+        const double scale = 4096.0 / std::sqrt(double(x * x + y * y + z * z));
+        return {int(x * scale), int(y * scale), int(z * scale)};
     }
     static glm::ivec2 gridPoint(Direction n) {
         const int norm = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
         if (norm == 0) return {512, 512};
         const double scale = 1023.0 / norm;
-        int x = static_cast<int>(n.x * scale), y = static_cast<int>(n.y * scale);
+        int x = int(n.x * scale), y = int(n.y * scale);
         if (n.z < 0) {
             const int before = x;
             x = (1023 - std::abs(y)) * (x >= 0 ? 1 : -1);
@@ -297,8 +294,7 @@ private:
     /// Converts a corner's vector to the unit of another leaf.
     static uint32_t rescaled(const Corner& corner, int edge) {
         if (corner.edge == edge) return corner.code;
-        const uint32_t d =
-            (corner.code & kPackedDistanceMax) * static_cast<uint32_t>(corner.edge) / static_cast<uint32_t>(edge);
+        const uint32_t d = (corner.code & kPackedDistanceMax) * uint32_t(corner.edge) / uint32_t(edge);
         return (corner.code & ~kPackedDistanceMax) | std::min(d, kPackedDistanceMax);
     }
 

@@ -69,7 +69,7 @@ private:
         if (h_.method != Method::Certified && !isPaper_)
             return fail(140,
                         fmt::format("it was built by method {}, which this program does not know: use a newer program",
-                                    static_cast<uint32_t>(h_.method)),
+                                    uint32_t(h_.method)),
                         ErrorCode::Unsupported);
         if (isPaper_ && (h_.levels != 1 || h_.pages != 1 || h_.flags != 0))
             return fail(128, "a file of this method has one page");
@@ -94,13 +94,12 @@ private:
         if (!(h_.cell > 0) || !std::isfinite(h_.cell) || !finite(h_.origin, 3) || !finite(h_.boundsMin, 3) ||
             !finite(h_.boundsMax, 3))
             return fail(32, "origin, cell or bounds are not finite");
-        const double edge = std::ldexp(h_.cell, static_cast<int>(h_.log2Cells + h_.levels - 1));
+        const double edge = std::ldexp(h_.cell, int(h_.log2Cells + h_.levels - 1));
         for (int i = 0; i < 3; ++i) {
             if (!std::isfinite(edge) || !std::isfinite(h_.origin[i] + edge))
                 return fail(offsetof(FileHeader, cell), "the cell is too large: the root page has no end");
             if (h_.boundsMin[i] > h_.boundsMax[i])
-                return fail(offsetof(FileHeader, boundsMin) + 8 * static_cast<uint64_t>(i),
-                            "the bounds end before they begin");
+                return fail(offsetof(FileHeader, boundsMin) + 8 * uint64_t(i), "the bounds end before they begin");
         }
         return {};
     }
@@ -152,9 +151,9 @@ private:
             return fail(at + offsetof(PaperParameters, mergeThreshold), "the method's merge threshold is not a number");
         if (p.growRounds < -1)
             return fail(at + offsetof(PaperParameters, growRounds), "the method's rounds of growing are out of range");
-        if (p.packing > static_cast<uint32_t>(PaperPacking::Octahedral))
+        if (p.packing > uint32_t(PaperPacking::Octahedral))
             return fail(at + offsetof(PaperParameters, packing), "the method's packing is not known");
-        if (p.mergeScheme > static_cast<uint32_t>(PaperScheme::Longer))
+        if (p.mergeScheme > uint32_t(PaperScheme::Longer))
             return fail(at + offsetof(PaperParameters, mergeScheme), "the method's merge scheme is not known");
         if (p.safeEmpty > 1)
             return fail(at + offsetof(PaperParameters, safeEmpty), "the method's kind of empty nodes is not known");

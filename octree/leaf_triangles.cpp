@@ -48,7 +48,7 @@ bool CubeTest::touches(glm::i32vec3 lower, int edge) {
     const int64_t cx = 2 * int64_t{lower.x} + edge, cy = 2 * int64_t{lower.y} + edge, cz = 2 * int64_t{lower.z} + edge;
     const int64_t plane = 2 * offset_ - (normal_.x * cx + normal_.y * cy + normal_.z * cz);
     if ((plane < 0 ? -plane : plane) > edge * normalSize_) return false;
-    const double x = static_cast<double>(cx), y = static_cast<double>(cy), z = static_cast<double>(cz), half = edge;
+    const double x = double(cx), y = double(cy), z = double(cz), half = edge;
     int apart = 0;
     for (int n = 0; n < kAxes; ++n) {
         const double centre = along_[0][n] * x + along_[1][n] * y + along_[2][n] * z, reach = half * size_[n];
@@ -60,7 +60,7 @@ bool CubeTest::touches(glm::i32vec3 lower, int edge) {
 NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)
     : nodes_(nodes),
       cells_(1 << log2Cells),
-      log2Cells_(static_cast<int>(log2Cells)),
+      log2Cells_(int(log2Cells)),
       word_(size_t{1} << (3 * log2Cells), kNodeEmpty << kNodeTypeShift),
       size_(word_.size()) {
     fillCells(root, glm::i32vec3(0), log2Cells);
@@ -80,7 +80,7 @@ void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge)
             size_t i = cell(lower.x, y, z);
             for (int x = 0; x < edge; ++x, ++i) {
                 word_[i] = word;
-                size_[i] = static_cast<uint8_t>(log2Edge);
+                size_[i] = uint8_t(log2Edge);
             }
         }
 }

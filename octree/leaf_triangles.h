@@ -17,7 +17,7 @@
 namespace vcp {
 
 /// 2^kCellShift steps of the lattice are a cell.
-inline constexpr int kCellShift = std::countr_zero(static_cast<unsigned>(kLatticePerCell));
+inline constexpr int kCellShift = std::countr_zero(unsigned(kLatticePerCell));
 
 /// Exact overlap of a closed triangle with closed cubes whose bounding boxes overlap its own: the separating axis
 /// test (Akenine-Moller 2001).
@@ -60,7 +60,7 @@ public:
 private:
     void fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge);
     [[nodiscard]] size_t cell(int x, int y, int z) const {
-        return static_cast<size_t>(x + (y << log2Cells_)) + (static_cast<size_t>(z) << (2 * log2Cells_));
+        return size_t(x + (y << log2Cells_)) + (size_t(z) << (2 * log2Cells_));
     }
     template <class Found>
     uint64_t withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 high, uint32_t word, glm::i32vec3 lower,
@@ -136,7 +136,7 @@ uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 h
         const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);
         for (uint32_t octants = x & y & z; octants != 0; octants &= octants - 1) {
             const int o = std::countr_zero(octants);
-            stack[waiting++] = {nodes_[size_t{8} * group + static_cast<uint32_t>(o)], half,
+            stack[waiting++] = {nodes_[size_t{8} * group + uint32_t(o)], half,
                                 v.lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2)};
         }
     }

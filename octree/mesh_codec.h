@@ -84,7 +84,7 @@ private:
         bool fresh = c == kNone;
         coder_.bit(fresh_[ends][from][to], fresh);
         if (fresh) {
-            c = static_cast<uint32_t>(positions_.size());
+            c = uint32_t(positions_.size());
             return codeVertex(gate);
         }
         if (next != kNone) {
@@ -109,7 +109,7 @@ private:
 
     /// Codes a vertex by its number, counted from the latest.
     void codeKnown(uint32_t& c) {
-        const uint32_t latest = static_cast<uint32_t>(positions_.size());
+        const uint32_t latest = uint32_t(positions_.size());
         uint32_t back = latest - 1 - c;
         known_.code(coder_, back);
         c = latest - 1 - back;
@@ -135,7 +135,7 @@ private:
                     codeKnown(t[i]);
                 continue;
             }
-            t[i] = static_cast<uint32_t>(positions_.size());
+            t[i] = uint32_t(positions_.size());
             const glm::i32vec3 near = i > 0                ? positions_[t[0]]
                                       : positions_.empty() ? glm::i32vec3(0)
                                                            : positions_.back();
@@ -157,25 +157,24 @@ private:
         const glm::i32vec3 a = positions_[gate.from], b = positions_[gate.to], o = positions_[gate.opposite];
         const glm::i32vec3 foretold = a + b - o;
         glm::i32vec3 more(0);
-        if constexpr (Coder::kEncodes) more = source_.takeThird(static_cast<uint32_t>(positions_.size())) - foretold;
+        if constexpr (Coder::kEncodes) more = source_.takeThird(uint32_t(positions_.size())) - foretold;
         const glm::i32vec3 u = b - a, v = o - a;
         const int32_t size = std::max(largest(u), largest(v));
         const WideVector n = areaNormal(a, b, o);
         const WideVector m(std::abs(n.x), std::abs(n.y), std::abs(n.z));
         const int k = m.x >= m.y && m.x >= m.z ? 0 : m.y >= m.z ? 1 : 2, i = (k + 1) % 3, j = (k + 2) % 3;
-        const uint32_t scale =
-            static_cast<uint32_t>(std::clamp(static_cast<int>(std::bit_width(static_cast<uint32_t>(size))) - 7, 0, 5));
+        const uint32_t scale = uint32_t(std::clamp(int(std::bit_width(uint32_t(size))) - 7, 0, 5));
         const std::array<bool, 3> known = codeLevel(gate, foretold, more);
-        if (!known[static_cast<size_t>(i)]) vertex_[scale][0].code(coder_, more[i]);
+        if (!known[size_t(i)]) vertex_[scale][0].code(coder_, more[i]);
         const uint32_t spread = category(more[i], scale);
-        if (!known[static_cast<size_t>(j)]) vertex_[scale][1 + spread].code(coder_, more[j]);
-        if (!known[static_cast<size_t>(k)]) {
+        if (!known[size_t(j)]) vertex_[scale][1 + spread].code(coder_, more[j]);
+        if (!known[size_t(k)]) {
             // Where the surface continues flat, the third coordinate follows from the other two.
             int32_t flat = 0;
             if (size <= kFlatSteps && n[k] != 0)
-                flat = static_cast<int32_t>(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) +
-                                              n[j] * std::clamp(more[j], -kFlatSteps, kFlatSteps)) /
-                                            n[k]);
+                flat = int32_t(-(n[i] * std::clamp(more[i], -kFlatSteps, kFlatSteps) +
+                                 n[j] * std::clamp(more[j], -kFlatSteps, kFlatSteps)) /
+                               n[k]);
             int32_t rest = more[k] - flat;
             height_[scale][std::max(spread, category(more[j], scale))].code(coder_, rest);
             more[k] = rest + flat;
@@ -202,7 +201,7 @@ private:
                                   (corner[1][axis] == corner[2][axis] ? 4u : 0u);
             coder_.symbol(level_[ends], which[axis]);
             if (which[axis] > 3) page_.wrong = true;
-            known[static_cast<size_t>(axis)] = which[axis] != 0;
+            known[size_t(axis)] = which[axis] != 0;
             if (which[axis] != 0) more[axis] = corner[(which[axis] - 1) % 3][axis] - foretold[axis];
         }
         return known;
@@ -210,28 +209,26 @@ private:
 
     /// Classes how far off a prediction was, against the edges' size: 0 to 3.
     static uint32_t category(int32_t more, uint32_t scale) {
-        const int bits =
-            static_cast<int>(std::bit_width(static_cast<uint32_t>(std::abs(more)))) - static_cast<int>(scale) - 3;
-        return static_cast<uint32_t>(std::clamp(bits, 0, 3));
+        const int bits = int(std::bit_width(uint32_t(std::abs(more)))) - int(scale) - 3;
+        return uint32_t(std::clamp(bits, 0, 3));
     }
     static int32_t largest(glm::i32vec3 v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
 
     void place(glm::i32vec3 position) {
-        const uint32_t number = static_cast<uint32_t>(positions_.size());
+        const uint32_t number = uint32_t(positions_.size());
         const glm::i32vec3 p = position + kLatticeBias;
         if (number >= page_.header.vertices || std::min(p.x, std::min(p.y, p.z)) < 0 ||
-            std::max(p.x, std::max(p.y, p.z)) > static_cast<int>(kField21Mask)) {
+            std::max(p.x, std::max(p.y, p.z)) > int(kField21Mask)) {
             page_.wrong = true;
             return;
         }
-        page_.vertices[number] =
-            pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
+        page_.vertices[number] = pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z));
         positions_.push_back(position);
         inHard_.push_back(places_.typeAt(position) == kNodeHard ? 1 : 0);
     }
 
     void add(uint32_t a, uint32_t b, uint32_t c, uint32_t number) {
-        if constexpr (Coder::kEncodes) source_.done(number, static_cast<uint32_t>(triangles_.size()));
+        if constexpr (Coder::kEncodes) source_.done(number, uint32_t(triangles_.size()));
         triangles_.push_back({a, b, c});
         const glm::i32vec3 u = positions_[b] - positions_[a], v = positions_[c] - positions_[a];
         if (std::max(largest(u), std::max(largest(v), largest(u - v))) > kMaxEdgeSteps) page_.wrong = true;
@@ -351,12 +348,11 @@ private:
         bool other = point.u != foretold.u || point.v != foretold.v;
         coder_.bit(otherNormal_[inHard_[v]], other);
         if (other) {
-            int32_t du = static_cast<int32_t>(point.u) - static_cast<int32_t>(foretold.u),
-                    dv = static_cast<int32_t>(point.v) - static_cast<int32_t>(foretold.v);
+            int32_t du = int32_t(point.u) - int32_t(foretold.u), dv = int32_t(point.v) - int32_t(foretold.v);
             const uint32_t context = (crease != 0 ? 1u : 0u) + (bent ? 2u : 0u);
             normal_[context].code(coder_, du);
             normal_[4 + context].code(coder_, dv);
-            point = {foretold.u + static_cast<uint32_t>(du), foretold.v + static_cast<uint32_t>(dv)};
+            point = {foretold.u + uint32_t(du), foretold.v + uint32_t(dv)};
             if (std::max(point.u, point.v) > kNormalSteps) {
                 page_.wrong = true;
                 return;

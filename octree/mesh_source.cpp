@@ -11,7 +11,7 @@ MeshSource::MeshSource(const PageView& page) : positions_(page.vertices), newVer
     collect(page);
     newTriangle_.assign(vertices_.size(), kNone);
     oldVertex_.reserve(page.vertices.size());
-    linkVertices(static_cast<uint32_t>(page.vertices.size()));
+    linkVertices(uint32_t(page.vertices.size()));
 }
 
 void MeshSource::collect(const PageView& page) {
@@ -29,7 +29,7 @@ void MeshSource::collect(const PageView& page) {
             uint32_t& number = numbers.findOrAdd(key);  // the number plus 1
             if (number == 0) {
                 vertices_.push_back(t);
-                number = static_cast<uint32_t>(vertices_.size());
+                number = uint32_t(vertices_.size());
             }
             triangleOf_[r] = number - 1;
         }

@@ -22,7 +22,7 @@ public:
 
     /// Whether the page has triangles that name a vertex twice, or edges that are too long.
     [[nodiscard]] bool wrong() const { return wrong_; }
-    [[nodiscard]] uint32_t triangles() const { return static_cast<uint32_t>(vertices_.size()); }
+    [[nodiscard]] uint32_t triangles() const { return uint32_t(vertices_.size()); }
     /// The vertices of a triangle, as the page numbers them.
     [[nodiscard]] const Index3& vertices(uint32_t triangle) const { return vertices_[triangle]; }
     /// The new number of a vertex of the page, or kNone.

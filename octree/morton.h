@@ -28,7 +28,7 @@ inline glm::u32vec3 mortonDecode(uint64_t code) {
         v = (v | v >> 4) & 0x100f00f00f00f00f;
         v = (v | v >> 8) & 0x1f0000ff0000ff;
         v = (v | v >> 16) & 0x1f00000000ffff;
-        return static_cast<uint32_t>((v | v >> 32) & 0x1fffff);
+        return uint32_t((v | v >> 32) & 0x1fffff);
     };
     return {gather(code), gather(code >> 1), gather(code >> 2)};
 }

@@ -17,11 +17,11 @@ public:
     /// Codes types breadth first, so that what is known of a node's surroundings predicts it; then clearances.
     /// Soft leaves' words still lack axis and faces, hard leaves' words their triangles.
     void run() {
-        const int log2Cells = static_cast<int>(page_.header.log2Cells);
-        grid_.resize(static_cast<size_t>(log2Cells) + 1);
-        for (int d = 0; d <= log2Cells; ++d) grid_[static_cast<size_t>(d)].assign(size_t{1} << (3 * d), kNodeEmpty);
+        const int log2Cells = int(page_.header.log2Cells);
+        grid_.resize(size_t(log2Cells) + 1);
+        for (int d = 0; d <= log2Cells; ++d) grid_[size_t(d)].assign(size_t{1} << (3 * d), kNodeEmpty);
         page_.places.resize(page_.nodes.size());
-        const NodePlace root{0, 0, 0, static_cast<uint16_t>(kSubcellsPerCell << log2Cells)};
+        const NodePlace root{0, 0, 0, uint16_t(kSubcellsPerCell << log2Cells)};
         page_.header.root = node(page_.source != nullptr ? page_.source->header.root : 0, root, 0, 0);
         for (uint32_t g = 0; g < page_.header.groups && !page_.wrong; ++g) group(g);
         if (groupsMade_ != page_.header.groups) page_.wrong = true;
@@ -67,17 +67,15 @@ private:
     /// Returns the type of the node of the same depth beside a node; kNodeEmpty outside of the page and, at depths
     /// below the cells, kNodeInternal.
     [[nodiscard]] uint32_t typeBeside(const NodePlace& place, int depth, int axis, bool upper) const {
-        if (static_cast<size_t>(depth) >= grid_.size()) return kNodeInternal;
+        if (size_t(depth) >= grid_.size()) return kNodeInternal;
         const int n = 1 << depth;
         glm::ivec3 p = place.lower() / int{place.edge};
         p[axis] += upper ? 1 : -1;
-        return p[axis] < 0 || p[axis] >= n
-                   ? kNodeEmpty
-                   : grid_[static_cast<size_t>(depth)][static_cast<size_t>(p.x + n * (p.y + n * p.z))];
+        return p[axis] < 0 || p[axis] >= n ? kNodeEmpty : grid_[size_t(depth)][size_t(p.x + n * (p.y + n * p.z))];
     }
 
     uint32_t node(uint32_t source, const NodePlace& place, int depth, uint32_t context) {
-        const int cellDepth = static_cast<int>(page_.header.log2Cells);
+        const int cellDepth = int(page_.header.log2Cells);
         const uint32_t scale = depth < cellDepth ? 0 : depth == cellDepth ? 1 : 2;
         bool occupied = nodeType(source) != kNodeEmpty;
         coder_.bit(occupied_[scale][context], occupied);
@@ -89,37 +87,34 @@ private:
         last_ = (last_ << 2 | type) & 15u;
         uint32_t word = type << kNodeTypeShift;
         if (type == kNodeInternal) {
-            if (depth >= cellDepth + static_cast<int>(kMaxSubcellDepth) || groupsMade_ >= page_.header.groups) {
+            if (depth >= cellDepth + int(kMaxSubcellDepth) || groupsMade_ >= page_.header.groups) {
                 page_.wrong = true;
                 return word;
             }
-            depth_[groupsMade_] = static_cast<uint8_t>(depth + 1);
+            depth_[groupsMade_] = uint8_t(depth + 1);
             parents_.push_back(place);
             if (Coder::kEncodes) page_.groupSource.push_back(source & kNodePayloadMask);
             word |= groupsMade_++;
         }
         if (type == kNodeSoft) word |= codes(source, place);
-        if (static_cast<size_t>(depth) < grid_.size()) mark(place, depth, type);
+        if (size_t(depth) < grid_.size()) mark(place, depth, type);
         return word;
     }
 
     /// Marks a node; a leaf covers the nodes below it, too.
     void mark(const NodePlace& place, int depth, uint32_t type) {
-        const int last = type == kNodeInternal ? depth : static_cast<int>(grid_.size()) - 1;
+        const int last = type == kNodeInternal ? depth : int(grid_.size()) - 1;
         for (int d = depth; d <= last; ++d) {
             const int n = 1 << d, edge = (kSubcellsPerCell << page_.header.log2Cells) >> d;
             const glm::ivec3 low = place.lower() / edge, high = low + std::max(1, place.edge / edge);
             for (int z = low.z; z < high.z; ++z)
                 for (int y = low.y; y < high.y; ++y)
-                    for (int x = low.x; x < high.x; ++x)
-                        grid_[static_cast<size_t>(d)][static_cast<size_t>(x + n * (y + n * z))] =
-                            static_cast<uint8_t>(type);
+                    for (int x = low.x; x < high.x; ++x) grid_[size_t(d)][size_t(x + n * (y + n * z))] = uint8_t(type);
         }
     }
 
     uint32_t codes(uint32_t source, const NodePlace& place) {
-        const int size =
-            std::min(3, static_cast<int>(std::bit_width(static_cast<unsigned>(place.edge / kSubcellsPerCell))));
+        const int size = std::min(3, int(std::bit_width(unsigned(place.edge / kSubcellsPerCell))));
         uint32_t wall = source >> kSoftWallShift & kSoftWallMask, dip = source >> kSoftDipShift & 3u;
         coder_.symbol(dip_[size][lastDip_], dip);
         if (dip > 3u) page_.wrong = true;
@@ -146,13 +141,13 @@ private:
             const int least = foretold && place.edge >= kSubcellsPerCell
                                   ? clearance.of(place.lower() / kSubcellsPerCell, place.edge / kSubcellsPerCell)
                                   : 0;
-            const int foretoldValue = least * static_cast<int>(kClearancePerCell);
-            int32_t more = static_cast<int32_t>(source & kNodePayloadMask) - foretoldValue;
+            const int foretoldValue = least * int(kClearancePerCell);
+            int32_t more = int32_t(source & kNodePayloadMask) - foretoldValue;
             const size_t size = place.edge >= kSubcellsPerCell ? 0 : 1;
             clearance_[size][std::min(least, 3)].code(coder_, more);
             const int64_t value = int64_t{foretoldValue} + more;
             if (value < 0 || value > int64_t{kNodePayloadMask}) page_.wrong = true;
-            word |= static_cast<uint32_t>(value) & kNodePayloadMask;
+            word |= uint32_t(value) & kNodePayloadMask;
         });
     }
 

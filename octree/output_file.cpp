@@ -53,10 +53,10 @@ std::vector<std::byte> startOf(int descriptor) {
     std::vector<std::byte> start(kStartBytes);
     size_t got = 0;
     while (got < start.size()) {
-        const ssize_t n = ::pread(descriptor, start.data() + got, start.size() - got, static_cast<off_t>(got));
+        const ssize_t n = ::pread(descriptor, start.data() + got, start.size() - got, off_t(got));
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) break;
-        got += static_cast<size_t>(n);
+        got += size_t(n);
     }
     start.resize(got);
     return start;
@@ -121,8 +121,7 @@ Result<Partial> createPartial(const fs::path& output, const fs::path& target, bo
         fs::path name = target;
         name += number == 1 ? ".partial" : fmt::format(".partial.{}", number);
         if (isMarked) {
-            const auto removed = removeLeftover(output, name);
-            if (!removed) return removed.error();
+            VCP_TRY(removeLeftover(output, name));
         }
         FileDescriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
         if (!file.isOpen() && errno == EEXIST) continue;
@@ -212,14 +211,11 @@ Result<OutputFile> OutputFile::create(const fs::path& output, OutputKind kind, c
         if (!made.file_.isOpen()) return systemError("standard output", "cannot be written", errno);
         return made;
     }
-    auto target = linkTarget(output);
-    if (!target) return target.error();
-    made.target_ = *std::move(target);
+    VCP_TRY_ASSIGN(made.target_, linkTarget(output));
     VCP_TRY(checkReplaced(output, made.target_, kind, rules));
-    auto partial = createPartial(output, made.target_, isMarked(kind));
-    if (!partial) return partial.error();
-    made.partial_ = std::move(partial->name);
-    made.file_ = std::move(partial->file);
+    VCP_TRY_ASSIGN(auto partial, createPartial(output, made.target_, isMarked(kind)));
+    made.partial_ = std::move(partial.name);
+    made.file_ = std::move(partial.file);
     if (isMarked(kind)) VCP_TRY(made.write(0, std::as_bytes(std::span(kPartialMark))));
     return made;
 }
@@ -261,7 +257,7 @@ Result<void> OutputFile::commit() {
     VCP_TRY(checkReplaced(output_, target_, kind_, rules_));
     // The new file takes over the permissions of the file that it replaces.
     struct stat there {};
-    if (::stat(target_.c_str(), &there) == 0) (void)::fchmod(file_.number(), there.st_mode & 0777);
+    if (::stat(target_.c_str(), &there) == 0) static_cast<void>(::fchmod(file_.number(), there.st_mode & 0777));
     if (::rename(partial_.c_str(), target_.c_str()) != 0)
         return systemError(output_, "cannot rename the finished file", errno);
     partial_.clear();
@@ -276,10 +272,9 @@ Result<void> OutputFile::commit() {
 
 Result<void> writeFile(const fs::path& output, OutputKind kind, std::span<const std::byte> bytes,
                        const OutputRules& rules) {
-    auto file = OutputFile::create(output, kind, rules);
-    if (!file) return file.error();
-    VCP_TRY(file->append(bytes));
-    return file->commit();
+    VCP_TRY_ASSIGN(auto file, OutputFile::create(output, kind, rules));
+    VCP_TRY(file.append(bytes));
+    return file.commit();
 }
 
 Result<void> writeFile(const fs::path& output, OutputKind kind, std::string_view text, const OutputRules& rules) {

@@ -23,9 +23,7 @@ glm::dvec2 octahedral(glm::dvec3 n) {
     return {x, y};
 }
 
-uint32_t quantize(double unit, uint32_t steps) {
-    return static_cast<uint32_t>(std::lround(std::clamp(unit, 0.0, 1.0) * steps));
-}
+uint32_t quantize(double unit, uint32_t steps) { return uint32_t(std::lround(std::clamp(unit, 0.0, 1.0) * steps)); }
 
 }  // namespace
 

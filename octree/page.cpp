@@ -57,7 +57,7 @@ private:
                 if (child >= page_.header.groups || int64_t{child} <= group || depth_[child] != 0xff)
                     return broken(byte, "node names a wrong group of children");
                 if (depth >= maxDepth) return broken(byte, "nodes are nested too deeply");
-                depth_[child] = static_cast<uint8_t>(depth + 1);
+                depth_[child] = uint8_t(depth + 1);
                 return {};
             }
             case kNodeSoft:

@@ -62,7 +62,7 @@ Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std
 /// The parts of a node word.
 inline uint32_t nodeType(uint32_t node) { return node >> kNodeTypeShift; }
 inline uint32_t emptyNode(double clearanceCells) {
-    return kNodeEmpty << kNodeTypeShift | static_cast<uint32_t>(clearanceCells * double(kClearancePerCell));
+    return kNodeEmpty << kNodeTypeShift | uint32_t(clearanceCells * double(kClearancePerCell));
 }
 inline double nodeClearance(uint32_t node) { return (node & kNodePayloadMask) / double(kClearancePerCell); }
 

@@ -60,8 +60,7 @@ PageDirectory& PageDirectory::operator=(const PageDirectory& other) {
         const size_t first = b * kEntriesPerBlock, count = std::min<size_t>(kEntriesPerBlock, size() - first);
         std::copy_n(other.sparse_.data() + first, count, sparse_.data() + first);
         for (size_t page = first; page < first + count; ++page)
-            for (const uint64_t child : childrenOf(sparse_[page]))
-                parts_->afterParents[child] = static_cast<uint32_t>(page + 1);
+            for (const uint64_t child : childrenOf(sparse_[page])) parts_->afterParents[child] = uint32_t(page + 1);
         parts_->known[b] = 1;
     }
     parts_->blocksKnown = other.parts_->blocksKnown.load();
@@ -138,7 +137,7 @@ private:
             uint32_t& parent = directory_.parts_->afterParents[child];
             if (parent != PageDirectory::Parts::kNoPage && parent != page + 1)
                 return brokenEntry(file_, page, "wrong child pages");
-            parent = static_cast<uint32_t>(page + 1);
+            parent = uint32_t(page + 1);
             if (isThere(child) && !isChildAt(directory_[child], e, octant))
                 return brokenEntry(file_, page, "child pages do not match");
             return {};

@@ -58,9 +58,8 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     const PageEntry& e = dataset.pages[index];
     const std::string element = fmt::format("page {}", index);
     PageBytes page;
-    const auto stored = readStored(reader, element, e.offset, e.storedBytes, e.hash);
-    if (!stored) return stored.error();
-    auto geometry = unpackGeometry(*stored, e.pageBytes);
+    VCP_TRY_ASSIGN(const auto stored, readStored(reader, element, e.offset, e.storedBytes, e.hash));
+    auto geometry = unpackGeometry(stored, e.pageBytes);
     if (!geometry) return brokenBytes(reader.name(), element, e.offset, geometry.error().message);
     page.geometry = *std::move(geometry);
     if (dataset.header.method == Method::Paper) {
@@ -80,13 +79,12 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
         return brokenBytes(reader.name(), element, e.offset, "page size differs from the file's");
     VCP_TRY(checkAgainstEntry(reader, dataset, index, view->header));
     if (!withColour || e.colourBytes == 0) return page;
-    const auto storedColour =
-        readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash);
-    if (!storedColour) return storedColour.error();
+    VCP_TRY_ASSIGN(const auto storedColour,
+                   readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash));
     if (e.colourBytes != colourPageBytes(view->header))
         return brokenBytes(reader.name(), element + " colour", e.colourOffset,
                            "colour page does not decode to its page's size");
-    auto colour = unpackColour(*storedColour, e.colourBytes, *view);
+    auto colour = unpackColour(storedColour, e.colourBytes, *view);
     if (!colour) return brokenBytes(reader.name(), element + " colour", e.colourOffset, colour.error().message);
     page.colour = *std::move(colour);
     return page;

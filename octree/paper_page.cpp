@@ -27,7 +27,7 @@ Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2
             return broken(16, "number of roots out of range");
         roots *= count;
     }
-    if (h.packing > static_cast<uint32_t>(PaperPacking::Octahedral)) return broken(8, "unknown packing");
+    if (h.packing > uint32_t(PaperPacking::Octahedral)) return broken(8, "unknown packing");
     if (h.nodes < roots || (h.nodes - roots) % 8 != 0 || h.nodes > uint32_t{paper::kPaperEmpty})
         return broken(12, "node count out of range");
     const auto isLength = [](float x) { return x > 0 && std::isfinite(x); };
@@ -61,25 +61,24 @@ private:
 
     Result<void> node(uint32_t i) {
         const uint64_t byte = paper::kPaperHeaderBytes + uint64_t{4} * i;
-        const uint8_t level = i < roots_ ? static_cast<uint8_t>(page_.header.rootLevel) : level_[(i - roots_) / 8];
+        const uint8_t level = i < roots_ ? uint8_t(page_.header.rootLevel) : level_[(i - roots_) / 8];
         if (level == kNoLevel) return broken(byte, "nodes without a parent");
         const int32_t word = page_.nodes[i];
         if (word < 0) {
             ++leaves_;
-            if (uint64_t{static_cast<uint32_t>(-(word + 1))} + 1 >= page_.header.slices)
-                return broken(byte, "leaf out of range");
+            if (uint64_t{uint32_t(-(word + 1))} + 1 >= page_.header.slices) return broken(byte, "leaf out of range");
             return {};
         }
         if (word >= paper::kPaperEmpty) {
             ++empties_;
             return {};
         }
-        const auto child = static_cast<uint32_t>(word);
+        const auto child = uint32_t(word);
         if (level == 0) return broken(byte, "nodes are nested too deeply");
         if (child < roots_ || child <= i || child >= page_.header.nodes || (child - roots_) % 8 != 0 ||
             level_[(child - roots_) / 8] != kNoLevel)
             return broken(byte, "node names wrong children");
-        level_[(child - roots_) / 8] = static_cast<uint8_t>(level - 1);
+        level_[(child - roots_) / 8] = uint8_t(level - 1);
         return {};
     }
 

@@ -21,10 +21,10 @@ struct BitModel {
 
     void learn(bool bit) {
         // The rates are 1/2, 1/4, ... down to 1/64, each for twice as many bits as the one before.
-        const int shift = seen >= 63 ? 6 : std::bit_width(static_cast<unsigned>(seen) + 1u);
+        const int shift = seen >= 63 ? 6 : std::bit_width(unsigned(seen) + 1u);
         if (seen < 63) ++seen;
         // The probability ends a little short of certainty: the coder needs room for either bit.
-        zero = static_cast<uint16_t>(zero + (((bit ? 48 : 65488) - zero) >> shift));
+        zero = uint16_t(zero + (((bit ? 48 : 65488) - zero) >> shift));
     }
 };
 
@@ -38,28 +38,26 @@ struct SymbolModel {
     /// `used`: symbols from this number on hardly ever come.
     explicit SymbolModel(int used = kSymbols) {
         for (int i = 0; i < kSymbols; ++i)
-            before[i] =
-                static_cast<int16_t>(i < used ? i * ((1 << kBits) - kSymbols) / used + i : (1 << kBits) - kSymbols + i);
+            before[i] = int16_t(i < used ? i * ((1 << kBits) - kSymbols) / used + i : (1 << kBits) - kSymbols + i);
     }
-    [[nodiscard]] uint32_t begin(uint32_t symbol) const { return static_cast<uint32_t>(before[symbol]); }
+    [[nodiscard]] uint32_t begin(uint32_t symbol) const { return uint32_t(before[symbol]); }
     [[nodiscard]] uint32_t end(uint32_t symbol) const {
-        return symbol + 1 < kSymbols ? static_cast<uint32_t>(before[symbol + 1]) : 1u << kBits;
+        return symbol + 1 < kSymbols ? uint32_t(before[symbol + 1]) : 1u << kBits;
     }
     /// Returns the symbol within whose share `target` lies.
     [[nodiscard]] uint32_t find(uint32_t target) const {
         int16_t count = 0;
-        for (int i = 0; i < kSymbols; ++i)
-            count = static_cast<int16_t>(count + (before[i] <= static_cast<int16_t>(target) ? 1 : 0));
-        return static_cast<uint32_t>(count - 1);
+        for (int i = 0; i < kSymbols; ++i) count = int16_t(count + (before[i] <= int16_t(target) ? 1 : 0));
+        return uint32_t(count - 1);
     }
     void learn(uint32_t symbol) {
         const int shift = seen < 6 ? 2 : seen < 16 ? 3 : seen < 48 ? 4 : 5;
         if (seen < 48) ++seen;
-        const int16_t at = static_cast<int16_t>(symbol);
+        const int16_t at = int16_t(symbol);
         for (int16_t i = 0; i < kSymbols; ++i) {
-            const int16_t goal = static_cast<int16_t>(i <= at ? i : (1 << kBits) - kSymbols + i);
-            const int16_t away = static_cast<int16_t>(goal - before[i]);
-            before[i] = static_cast<int16_t>(before[i] + static_cast<int16_t>(away >> shift));
+            const int16_t goal = int16_t(i <= at ? i : (1 << kBits) - kSymbols + i);
+            const int16_t away = int16_t(goal - before[i]);
+            before[i] = int16_t(before[i] + int16_t(away >> shift));
         }
     }
 };
@@ -89,17 +87,17 @@ public:
     void raw(uint32_t value, int count) {
         rawBits_ |= (uint64_t{value} & ((uint64_t{1} << count) - 1)) << rawCount_;
         for (rawCount_ += count; rawCount_ >= 8; rawCount_ -= 8) {
-            raw_.push_back(static_cast<std::byte>(rawBits_ & 255u));
+            raw_.push_back(std::byte(rawBits_ & 255u));
             rawBits_ >>= 8;
         }
     }
     /// Appends all that was coded: bytes of raw bits (4 bytes), raw bits, range coded bytes. The encoder is done.
     void finish(std::vector<std::byte>& out) {
-        if (rawCount_ > 0) raw_.push_back(static_cast<std::byte>(rawBits_ & 255u));
+        if (rawCount_ > 0) raw_.push_back(std::byte(rawBits_ & 255u));
         for (int i = 0; i < 5; ++i) shiftLow();
         // The decoder takes bytes past the end, up to kSparedZeros, for zero.
         for (size_t i = 0; i < kSparedZeros && !bytes_.empty() && bytes_.back() == std::byte{0}; ++i) bytes_.pop_back();
-        for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::byte>(raw_.size() >> shift & 255u));
+        for (int shift = 0; shift < 32; shift += 8) out.push_back(std::byte(raw_.size() >> shift & 255u));
         out.insert(out.end(), raw_.begin(), raw_.end());
         out.insert(out.end(), bytes_.begin(), bytes_.end());
     }
@@ -114,11 +112,11 @@ private:
     /// Bytes are held back while a carry could still change them.
     void shiftLow() {
         if (low_ < 0xff000000u || low_ > 0xffffffffu) {
-            const uint8_t carry = static_cast<uint8_t>(low_ >> 32);
-            if (started_) bytes_.push_back(static_cast<std::byte>(held_ + carry));
-            for (; waiting_ > 0; --waiting_) bytes_.push_back(static_cast<std::byte>(0xff + carry));
+            const uint8_t carry = uint8_t(low_ >> 32);
+            if (started_) bytes_.push_back(std::byte(held_ + carry));
+            for (; waiting_ > 0; --waiting_) bytes_.push_back(std::byte(0xff + carry));
             started_ = true;
-            held_ = static_cast<uint8_t>(low_ >> 24);
+            held_ = uint8_t(low_ >> 24);
         } else {
             ++waiting_;
         }
@@ -172,7 +170,7 @@ public:
             rawBits_ |= uint64_t{i < raw_.size() ? std::to_integer<uint8_t>(raw_[i]) : uint8_t{0}} << rawCount_;
             rawCount_ += 8;
         }
-        value = static_cast<uint32_t>(rawBits_ & ((uint64_t{1} << count) - 1));
+        value = uint32_t(rawBits_ & ((uint64_t{1} << count) - 1));
         rawBits_ >>= count;
         rawCount_ -= count;
     }
@@ -208,7 +206,7 @@ struct NumberModel {
     template <class Coder>
     void code(Coder& coder, uint32_t& value) {
         constexpr uint32_t kLong = SymbolModel::kSymbols - 1;
-        uint32_t bits = static_cast<uint32_t>(std::bit_width(value));
+        uint32_t bits = uint32_t(std::bit_width(value));
         uint32_t symbol = bits < kLong ? bits : kLong;
         coder.symbol(length, symbol);
         if (symbol == kLong) {
@@ -223,7 +221,7 @@ struct NumberModel {
             return;
         }
         uint32_t rest = value;
-        coder.raw(rest, static_cast<int>(bits) - 1);
+        coder.raw(rest, int(bits) - 1);
         value = 1u << (bits - 1) | (rest & ((1u << (bits - 1)) - 1));
     }
 };
@@ -234,11 +232,11 @@ struct SignedModel {
 
     template <class Coder>
     void code(Coder& coder, int32_t& value) {
-        uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value);
+        uint32_t size = uint32_t(value < 0 ? -value : value);
         magnitude.code(coder, size);
         uint32_t negative = value < 0 ? 1u : 0u;
         if (size != 0) coder.raw(negative, 1);
-        value = negative != 0 && size != 0 ? -static_cast<int32_t>(size) : static_cast<int32_t>(size);
+        value = negative != 0 && size != 0 ? -int32_t(size) : int32_t(size);
     }
 };
 
@@ -251,10 +249,10 @@ struct SmallModel {
     void code(Coder& coder, int32_t& value) {
         constexpr uint32_t kBeyond = 15;
         // The classes are 0, 1, 2, 3, 4..5, 6..7, 8..11, 12..15, ... 96..127, 128..191, and all from 192 on.
-        const uint32_t size = static_cast<uint32_t>(value < 0 ? -value : value);
+        const uint32_t size = uint32_t(value < 0 ? -value : value);
         uint32_t symbol = size;
         if (size >= 4) {
-            const uint32_t bits = static_cast<uint32_t>(std::bit_width(size));
+            const uint32_t bits = uint32_t(std::bit_width(size));
             symbol = size >= 192 ? kBeyond : 2 * bits - 2 + (size >> (bits - 2) & 1u);
         }
         coder.symbol(half, symbol);
@@ -264,14 +262,14 @@ struct SmallModel {
             beyond.code(coder, result);
             result += 192;
         } else if (symbol >= 4) {
-            const int left = static_cast<int>(symbol) / 2 - 1;
+            const int left = int(symbol) / 2 - 1;
             uint32_t rest = size;
             coder.raw(rest, left);
             result = (2u | (symbol & 1u)) << left | (rest & ((1u << left) - 1));
         }
         uint32_t negative = value < 0 ? 1u : 0u;
         if (result != 0) coder.raw(negative, 1);
-        value = negative != 0 && result != 0 ? -static_cast<int32_t>(result) : static_cast<int32_t>(result);
+        value = negative != 0 && result != 0 ? -int32_t(result) : int32_t(result);
     }
 };
 

@@ -101,8 +101,7 @@ glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dv
     const glm::u32vec2 a = view.vertices[v[0]], b = view.vertices[v[1]], c = view.vertices[v[2]];
     if (single)
         return f32::intersectTriangle(glm::vec3(q), glm::vec3(d), f32::decodeVertex(a.x, a.y),
-                                      f32::decodeVertex(b.x, b.y), f32::decodeVertex(c.x, c.y),
-                                      static_cast<float>(kTriangleSlack));
+                                      f32::decodeVertex(b.x, b.y), f32::decodeVertex(c.x, c.y), float(kTriangleSlack));
     return f64::intersectTriangle(q, d, f64::decodeVertex(a.x, a.y), f64::decodeVertex(b.x, b.y),
                                   f64::decodeVertex(c.x, c.y), kTriangleSlack);
 }
@@ -190,7 +189,7 @@ private:
         for (uint32_t octant = 0; octant < 8; ++octant)
             order.insert(clipToCube(in.origin, in.direction, lowest + octantOffset(octant) * edge, edge).first, octant);
         for (uint32_t i = 0; i < 8; ++i) {
-            const auto octant = static_cast<uint32_t>(order.child[i]);
+            const auto octant = uint32_t(order.child[i]);
             visitNode(in, in.view->nodes[8 * group + octant], lowest + octantOffset(octant) * edge, edge);
         }
     }
@@ -213,8 +212,7 @@ private:
         const double wallIn = segment.first > ray_.tMin / in.cell ? wall : 0;
         const double wallOut = segment.last < ray_.tMax / in.cell ? wall : 0;
         const CastOptions& o = caster_.options_;
-        auto hit = o.singlePrecision ? castSoftF32(*in.view, node, p, d, static_cast<float>(wallIn),
-                                                   static_cast<float>(wallOut), o.steps)
+        auto hit = o.singlePrecision ? castSoftF32(*in.view, node, p, d, float(wallIn), float(wallOut), o.steps)
                                      : castSoftF64(*in.view, node, p, d, wallIn, wallOut, o.steps);
         if (!hit) return;
         hit->t = segment.first + hit->t * (segment.last - segment.first);
@@ -280,24 +278,20 @@ Result<PageCache> PageCache::fromPages(Dataset dataset, std::vector<PageBytes> p
     for (size_t page = 0; page < pages.size(); ++page) {
         auto loaded = std::make_unique<Loaded>();
         loaded->bytes = std::move(pages[page]);
-        auto view = parsePage(loaded->bytes.geometryBytes(), loaded->bytes.colourBytes());
-        if (!view) return view.error();
-        loaded->view = *view;
+        VCP_TRY_ASSIGN(loaded->view, parsePage(loaded->bytes.geometryBytes(), loaded->bytes.colourBytes()));
         cache.keep(page, std::move(loaded));
     }
     return cache;
 }
 
 Result<PageCache> PageCache::open(const std::filesystem::path& path) {
-    auto reader = openFile(path);
-    if (!reader) return reader.error();
-    auto dataset = readDataset(**reader);
-    if (!dataset) return dataset.error();
-    if (dataset->header.method != Method::Certified)
+    VCP_TRY_ASSIGN(auto reader, openFile(path));
+    VCP_TRY_ASSIGN(auto dataset, readDataset(*reader));
+    if (dataset.header.method != Method::Certified)
         return Error{.code = ErrorCode::Unsupported,
                      .message = "was built with --method paper and has no certified surface; build it without",
                      .file = path.string()};
-    return PageCache(*reader, std::move(*dataset));
+    return PageCache(reader, std::move(dataset));
 }
 
 void PageCache::keep(uint64_t page, std::unique_ptr<const Loaded> loaded) {
@@ -309,13 +303,10 @@ Result<void> PageCache::load(uint64_t page) {
     if (page >= pages_.size())
         return Error{.code = ErrorCode::Usage, .message = "no such page", .element = fmt::format("page {}", page)};
     if (pages_[page]) return {};
-    auto bytes = readPage(*reader_, dataset_, page, dataset_.hasColour());
-    if (!bytes) return bytes.error();
+    VCP_TRY_ASSIGN(auto bytes, readPage(*reader_, dataset_, page, dataset_.hasColour()));
     auto loaded = std::make_unique<Loaded>();
-    loaded->bytes = std::move(*bytes);
-    auto view = parsePage(loaded->bytes.geometryBytes(), loaded->bytes.colourBytes());
-    if (!view) return view.error();
-    loaded->view = *view;
+    loaded->bytes = std::move(bytes);
+    VCP_TRY_ASSIGN(loaded->view, parsePage(loaded->bytes.geometryBytes(), loaded->bytes.colourBytes()));
     keep(page, std::move(loaded));
     return {};
 }

@@ -39,11 +39,10 @@ Result<FileDescriptor> openRegular(const std::filesystem::path& path) {
 }
 
 Result<std::unique_ptr<std::FILE, FileCloser>> openRegularStream(const std::filesystem::path& path) {
-    auto file = openRegular(path);
-    if (!file) return file.error();
-    std::unique_ptr<std::FILE, FileCloser> stream(::fdopen(file->number(), "rb"));
+    VCP_TRY_ASSIGN(auto file, openRegular(path));
+    std::unique_ptr<std::FILE, FileCloser> stream(::fdopen(file.number(), "rb"));
     if (!stream) return systemError(path, "cannot open", errno);
-    static_cast<void>(file->release());
+    static_cast<void>(file.release());
     return stream;
 }
 

@@ -83,3 +83,15 @@ private:
     do {                                                                \
         if (auto vcpTried = (expr); !vcpTried) return vcpTried.error(); \
     } while (false)
+
+/// Gives a variable the value of a Result, or returns its error from the enclosing function. The variable is declared
+/// here, VCP_TRY_ASSIGN(const auto reader, openFile(path)), or stands already: VCP_TRY_ASSIGN(reader_, openFile(path)).
+/// It is more than one statement, so braces are around it after an `if`.
+#define VCP_TRY_ASSIGN(declaration, ...) \
+    VCP_TRY_ASSIGN_NAMED(VCP_TRY_NAME(vcpTried, __COUNTER__), declaration, __VA_ARGS__)
+#define VCP_TRY_ASSIGN_NAMED(tried, declaration, ...) \
+    auto tried = (__VA_ARGS__);                       \
+    if (!tried) return tried.error();                 \
+    declaration = *std::move(tried)
+#define VCP_TRY_NAME(name, number) VCP_TRY_NAME_JOINED(name, number)
+#define VCP_TRY_NAME_JOINED(name, number) name##number

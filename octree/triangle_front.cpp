@@ -8,7 +8,7 @@ void TriangleFront::link(uint32_t g, uint32_t next) {
 }
 
 uint32_t TriangleFront::add(uint32_t from, uint32_t to, uint32_t opposite) {
-    const uint32_t g = static_cast<uint32_t>(gates_.size());
+    const uint32_t g = uint32_t(gates_.size());
     gates_.push_back({from, to, opposite, kNone, kNone, true});
     gateFrom_[from] = g;
     return g;

@@ -27,7 +27,7 @@ public:
     /// Returns the next open gate, or kNone when the front is closed.
     [[nodiscard]] uint32_t first() {
         while (head_ < gates_.size() && !gates_[head_].open) ++head_;
-        return head_ < gates_.size() ? static_cast<uint32_t>(head_) : kNone;
+        return head_ < gates_.size() ? uint32_t(head_) : kNone;
     }
     [[nodiscard]] const Gate& gate(uint32_t g) const { return gates_[g]; }
     /// Returns the vertex that closes the corner with the next or previous gate, or kNone.

@@ -134,7 +134,7 @@ private:
 
 /// The entries of a page's children, in octant order.
 inline EntryRange childrenOf(const PageEntry& page) {
-    return {page.firstChild, static_cast<uint64_t>(std::popcount(page.childMask))};
+    return {page.firstChild, uint64_t(std::popcount(page.childMask))};
 }
 
 struct CommitRecord {

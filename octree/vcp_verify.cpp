@@ -79,7 +79,7 @@ private:
         for (int i = 0; i < 3; ++i) {
             // The builder leaves a cell around the mesh; far from the origin a coordinate is rounded by more than that.
             const double slack = h.cell + 1e-12 * std::max(std::abs(h.boundsMin[i]), std::abs(h.boundsMax[i]));
-            const uint64_t axis = 8 * static_cast<uint64_t>(i);
+            const uint64_t axis = 8 * uint64_t(i);
             if (h.boundsMin[i] < h.origin[i] - slack)
                 return broken("header", offsetof(FileHeader, boundsMin) + axis,
                               "the bounds begin outside the root page");
@@ -97,11 +97,10 @@ private:
 }  // namespace
 
 Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64_t), void* user) {
-    const auto dataset = readDataset(reader);
-    if (!dataset) return dataset.error();
-    FileVerification verification(reader, *dataset);
+    VCP_TRY_ASSIGN(const auto dataset, readDataset(reader));
+    FileVerification verification(reader, dataset);
     VCP_TRY(verification.sums());
-    for (uint64_t i = 0; i < dataset->pages.size(); ++i) {
+    for (uint64_t i = 0; i < dataset.pages.size(); ++i) {
         VCP_TRY(verification.page(i));
         if (progress != nullptr && !progress(user, verification.done()))
             return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = reader.name()};

@@ -19,16 +19,15 @@ StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std
     PackedPage packed = packPage(geometry, colour);
     page.geometry = std::move(packed.geometry);
     page.colour = std::move(packed.colour);
-    page.geometryBytes = static_cast<uint32_t>(geometry.size());
-    page.colourBytes = static_cast<uint32_t>(colour.size());
+    page.geometryBytes = uint32_t(geometry.size());
+    page.colourBytes = uint32_t(colour.size());
     return page;
 }
 
 Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path& output, uint64_t pages,
                                                      const OutputRules& rules) {
-    auto file = OutputFile::create(output, OutputKind::Dataset, rules);
-    if (!file) return file.error();
-    return std::unique_ptr<VcpWriter>(new VcpWriter(*std::move(file), pages));
+    VCP_TRY_ASSIGN(auto file, OutputFile::create(output, OutputKind::Dataset, rules));
+    return std::unique_ptr<VcpWriter>(new VcpWriter(std::move(file), pages));
 }
 
 VcpWriter::VcpWriter(OutputFile file, uint64_t pages)
@@ -36,14 +35,14 @@ VcpWriter::VcpWriter(OutputFile file, uint64_t pages)
 
 Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
     entry.offset = end_;
-    entry.storedBytes = static_cast<uint32_t>(page.geometry.size());
+    entry.storedBytes = uint32_t(page.geometry.size());
     entry.pageBytes = page.geometryBytes;
     entry.hash = hashBytes(page.geometry);
     VCP_TRY(file_.write(end_, page.geometry));
     end_ = alignPage(end_ + page.geometry.size());
     if (!page.colour.empty()) {
         entry.colourOffset = end_;
-        entry.colourStoredBytes = static_cast<uint32_t>(page.colour.size());
+        entry.colourStoredBytes = uint32_t(page.colour.size());
         entry.colourBytes = page.colourBytes;
         entry.colourHash = hashBytes(page.colour);
         VCP_TRY(file_.write(end_, page.colour));

@@ -14,7 +14,7 @@ int64_t largest(WideVector v) { return std::max(magnitude(v.x), std::max(magnitu
 
 /// Returns the vector, scaled down to components of at most `bits` bits.
 WideVector shortened(WideVector v, int bits) {
-    const int shift = std::max(0, static_cast<int>(std::bit_width(static_cast<uint64_t>(largest(v)))) - bits);
+    const int shift = std::max(0, int(std::bit_width(uint64_t(largest(v)))) - bits);
     return {v.x >> shift, v.y >> shift, v.z >> shift};
 }
 
@@ -65,7 +65,7 @@ NormalGridPoint normalGridPoint(WideVector sum) {
     if (turned) n = -n;
     const int64_t norm = magnitude(n.x) + magnitude(n.y) + n.z;
     if (norm == 0) return {(kNormalSteps + 1) / 2, (kNormalSteps + 1) / 2};
-    const auto step = [&](int64_t v) { return static_cast<uint32_t>(((v + norm) * kNormalSteps + norm) / (2 * norm)); };
+    const auto step = [&](int64_t v) { return uint32_t(((v + norm) * kNormalSteps + norm) / (2 * norm)); };
     return {step(n.x), step(n.y)};
 }
 

@@ -82,7 +82,7 @@ void setSections(frame::FrameConstants& c, const FrameRequest& request, const Fi
     for (const SectionPlane& plane : request.sections) {
         const double length = glm::length(plane.normal);
         const double off = (glm::dot(plane.normal, origin) - plane.offset) / (length * header.cell);
-        c.sections[c.extra.y++] = glm::vec4(glm::vec3(plane.normal / length), static_cast<float>(off));
+        c.sections[c.extra.y++] = glm::vec4(glm::vec3(plane.normal / length), float(off));
     }
 }
 
@@ -155,7 +155,7 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.cap = encoded(request.shading.cap);
     c.extra.x = hitPlanes(request, colour) - 1;
     c.march.x = request.march.epsilon;
-    c.march.y = static_cast<float>(header.cell * placement.scale);
+    c.march.y = float(header.cell * placement.scale);
     const glm::dquat& q = placement.rotation;
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     setSections(c, request, header);
@@ -176,8 +176,7 @@ std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
     for (uint32_t y = 0; y < request.height; ++y) {
         const glm::vec4 colour = glm::mix(top, bottom, (float(whole.y + y) + 0.5f) / float(whole.fullHeight));
         rows[y] = 0xff000000u;
-        for (int i = 0; i < 3; ++i)
-            rows[y] |= static_cast<uint32_t>(std::lround(glm::clamp(colour[i], 0.0f, 1.0f) * 255)) << 8 * i;
+        for (int i = 0; i < 3; ++i) rows[y] |= uint32_t(std::lround(glm::clamp(colour[i], 0.0f, 1.0f) * 255)) << 8 * i;
     }
     return rows;
 }

@@ -33,9 +33,8 @@ struct MesoMarcher::State {
         }));
         if (!timer.hasClock())
             return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-        const auto ms = timer.read();
-        if (!ms) return ms.error();
-        return ms->front();
+        VCP_TRY_ASSIGN(const auto ms, timer.read());
+        return ms.front();
     }
 };
 
@@ -44,18 +43,12 @@ MesoMarcher::~MesoMarcher() = default;
 
 Result<std::unique_ptr<MesoMarcher>> MesoMarcher::create(const MesoMarcherOptions& options) {
     auto state = std::make_unique<State>();
-    auto instance = Instance::create(options.validation, {});
-    if (!instance) return instance.error();
-    state->instance = std::move(*instance);
-    auto device = Device::create(*state->instance, options.device, VK_NULL_HANDLE, false);
-    if (!device) return device.error();
-    state->device = std::move(*device);
-    auto resources = MesoResources::create(*state->device);
-    if (!resources) return resources.error();
-    state->resources = std::move(*resources);
-    auto timer = PassTimer::create(*state->device, 2);
-    if (!timer) return timer.error();
-    state->timer = *std::move(timer);
+    VCP_TRY_ASSIGN(auto instance, Instance::create(options.validation, {}));
+    state->instance = std::move(instance);
+    VCP_TRY_ASSIGN(auto device, Device::create(*state->instance, options.device, VK_NULL_HANDLE, false));
+    state->device = std::move(device);
+    VCP_TRY_ASSIGN(state->resources, MesoResources::create(*state->device));
+    VCP_TRY_ASSIGN(state->timer, PassTimer::create(*state->device, 2));
     return std::unique_ptr<MesoMarcher>(new MesoMarcher(std::move(state)));
 }
 
@@ -70,23 +63,19 @@ Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method
                      .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
     std::vector<MesoRaysPass> passes;
     for (const meso::Method* method : methods) {
-        const auto arrays = packMesoArrays(*method);
-        if (!arrays) return arrays.error();
-        VCP_TRY(passes.emplace_back(*state_->device, *state_->resources).prepare(*arrays, rays));
+        VCP_TRY_ASSIGN(const auto arrays, packMesoArrays(*method));
+        VCP_TRY(passes.emplace_back(*state_->device, *state_->resources).prepare(arrays, rays));
     }
     for (int round = 0; round <= rounds; ++round)
         for (size_t i = 0; i < passes.size(); ++i) {
             const std::clock_t start = std::clock();
-            const auto ms = state_->milliseconds(passes[i]);
-            if (!ms) return ms.error();
+            VCP_TRY_ASSIGN(const auto ms, state_->milliseconds(passes[i]));
             const double processorMs = double(std::clock() - start) * 1e3 / CLOCKS_PER_SEC;
             if (round > 0)
-                marched[i].nsPerRay.push_back((device().software ? processorMs : *ms) * 1e6 / double(rays.size()));
+                marched[i].nsPerRay.push_back((device().software ? processorMs : ms) * 1e6 / double(rays.size()));
         }
     for (size_t i = 0; i < passes.size(); ++i) {
-        auto results = passes[i].read();
-        if (!results) return results.error();
-        marched[i].results = *std::move(results);
+        VCP_TRY_ASSIGN(marched[i].results, passes[i].read());
     }
     return marched;
 }

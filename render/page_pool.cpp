@@ -44,20 +44,18 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
                      .message = fmt::format("a pool of {} bytes is more than shaders can address on '{}'; at most {}",
                                             bytes, device.info().name, chunkBytes * frame::kMaxPoolChunks)};
     std::unique_ptr<PagePool> pool(new PagePool(device, units * kPoolUnitBytes));
-    pool->chunkShift_ = static_cast<uint32_t>(std::countr_zero(chunkBytes / 16));
+    pool->chunkShift_ = uint32_t(std::countr_zero(chunkBytes / 16));
     constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT |
                                           VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                           VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
     for (uint64_t done = 0; done < pool->bytes(); done += chunkBytes) {
         Chunk chunk;
-        auto buffer = device.createBuffer(std::min(chunkBytes, pool->bytes() - done), kUsage, MemoryUse::Local);
-        if (!buffer) return buffer.error();
-        chunk.buffer = std::move(*buffer);
+        VCP_TRY_ASSIGN(auto buffer,
+                       device.createBuffer(std::min(chunkBytes, pool->bytes() - done), kUsage, MemoryUse::Local));
+        chunk.buffer = std::move(buffer);
         const uint64_t viewBytes =
             std::min(chunk.buffer.bytes(), uint64_t{device.limits().maxTexelBufferElements} * 16);
-        auto view = device.createTexelView(chunk.buffer, VK_FORMAT_R32G32B32A32_UINT, viewBytes);
-        if (!view) return view.error();
-        chunk.view = std::move(*view);
+        VCP_TRY_ASSIGN(chunk.view, device.createTexelView(chunk.buffer, VK_FORMAT_R32G32B32A32_UINT, viewBytes));
         pool->chunks_.push_back(std::move(chunk));
     }
     return pool;
@@ -68,10 +66,9 @@ PagePool::~PagePool() { static_cast<void>(device_.waitForCopies()); }
 Result<void> PagePool::reserveStaging(uint64_t bytes) {
     if (staging_.bytes() >= bytes) return {};
     VCP_TRY(device_.waitForCopies());
-    auto staging = device_.createBuffer(
-        std::bit_ceil(bytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Upload);
-    if (!staging) return staging.error();
-    staging_ = std::move(*staging);
+    VCP_TRY_ASSIGN(staging_, device_.createBuffer(std::bit_ceil(bytes),
+                                                  VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                                  MemoryUse::Upload));
     return {};
 }
 
@@ -156,11 +153,10 @@ Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
     if (scratch_.bytes() < bytes) {
         VCP_TRY(flush());
         VCP_TRY(device_.waitForCopies());
-        auto scratch =
-            device_.createBuffer(std::bit_ceil(bytes),
-                                 VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
-        if (!scratch) return scratch.error();
-        scratch_ = std::move(*scratch);
+        VCP_TRY_ASSIGN(scratch_,
+                       device_.createBuffer(std::bit_ceil(bytes),
+                                            VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                            MemoryUse::Local));
     }
     waiting_.push_back({source / chunkBytes(), {source % chunkBytes(), target % chunkBytes(), bytes}, true});
     return {};

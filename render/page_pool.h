@@ -32,12 +32,10 @@ public:
     Result<void> move(PoolSlot from, PoolSlot to);
 
     /// Returns the number of the slot's first texel, over all chunks.
-    [[nodiscard]] uint32_t texel(PoolSlot slot) const {
-        return static_cast<uint32_t>(slot.firstUnit * (kPoolUnitBytes / 16));
-    }
+    [[nodiscard]] uint32_t texel(PoolSlot slot) const { return uint32_t(slot.firstUnit * (kPoolUnitBytes / 16)); }
     [[nodiscard]] uint64_t bytes() const { return bytes_; }
 
-    [[nodiscard]] uint32_t chunks() const { return static_cast<uint32_t>(chunks_.size()); }
+    [[nodiscard]] uint32_t chunks() const { return uint32_t(chunks_.size()); }
     [[nodiscard]] uint32_t chunkShift() const { return chunkShift_; }
     [[nodiscard]] const Buffer& chunk(uint32_t i) const { return chunks_[i].buffer; }
     [[nodiscard]] VkBufferView view(uint32_t i) const { return chunks_[i].view.handle(); }

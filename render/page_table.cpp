@@ -39,12 +39,12 @@ Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
 
 void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, float errorCells) {
     const PageSections sections = pageSections(page.header);
-    const auto texelOf = [&](uint64_t byte) { return page.texel + static_cast<uint32_t>(byte / 16); };
+    const auto texelOf = [&](uint64_t byte) { return page.texel + uint32_t(byte / 16); };
     const uint32_t error = (std::bit_cast<uint32_t>(errorCells) + ~frame::kRecordErrorMask) & frame::kRecordErrorMask;
     record[0] = {frame::kRecordResident | error, 0, page.header.root, page.texel};
     record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices),
                  texelOf(sections.normals)};
-    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, static_cast<uint32_t>(entry), 0};
+    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, uint32_t(entry), 0};
 }
 
 }  // namespace
@@ -61,11 +61,11 @@ std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64
         glm::uvec4 record[frame::kRecordTexels] = {};
         const PageEntry& entry = dataset.pages[page];
         if (const auto resident = pageOf(page))
-            writePage(record, *resident, page, static_cast<float>(double(entry.certifiedError) / dataset.header.cell));
+            writePage(record, *resident, page, float(double(entry.certifiedError) / dataset.header.cell));
         if (partOf(parts, page) == Part::Cut) {
             record[0].x |= frame::kRecordInCut;
         } else {
-            record[0].y = static_cast<uint32_t>(order.size());
+            record[0].y = uint32_t(order.size());
             uint64_t child = entry.firstChild;
             for (uint32_t octant = 0; octant < 8; ++octant) {
                 if ((entry.childMask >> octant & 1) == 0) continue;

@@ -45,21 +45,19 @@ Result<void> writePng(const Picture& picture, const std::filesystem::path& path,
     if (picture.width == 0 || picture.height == 0 || uint64_t{picture.width} * picture.height > kMaxPixels ||
         picture.rgba.size() != uint64_t{4} * picture.width * picture.height)
         return Error{.code = ErrorCode::Usage, .message = "the picture's size and its pixels disagree", .file = name};
-    auto output = OutputFile::create(path, OutputKind::Png, rules);
-    if (!output) return output.error();
-    File file(::fdopen(::dup(output->descriptor()), "wb"));
+    VCP_TRY_ASSIGN(auto output, OutputFile::create(path, OutputKind::Png, rules));
+    File file(::fdopen(::dup(output.descriptor()), "wb"));
     if (!file) return ioError(path, "cannot write");
     png_image image = imageOf(picture);
     if (png_image_write_to_stdio(&image, file.get(), 0, picture.rgba.data(), 0, nullptr) == 0)
         return Error{.code = ErrorCode::Io, .message = pngError(image), .file = name};
     if (std::fflush(file.get()) != 0) return ioError(path, "cannot write");
-    return output->commit();
+    return output.commit();
 }
 
 Result<Picture> readPng(const std::filesystem::path& path) {
-    const auto opened = openRegularStream(path);
-    if (!opened) return opened.error();
-    const auto& file = *opened;
+    VCP_TRY_ASSIGN(const auto opened, openRegularStream(path));
+    const auto& file = opened;
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     const auto invalid = [&](const std::string& what) {

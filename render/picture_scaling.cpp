@@ -8,9 +8,7 @@ namespace {
 
 constexpr VkImageSubresourceLayers kLayer{VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
 
-VkOffset3D farCorner(uint32_t width, uint32_t height) {
-    return {static_cast<int32_t>(width), static_cast<int32_t>(height), 1};
-}
+VkOffset3D farCorner(uint32_t width, uint32_t height) { return {int32_t(width), int32_t(height), 1}; }
 
 }  // namespace
 
@@ -50,11 +48,10 @@ Result<void> PictureScaling::prepare(PictureSize size) {
     VCP_VK(vkCreateImage, device_.handle(), &info, nullptr, &image_);
     VkMemoryRequirements needs;
     vkGetImageMemoryRequirements(device_.handle(), image_, &needs);
-    auto type = device_.memoryType(needs.memoryTypeBits, MemoryUse::Local);
-    if (!type) return type.error();
+    VCP_TRY_ASSIGN(auto type, device_.memoryType(needs.memoryTypeBits, MemoryUse::Local));
     VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocation.allocationSize = needs.size;
-    allocation.memoryTypeIndex = *type;
+    allocation.memoryTypeIndex = type;
     VCP_VK(vkAllocateMemory, device_.handle(), &allocation, nullptr, &memory_);
     VCP_VK(vkBindImageMemory, device_.handle(), image_, memory_, 0);
     size_ = size;

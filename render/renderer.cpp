@@ -65,10 +65,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     if (options.host) {
         shared->instance = Instance::borrow(options.host->instance);
     } else {
-        auto instance = Instance::create(
-            options.validation, options.surface ? options.surface->instanceExtensions : options.windowExtensions);
-        if (!instance) return instance.error();
-        shared->instance = std::move(*instance);
+        VCP_TRY_ASSIGN(shared->instance,
+                       Instance::create(options.validation, options.surface ? options.surface->instanceExtensions
+                                                                            : options.windowExtensions));
     }
     auto state = std::make_unique<State>(shared, options.host ? std::nullopt : options.surface);
     VCP_TRY(state->createDevice(options.faults));
@@ -91,13 +90,12 @@ Result<VkSurfaceKHR> Renderer::State::createSurface() const {
 
 Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
     if (options.host && losses > 0) return Error{.code = ErrorCode::Device, .message = "the host's device was lost"};
-    const auto window = createSurface();
-    if (!window) return window.error();
-    const bool forWindows = *window != VK_NULL_HANDLE || !options.windowExtensions.empty();
+    VCP_TRY_ASSIGN(const auto window, createSurface());
+    const bool forWindows = window != VK_NULL_HANDLE || !options.windowExtensions.empty();
     auto made = options.host ? Device::borrow(*options.host, faults)
-                             : Device::create(*instance, options.device, *window, forWindows, faults);
+                             : Device::create(*instance, options.device, window, forWindows, faults);
     if (!made) {
-        if (*window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
+        if (window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance->handle(), window, nullptr);
         return made.error();
     }
     device = std::move(*made);
@@ -105,15 +103,13 @@ Result<void> Renderer::State::createDevice(const DeviceFaults& faults) {
     access = options.access != PageAccess::Auto ? options.access
              : info.software                    ? PageAccess::TexelBuffer
                                                 : PageAccess::StorageBuffer;
-    stripes = info.software ? std::max(1u, static_cast<uint32_t>(get_nprocs())) : 1;
-    return attach(*window);
+    stripes = info.software ? std::max(1u, uint32_t(get_nprocs())) : 1;
+    return attach(window);
 }
 
 Result<void> Renderer::State::attach(VkSurfaceKHR window) {
     if (window != VK_NULL_HANDLE) swapchain = std::make_unique<Swapchain>(instance->handle(), *device, window);
-    auto clock = PassTimer::create(*device, kPassMarks);
-    if (!clock) return clock.error();
-    timer = *std::move(clock);
+    VCP_TRY_ASSIGN(timer, PassTimer::create(*device, kPassMarks));
     return makeLayers();
 }
 
@@ -121,9 +117,7 @@ Result<void> Renderer::State::makeLayers() {
     const size_t wanted = std::max<size_t>(datasets.size(), 1);
     if (layers.size() > wanted) layers.resize(wanted);
     while (layers.size() < wanted) {
-        auto made = FrameResources::create(*device);
-        if (!made) return made.error();
-        layers.emplace_back().resources = std::move(*made);
+        VCP_TRY_ASSIGN(layers.emplace_back().resources, FrameResources::create(*device));
     }
     if (composes()) return {};
     layers.front().resources->setTarget(nullptr, nullptr);
@@ -140,10 +134,9 @@ bool Renderer::State::isComplete() const {
 }
 
 Result<void> Renderer::State::attachToDevice() {
-    const auto window = createSurface();
-    if (!window) return window.error();
-    if (*window == VK_NULL_HANDLE || device->shows(*window)) return attach(*window);
-    vkDestroySurfaceKHR(instance->handle(), *window, nullptr);
+    VCP_TRY_ASSIGN(const auto window, createSurface());
+    if (window == VK_NULL_HANDLE || device->shows(window)) return attach(window);
+    vkDestroySurfaceKHR(instance->handle(), window, nullptr);
     return Error{.code = ErrorCode::Device,
                  .message = "device '" + info.name +
                             "', as it was chosen for the first view, cannot show pictures in this window"};
@@ -267,7 +260,7 @@ Result<void> Renderer::openDatasets(std::vector<PlacedDataset> datasets) {
     ResidencyOptions options;
     options.order = o.order;
     options.loader.withColour = o.colour;
-    const auto loaders = static_cast<uint32_t>(std::max<size_t>(datasets.size(), 1));
+    const auto loaders = uint32_t(std::max<size_t>(datasets.size(), 1));
     uint32_t threads = o.loaderThreads;
     if (threads == 0)
         for (const PlacedDataset& each : datasets) threads = std::max(threads, each.loaderThreads);
@@ -342,11 +335,9 @@ Result<void> Renderer::Shared::uploadSurfaces() {
     if (!meso) return {};
     const auto upload = [&]() -> Result<void> {
         if (meso->pass) return meso->pass->setSurfaces(meso->surfaces);
-        auto made = MesoResources::create(*device);
-        if (!made) return made.error();
-        auto clock = PassTimer::create(*device, 2);
-        if (!clock) return clock.error();
-        meso->resources = *std::move(made), meso->timer = *std::move(clock);
+        VCP_TRY_ASSIGN(auto made, MesoResources::create(*device));
+        VCP_TRY_ASSIGN(auto clock, PassTimer::create(*device, 2));
+        meso->resources = std::move(made), meso->timer = std::move(clock);
         meso->pass = std::make_unique<MesoSurfacePass>(*device, *meso->resources);
         return meso->pass->setSurfaces(meso->surfaces);
     };

@@ -219,10 +219,9 @@ Result<void> Renderer::State::drawSurfaces(const FrameRequest& request, FrameSta
     }));
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
     const MesoCounts counts = mesoTarget.counts();
-    const auto ms = meso.timer.read();
-    if (!ms) return ms.error();
+    VCP_TRY_ASSIGN(const auto ms, meso.timer.read());
     stats.msFrame += took.count();
-    stats.msSurfaces = ms->front();
+    stats.msSurfaces = ms.front();
     stats.unresolvedRays = counts.unresolvedRays, stats.farHits = counts.farHits, stats.hitPixels = counts.hitPixels;
     stats.pipelines += meso.resources->pipelinesMade();
     stats.surfaceBytes = meso.pass->assetBytes();
@@ -232,13 +231,13 @@ Result<void> Renderer::State::drawSurfaces(const FrameRequest& request, FrameSta
 void Renderer::State::keep(const RayFeedback& heard, const SelectionView& view, const Dataset& dataset) {
     if (!feedbackPicture) feedbackPicture.emplace().errorPixels.fill(-1);
     const glm::dvec3 corner = dataset.originOf(dataset.pages[0]);
-    const double unit = std::ldexp(dataset.edgeOf(dataset.pages[0]), -static_cast<int>(frame::kLatticeBits));
+    const double unit = std::ldexp(dataset.edgeOf(dataset.pages[0]), -int(frame::kLatticeBits));
     for (const RayFeedback::Hit& hit : heard.hits) {
         const double distance = view.orthographic ? 1 : glm::length(corner + glm::dvec3(hit.place) * unit - view.eye);
         const double error =
             double(dataset.pages[hit.page].certifiedError) * view.pixelsPerUnit / std::max(distance, unit);
         float& kept = feedbackPicture->errorPixels[hit.ray];
-        kept = std::max(kept, static_cast<float>(error));
+        kept = std::max(kept, float(error));
     }
 }
 
@@ -252,19 +251,18 @@ Result<FrameStats> Renderer::State::collectStats(const Layer& layer, const Frame
         std::min<uint64_t>(stats.rays, uint64_t{counts.listedTiles} * frame::kTileSize * frame::kTileSize);
     stats.steps = counts.counters.steps;
     stats.fetches = counts.counters.fetches;
-    auto ms = timer.read();
-    if (!ms) return ms.error();
-    stats.msBeam = (*ms)[0];
-    stats.msTrace = (*ms)[1];
-    stats.msLight = (*ms)[2];
-    stats.msShade = (*ms)[3];
-    stats.msFeedback = (*ms)[4];
+    VCP_TRY_ASSIGN(auto ms, timer.read());
+    stats.msBeam = ms[0];
+    stats.msTrace = ms[1];
+    stats.msLight = ms[2];
+    stats.msShade = ms[3];
+    stats.msFeedback = ms[4];
     stats.feedbackPasses = feedback.passes();
     stats.pipelines = resources->pipelinesMade();
     if (Residency* const residency = layer.residency) {
         stats.colourBytes = residency->colourBytes();
         stats.poolBytes = residency->pages().bytes();
-        stats.pagesInCut = static_cast<uint32_t>(residency->cut(number).size());
+        stats.pagesInCut = uint32_t(residency->cut(number).size());
     }
     return stats;
 }

@@ -47,10 +47,9 @@ Result<Picture> Renderer::readPicture() {
     if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
     const FrameResources& resources = *s.layers.front().resources;
     const PictureSize size = resources.size();
-    auto words = readWords(*s.device, resources.picture(), 0, size.pixels());
-    if (!words) return words.error();
+    VCP_TRY_ASSIGN(auto words, readWords(*s.device, resources.picture(), 0, size.pixels()));
     Picture picture{size.width, size.height, std::vector<uint8_t>(size.pixels() * 4)};
-    std::memcpy(picture.rgba.data(), words->data(), picture.rgba.size());
+    std::memcpy(picture.rgba.data(), words.data(), picture.rgba.size());
     return picture;
 }
 
@@ -71,15 +70,13 @@ Result<std::vector<float>> Renderer::readDepth() {
 }
 
 Result<std::vector<float>> Renderer::State::depthOf(const Layer& layer) const {
-    auto words = hitPlane(layer, 0, std::bit_cast<uint32_t>(frame::kNoHit));
-    if (!words) return words.error();
+    VCP_TRY_ASSIGN(auto words, hitPlane(layer, 0, std::bit_cast<uint32_t>(frame::kNoHit)));
     const double cell = layer.unit();
-    std::vector<float> depth(words->size());
-    std::transform(words->begin(), words->end(), depth.begin(), [&](uint32_t word) {
+    std::vector<float> depth(words.size());
+    std::transform(words.begin(), words.end(), depth.begin(), [&](uint32_t word) {
         const float cells = std::abs(std::bit_cast<float>(word));
         if (cells >= frame::kGaveUp) return std::numeric_limits<float>::quiet_NaN();
-        return cells >= frame::kNoHit ? std::numeric_limits<float>::infinity()
-                                      : static_cast<float>(double(cells) * cell);
+        return cells >= frame::kNoHit ? std::numeric_limits<float>::infinity() : float(double(cells) * cell);
     });
     return depth;
 }
@@ -98,7 +95,7 @@ Result<std::vector<uint32_t>> Renderer::readWork() {
         if (!words) return words;
         work.resize(words->size());
         for (size_t i = 0; i < work.size(); ++i)
-            work[i] += static_cast<uint32_t>(std::lround(std::bit_cast<float>((*words)[i]) * most));
+            work[i] += uint32_t(std::lround(std::bit_cast<float>((*words)[i]) * most));
     }
     return work;
 }
@@ -107,23 +104,20 @@ Result<std::vector<glm::vec3>> Renderer::readNormals() {
     std::vector<float> nearest;
     std::vector<glm::vec3> normals;
     for (const State::Layer& layer : state_->layers) {
-        const auto depth = state_->depthOf(layer);
-        if (!depth) return depth.error();
-        const auto words = state_->hitPlane(layer, 1, 0);
-        if (!words) return words.error();
-        nearest.resize(words->size(), std::numeric_limits<float>::infinity());
-        normals.resize(words->size(), glm::vec3(0));
+        VCP_TRY_ASSIGN(const auto depth, state_->depthOf(layer));
+        VCP_TRY_ASSIGN(const auto words, state_->hitPlane(layer, 1, 0));
+        nearest.resize(words.size(), std::numeric_limits<float>::infinity());
+        normals.resize(words.size(), glm::vec3(0));
         const glm::quat turn(layer.placement.rotation);
         for (size_t i = 0; i < normals.size(); ++i) {
-            if (!((*depth)[i] < nearest[i])) continue;
-            nearest[i] = (*depth)[i];
-            normals[i] = turn * unpackNormal((*words)[i]);
+            if (!(depth[i] < nearest[i])) continue;
+            nearest[i] = depth[i];
+            normals[i] = turn * unpackNormal(words[i]);
         }
     }
-    const auto words = state_->mesoPlane(kMesoNormal);
-    if (!words) return words.error();
-    for (size_t i = 0; i < words->size(); ++i)
-        if ((*words)[i] != 0) normals[i] = unpackNormal((*words)[i]);
+    VCP_TRY_ASSIGN(const auto words, state_->mesoPlane(kMesoNormal));
+    for (size_t i = 0; i < words.size(); ++i)
+        if (words[i] != 0) normals[i] = unpackNormal(words[i]);
     return normals;
 }
 
@@ -156,9 +150,8 @@ Result<std::optional<PixelHit>> Renderer::State::pickSurfaces(uint32_t x, uint32
     const uint64_t at = uint64_t{y} * size.width + x;
     const WordPlace places[] = {{&mesoTarget.hits, kMesoDepth * size.pixels() + at},
                                 {&mesoTarget.hits, kMesoNormal * size.pixels() + at}};
-    const auto words = readEach(*device, places);
-    if (!words) return words.error();
-    const auto [depth, normal] = std::pair((*words)[0], (*words)[1]);
+    VCP_TRY_ASSIGN(const auto words, readEach(*device, places));
+    const auto [depth, normal] = std::pair(words[0], words[1]);
     if (normal == 0) return std::optional<PixelHit>{};
     PixelHit hit = hitAt(x, y, double(std::bit_cast<float>(depth)));
     hit.normal = unpackNormal(normal);
@@ -181,9 +174,8 @@ Result<std::optional<PixelHit>> Renderer::State::pick(const Layer& layer, uint32
     const uint64_t at = uint64_t{y} * size.width + x;
     const WordPlace places[] = {
         {&resources->tileStarts(), tile}, {&resources->hits(), at}, {&resources->hits(), size.pixels() + at}};
-    const auto read = readEach(*device, places);
-    if (!read) return read.error();
-    const std::vector<uint32_t>& words = *read;
+    VCP_TRY_ASSIGN(const auto read, readEach(*device, places));
+    const std::vector<uint32_t>& words = read;
     const float cells = std::abs(std::bit_cast<float>(words[1]));
     const bool onCap = std::signbit(std::bit_cast<float>(words[1]));
     if (std::bit_cast<float>(words[0]) >= frame::kTileEmpty || cells >= frame::kNoHit) return std::optional<PixelHit>{};
@@ -206,10 +198,9 @@ Result<void> Renderer::copyPicture(const ImageTarget& target) {
                      .message = "pictures are scaled to images by queues with graphics, which this is not"};
     if (!s.scaling) s.scaling = std::make_unique<PictureScaling>(*s.device);
     VCP_TRY(s.scaling->prepare(s.layers.front().resources->size()));
-    auto commands = s.device->beginCommands();
-    if (!commands) return commands.error();
-    s.scaling->record(*commands, s.layers.front().resources->picture(), target.image, {target.width, target.height});
-    changeLayout(*commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter,
+    VCP_TRY_ASSIGN(auto commands, s.device->beginCommands());
+    s.scaling->record(commands, s.layers.front().resources->picture(), target.image, {target.width, target.height});
+    changeLayout(commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter,
                  VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
     return s.device->endCommandsAndWait(target.wait, target.signal);
 }
@@ -255,10 +246,9 @@ Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& 
 Result<WindowDrawing> Renderer::windowDrawing() {
     const State& s = *state_;
     if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
-    const auto renderPass = s.swapchain->renderPass();
-    if (!renderPass) return renderPass.error();
+    VCP_TRY_ASSIGN(const auto renderPass, s.swapchain->renderPass());
     return WindowDrawing{s.instance->handle(), s.device->physical(),    s.device->handle(),
-                         s.device->queue(),    s.device->queueFamily(), *renderPass};
+                         s.device->queue(),    s.device->queueFamily(), renderPass};
 }
 
 }  // namespace vcp

@@ -98,13 +98,11 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
     startLoader();  // what the old loader held is gone
     for (const Request request : std::exchange(tooLarge_, {})) policy_->restore(request);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
-    auto carried = pool_ ? carryOut() : std::vector<CarriedPage>();
-    if (!carried) return carried.error();
+    VCP_TRY_ASSIGN(auto carried, pool_ ? carryOut() : std::vector<CarriedPage>());
     VCP_TRY(rebuild(device, access));
-    for (CarriedPage& page : *carried) {
-        const auto slot = slotFor(page.page);
-        if (!slot) return slot.error();
-        if (*slot) VCP_TRY(pool_->write(**slot, 0, page.bytes));
+    for (CarriedPage& page : carried) {
+        VCP_TRY_ASSIGN(const auto slot, slotFor(page.page));
+        if (slot) VCP_TRY(pool_->write(*slot, 0, page.bytes));
         page.bytes = {};
     }
     return pool_->flush();
@@ -177,11 +175,11 @@ UpdateResult Residency::report(const PolicyOutcome& outcome) const {
     result.loads = counts.loads;
     result.evictions = counts.evictions;
     result.reloads = counts.reloads;
-    result.pagesPending = static_cast<uint32_t>(loader_->pending());
-    result.pagesResident = static_cast<uint32_t>(policy_->pagesResident());
-    result.pagesInCut = static_cast<uint32_t>(cut.size());
-    result.pagesWanted = static_cast<uint32_t>(outcome.drawable.pagesWanted);
-    result.pagesMissing = static_cast<uint32_t>(outcome.drawable.pagesMissing);
+    result.pagesPending = uint32_t(loader_->pending());
+    result.pagesResident = uint32_t(policy_->pagesResident());
+    result.pagesInCut = uint32_t(cut.size());
+    result.pagesWanted = uint32_t(outcome.drawable.pagesWanted);
+    result.pagesMissing = uint32_t(outcome.drawable.pagesMissing);
     if (cut.empty()) return result;
     // Pages are numbered level by level, coarsest first.
     result.coarsestLevel = dataset_->pages[cut.front()].level;
@@ -196,15 +194,14 @@ Result<std::optional<PoolSlot>> Residency::slotFor(uint64_t page) {
 }
 
 Result<void> Residency::place(uint64_t page, const PageBytes& bytes) {
-    const auto slot = slotFor(page);
-    if (!slot) return slot.error();
-    if (!*slot) return {};
+    VCP_TRY_ASSIGN(const auto slot, slotFor(page));
+    if (!slot) return {};
     const std::span geometry = bytes.geometryBytes();
     PageHeader& header = headers_[page];
     // Pages of the other method have all they need in a header of their own, which the shader reads.
     if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
-    VCP_TRY(pool_->write(**slot, 0, geometry));
-    if (!bytes.colour.empty()) VCP_TRY(pool_->write(**slot, geometry.size(), bytes.colourBytes()));
+    VCP_TRY(pool_->write(*slot, 0, geometry));
+    if (!bytes.colour.empty()) VCP_TRY(pool_->write(*slot, geometry.size(), bytes.colourBytes()));
     return {};
 }
 

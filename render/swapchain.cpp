@@ -75,8 +75,7 @@ Result<VkRenderPass> Swapchain::renderPass() {
 
 Result<void> Swapchain::makeFramebuffers() {
     if (!framebuffers_.empty()) return {};
-    const auto pass = renderPass();
-    if (!pass) return pass.error();
+    VCP_TRY_ASSIGN(const auto pass, renderPass());
     for (VkImage image : images_) {
         VkImageViewCreateInfo viewInfo{VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO};
         viewInfo.image = image;
@@ -85,7 +84,7 @@ Result<void> Swapchain::makeFramebuffers() {
         viewInfo.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
         VCP_VK(vkCreateImageView, device_.handle(), &viewInfo, nullptr, &views_.emplace_back(VK_NULL_HANDLE));
         VkFramebufferCreateInfo info{VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO};
-        info.renderPass = *pass;
+        info.renderPass = pass;
         info.attachmentCount = 1;
         info.pAttachments = &views_.back();
         info.width = extent_.width;
@@ -159,13 +158,12 @@ Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, Pic
     if (acquired != VK_SUCCESS && acquired != VK_SUBOPTIMAL_KHR) return vulkanError("vkAcquireNextImageKHR", acquired);
     VCP_TRY(scaling_.prepare(pictureSize));
     if (drawOver) VCP_TRY(makeFramebuffers());
-    auto commands = device_.beginCommands();
-    if (!commands) return commands.error();
-    scaling_.record(*commands, picture, images_[image], extent_);
+    VCP_TRY_ASSIGN(auto commands, device_.beginCommands());
+    scaling_.record(commands, picture, images_[image], extent_);
     if (drawOver)
-        recordOver(*commands, drawOver, image);
+        recordOver(commands, drawOver, image);
     else
-        changeLayout(*commands, images_[image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
+        changeLayout(commands, images_[image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
                      VK_ACCESS_TRANSFER_WRITE_BIT, 0);
     VCP_TRY(device_.endCommandsAndWait(acquired_, shown_[image]));
     VkPresentInfoKHR present{VK_STRUCTURE_TYPE_PRESENT_INFO_KHR};

@@ -8,10 +8,9 @@ namespace vcp {
 
 ExchangePace::ExchangePace(const HttpOptions& options, uint64_t mostBytes, double now)
     : stallSeconds_(options.stallSeconds),
-      leastBytesPerSecond_(static_cast<double>(std::max<uint64_t>(options.leastBytesPerSecond, 1))),
+      leastBytesPerSecond_(double(std::max<uint64_t>(options.leastBytesPerSecond, 1))),
       begun_(now),
-      mostSeconds_(options.connectSeconds + options.stallSeconds +
-                   static_cast<double>(mostBytes) / leastBytesPerSecond_),
+      mostSeconds_(options.connectSeconds + options.stallSeconds + double(mostBytes) / leastBytesPerSecond_),
       since_(now) {}
 
 std::optional<std::string> ExchangePace::problem(double now, uint64_t bytes, bool isConnected) {
@@ -22,7 +21,7 @@ std::optional<std::string> ExchangePace::problem(double now, uint64_t bytes, boo
     if (seconds < stallSeconds_) return std::nullopt;
     const uint64_t came = bytes - before_;
     if (came == 0) return fmt::format("time-out: no byte for {:.3g} s", seconds);
-    if (static_cast<double>(came) < leastBytesPerSecond_ * seconds)
+    if (double(came) < leastBytesPerSecond_ * seconds)
         return fmt::format("time-out: only {} bytes in {:.3g} s, where {:.0f} a second are needed", came, seconds,
                            leastBytesPerSecond_);
     since_ = now;

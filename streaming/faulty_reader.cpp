@@ -14,12 +14,12 @@ namespace {
 enum class Draw : uint64_t { Error, Corrupt, Place, Stall, Spread };
 
 uint64_t drawn(const Faults& faults, uint64_t offset, uint64_t attempt, Draw draw) {
-    const std::array<uint64_t, 4> key = {faults.seed, offset, attempt, static_cast<uint64_t>(draw)};
+    const std::array<uint64_t, 4> key = {faults.seed, offset, attempt, uint64_t(draw)};
     return hashBytes(std::as_bytes(std::span(key)));
 }
 
 /// Returns a number from 0 to below 1.
-double fraction(uint64_t random) { return static_cast<double>(random >> 11) * 0x1p-53; }
+double fraction(uint64_t random) { return double(random >> 11) * 0x1p-53; }
 
 }  // namespace
 
@@ -65,7 +65,7 @@ double FaultyReader::delayOf(uint64_t offset, uint64_t attempt, size_t bytes) co
     if (faults_.bytesPerSecond > 0) {
         const std::lock_guard lock(mutex_);
         const double now = clock_.now();
-        busyUntil_ = std::max(busyUntil_, now) + static_cast<double>(bytes) / faults_.bytesPerSecond;
+        busyUntil_ = std::max(busyUntil_, now) + double(bytes) / faults_.bytesPerSecond;
         delay += busyUntil_ - now;
     }
     return delay;

@@ -38,7 +38,7 @@ std::optional<uint64_t> takeNumber(std::string_view& text, char after) {
     uint64_t value = 0;
     const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (failed != std::errc()) return std::nullopt;
-    text.remove_prefix(static_cast<size_t>(end - text.data()));
+    text.remove_prefix(size_t(end - text.data()));
     if (after == '\0') return text.empty() ? std::optional(value) : std::nullopt;
     if (text.empty() || text.front() != after) return std::nullopt;
     text.remove_prefix(1);
@@ -243,13 +243,13 @@ void HttpConnection::prepare(const WebAddress& address, const std::string& range
     curl_easy_setopt(curl, CURLOPT_RANGE, ranges.c_str());
     curl_easy_setopt(curl, CURLOPT_HTTPHEADER, exchange.fields);
     curl_easy_setopt(curl, CURLOPT_USERAGENT, "vcp");
-    curl_easy_setopt(curl, CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_2TLS));
+    curl_easy_setopt(curl, CURLOPT_HTTP_VERSION, long(CURL_HTTP_VERSION_2TLS));
     curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, mayBePlain ? "http,https" : "https");
     curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
     curl_easy_setopt(curl, CURLOPT_QUICK_EXIT, 1L);  // a name that is being looked up is not waited for
     curl_easy_setopt(curl, CURLOPT_TCP_NODELAY, 1L);
     curl_easy_setopt(curl, CURLOPT_SUPPRESS_CONNECT_HEADERS, 1L);
-    curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT_MS, std::max(1L, static_cast<long>(options_.connectSeconds * 1000)));
+    curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT_MS, std::max(1L, long(options_.connectSeconds * 1000)));
     if (!options_.caFile.empty()) curl_easy_setopt(curl, CURLOPT_CAINFO, options_.caFile.c_str());
     curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, onHeader);
     curl_easy_setopt(curl, CURLOPT_HEADERDATA, &exchange);

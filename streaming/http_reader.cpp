@@ -159,24 +159,23 @@ Result<void> HttpReader::State::checkVersion(const HttpAnswer& answer, uint64_t 
 
 Result<void> HttpReader::State::begin() {
     const ByteRange wanted{0, std::max<uint64_t>(options.firstBytes, 1) - 1};
-    auto answer = get(rangeText(wanted), wanted.size());
-    if (!answer) return answer.error();
-    VCP_TRY(checkAnswer(*answer));
-    const auto range = parseContentRange(answer->range);
+    VCP_TRY_ASSIGN(auto answer, get(rangeText(wanted), wanted.size()));
+    VCP_TRY(checkAnswer(answer));
+    const auto range = parseContentRange(answer.range);
     if (!range || range->range.first != 0 || range->range.last != std::min(wanted.last, range->fileBytes - 1))
-        return anotherRange(*answer);
-    if (answer->body.size() != range->range.size())
+        return anotherRange(answer);
+    if (answer.body.size() != range->range.size())
         return fail(ErrorCode::Io, "the answer ended before all its bytes had come");
     size = range->fileBytes;
-    entityTag = answer->entityTag;
-    lastModified = answer->lastModified;
+    entityTag = answer.entityTag;
+    lastModified = answer.lastModified;
     // A weak tag never matches in If-Match.
     if (isFieldText(entityTag) && !entityTag.starts_with("W/"))
         condition = "If-Match: " + entityTag;
     else if (isFieldText(lastModified))
         condition = "If-Unmodified-Since: " + lastModified;
-    heldEnd = answer->body.size();
-    held = {std::make_shared<const Stretch>(Stretch{0, std::move(answer->body)})};
+    heldEnd = answer.body.size();
+    held = {std::make_shared<const Stretch>(Stretch{0, std::move(answer.body)})};
     return readAhead();
 }
 

@@ -57,7 +57,7 @@ std::optional<LoadOrder> loadOrderNamed(std::string_view name) {
     return static_cast<LoadOrder>(at - kNames.begin());
 }
 
-std::string_view nameOf(LoadOrder order) { return kNames[static_cast<size_t>(order)]; }
+std::string_view nameOf(LoadOrder order) { return kNames[size_t(order)]; }
 
 LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span<const uint64_t> pageUnits,
                                LoadOrder order)
@@ -72,7 +72,7 @@ LoadPriorities::LoadPriorities(std::shared_ptr<const Dataset> dataset, std::span
 
 void LoadPriorities::learn(uint64_t page, uint64_t units) {
     pageUnits_[page] = units;
-    for (const uint64_t child : childrenOf(dataset_->pages[page])) parents_[child] = static_cast<uint32_t>(page);
+    for (const uint64_t child : childrenOf(dataset_->pages[page])) parents_[child] = uint32_t(page);
 }
 
 void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view, size_t views) {

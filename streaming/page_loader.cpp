@@ -28,7 +28,7 @@ std::string elementOf(Request request) {
 // takes a fifth of its share of the processor. All together have about the share that two threads have 8 steps down, a
 // third of one thread that draws.
 void giveWay(uint32_t threads) {
-    const int steps = 8 + static_cast<int>(std::lround(std::log(std::max(threads, 2u) / 2.0) / std::log(1.25)));
+    const int steps = 8 + int(std::lround(std::log(std::max(threads, 2u) / 2.0) / std::log(1.25)));
     const auto thread = static_cast<id_t>(::gettid());
     ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + steps);
 }

@@ -109,7 +109,7 @@ std::vector<Result<PageBytes>> FilePageSource::readPages(uint64_t first, uint32_
 
 uint32_t FilePageSource::runFrom(Request first, uint32_t most, bool withColour) const {
     if (first.isPage()) return pageRunFrom(first.number, most, withColour);
-    return static_cast<uint32_t>(std::min<uint64_t>(most, dataset_->pages.blocks() - first.number));
+    return uint32_t(std::min<uint64_t>(most, dataset_->pages.blocks() - first.number));
 }
 
 uint32_t FilePageSource::pageRunFrom(uint64_t first, uint32_t most, bool withColour) const {

@@ -63,7 +63,7 @@ double RequestQueue::nextTry() const {
 
 size_t RequestQueue::pending() const {
     const auto waits = [&](const Wish& wish) { return isIdle(wish.request); };
-    return static_cast<size_t>(std::count_if(wishes_.begin(), wishes_.end(), waits)) + underWay_.size();
+    return size_t(std::count_if(wishes_.begin(), wishes_.end(), waits)) + underWay_.size();
 }
 
 }  // namespace vcp

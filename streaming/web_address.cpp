@@ -82,7 +82,7 @@ std::optional<WebAddress> addressOf(CURLU* url) {
     curl_url_set(url, CURLUPART_PASSWORD, nullptr, 0);
     address.origin = *scheme + "://" + *host + ":" + *port;
     std::transform(address.origin.begin(), address.origin.end(), address.origin.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+                   [](unsigned char c) { return char(std::tolower(c)); });
     address.url = partOf(url, CURLUPART_URL).value_or("");
     return address.url.empty() ? std::nullopt : std::optional(address);
 }

@@ -85,14 +85,12 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
     if (bytesKept() > kMostBytes) forget();
     std::optional<RayHit> nearest;
     if (ray.tMin > ray.tMax) return nearest;
-    const auto pages = finestPagesOn(*reader_, pages_.dataset(), ray);
-    if (!pages) return pages.error();
-    for (const PageOnRay& next : *pages) {
+    VCP_TRY_ASSIGN(const auto pages, finestPagesOn(*reader_, pages_.dataset(), ray));
+    for (const PageOnRay& next : pages) {
         if (nearest && nearest->t < next.enter) break;
         VCP_TRY(pages_.load(next.page));
-        const auto caster = ReferenceCaster::create(pages_, std::span(&next.page, 1));
-        if (!caster) return caster.error();
-        const auto hit = caster->cast(ray);
+        VCP_TRY_ASSIGN(const auto caster, ReferenceCaster::create(pages_, std::span(&next.page, 1)));
+        const auto hit = caster.cast(ray);
         if (hit && (!nearest || hit->t < nearest->t)) nearest = hit;
     }
     return nearest;
@@ -112,10 +110,9 @@ Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const 
         local.tMax = (nearest ? std::min(nearest->t, ray.tMax) : ray.tMax) / placement.scale;
         std::vector<SectionPlane> planes;
         for (const SectionPlane& plane : sections) planes.push_back(planeIn(placement, plane));
-        const auto hit = part.pick.cast(local, planes);
-        if (!hit) return hit.error();
-        if (!*hit || (nearest && nearest->t <= (*hit)->t * placement.scale)) continue;
-        nearest = SceneHit{**hit, static_cast<size_t>(&part - parts_.data())};
+        VCP_TRY_ASSIGN(const auto hit, part.pick.cast(local, planes));
+        if (!hit || (nearest && nearest->t <= hit->t * placement.scale)) continue;
+        nearest = SceneHit{*hit, size_t(&part - parts_.data())};
         nearest->t *= placement.scale;
         nearest->certifiedError *= placement.scale;
         nearest->position = placement.toWorld(nearest->position);

@@ -109,7 +109,7 @@ SectionDrag::SectionDrag(const SectionHandle& handle, SectionGrip grip, const Se
         const double distance = glm::distance(handle.ring[i], pressed);
         if (distance >= nearest) continue;
         nearest = distance;
-        const double angle = 2 * std::numbers::pi * static_cast<double>(i) / kRingPoints;
+        const double angle = 2 * std::numbers::pi * double(i) / kRingPoints;
         const glm::dvec3 arm = u * std::cos(angle) + v * std::sin(angle);
         side_ = glm::dot(arm, camera.forwardVector()) > kFarSide ? -1 : 1;
     }

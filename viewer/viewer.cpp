@@ -36,7 +36,7 @@ constexpr uint32_t kOcclusionRays = 8;
 constexpr double kSmallestInView = 1e-3;
 
 ShadingMode next(ShadingMode mode) {
-    return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(static_cast<int>(mode) + 1);
+    return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(int(mode) + 1);
 }
 
 /// Shortens a long name in its middle.
@@ -89,9 +89,8 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
 }
 
 Result<std::unique_ptr<Viewer>> Viewer::create(const ViewerOptions& options) {
-    auto renderer = Renderer::create(options.renderer);
-    if (!renderer) return renderer.error();
-    return std::unique_ptr<Viewer>(new Viewer(options, *std::move(renderer)));
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options.renderer));
+    return std::unique_ptr<Viewer>(new Viewer(options, std::move(renderer)));
 }
 
 std::unique_ptr<Viewer> Viewer::on(std::unique_ptr<Renderer> view, const ViewerOptions& options) {
@@ -166,7 +165,7 @@ std::optional<PixelHit> Viewer::hitAt(glm::dvec2 pixel) {
     // The last picture may be smaller than the window it is shown in.
     const glm::dvec2 at = pixel * glm::dvec2(drawn_->width, drawn_->height) / glm::dvec2(size_);
     if (at.x < 0 || at.y < 0 || at.x >= drawn_->width || at.y >= drawn_->height) return std::nullopt;
-    const auto hit = renderer_->pick(static_cast<uint32_t>(at.x), static_cast<uint32_t>(at.y));
+    const auto hit = renderer_->pick(uint32_t(at.x), uint32_t(at.y));
     return hit ? *hit : std::nullopt;
 }
 
@@ -454,16 +453,16 @@ bool Viewer::isMoving(double now) const { return now - movedAt_ < kRestSeconds; 
 int Viewer::reductionAt(double now) const {
     if (options_.movingFrameMs <= 0 || !isMoving(now)) return 1;
     if (fullFrameMs_ <= options_.movingFrameMs) return movingReduction_;
-    const int wanted = static_cast<int>(
-        std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
+    const int wanted =
+        int(std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
     return std::max(wanted, movingReduction_);
 }
 
 FrameRequest Viewer::requestWith(int reduction) const {
     FrameRequest request;
     request.camera = camera_.current();
-    request.width = static_cast<uint32_t>(std::max(1, size_.x / reduction));
-    request.height = static_cast<uint32_t>(std::max(1, size_.y / reduction));
+    request.width = uint32_t(std::max(1, size_.x / reduction));
+    request.height = uint32_t(std::max(1, size_.y / reduction));
     request.errorPixels = options_.errorPixels;
     request.shading = shading_;
     if (isMoving(now_)) request.shading.occlusionRays = 0;
@@ -476,8 +475,8 @@ FrameRequest Viewer::requestWith(int reduction) const {
 FrameRequest Viewer::pictureOf(glm::ivec2 size) const {
     FrameRequest request = requestWith(1);
     request.shading = shading_;
-    request.width = static_cast<uint32_t>(size.x);
-    request.height = static_cast<uint32_t>(size.y);
+    request.width = uint32_t(size.x);
+    request.height = uint32_t(size.y);
     return request;
 }
 
@@ -495,11 +494,10 @@ Result<NextStep> Viewer::update(double now) {
     seen_ = camera_;
     requestReduction_ = movingReduction_ = reductionAt(now);
     request_ = requestWith(requestReduction_);
-    auto update = renderer_->update(request_);
-    if (!update) return update.error();
-    pagesChanged_ = pagesChanged_ || update->changed;
-    if (!update->problems.empty()) status_.problem = update->problems.back().line();
-    status_.update = *std::move(update);
+    VCP_TRY_ASSIGN(auto update, renderer_->update(request_));
+    pagesChanged_ = pagesChanged_ || update.changed;
+    if (!update.problems.empty()) status_.problem = update.problems.back().line();
+    status_.update = std::move(update);
     return nextStep(now);
 }
 
@@ -516,9 +514,8 @@ NextStep Viewer::nextStep(double now) const {
 }
 
 Result<void> Viewer::draw() {
-    auto stats = renderer_->render(request_);
-    if (!stats) return stats.error();
-    status_.frame = *stats;
+    VCP_TRY_ASSIGN(auto stats, renderer_->render(request_));
+    status_.frame = stats;
     status_.reduction = requestReduction_;
     const bool wantsLight =
         request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
@@ -526,7 +523,7 @@ Result<void> Viewer::draw() {
     // The first frame also compiles: it says nothing about the next. Nor does a moving one, which has no occlusion.
     if (framesDrawn_ > 0)
         fullFrameMs_ = requestReduction_ * requestReduction_ *
-                       (stats->msFrame - (request_.shading.occlusionRays > 0 ? stats->msLight : 0));
+                       (stats.msFrame - (request_.shading.occlusionRays > 0 ? stats.msLight : 0));
     ++framesDrawn_;
     drawn_ = request_;
     drawnAt_ = now_;

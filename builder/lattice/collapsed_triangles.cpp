@@ -88,7 +88,7 @@ void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(
         t.corner[1] = s.a == s.b ? besideLine(t.corner[0], t.corner[0], samePage) : vectorOf(s.b);
         t.corner[2] = besideLine(t.corner[0], t.corner[1], samePage);
         for (int i = 0; i < 3; ++i) t.colour[i] = s.colour[i == 1 ? 1 : 0];
-        t.stray = static_cast<float>(kLatticeRounding + 1.0 / kLatticePerCell);
+        t.stray = float(kLatticeRounding + 1.0 / kLatticePerCell);
         soup.push_back(t);
     }
 }

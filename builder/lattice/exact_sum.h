@@ -22,8 +22,7 @@ public:
     [[nodiscard]] double value() const {
         double sum = 0;
         for (size_t e = 0; e < parts_.size(); ++e)
-            if (parts_[e] != 0)
-                sum += std::ldexp(static_cast<double>(parts_[e]), static_cast<int>(e == 0 ? 1 : e) - 1075);
+            if (parts_[e] != 0) sum += std::ldexp(double(parts_[e]), int(e == 0 ? 1 : e) - 1075);
         return sum;
     }
 

@@ -158,7 +158,7 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
         PositionIndex index(soup.size() * 6 / 10);
         for (size_t k = 0; k < corners.size(); ++k) {
             const glm::i32vec3 p = soup[k / 3].corner[k % 3];
-            const uint32_t next = static_cast<uint32_t>(mesh.positions.size());
+            const uint32_t next = uint32_t(mesh.positions.size());
             corners[k] = index.findOrAdd(mesh.positions, p, next);
             if (corners[k] == next) mesh.positions.push_back(p);
         }
@@ -182,7 +182,7 @@ std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
     const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p),
                                      [&](glm::i32vec3 q, const OrderedVertex& wanted) { return named(q) < wanted; });
     if (at == mesh.positions.end() || *at != p) return {};
-    return static_cast<uint32_t>(at - mesh.positions.begin());
+    return uint32_t(at - mesh.positions.begin());
 }
 
 void computeNormals(LatticeMesh& mesh) {

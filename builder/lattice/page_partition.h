@@ -23,7 +23,7 @@ struct PageGrid {
     [[nodiscard]] double edgeCells() const { return double(1u << log2Cells); }
     /// Returns the Morton code of the page that a lattice point lies in.
     [[nodiscard]] uint64_t pageOf(glm::i32vec3 p) const {
-        const glm::i32vec3 page = glm::min(p >> static_cast<int>(log2Cells + kLog2LatticePerCell), lastPage());
+        const glm::i32vec3 page = glm::min(p >> int(log2Cells + kLog2LatticePerCell), lastPage());
         return mortonEncode(glm::u32vec3(page));
     }
     /// Calls visit(Morton code) for every page whose cube, widened by `margin` cells, the triangle overlaps.
@@ -73,7 +73,7 @@ public:
     [[nodiscard]] size_t bins() const { return first_.size(); }
     [[nodiscard]] const std::vector<uint64_t>& first() const { return first_; }
     [[nodiscard]] size_t binOf(uint64_t page) const {
-        return static_cast<size_t>(std::upper_bound(first_.begin(), first_.end(), page) - first_.begin()) - 1;
+        return size_t(std::upper_bound(first_.begin(), first_.end(), page) - first_.begin()) - 1;
     }
     /// Returns the same bins on the next coarser level.
     [[nodiscard]] PagePartition coarser() const {

@@ -67,7 +67,7 @@ private:
         for (const Image& image : images) {
             if (out_.mesh.triangles.empty() || out_.mesh.triangles.back() != image.corners)
                 out_.mesh.triangles.push_back(image.corners);
-            out_.imageOf[image.fine] = static_cast<uint32_t>(out_.mesh.triangles.size() - 1);
+            out_.imageOf[image.fine] = uint32_t(out_.mesh.triangles.size() - 1);
         }
     }
 
@@ -169,7 +169,7 @@ private:
         mesh.positions.push_back(v ? fine_.positions[*v] >> 1 : mesh.positions[cluster] + step);
         if (!mesh.colours.empty()) mesh.colours.push_back(v ? fine_.colours[*v] : mesh.colours[cluster]);
         if (!mesh.normals.empty()) mesh.normals.push_back(v ? fine_.normals[*v] : mesh.normals[cluster]);
-        return static_cast<uint32_t>(mesh.positions.size() - 1);
+        return uint32_t(mesh.positions.size() - 1);
     }
 
     void keep(uint32_t a, uint32_t b, const Farthest& farthest) {
@@ -205,7 +205,7 @@ LatticeTriangle longImage(const LatticeTriangle& fine, const VertexImage (&image
     double moved = 0;
     for (int i = 0; i < 3; ++i)
         moved = std::max(moved, glm::length(glm::dvec3(fine.corner[i]) / 2.0 - glm::dvec3(image[i].position)));
-    t.stray = std::nextafter(static_cast<float>(moved / kLatticePerCell + double(fine.stray) / 2), 1e9f);
+    t.stray = std::nextafter(float(moved / kLatticePerCell + double(fine.stray) / 2), 1e9f);
     if (hasArea(t.corner[0], t.corner[1], t.corner[2])) return t;
     // The thin triangle lies along the longest side, with the third corner where the mesh had it; ties by that.
     int from = 0;

@@ -39,7 +39,7 @@ bool LevelStep::isKnown(size_t bin, glm::i32vec3 p) const {
     if (binOf(p) == bin) return true;
     if (first_) return false;
     // The coarse cell must lie within a page of the bin, widened.
-    const glm::dvec3 low = glm::dvec3(p >> static_cast<int>(PageGrid::kLog2LatticePerCell + 1)) * 2.0;
+    const glm::dvec3 low = glm::dvec3(p >> int(PageGrid::kLog2LatticePerCell + 1)) * 2.0;
     const double edge = grid_.edgeCells();
     const glm::i32vec3 first = glm::max(glm::i32vec3(glm::ceil((low + 2.0 - kStepMarginCells) / edge)) - 1, 0);
     const glm::i32vec3 last = glm::min(glm::i32vec3(glm::floor((low + kStepMarginCells) / edge)), grid_.lastPage());
@@ -56,7 +56,7 @@ LevelStep::Images LevelStep::imagesOf(size_t bin, const LatticeMesh& mesh) const
     images.known.resize(mesh.positions.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.positions.size(), 4096), [&](const auto& range) {
         for (size_t v = range.begin(); v < range.end(); ++v) {
-            images.bin[v] = static_cast<uint32_t>(binOf(mesh.positions[v]));
+            images.bin[v] = uint32_t(binOf(mesh.positions[v]));
             images.known[v] = isKnown(bin, mesh.positions[v]);
         }
     });
@@ -84,9 +84,8 @@ Result<void> LevelStep::stepWaiting(size_t bin, const LatticeMesh& mesh, const I
     LevelSink::Batch batch(sink_);
     const auto blocks = waiting_.raw().blocks(bin);
     for (const RawBins::Block& block : std::vector(blocks.begin(), blocks.end())) {
-        auto records = waiting_.read(block);
-        if (!records) return records.error();
-        for (WaitingTriangle& w : *records) {
+        VCP_TRY_ASSIGN(auto records, waiting_.read(block));
+        for (WaitingTriangle& w : records) {
             for (int i = 0; i < 3; ++i) {
                 if (w.known >> i & 1) continue;
                 const auto vertex = findVertex(mesh, w.from.corner[i]);

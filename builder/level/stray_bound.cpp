@@ -42,7 +42,7 @@ public:
         all_.resize(begin_.back());
         std::vector<uint32_t> next(begin_.begin(), begin_.end() - 1);
         for (size_t k = 0; k < triangles; ++k)
-            forDistinct(corners(k), clusters, [&](uint32_t c) { all_[next[c]++] = static_cast<uint32_t>(k); });
+            forDistinct(corners(k), clusters, [&](uint32_t c) { all_[next[c]++] = uint32_t(k); });
     }
     /// Returns the triangles at any of the corners, ascending.
     void around(const Index3& corners, std::vector<uint32_t>& out) const {
@@ -211,7 +211,7 @@ private:
         for (size_t i = first; i < pieces_.size(); ++i) {
             double away = pieces_[i].stray;
             for (const glm::dvec3& p : pieces_[i].corners) away = std::max(away, pieces_[i].stray + prism.away(p));
-            order_.push_back({away, static_cast<uint32_t>(ownPrisms_.size())});
+            order_.push_back({away, uint32_t(ownPrisms_.size())});
             ownPrisms_.emplace_back(pieces_[i].corners, pieces_[i].stray);
         }
         std::sort(order_.begin(), order_.end(), [&](const auto& a, const auto& b) {
@@ -327,7 +327,7 @@ std::vector<float> boundStray(const LatticeMesh& fine, const VertexClusters& clu
     forAll(meshes.stray.size(), &StrayBound::boundCoarse);
     std::vector<float> stray(meshes.stray.size());
     for (size_t k = 0; k < stray.size(); ++k)
-        stray[k] = std::nextafter(static_cast<float>(meshes.stray[k]), std::numeric_limits<float>::infinity());
+        stray[k] = std::nextafter(float(meshes.stray[k]), std::numeric_limits<float>::infinity());
     return stray;
 }
 

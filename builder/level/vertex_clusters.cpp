@@ -18,8 +18,8 @@ namespace {
 
 // A coarse cell, in steps of the finer lattice.
 constexpr int kCoarseCell = 2 * kLatticePerCell;
-constexpr int kLargestCube = static_cast<int>(kLargestClusterCells * kCoarseCell);
-constexpr int kSmallestCube = static_cast<int>(kSmallestClusterCells * kCoarseCell);
+constexpr int kLargestCube = int(kLargestClusterCells * kCoarseCell);
+constexpr int kSmallestCube = int(kSmallestClusterCells * kCoarseCell);
 
 // Sums are of integers, so that their order does not matter: reals are rounded to multiples of this.
 constexpr double kFixedPoint = 1 << 30;
@@ -35,7 +35,7 @@ constexpr double kTip = 0.8;
 
 constexpr double kCreaseCosine = 0.766;  // 40 degrees
 
-int64_t fixed(double x) { return static_cast<int64_t>(x * kFixedPoint); }
+int64_t fixed(double x) { return int64_t(x * kFixedPoint); }
 
 /// The order of components is xx yy zz yz zx xy.
 using Symmetric3 = std::array<double, 6>;
@@ -166,12 +166,12 @@ private:
         planes_.clear();
         for (Member& m : members_) {
             m.point = glm::dvec3(mesh_.positions[m.vertex]) / double(kCoarseCell) - centre_;
-            m.planes = static_cast<uint32_t>(planes_.size());
+            m.planes = uint32_t(planes_.size());
             edges_.clear();
             for (uint32_t i = begin_[m.vertex]; i < begin_[m.vertex + 1]; ++i) addTriangle(m, incident_[i]);
-            m.borders = static_cast<uint32_t>(planes_.size());
+            m.borders = uint32_t(planes_.size());
             addBorders(m);
-            m.end = static_cast<uint32_t>(planes_.size());
+            m.end = uint32_t(planes_.size());
         }
     }
 
@@ -284,7 +284,7 @@ private:
     }
 
     void emit(Members members, glm::dvec3 r, glm::i32vec3 lower, int edge) {
-        const uint32_t number = static_cast<uint32_t>(out_.positions.size());
+        const uint32_t number = uint32_t(out_.positions.size());
         for (const Member& m : members) out_.ofVertex[m.vertex] = number;
         // The point stays within the half-open cube, so that no two clusters meet in a point.
         const glm::dvec3 steps = glm::round((centre_ + r) * double(kLatticePerCell));
@@ -298,8 +298,7 @@ private:
         for (const Member& m : members)
             for (int c = 0; c < 4; ++c) channel[c] += mesh_.colours[m.vertex] >> 8 * c & 255u;
         uint32_t colour = 0;
-        for (int c = 0; c < 4; ++c)
-            colour |= static_cast<uint32_t>((channel[c] + members.size() / 2) / members.size()) << 8 * c;
+        for (int c = 0; c < 4; ++c) colour |= uint32_t((channel[c] + members.size() / 2) / members.size()) << 8 * c;
         return colour;
     }
 

@@ -9,22 +9,19 @@ namespace vcp {
 namespace {
 
 Result<void> append(const std::filesystem::path& path, IndexedMesh& mesh) {
-    auto stream = openMesh(path);
-    if (!stream) return stream.error();
+    VCP_TRY_ASSIGN(auto stream, openMesh(path));
     const uint64_t base = mesh.positions.size();
     MeshChunk chunk;
     while (true) {
-        auto more = (*stream)->next(chunk);
-        if (!more) return more.error();
-        if (!*more) return {};
+        VCP_TRY_ASSIGN(auto more, stream->next(chunk));
+        if (!more) return {};
         if (mesh.positions.size() + chunk.positions.size() > std::numeric_limits<uint32_t>::max())
             return Error{.code = ErrorCode::Limit,
                          .message = "more vertices than a mesh in memory can number",
                          .file = path.string()};
         mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
         for (const auto& t : chunk.triangles)
-            mesh.triangles.push_back({static_cast<uint32_t>(base + t[0]), static_cast<uint32_t>(base + t[1]),
-                                      static_cast<uint32_t>(base + t[2])});
+            mesh.triangles.push_back({uint32_t(base + t[0]), uint32_t(base + t[1]), uint32_t(base + t[2])});
     }
 }
 

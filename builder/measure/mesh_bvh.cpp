@@ -86,7 +86,7 @@ Split cheapestSplit(const IndexedMesh& mesh, const uint32_t* triangles, uint32_t
         std::array<uint32_t, kBins> counts{};
         for (uint32_t i = 0; i < count; ++i) {
             const double at = (centres[triangles[i]][axis] - spread.low[axis]) / width * kBins;
-            const int bin = std::min(static_cast<int>(at), kBins - 1);
+            const int bin = std::min(int(at), kBins - 1);
             bins[bin].add(triangleBounds(mesh, triangles[i]));
             ++counts[bin];
         }
@@ -190,7 +190,7 @@ MeshBvh::MeshBvh(const IndexedMesh& mesh) : mesh_(&mesh), order_(mesh.triangles.
         centres[t] = 0.5 * bounds.low + 0.5 * bounds.high;
     }
     nodes_.reserve(order_.size());
-    nodes_.push_back({{}, {}, 0, static_cast<uint32_t>(order_.size())});
+    nodes_.push_back({{}, {}, 0, uint32_t(order_.size())});
     fitNode(nodes_[0]);
     split(0, centres);
     nodes_.shrink_to_fit();
@@ -214,12 +214,11 @@ void MeshBvh::split(uint32_t root, std::vector<glm::dvec3>& centres) {
         const Split plane = cheapestSplit(*mesh_, begin, count, centres);
         uint32_t left = count / 2;
         if (plane.axis >= 0)
-            left = static_cast<uint32_t>(
-                std::partition(begin, begin + count,
-                               [&](uint32_t t) { return centres[t][plane.axis] < plane.position; }) -
-                begin);
+            left = uint32_t(std::partition(begin, begin + count,
+                                           [&](uint32_t t) { return centres[t][plane.axis] < plane.position; }) -
+                            begin);
         if (left == 0 || left == count) left = count / 2;
-        const auto child = static_cast<uint32_t>(nodes_.size());
+        const auto child = uint32_t(nodes_.size());
         nodes_[number].first = child;
         nodes_[number].count = 0;
         nodes_.push_back({{}, {}, first, left});

@@ -11,15 +11,15 @@ namespace {
 /// The value at an index of them in order.
 template <class Value>
 double valueAt(std::vector<Value>& values, size_t index) {
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(index);
+    const auto at = values.begin() + std::ptrdiff_t(index);
     std::nth_element(values.begin(), at, values.end());
-    return static_cast<double>(*at);
+    return double(*at);
 }
 
 template <class Value>
 double nearestRank(std::vector<Value>& values, double part) {
-    const double rank = std::ceil(part * static_cast<double>(values.size()));
-    return valueAt(values, static_cast<size_t>(std::clamp(rank, 1.0, static_cast<double>(values.size()))) - 1);
+    const double rank = std::ceil(part * double(values.size()));
+    return valueAt(values, size_t(std::clamp(rank, 1.0, double(values.size()))) - 1);
 }
 
 }  // namespace
@@ -28,7 +28,7 @@ double quantile(std::vector<double> values, double part) { return values.empty()
 
 double upperQuantile(std::vector<double> values, double part) {
     if (values.empty()) return 0;
-    return valueAt(values, std::min(values.size() - 1, static_cast<size_t>(part * static_cast<double>(values.size()))));
+    return valueAt(values, std::min(values.size() - 1, size_t(part * double(values.size()))));
 }
 
 Quantiles quantilesOf(std::vector<float> values) {

@@ -144,14 +144,14 @@ bool RayJudge::borderNear(glm::dvec3 first, glm::dvec3 last) const {
 }
 
 void RayClassTable::add(const RayJudgement& j) {
-    ++counts_[static_cast<size_t>(j.rayClass)];
+    ++counts_[size_t(j.rayClass)];
     holes_ += j.hole ? 1 : 0;
     tooFar_ += j.tooFar ? 1 : 0;
     overCertifiedMax_ = std::max(overCertifiedMax_, j.overCertified);
     if (j.rayClass != RayClass::Hit) return;
-    distances_.push_back(static_cast<float>(j.distance));
-    depthErrors_.push_back(static_cast<float>(j.depthError));
-    normalDegrees_.push_back(static_cast<float>(j.normalDegrees));
+    distances_.push_back(float(j.distance));
+    depthErrors_.push_back(float(j.depthError));
+    normalDegrees_.push_back(float(j.normalDegrees));
 }
 
 void RayClassTable::merge(const RayClassTable& other) {
@@ -175,7 +175,7 @@ uint64_t RayClassTable::rays() const {
 
 double RayClassTable::fraction(RayClass rayClass) const {
     const uint64_t all = rays();
-    return all > 0 ? static_cast<double>(count(rayClass)) / static_cast<double>(all) : 0;
+    return all > 0 ? double(count(rayClass)) / double(all) : 0;
 }
 
 Quantiles RayClassTable::distanceCells(double cell) const { return inCells(quantilesOf(distances_), cell); }

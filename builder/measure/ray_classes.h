@@ -94,7 +94,7 @@ public:
     void merge(const RayClassTable& other);
 
     [[nodiscard]] uint64_t rays() const;
-    [[nodiscard]] uint64_t count(RayClass rayClass) const { return counts_[static_cast<size_t>(rayClass)]; }
+    [[nodiscard]] uint64_t count(RayClass rayClass) const { return counts_[size_t(rayClass)]; }
     /// Returns a class's fraction of all rays; the six fractions sum to 1.
     [[nodiscard]] double fraction(RayClass rayClass) const;
     [[nodiscard]] uint64_t holes() const { return holes_; }

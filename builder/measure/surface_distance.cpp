@@ -29,10 +29,8 @@ public:
         z = (z ^ z >> 27) * 0x94d049bb133111ebu;
         return z ^ z >> 31;
     }
-    double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
-    uint64_t below(uint64_t count) {
-        return std::min(static_cast<uint64_t>(unit() * static_cast<double>(count)), count - 1);
-    }
+    double unit() { return double(next() >> 11) * 0x1p-53; }
+    uint64_t below(uint64_t count) { return std::min(uint64_t(unit() * double(count)), count - 1); }
     glm::dvec3 direction() {
         const double z = 2 * unit() - 1, phi = 2 * std::numbers::pi * unit();
         const double r = std::sqrt(std::max(1 - z * z, 0.0));
@@ -58,8 +56,7 @@ public:
         const auto loop = [&] {
             for (uint64_t block = next++; block < blocks && !cancelled; block = next++) {
                 for (uint64_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) work(i);
-                if (!report(from + (to - from) * static_cast<double>(block + 1) / static_cast<double>(blocks)))
-                    cancelled = true;
+                if (!report(from + (to - from) * double(block + 1) / double(blocks))) cancelled = true;
             }
         };
         std::vector<std::thread> threads;
@@ -152,9 +149,7 @@ public:
     }
 
 private:
-    [[nodiscard]] double pageCells() const {
-        return static_cast<double>(uint64_t{1} << cache_.dataset().header.log2Cells);
-    }
+    [[nodiscard]] double pageCells() const { return double(uint64_t{1} << cache_.dataset().header.log2Cells); }
 
     void collect(uint64_t page, uint32_t node, glm::dvec3 lowest, double edge, std::vector<LeafBox>& leaves) const {
         if (nodeType(node) == kNodeSoft || nodeType(node) == kNodeHard) leaves.push_back({page, lowest, edge});
@@ -213,7 +208,7 @@ public:
             const auto v = mesh.corners(t);
             const double area = glm::length(glm::cross(v[1] - v[0], v[2] - v[0]));
             if (!(area > 0)) continue;
-            triangles_.push_back(static_cast<uint32_t>(t));
+            triangles_.push_back(uint32_t(t));
             areaUpTo_.push_back(sum += area);
         }
     }
@@ -315,8 +310,7 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     const Dataset& dataset = cache.dataset();
     const uint32_t level = std::min(options.level, dataset.header.levels - 1);
     const std::vector<uint64_t> cut = cutAtLevel(dataset, level);
-    const auto caster = ReferenceCaster::create(cache, cut);
-    if (!caster) return caster.error();
+    VCP_TRY_ASSIGN(const auto caster, ReferenceCaster::create(cache, cut));
     const LevelLeaves leavesOfLevel(cache, cut);
     const MeshSampler sampler(mesh.mesh());
     if (sampler.empty()) return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle with area"};
@@ -332,8 +326,8 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     if (!runner.run(options.samples, 0, 0.6, [&](uint64_t i) {
             SampleRandom random(options.seed, 2 * i);
             const MeshSampler::Sample sample = sampler.sample(i, random);
-            const double distance = distanceToSurface(*caster, leavesOfLevel, sample, cell, certified);
-            toSurface[i] = static_cast<float>(distance);
+            const double distance = distanceToSurface(caster, leavesOfLevel, sample, cell, certified);
+            toSurface[i] = float(distance);
             worstOfMesh.add(distance, i, sample.position);
         }))
         return cancelled;
@@ -346,10 +340,10 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
             std::vector<glm::dvec3> hits;
             // Most lines through a leaf miss its surface.
             const LeafBox& leaf = leaves[random.below(leaves.size())];
-            for (int ray = 0; ray < 8 && hits.empty(); ++ray) hitsOfLeaf(*caster, leaf, random, hits);
+            for (int ray = 0; ray < 8 && hits.empty(); ++ray) hitsOfLeaf(caster, leaf, random, hits);
             for (const glm::dvec3& hit : hits) {
                 const double distance = mesh.nearestPoint(hit)->distance;
-                toMesh[i / kBlock].push_back(static_cast<float>(distance));
+                toMesh[i / kBlock].push_back(float(distance));
                 worstOfSurface.add(distance, i, hit);
             }
         }))

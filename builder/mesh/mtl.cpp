@@ -27,7 +27,7 @@ public:
 
     [[nodiscard]] std::string_view peek() {
         p_ = skipSpaces(p_, end_);
-        return {p_, static_cast<size_t>(wordEnd(p_, end_) - p_)};
+        return {p_, size_t(wordEnd(p_, end_) - p_)};
     }
     std::string_view take() {
         const std::string_view word = peek();
@@ -43,7 +43,7 @@ public:
     }
     /// Returns what is left, without the white space around it: names may hold spaces.
     [[nodiscard]] std::string rest() {
-        (void)peek();
+        static_cast<void>(peek());
         const char* end = end_;
         while (end != p_ && isSpace(end[-1])) --end;
         return {p_, end};
@@ -119,7 +119,7 @@ private:
             std::array<double, 3> numbers{0, option == "-s" ? 1.0 : 0.0, 0};
             for (double& number : numbers)
                 if (!words.takeNumber(number)) break;
-            const glm::vec2 pair(static_cast<float>(numbers[0]), static_cast<float>(numbers[1]));
+            const glm::vec2 pair{float(numbers[0]), float(numbers[1])};
             if (!std::isfinite(pair.x) || !std::isfinite(pair.y)) return;
             if (option == "-o") current_.uvOffset = pair;
             if (option == "-s") current_.uvScale = pair;

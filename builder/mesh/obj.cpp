@@ -52,11 +52,10 @@ public:
 
     // Skips a byte order mark and looks at the first vertices for colours.
     Result<void> begin() {
-        const auto text = source_.window(kUtf8Mark.size());
-        if (!text) return text.error();
-        if (text->starts_with("\xFF\xFE") || text->starts_with("\xFE\xFF"))
+        VCP_TRY_ASSIGN(const auto text, source_.window(kUtf8Mark.size()));
+        if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
             return source_.error(ErrorCode::Unsupported, "", 0, "is UTF-16 text; save it as UTF-8 or ASCII");
-        if (text->starts_with(kUtf8Mark)) source_.advance(kUtf8Mark.size());
+        if (text.starts_with(kUtf8Mark)) source_.advance(kUtf8Mark.size());
         VCP_TRY(lookForColours());
         materials_.begin();
         info_.hasMaterials = materials_.active();
@@ -84,34 +83,32 @@ public:
                 statementLine_ = line_;
                 VCP_TRY(readStatement(p, chunk));
             }
-            source_.advance(static_cast<uint64_t>(p - begin_));
+            source_.advance(uint64_t(p - begin_));
         }
         return !isEmpty(chunk);
     }
 
 private:
     Result<void> openWindow() {
-        const auto text = source_.wholeWindow(afterLastStatement, kStatementLimit);
-        if (!text) return text.error();
-        begin_ = text->data();
-        end_ = begin_ + text->size();
+        VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(afterLastStatement, kStatementLimit));
+        begin_ = text.data();
+        end_ = begin_ + text.size();
         return {};
     }
 
     // Whole numbers 0..255 and fractions 0..1 are told apart by the start of the file alone, so that the answer
     // does not depend on where the stream stands.
     Result<void> lookForColours() {
-        auto start = source_.window(kStartBytes);
-        if (!start) return start.error();
-        if (start->size() < source_.remaining()) start = start->substr(0, afterLastStatement(*start));
-        begin_ = start->data();
-        end_ = begin_ + start->size();
+        VCP_TRY_ASSIGN(auto start, source_.window(kStartBytes));
+        if (start.size() < source_.remaining()) start = start.substr(0, afterLastStatement(start));
+        begin_ = start.data();
+        end_ = begin_ + start.size();
         bool first = true;
         bool done = false;  // with the vertices
         for (const char* p = begin_; p != end_;) {
             const char* const word = skipBlanks(p, end_);
             if (const char* const names = afterKeyword(word, "mtllib"))
-                materials_.addLibrary({names, static_cast<size_t>(lineEnd(names) - names)});
+                materials_.addLibrary({names, size_t(lineEnd(names) - names)});
             if (!done && end_ - word >= 2 && word[0] == 'v' && isBlank(word[1])) {
                 VertexNumbers numbers;
                 const char* q = word + 1;
@@ -136,7 +133,7 @@ private:
     static bool isAboveOne(double value) { return value > 1.0; }
 
     const char* lineEnd(const char* p) const {
-        const void* const found = std::memchr(p, '\n', static_cast<size_t>(end_ - p));
+        const void* const found = std::memchr(p, '\n', size_t(end_ - p));
         return found ? static_cast<const char*>(found) : end_;
     }
 
@@ -144,7 +141,7 @@ private:
         return source_.error(ErrorCode::InvalidInput, fmt::format("line {}", line_), byteAt(p), std::move(message));
     }
 
-    uint64_t byteAt(const char* p) const { return source_.offset() + static_cast<uint64_t>(p - begin_); }
+    uint64_t byteAt(const char* p) const { return source_.offset() + uint64_t(p - begin_); }
 
     // Takes one line, or several joined by backslashes, with its end.
     Result<void> readStatement(const char*& p, MeshChunk& chunk) {
@@ -168,7 +165,7 @@ private:
 
     // Returns where the word `keyword` ends, or nullptr when another word stands at p.
     const char* afterKeyword(const char* p, std::string_view keyword) const {
-        const auto left = static_cast<size_t>(end_ - p);
+        const auto left = size_t(end_ - p);
         if (left <= keyword.size() || std::string_view(p, keyword.size()) != keyword || !isBlank(p[keyword.size()]))
             return nullptr;
         return p + keyword.size();
@@ -178,9 +175,9 @@ private:
     Result<void> readPaint(const char*& p) {
         const char* const end = lineEnd(p);
         if (const char* const name = afterKeyword(p, "usemtl")) {
-            materials_.use({name, static_cast<size_t>(end - name)});
+            materials_.use({name, size_t(end - name)});
         } else if (const char* const library = afterKeyword(p, "mtllib")) {
-            if (byteAt(p) >= lookedAtBytes_) materials_.addLibrary({library, static_cast<size_t>(end - library)});
+            if (byteAt(p) >= lookedAtBytes_) materials_.addLibrary({library, size_t(end - library)});
         } else if (const char* q = afterKeyword(p, "vt"); q && materials_.hasImages()) {
             VertexNumbers numbers;
             if (!readNumbers(q, numbers)) return wrong(q, shownWord(q, end_) + " is not a number");
@@ -274,10 +271,9 @@ private:
         const char* stop = parseInteger(p, end_, number);
         if (!stop || !(endsWord(stop) || *stop == '/'))
             return wrong(p, shownWord(p, end_) + " is not a corner of a face (v, v/t, v//n or v/t/n)");
-        const auto seen = static_cast<int64_t>(vertices_);
-        if (number == 0 || number < -seen || number > static_cast<int64_t>(mostVertices_))
-            return noSuchVertex(p, number);
-        vertex = static_cast<uint64_t>(number > 0 ? number - 1 : seen + number);
+        const auto seen = int64_t(vertices_);
+        if (number == 0 || number < -seen || number > int64_t(mostVertices_)) return noSuchVertex(p, number);
+        vertex = uint64_t(number > 0 ? number - 1 : seen + number);
         if (vertex >= vertices_ && vertex >= promised_) {
             promised_ = vertex + 1;
             promisedLine_ = line_;
@@ -293,9 +289,9 @@ private:
     std::optional<uint64_t> uvNumber(const char* p) const {
         int64_t number = 0;
         if (!parseInteger(p, end_, number)) return std::nullopt;
-        const auto seen = static_cast<int64_t>(materials_.uvCount());
+        const auto seen = int64_t(materials_.uvCount());
         if (number == 0 || number < -seen || number > seen) return std::nullopt;
-        return static_cast<uint64_t>(number > 0 ? number - 1 : seen + number);
+        return uint64_t(number > 0 ? number - 1 : seen + number);
     }
 
     Error noSuchVertex(const char* p, int64_t number) const {
@@ -346,7 +342,7 @@ bool looksLikeObj(std::string_view start) {
     for (const char* p = start.data(); (p = skipSpaces(p, end)) != end;) {
         if (*p != '#') {
             const char* const stop = wordEnd(p, end);
-            return std::ranges::find(kKeywords, std::string_view(p, static_cast<size_t>(stop - p))) != kKeywords.end();
+            return std::ranges::find(kKeywords, std::string_view(p, size_t(stop - p))) != kKeywords.end();
         }
         p = std::find(p, end, '\n');
     }

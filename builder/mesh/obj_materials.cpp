@@ -52,7 +52,7 @@ void ObjMaterials::addLibrary(std::string_view names) {
     const char* const end = names.data() + names.size();
     for (const char* p = names.data(); p != end && warnings_.size() < kMostWarnings; p = skipSpaces(p, end)) {
         const char* const stop = wordEnd(p, end);
-        add({p, static_cast<size_t>(stop - p)});
+        add({p, size_t(stop - p)});
         p = stop;
     }
 }
@@ -63,7 +63,7 @@ void ObjMaterials::begin() {
     for (const MtlMaterial& m : read_) {
         colours.insert(m.material.factor);
         hasImages_ = hasImages_ || m.material.image.exists();
-        numbers_.try_emplace(m.material.name, static_cast<uint32_t>(materials_.size()));
+        numbers_.try_emplace(m.material.name, uint32_t(materials_.size()));
         materials_.push_back(m.material);
     }
     active_ = hasImages_ || colours.size() > 1;
@@ -81,7 +81,7 @@ void ObjMaterials::use(std::string_view name) {
 }
 
 Result<void> ObjMaterials::addUv(double u, double v) {
-    const glm::vec2 uv(static_cast<float>(u), static_cast<float>(v));
+    const glm::vec2 uv{float(u), float(v)};
     return uvs_.append(std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : glm::vec2(0));
 }
 
@@ -91,9 +91,8 @@ Result<void> ObjMaterials::paint(const std::array<std::optional<uint64_t>, 3>& u
         const MtlMaterial& material = read_[current_];
         for (size_t i = 0; i < 3; ++i) {
             if (!uvs[i]) continue;
-            const auto uv = uvs_.at(*uvs[i]);
-            if (!uv) return uv.error();
-            corners[i] = *uv * material.uvScale + material.uvOffset;
+            VCP_TRY_ASSIGN(const auto uv, uvs_.at(*uvs[i]));
+            corners[i] = uv * material.uvScale + material.uvOffset;
             corners[i].y = 1 - corners[i].y;  // v grows upwards in OBJ
             if (!std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) corners[i] = glm::vec2(0);
         }

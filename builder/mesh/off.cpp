@@ -69,11 +69,11 @@ protected:
 
     // Takes the next number of the face at `corner`.
     Result<void> addCorner(uint64_t corner, int64_t number, uint64_t byte, MeshChunk& chunk) {
-        if (number < 0 || static_cast<uint64_t>(number) >= header_.vertices)
+        if (number < 0 || uint64_t(number) >= header_.vertices)
             return wrong(
                 byte, fmt::format("vertex number {} is out of range; the mesh has {} vertices, numbered from 0", number,
                                   header_.vertices));
-        const auto vertex = static_cast<uint64_t>(number);
+        const auto vertex = uint64_t(number);
         if (corner == 0) first_ = vertex;
         if (corner > 1) chunk.triangles.push_back({first_, last_, vertex});
         last_ = vertex;
@@ -103,11 +103,10 @@ private:
     static size_t afterLastLine(std::string_view text) { return text.rfind('\n') + 1; }
 
     Result<void> readSome(MeshChunk& chunk) override {
-        const auto text = source_.wholeWindow(afterLastLine, kLineLimit);
-        if (!text) return text.error();
-        if (text->empty()) return truncated();
-        begin_ = text->data();
-        const char* const end = begin_ + text->size();
+        VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(afterLastLine, kLineLimit));
+        if (text.empty()) return truncated();
+        begin_ = text.data();
+        const char* const end = begin_ + text.size();
         const char* p = begin_;
         while (p != end && hasRoom(chunk) && face_ < header_.faces) {
             const char* const stop = std::find(p, end, '\n');
@@ -116,11 +115,11 @@ private:
             if (p != end_) VCP_TRY(inVertices() ? readVertex(p, chunk) : readFace(p, chunk));
             p = stop == end ? end : stop + 1;
         }
-        source_.advance(static_cast<uint64_t>(p - begin_));
+        source_.advance(uint64_t(p - begin_));
         return {};
     }
 
-    uint64_t byteAt(const char* p) const { return source_.offset() + static_cast<uint64_t>(p - begin_); }
+    uint64_t byteAt(const char* p) const { return source_.offset() + uint64_t(p - begin_); }
 
     bool endsWord(const char* p) const { return p && (p == end_ || isSpace(*p)); }
 
@@ -168,7 +167,7 @@ private:
             int64_t number = 0;
             stop = parseInteger(p, end_, number);
             if (!endsWord(stop)) return wrong(byteAt(p), shownWord(p, end_) + " is not a vertex number");
-            VCP_TRY(addCorner(static_cast<uint64_t>(corner), number, byteAt(p), chunk));
+            VCP_TRY(addCorner(uint64_t(corner), number, byteAt(p), chunk));
         }
         if (skipSpaces(stop, end_) != end_) warnOfFaceColours();
         ++face_;
@@ -195,12 +194,11 @@ private:
 
     Result<void> readVertices(MeshChunk& chunk) {
         const size_t rowBytes = 4 * header_.numbersOfVertex();
-        const auto bytes = source_.window(rowBytes);
-        if (!bytes) return bytes.error();
-        if (bytes->size() < rowBytes) return truncated();
-        const char* p = bytes->data();
-        const char* const end = p + bytes->size();
-        for (; static_cast<size_t>(end - p) >= rowBytes && inVertices() && hasRoom(chunk); p += rowBytes) {
+        VCP_TRY_ASSIGN(const auto bytes, source_.window(rowBytes));
+        if (bytes.size() < rowBytes) return truncated();
+        const char* p = bytes.data();
+        const char* const end = p + bytes.size();
+        for (; size_t(end - p) >= rowBytes && inVertices() && hasRoom(chunk); p += rowBytes) {
             Rgba8 colour = 0;
             const char* const rgba = p + 4 * header_.numbersBeforeColour();
             for (size_t channel = 0; header_.hasColour && channel < 4; ++channel) {
@@ -208,24 +206,23 @@ private:
                 colour |= static_cast<Rgba8>(value * 255 + 0.5f) << (8 * channel);
             }
             VCP_TRY(addVertex({loadReal(p), loadReal(p + 4), loadReal(p + 8)}, colour,
-                              source_.offset() + static_cast<uint64_t>(p - bytes->data()), chunk));
+                              source_.offset() + uint64_t(p - bytes.data()), chunk));
         }
-        source_.advance(static_cast<uint64_t>(p - bytes->data()));
+        source_.advance(uint64_t(p - bytes.data()));
         return {};
     }
 
     // Faces are read number by number, since one may be larger than the window.
     Result<void> readFaces(MeshChunk& chunk) {
-        const auto bytes = source_.window(4);
-        if (!bytes) return bytes.error();
-        if (bytes->size() < 4) return truncated();
-        const char* p = bytes->data();
-        const char* const end = p + bytes->size();
+        VCP_TRY_ASSIGN(const auto bytes, source_.window(4));
+        if (bytes.size() < 4) return truncated();
+        const char* p = bytes.data();
+        const char* const end = p + bytes.size();
         for (; end - p >= 4 && face_ < header_.faces && hasRoom(chunk); p += 4) {
-            const uint64_t byte = source_.offset() + static_cast<uint64_t>(p - bytes->data());
+            const uint64_t byte = source_.offset() + uint64_t(p - bytes.data());
             VCP_TRY(takeNumber(load(p), byte, chunk));
         }
-        source_.advance(static_cast<uint64_t>(p - bytes->data()));
+        source_.advance(uint64_t(p - bytes.data()));
         return {};
     }
 
@@ -269,10 +266,9 @@ private:
 }  // namespace
 
 Result<std::unique_ptr<MeshStream>> openOff(ByteSource source) {
-    const auto header = readOffHeader(source);
-    if (!header) return header.error();
-    if (header->binary) return std::unique_ptr<MeshStream>(std::make_unique<BinaryOff>(std::move(source), *header));
-    return std::unique_ptr<MeshStream>(std::make_unique<AsciiOff>(std::move(source), *header));
+    VCP_TRY_ASSIGN(const auto header, readOffHeader(source));
+    if (header.binary) return std::unique_ptr<MeshStream>(std::make_unique<BinaryOff>(std::move(source), header));
+    return std::unique_ptr<MeshStream>(std::make_unique<AsciiOff>(std::move(source), header));
 }
 
 }  // namespace vcp

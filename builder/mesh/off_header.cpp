@@ -24,7 +24,7 @@ std::string_view withoutComment(std::string_view line) { return line.substr(0, l
 std::string_view firstWord(std::string_view text) {
     const char* const end = text.data() + text.size();
     const char* const begin = skipSpaces(text.data(), end);
-    return {begin, static_cast<size_t>(wordEnd(begin, end) - begin)};
+    return {begin, size_t(wordEnd(begin, end) - begin)};
 }
 
 // Returns the bytes of the keyword at the start of `word`; 0 when there is none.
@@ -59,7 +59,7 @@ public:
                                  "4OFF and nOFF have no surface in three dimensions");
         if (bytes > 0) {
             header_ = keyword;
-            line_.remove_prefix(static_cast<size_t>(word.data() - line_.data()) + bytes);
+            line_.remove_prefix(size_t(word.data() - line_.data()) + bytes);
             header_.binary = firstWord(line_) == "BINARY";
             if (header_.binary) return readBinaryCounts();
         }
@@ -75,10 +75,9 @@ private:
     Result<void> nextLine() {
         do {
             lineByte_ = source_.offset();
-            const auto line = source_.line(kLineLimit);
-            if (!line) return line.error();
-            if (!*line) return wrong("the file ends inside the header");
-            line_ = withoutComment(**line);
+            VCP_TRY_ASSIGN(const auto line, source_.line(kLineLimit));
+            if (!line) return wrong("the file ends inside the header");
+            line_ = withoutComment(*line);
         } while (firstWord(line_).empty());
         return {};
     }
@@ -96,19 +95,18 @@ private:
                 return wrong(fmt::format("{} is not a count of vertices or faces", shownWord(p, end)));
             p = stop;
         }
-        header_.vertices = static_cast<uint64_t>(counts[0]);
-        header_.faces = static_cast<uint64_t>(counts[1]);
+        header_.vertices = uint64_t(counts[0]);
+        header_.faces = uint64_t(counts[1]);
         return checked(6, 2);  // "0 0 0\n" and "0\n"
     }
 
     Result<OffHeader> readBinaryCounts() {
         lineByte_ = source_.offset();
-        const auto bytes = source_.window(12);
-        if (!bytes) return bytes.error();
-        if (bytes->size() < 12) return wrong("the file ends inside the header");
+        VCP_TRY_ASSIGN(const auto bytes, source_.window(12));
+        if (bytes.size() < 12) return wrong("the file ends inside the header");
         const auto number = [&](size_t at, bool bigEndian) {
             uint32_t value;
-            std::memcpy(&value, bytes->data() + at, sizeof value);
+            std::memcpy(&value, bytes.data() + at, sizeof value);
             return bigEndian ? __builtin_bswap32(value) : value;
         };
         header_.bigEndian = number(0, true) <= number(0, false);

@@ -23,8 +23,7 @@ constexpr size_t kStartBytes = 1024;
 constexpr std::array<std::string_view, 7> kFormats{"ply", "obj", "stl", "off", "gltf", "glb", "drc"};
 
 std::string lower(std::string text) {
-    std::ranges::transform(text, text.begin(),
-                           [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    std::ranges::transform(text, text.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
     return text;
 }
 
@@ -64,22 +63,20 @@ Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, 
         return Error{
             .code = ErrorCode::Usage,
             .message = fmt::format("unknown mesh format {}; known are {}", shown(wanted), fmt::join(kFormats, ", "))};
-    auto source = ByteSource::open(path);
-    if (!source) return source.error();
-    const auto window = source->window(kStartBytes);
-    if (!window) return window.error();
-    if (source->atEnd()) return source->error(ErrorCode::InvalidInput, "", 0, "the file is empty");
-    std::string format = formatByContent(window->substr(0, kStartBytes), *source);
+    VCP_TRY_ASSIGN(auto source, ByteSource::open(path));
+    VCP_TRY_ASSIGN(const auto window, source.window(kStartBytes));
+    if (source.atEnd()) return source.error(ErrorCode::InvalidInput, "", 0, "the file is empty");
+    std::string format = formatByContent(window.substr(0, kStartBytes), source);
     if (format.empty()) format = wanted;
     if (format.empty()) format = formatByName(path);
 
-    if (format == "ply") return openPly(*std::move(source));
-    if (format == "stl") return openStl(*std::move(source));
-    if (format == "drc") return openDraco(*std::move(source), options.decoderBytes);
-    if (format == "gltf" || format == "glb") return openGltf(*std::move(source), path, options);
-    if (format == "off") return openOff(*std::move(source));
-    if (format == "obj") return openObj(*std::move(source), path, options);
-    return unknownFormat(*source);
+    if (format == "ply") return openPly(std::move(source));
+    if (format == "stl") return openStl(std::move(source));
+    if (format == "drc") return openDraco(std::move(source), options.decoderBytes);
+    if (format == "gltf" || format == "glb") return openGltf(std::move(source), path, options);
+    if (format == "off") return openOff(std::move(source));
+    if (format == "obj") return openObj(std::move(source), path, options);
+    return unknownFormat(source);
 }
 
 Result<std::vector<std::filesystem::path>> expandInputs(std::span<const std::filesystem::path> paths) {

@@ -62,7 +62,7 @@ Result<void> checkCounts(const ByteSource& source, const PlyHeader& header) {
 std::optional<size_t> scalarColumn(const PlyElement& element, std::string_view name) {
     const PlyProperty* const property = element.find(name);
     if (!property || property->isList()) return std::nullopt;
-    return static_cast<size_t>(property - element.properties.data());
+    return size_t(property - element.properties.data());
 }
 
 // Colour has three spellings; it counts when red, green and blue are there.
@@ -102,7 +102,7 @@ Result<PlyPlan> planElement(const ByteSource& source, const PlyElement& element,
         if (!list) list = element.find("vertex_index");
         if (!list || !list->isList())
             return elementError(source, element, "has no list property 'vertex_indices' or 'vertex_index'");
-        plan.indexColumn = static_cast<size_t>(list - element.properties.data());
+        plan.indexColumn = size_t(list - element.properties.data());
     }
     return plan;
 }
@@ -123,10 +123,9 @@ public:
         VCP_TRY(checkCounts(source_, header_));
         for (const PlyElement& element : header_.elements) {
             if (element.count == 0) continue;
-            auto planned = planElement(source_, element, vertices->count);
-            if (!planned) return planned.error();
-            info_.hasColour = info_.hasColour || planned->hasColour;
-            plans_.push_back(*planned);
+            VCP_TRY_ASSIGN(auto planned, planElement(source_, element, vertices->count));
+            info_.hasColour = info_.hasColour || planned.hasColour;
+            plans_.push_back(planned);
         }
         info_.format = formatName(header_.encoding);
         info_.fileBytes = source_.fileBytes();
@@ -166,9 +165,8 @@ private:
 }  // namespace
 
 Result<std::unique_ptr<MeshStream>> openPly(ByteSource source) {
-    auto header = readPlyHeader(source);
-    if (!header) return header.error();
-    auto stream = std::make_unique<PlyStream>(std::move(source), *std::move(header));
+    VCP_TRY_ASSIGN(auto header, readPlyHeader(source));
+    auto stream = std::make_unique<PlyStream>(std::move(source), std::move(header));
     VCP_TRY(stream->plan());
     return std::unique_ptr<MeshStream>(std::move(stream));
 }

@@ -32,11 +32,10 @@ public:
     }
 
     Result<void> readSome(MeshChunk& chunk) override {
-        const auto text = source_.wholeWindow(afterLastSpace, kWordLimit);
-        if (!text) return text.error();
-        begin_ = text->data();
-        end_ = begin_ + text->size();
-        const bool last = text->size() == source_.remaining();
+        VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(afterLastSpace, kWordLimit));
+        begin_ = text.data();
+        end_ = begin_ + text.size();
+        const bool last = text.size() == source_.remaining();
         const char* p = begin_;
         while (!done() && hasRoom(chunk)) {
             if (column_ == columns_.size()) {
@@ -52,7 +51,7 @@ public:
             if (isLineEnd(*p)) return wrong(byteAt(p), "the line has fewer values than the header declares");
             VCP_TRY(columns_[column_].isList ? takeOfList(p, chunk) : takeScalar(p));
         }
-        source_.advance(static_cast<uint64_t>(p - begin_));
+        source_.advance(uint64_t(p - begin_));
         return {};
     }
 
@@ -72,7 +71,7 @@ private:
         return p;
     }
 
-    uint64_t byteAt(const char* p) const { return source_.offset() + static_cast<uint64_t>(p - begin_); }
+    uint64_t byteAt(const char* p) const { return source_.offset() + uint64_t(p - begin_); }
 
     bool endsWord(const char* p) const { return p && (p == end_ || isSpace(*p)); }
 
@@ -128,8 +127,8 @@ private:
     Result<void> beginList(std::optional<int64_t> length, const char* p) {
         // Every value takes at least a digit and a space.
         const uint64_t fitting = (source_.size() - byteAt(p)) / 2;
-        if (!length || *length < 0 || static_cast<uint64_t>(*length) > fitting) return badLength(length, byteAt(p));
-        listLeft_ = static_cast<uint64_t>(*length);
+        if (!length || *length < 0 || uint64_t(*length) > fitting) return badLength(length, byteAt(p));
+        listLeft_ = uint64_t(*length);
         insideList_ = listLeft_ > 0;
         if (!insideList_) ++column_;
         cutter_.beginList();

@@ -86,14 +86,14 @@ size_t takeTriangles(const FaceLayout& layout, const char*& p, const char* end, 
     const size_t rowBytes = layout.before + sizeof(Count) + 3 * sizeof(Index) + layout.after;
     const char* row = p;
     size_t taken = 0;
-    while (taken < room && static_cast<size_t>(end - row) >= rowBytes) {
+    while (taken < room && size_t(end - row) >= rowBytes) {
         const char* const list = row + layout.before;
         if (load<Count, kSwap>(list) != 3) break;
         const char* const items = list + sizeof(Count);
         // A negative index becomes a huge one.
-        const auto a = static_cast<uint64_t>(int64_t{load<Index, kSwap>(items)});
-        const auto b = static_cast<uint64_t>(int64_t{load<Index, kSwap>(items + sizeof(Index))});
-        const auto c = static_cast<uint64_t>(int64_t{load<Index, kSwap>(items + 2 * sizeof(Index))});
+        const auto a = uint64_t(int64_t{load<Index, kSwap>(items)});
+        const auto b = uint64_t(int64_t{load<Index, kSwap>(items + sizeof(Index))});
+        const auto c = uint64_t(int64_t{load<Index, kSwap>(items + 2 * sizeof(Index))});
         if (std::max({a, b, c}) >= layout.vertexCount) break;
         out[taken++] = {a, b, c};
         row += rowBytes;
@@ -177,20 +177,17 @@ private:
             return {};
         }
         const uint64_t possible = std::min(rows, source_.remaining() / rowBytes_);
-        const auto skipped = source_.skip(possible * rowBytes_);
-        if (!skipped) return skipped.error();
-        row_ += *skipped / rowBytes_;
+        VCP_TRY_ASSIGN(const auto skipped, source_.skip(possible * rowBytes_));
+        row_ += skipped / rowBytes_;
         return done() ? Result<void>() : truncated();
     }
 
     Result<void> readVertices(MeshChunk& chunk) {
-        const auto bytes = source_.window(rowBytes_);
-        if (!bytes) return bytes.error();
+        VCP_TRY_ASSIGN(const auto bytes, source_.window(rowBytes_));
         const uint64_t room = kChunkElements - chunk.positions.size();
-        const auto rows =
-            static_cast<size_t>(std::min({room, plan_.element->count - row_, uint64_t{bytes->size() / rowBytes_}}));
+        const auto rows = size_t(std::min({room, plan_.element->count - row_, uint64_t{bytes.size() / rowBytes_}}));
         if (rows == 0) return truncated();
-        VCP_TRY(decodeVertices(bytes->data(), rows, chunk));
+        VCP_TRY(decodeVertices(bytes.data(), rows, chunk));
         source_.advance(rows * rowBytes_);
         row_ += rows;
         return {};
@@ -263,28 +260,27 @@ private:
 
     uint64_t firstNonFiniteByte(const glm::dvec3& position, size_t row) const {
         size_t axis = 0;
-        while (axis < 2 && std::isfinite(position[static_cast<int>(axis)])) ++axis;
+        while (axis < 2 && std::isfinite(position[int(axis)])) ++axis;
         if (!fixedRows_) return positionBytes_[axis];
         return source_.offset() + row * rowBytes_ + scalarOffsets_[plan_.positionColumns[axis]];
     }
 
     // Rows with lists are walked step by step, and can be resumed at every list item.
     Result<void> walkRows(MeshChunk& chunk) {
-        const auto bytes = source_.window(std::max<uint64_t>(rowBytes_, sizeof(double)));
-        if (!bytes) return bytes.error();
-        const char* const begin = bytes->data();
-        const char* const end = begin + bytes->size();
+        VCP_TRY_ASSIGN(const auto bytes, source_.window(std::max<uint64_t>(rowBytes_, sizeof(double))));
+        const char* const begin = bytes.data();
+        const char* const end = begin + bytes.size();
         const char* p = begin;
         while (!done() && hasRoom(chunk)) {
             if (step_ == 0 && !insideList_ && takeTriangles_) takePlainTriangles(p, end, chunk);
             if (done() || !hasRoom(chunk)) break;
             const char* const at = p;
             const size_t stepBefore = step_;
-            VCP_TRY(walkStep(p, end, source_.offset() + static_cast<uint64_t>(p - begin), chunk));
+            VCP_TRY(walkStep(p, end, source_.offset() + uint64_t(p - begin), chunk));
             if (p == at && step_ == stepBefore) break;  // a step needs more than the window holds
         }
         if (p == begin && !done() && hasRoom(chunk)) return truncated();
-        source_.advance(static_cast<uint64_t>(p - begin));
+        source_.advance(uint64_t(p - begin));
         return {};
     }
 
@@ -295,7 +291,7 @@ private:
             const uint64_t room =
                 std::min<uint64_t>(kChunkElements - chunk.triangles.size(), plan_.element->count - row_);
             taken = takeTriangles_(faceLayout_, p, end, batch.data(), std::min<uint64_t>(batch.size(), room));
-            chunk.triangles.insert(chunk.triangles.end(), batch.begin(), batch.begin() + static_cast<ptrdiff_t>(taken));
+            chunk.triangles.insert(chunk.triangles.end(), batch.begin(), batch.begin() + ptrdiff_t(taken));
             row_ += taken;
         } while (taken == batch.size());
     }
@@ -303,7 +299,7 @@ private:
     // Takes one run, one list length, or what the input and the chunk hold of one list. `byte` is the offset of `p`.
     Result<void> walkStep(const char*& p, const char* end, uint64_t byte, MeshChunk& chunk) {
         const Step& step = steps_[step_];
-        const auto available = static_cast<uint64_t>(end - p);
+        const auto available = uint64_t(end - p);
         if (!step.isList) {
             if (available < step.bytes) return {};
             if (plan_.role == PlyRole::Vertices) keepRun(step, p, byte);
@@ -327,10 +323,9 @@ private:
         const auto length = loadWhole<kSwap>(*list.countType, p);
         const size_t lengthBytes = byteSize(*list.countType);
         const uint64_t left = source_.size() - byte - lengthBytes;
-        if (!length || *length < 0 || static_cast<uint64_t>(*length) > left / byteSize(list.type))
-            return badLength(length, byte);
+        if (!length || *length < 0 || uint64_t(*length) > left / byteSize(list.type)) return badLength(length, byte);
         p += lengthBytes;
-        listLeft_ = static_cast<uint64_t>(*length);
+        listLeft_ = uint64_t(*length);
         insideList_ = true;
         cutter_.beginList();
         return {};
@@ -339,7 +334,7 @@ private:
     Result<void> takeItems(const PlyProperty& list, size_t column, const char*& p, const char* end, uint64_t byte,
                            MeshChunk& chunk) {
         const size_t itemBytes = byteSize(list.type);
-        const uint64_t here = std::min(listLeft_, static_cast<uint64_t>(end - p) / itemBytes);
+        const uint64_t here = std::min(listLeft_, uint64_t(end - p) / itemBytes);
         const bool names =
             column == plan_.indexColumn && (plan_.role == PlyRole::Faces || plan_.role == PlyRole::Strips);
         if (!names) {
@@ -350,7 +345,7 @@ private:
         const char* const begin = p;
         for (uint64_t i = 0; i < here && hasRoom(chunk); ++i, p += itemBytes, --listLeft_) {
             const auto number = loadWhole<kSwap>(list.type, p);
-            if (!cutter_.add(number, chunk.triangles)) return badIndex(number, byte + static_cast<uint64_t>(p - begin));
+            if (!cutter_.add(number, chunk.triangles)) return badIndex(number, byte + uint64_t(p - begin));
         }
         return {};
     }

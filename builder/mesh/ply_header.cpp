@@ -46,7 +46,7 @@ std::vector<std::string_view> wordsOf(std::string_view line) {
     const char* const end = line.data() + line.size();
     for (const char* p = skipSpaces(line.data(), end); p != end;) {
         const char* const stop = wordEnd(p, end);
-        words.emplace_back(p, static_cast<size_t>(stop - p));
+        words.emplace_back(p, size_t(stop - p));
         p = skipSpaces(stop, end);
     }
     return words;
@@ -60,9 +60,8 @@ public:
     Result<PlyHeader> read() {
         VCP_TRY(findLineBreak());
         while (true) {
-            auto more = nextLine();
-            if (!more) return more.error();
-            if (!*more) return wrong("the file ends inside the header; it is truncated");
+            VCP_TRY_ASSIGN(auto more, nextLine());
+            if (!more) return wrong("the file ends inside the header; it is truncated");
             if (words_.empty() || words_[0] == "comment" || words_[0] == "obj_info") continue;
             if (words_[0] == "end_header") break;
             VCP_TRY(readStatement());
@@ -79,9 +78,8 @@ private:
 
     // Reads "ply" and the kind of line break that follows it: a lone CR must not swallow a body byte 0x0A.
     Result<void> findLineBreak() {
-        const auto start = source_.window(kLongestFirstLine);
-        if (!start) return start.error();
-        std::string_view text = *start;
+        VCP_TRY_ASSIGN(const auto start, source_.window(kLongestFirstLine));
+        std::string_view text = start;
         if (!text.starts_with("ply")) return wrong("does not start with 'ply'; this is not a PLY file");
         text.remove_prefix(3);
         const size_t blanks = std::min(text.find_first_not_of(" \t"), text.size());
@@ -100,16 +98,15 @@ private:
         if (source_.atEnd()) return false;
         const auto breakBefore = lineBreak_ == '\n' ? [](std::string_view text) { return text.rfind('\n') + 1; }
                                                     : [](std::string_view text) { return text.rfind('\r') + 1; };
-        const auto text = source_.wholeWindow(breakBefore, kHeaderLimit);
-        if (!text) return text.error();
-        const size_t length = text->find(lineBreak_);
+        VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(breakBefore, kHeaderLimit));
+        const size_t length = text.find(lineBreak_);
         if (length == std::string_view::npos || source_.offset() + length > kHeaderLimit) {
             if (source_.size() > kHeaderLimit)
                 return source_.error(ErrorCode::Limit, fmt::format("header line {}", lineNumber_), lineByte_,
                                      fmt::format("the header is longer than {} bytes", kHeaderLimit));
             return wrong("the file ends inside the header; it is truncated");
         }
-        words_ = wordsOf(text->substr(0, length));
+        words_ = wordsOf(text.substr(0, length));
         source_.advance(length + 1);
         return true;
     }

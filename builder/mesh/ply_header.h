@@ -16,7 +16,7 @@ enum class PlyEncoding : uint8_t { Ascii, LittleEndian, BigEndian };
 
 constexpr size_t byteSize(PlyType type) {
     constexpr size_t kSizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-    return kSizes[static_cast<size_t>(type)];
+    return kSizes[size_t(type)];
 }
 
 struct PlyProperty {

@@ -12,14 +12,14 @@ namespace vcp {
 bool PolygonCutter::add(std::optional<int64_t> number, std::vector<std::array<uint64_t, 3>>& triangles) {
     constexpr int64_t kAllOnes = 0xFFFFFFFF;
     if (!number) return false;
-    const bool valid = *number >= 0 && static_cast<uint64_t>(*number) < vertexCount_;
+    const bool valid = *number >= 0 && uint64_t(*number) < vertexCount_;
     if (!valid && role_ == PlyRole::Strips && (*number == -1 || *number == kAllOnes)) {
         seen_ = 0;
         return true;
     }
     if (!valid) return false;
 
-    const auto vertex = static_cast<uint64_t>(*number);
+    const auto vertex = uint64_t(*number);
     const uint64_t before = seen_++;
     if (before == 0) {
         first_ = vertex;
@@ -42,14 +42,14 @@ bool PolygonCutter::add(std::optional<int64_t> number, std::vector<std::array<ui
 std::optional<int64_t> wholeNumber(double value) {
     constexpr double kExact = 9007199254740992.0;  // 2^53
     if (!(std::abs(value) <= kExact) || value != std::floor(value)) return std::nullopt;
-    return static_cast<int64_t>(value);
+    return int64_t(value);
 }
 
 uint8_t colourChannel(PlyType type, double value) {
     if (std::isnan(value)) return 0;
     if (type == PlyType::Float32 || type == PlyType::Float64) value = std::clamp(value, 0.0, 1.0) * 255.0 + 0.5;
     if (type == PlyType::Uint16) value /= 256.0;
-    return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
+    return uint8_t(std::clamp(value, 0.0, 255.0));
 }
 
 Error PlyRows::wrong(std::optional<uint64_t> byte, std::string message) const {

@@ -28,13 +28,13 @@ bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(
 bool sameWord(std::string_view word, std::string_view keyword) {
     if (word.size() != keyword.size()) return false;
     for (size_t i = 0; i < word.size(); ++i) {
-        const char c = word[i] >= 'A' && word[i] <= 'Z' ? static_cast<char>(word[i] - 'A' + 'a') : word[i];
+        const char c = word[i] >= 'A' && word[i] <= 'Z' ? char(word[i] - 'A' + 'a') : word[i];
         if (c != keyword[i]) return false;
     }
     return true;
 }
 
-std::string_view wordAt(const char* p, const char* end) { return {p, static_cast<size_t>(wordEnd(p, end) - p)}; }
+std::string_view wordAt(const char* p, const char* end) { return {p, size_t(wordEnd(p, end) - p)}; }
 
 uint32_t facetCount(std::string_view start) {
     uint32_t count = 0;
@@ -75,12 +75,11 @@ public:
     explicit BinaryStl(ByteSource source) : source_(std::move(source)) {}
 
     Result<void> begin() {
-        const auto start = source_.window(kHeaderBytes);
-        if (!start) return start.error();
-        if (start->size() < kHeaderBytes)
+        VCP_TRY_ASSIGN(const auto start, source_.window(kHeaderBytes));
+        if (start.size() < kHeaderBytes)
             return source_.error(ErrorCode::InvalidInput, "header", source_.size(),
                                  fmt::format("the file ends inside the STL header of {} bytes", kHeaderBytes));
-        facets_ = facetCount(*start);
+        facets_ = facetCount(start);
         source_.advance(kHeaderBytes);
         if (facets_ == 0)
             return source_.error(ErrorCode::InvalidInput, "header", kHeaderBytes - sizeof(uint32_t), "has no facets");
@@ -99,13 +98,11 @@ public:
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();
         while (hasRoom(chunk) && facet_ < facets_) {
-            const auto bytes = source_.window(kFacetBytes);
-            if (!bytes) return bytes.error();
+            VCP_TRY_ASSIGN(const auto bytes, source_.window(kFacetBytes));
             const uint64_t room = (kChunkElements - chunk.positions.size() + 2) / 3;
-            const auto facets =
-                static_cast<size_t>(std::min({room, facets_ - facet_, uint64_t{bytes->size() / kFacetBytes}}));
+            const auto facets = size_t(std::min({room, facets_ - facet_, uint64_t{bytes.size() / kFacetBytes}}));
             if (facets == 0) return endsAfter(facet_);
-            VCP_TRY(decode(bytes->data(), facets, chunk));
+            VCP_TRY(decode(bytes.data(), facets, chunk));
             source_.advance(facets * kFacetBytes);
         }
         return !isEmpty(chunk);
@@ -139,8 +136,7 @@ private:
     }
 
     Error notFinite(size_t facetInWindow, int corner) const {
-        const uint64_t byte =
-            source_.offset() + facetInWindow * kFacetBytes + kNormalBytes + static_cast<uint64_t>(corner) * 12;
+        const uint64_t byte = source_.offset() + facetInWindow * kFacetBytes + kNormalBytes + uint64_t(corner) * 12;
         return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}, vertex {}", facet_, corner), byte,
                              "the position is not finite (NaN or infinite)");
     }
@@ -167,16 +163,15 @@ public:
     Result<bool> next(MeshChunk& chunk) override {
         chunk.clear();
         while (hasRoom(chunk)) {
-            const auto text = source_.wholeWindow(afterLastLine, kLineLimit);
-            if (!text) return text.error();
-            begin_ = text->data();
-            end_ = begin_ + text->size();
+            VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(afterLastLine, kLineLimit));
+            begin_ = text.data();
+            end_ = begin_ + text.size();
             const char* p = skipSpaces(begin_, end_);
             while (p != end_ && hasRoom(chunk)) {
                 VCP_TRY(takeWord(p, chunk));
                 p = skipSpaces(p, end_);
             }
-            source_.advance(static_cast<uint64_t>(p - begin_));
+            source_.advance(uint64_t(p - begin_));
             if (source_.atEnd()) {
                 VCP_TRY(checkEnd());
                 break;
@@ -188,7 +183,7 @@ public:
 private:
     static size_t afterLastLine(std::string_view text) { return text.rfind('\n') + 1; }
 
-    uint64_t byteAt(const char* p) const { return source_.offset() + static_cast<uint64_t>(p - begin_); }
+    uint64_t byteAt(const char* p) const { return source_.offset() + uint64_t(p - begin_); }
 
     Error wrong(uint64_t byte, std::string message) const {
         return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}", facets_), byte, std::move(message));
@@ -276,7 +271,7 @@ private:
         if (!std::isfinite(value))
             return source_.error(ErrorCode::InvalidInput, fmt::format("facet {}, vertex {}", facets_, corners_),
                                  byteAt(p), "the position is not finite (NaN or infinite)");
-        corner_[corners_][static_cast<int>(axis_)] = value;
+        corner_[corners_][int(axis_)] = value;
         p = stop;
         if (++axis_ == 3) {
             axis_ = 0;
@@ -333,9 +328,8 @@ bool looksLikeStl(std::string_view start, std::optional<uint64_t> fileBytes) {
 }
 
 Result<std::unique_ptr<MeshStream>> openStl(ByteSource source) {
-    const auto window = source.window(kStartBytes);
-    if (!window) return window.error();
-    const std::string_view start = window->substr(0, kStartBytes);
+    VCP_TRY_ASSIGN(const auto window, source.window(kStartBytes));
+    const std::string_view start = window.substr(0, kStartBytes);
     const uint64_t exactBytes =
         start.size() < kHeaderBytes ? 0 : kHeaderBytes + uint64_t{facetCount(start)} * kFacetBytes;
     // For a short or garbled text, the error of the text reader is the most useful.

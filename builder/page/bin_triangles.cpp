@@ -21,7 +21,7 @@ TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_
             const auto& t = mesh.triangles[k];
             const glm::i32vec3 corner[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
             grid.forPagesNear(corner, kBinMarginCells, [&](uint64_t page) {
-                if (page >= first && page < end) part.push_back({page, static_cast<uint32_t>(k)});
+                if (page >= first && page < end) part.push_back({page, uint32_t(k)});
             });
         }
     });

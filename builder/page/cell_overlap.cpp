@@ -43,7 +43,7 @@ CellOverlap::CellOverlap(const Triangle3& t, double margin) {
 
 WIDER_CLONES void CellOverlap::classify(glm::ivec3 low, glm::ivec3 high, std::vector<uint8_t>& cells) const {
     const glm::ivec3 size = high - low + 1;
-    cells.assign(static_cast<size_t>(size.x) * size.y * size.z, 0);
+    cells.assign(size_t(size.x) * size.y * size.z, 0);
     uint8_t* cell = cells.data();
     const double middle = 0.5 * (low.x + high.x + 1), half = 0.5 * (size.x - 1);
     for (int z = low.z; z <= high.z; ++z)

@@ -60,11 +60,11 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
                   glm::dvec3(-margin), glm::dvec3(1 + margin), polygon);
         if (polygon.empty()) continue;
         for (const glm::dvec3& p : polygon) {
-            s.x[s.count] = static_cast<float>(p.x);
-            s.y[s.count] = static_cast<float>(p.y);
-            s.z[s.count++] = static_cast<float>(p.z);
+            s.x[s.count] = float(p.x);
+            s.y[s.count] = float(p.y);
+            s.z[s.count++] = float(p.z);
         }
-        s.ends.push_back(static_cast<uint32_t>(s.count));
+        s.ends.push_back(uint32_t(s.count));
         s.normals.push_back(t->normal);
         s.areas.push_back(clippedArea(polygon, t->normal));
     }
@@ -76,7 +76,7 @@ bool clipTriangles(glm::dvec3 lower, double edge, std::span<const CertifiedTrian
 
 /// Returns the mean normal without orientation, started from the largest piece; zero where the pieces disagree.
 glm::dvec3 referenceDirection(const CertificateScratch& s) {
-    const size_t largest = static_cast<size_t>(std::max_element(s.areas.begin(), s.areas.end()) - s.areas.begin());
+    const size_t largest = size_t(std::max_element(s.areas.begin(), s.areas.end()) - s.areas.begin());
     glm::dvec3 sum(0);
     for (size_t i = 0; i < s.normals.size(); ++i)
         sum += (glm::dot(s.normals[i], s.normals[largest]) < 0 ? -s.areas[i] : s.areas[i]) * s.normals[i];
@@ -118,10 +118,9 @@ public:
             }
         }
         for (int r = 0; r < kPoints; ++r)
-            for (int m = 0; m < kPoints; ++m)
-                coefficient_[m][r] = static_cast<float>(rows[r][kPoints + m] / rows[r][r]);
+            for (int m = 0; m < kPoints; ++m) coefficient_[m][r] = float(rows[r][kPoints + m] / rows[r][r]);
         for (int p = 0; p < 16; ++p)
-            for (int c = 0; c < 3; ++c) weight_[c][p] = static_cast<float>(index_[p % kPoints][c]) / 4;
+            for (int c = 0; c < 3; ++c) weight_[c][p] = float(index_[p % kPoints][c]) / 4;
     }
 
     /// Sets the 15 points of a triangle (and its first corner again).
@@ -312,7 +311,7 @@ Certificate certifyLeaf(glm::dvec3 lower, double edge, std::span<const Certified
 
 uint32_t wallCode(double value) {
     if (value <= 0) return 0;
-    uint32_t code = static_cast<uint32_t>(std::ceil(std::sqrt(value / double(kWallUnit))));
+    uint32_t code = uint32_t(std::ceil(std::sqrt(value / double(kWallUnit))));
     while (wallOf(code) < value) ++code;
     while (wallOf(code - 1) >= value) --code;
     return std::min(code, kSoftWallMask + 1);

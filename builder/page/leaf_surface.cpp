@@ -29,10 +29,10 @@ LeafSurface::LeafSurface(const std::array<uint32_t, 8>& codes) {
         slope_[i] = 0.5 * side * f64::decodeDirection(codes[i] >> 11);
         constant_[i] =
             side * f64::decodeDistance(codes[i]) - glm::dot(slope_[i], glm::dvec3(i & 1, i >> 1 & 1, i >> 2));
-        coefficients_[i] = static_cast<float>(constant_[i]);
-        coefficients_[i + 8] = static_cast<float>(slope_[i].x);
-        coefficients_[i + 16] = static_cast<float>(slope_[i].y);
-        coefficients_[i + 24] = static_cast<float>(slope_[i].z);
+        coefficients_[i] = float(constant_[i]);
+        coefficients_[i + 8] = float(slope_[i].x);
+        coefficients_[i + 16] = float(slope_[i].y);
+        coefficients_[i + 24] = float(slope_[i].z);
     }
 }
 

@@ -54,13 +54,13 @@ private:
     /// occupancy_[l]: cubes of 2^l cells that the mesh touches.
     void fillOccupancy() {
         const int n = geometry_.cells();
-        const auto index = [](int side, int x, int y, int z) { return static_cast<size_t>(x + side * (y + side * z)); };
-        occupancy_.emplace_back(static_cast<size_t>(n) * n * n);
+        const auto index = [](int side, int x, int y, int z) { return size_t(x + side * (y + side * z)); };
+        occupancy_.emplace_back(size_t(n) * n * n);
         for (int z = 0; z < n; ++z)
             for (int y = 0; y < n; ++y)
                 for (int x = 0; x < n; ++x) occupancy_[0][index(n, x, y, z)] = geometry_.occupied({x, y, z});
         for (int m = n / 2; m >= 1; m /= 2) {
-            std::vector<uint8_t> up(static_cast<size_t>(m) * m * m, 0);
+            std::vector<uint8_t> up(size_t(m) * m * m, 0);
             for (int z = 0; z < 2 * m; ++z)
                 for (int y = 0; y < 2 * m; ++y)
                     for (int x = 0; x < 2 * m; ++x)
@@ -74,7 +74,7 @@ private:
         while (kSubcells << level < box.edge) ++level;
         const int n = geometry_.cells() >> level;
         const glm::ivec3 c = box.lower / box.edge;
-        return occupancy_[level][static_cast<size_t>(c.x + n * (c.y + n * c.z))] != 0;
+        return occupancy_[level][size_t(c.x + n * (c.y + n * c.z))] != 0;
     }
 
     /// Fills node `index`: a box of at least a cell.
@@ -91,7 +91,7 @@ private:
             return fillCell(index, box, triangles.around, triangles.inside, 0);
         }
         const uint32_t first = addChildren(index);
-        for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(static_cast<int>(i)));
+        for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(int(i)));
         merge(index);
     }
 
@@ -110,13 +110,13 @@ private:
         if (double(together) > kMaxRepetition * double(inside.size())) return makeHard(index, inside);
         const uint32_t first = addChildren(index);
         for (uint32_t i = 0; i < 8; ++i)
-            fillCell(first + i, box.child(static_cast<int>(i)), children.around[i], children.inside[i], depth + 1);
+            fillCell(first + i, box.child(int(i)), children.around[i], children.inside[i], depth + 1);
     }
 
     uint32_t addChildren(uint32_t index) {
-        const uint32_t first = static_cast<uint32_t>(tree_.nodes.size());
+        const uint32_t first = uint32_t(tree_.nodes.size());
         const NodeBox box = tree_.nodes[index].box;
-        for (uint32_t i = 0; i < 8; ++i) tree_.nodes.push_back({.box = box.child(static_cast<int>(i))});
+        for (uint32_t i = 0; i < 8; ++i) tree_.nodes.push_back({.box = box.child(int(i))});
         tree_.nodes[index].kind = Kind::Internal;
         tree_.nodes[index].index = first;
         return first;
@@ -138,13 +138,13 @@ private:
 
     void makeSoft(uint32_t index, const Certificate& certificate) {
         tree_.nodes[index].kind = Kind::Soft;
-        tree_.nodes[index].index = static_cast<uint32_t>(tree_.soft.size());
+        tree_.nodes[index].index = uint32_t(tree_.soft.size());
         tree_.soft.push_back({tree_.nodes[index].box, certificate, 0});
     }
 
     void makeHard(uint32_t index, std::span<const uint32_t> triangles) {
         tree_.nodes[index].kind = Kind::Hard;
-        tree_.nodes[index].index = static_cast<uint32_t>(tree_.hard.size());
+        tree_.nodes[index].index = uint32_t(tree_.hard.size());
         tree_.hard.push_back({tree_.nodes[index].box, {triangles.begin(), triangles.end()}});
         records_ += triangles.size();
     }
@@ -217,7 +217,7 @@ private:
             const glm::ivec3 o(i & 1, i >> 1 & 1, i >> 2);
             const glm::ivec3 d = g - o;
             if (d.x >= 0 && d.x <= 1 && d.y >= 0 && d.y <= 1 && d.z >= 0 && d.z <= 1 &&
-                tree_.nodes[firstChild + static_cast<uint32_t>(i)].kind != Kind::Empty)
+                tree_.nodes[firstChild + uint32_t(i)].kind != Kind::Empty)
                 return true;
         }
         return false;

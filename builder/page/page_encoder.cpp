@@ -76,7 +76,7 @@ void setWalls(PageTree& tree, const LeafMap& map) {
             const BernsteinCube::Range range = cube.faceRange(axis, end);
             if (range.min > near || range.max < -near) continue;
             const int64_t next = map.find(neighbour(leaf.box, axis, end));
-            continued = next >= 0 && sideAgreement(leaf, tree.soft[static_cast<size_t>(next)], axis, end) != 0;
+            continued = next >= 0 && sideAgreement(leaf, tree.soft[size_t(next)], axis, end) != 0;
         }
         leaf.wall = continued ? 0 : wallCode(leaf.certificate.maxValue);
     }
@@ -114,10 +114,10 @@ private:
         for (;;) {
             const SoftLeaf& last = tree_.soft[run.back().leaf];
             const int64_t next = map_.find(neighbour(last.box, axis, 1));
-            if (next < 0 || first_[static_cast<size_t>(next)] != kUnset) return run;
-            const int agreement = sideAgreement(last, tree_.soft[static_cast<size_t>(next)], axis, 1);
+            if (next < 0 || first_[size_t(next)] != kUnset) return run;
+            const int agreement = sideAgreement(last, tree_.soft[size_t(next)], axis, 1);
             if (agreement == 0) return run;
-            run.push_back({static_cast<uint32_t>(next), run.back().flip != (agreement < 0)});
+            run.push_back({uint32_t(next), run.back().flip != (agreement < 0)});
         }
     }
 
@@ -133,8 +133,8 @@ private:
             }
         }
         for (const Link& link : best) {
-            first_[link.leaf] = static_cast<uint32_t>(faces.size());
-            axis_[link.leaf] = static_cast<uint32_t>(bestAxis);
+            first_[link.leaf] = uint32_t(faces.size());
+            axis_[link.leaf] = uint32_t(bestAxis);
             addFace(link, bestAxis, 0);
         }
         addFace(best.back(), bestAxis, 1);
@@ -182,16 +182,15 @@ public:
 
     /// Appends a leaf's triangles; returns its node word.
     uint32_t add(const HardLeaf& leaf) {
-        const uint32_t first = static_cast<uint32_t>(records.size());
+        const uint32_t first = uint32_t(records.size());
         const size_t count = leaf.triangles.size();
         const bool isLong = count >= kHardCountLong;
-        if (isLong) records.emplace_back(static_cast<uint32_t>(count), 0u);
+        if (isLong) records.emplace_back(uint32_t(count), 0u);
         for (const uint32_t k : leaf.triangles) {
             const auto& v = geometry_.vertices(k);
             records.push_back(pack21(vertex(v[0]), vertex(v[1]), vertex(v[2])));
         }
-        return kNodeHard << kNodeTypeShift |
-               (isLong ? kHardCountLong : static_cast<uint32_t>(count)) << kHardCountShift | first;
+        return kNodeHard << kNodeTypeShift | (isLong ? kHardCountLong : uint32_t(count)) << kHardCountShift | first;
     }
 
     std::vector<glm::u32vec2> records, vertices;
@@ -199,11 +198,10 @@ public:
 
 private:
     uint32_t vertex(uint32_t global) {
-        const auto [entry, isNew] = local_.try_emplace(global, static_cast<uint32_t>(vertices.size()));
+        const auto [entry, isNew] = local_.try_emplace(global, uint32_t(vertices.size()));
         if (isNew) {
             const glm::i32vec3 p = mesh_.positions[global] - geometry_.originLattice() + kLatticeBias;
-            vertices.push_back(
-                pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z)));
+            vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
             normals.push_back(mesh_.normals[global]);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
         }
@@ -235,7 +233,7 @@ private:
         switch (n.kind) {
             case TreeNode::Kind::Internal:
                 queue.push_back(node);
-                return kNodeInternal << kNodeTypeShift | static_cast<uint32_t>(queue.size() - 1);
+                return kNodeInternal << kNodeTypeShift | uint32_t(queue.size() - 1);
             case TreeNode::Kind::Soft: {
                 const SoftLeaf& leaf = tree_.soft[n.index];
                 return kNodeSoft << kNodeTypeShift | dipCode(leaf.certificate.curvature) << kSoftDipShift |
@@ -279,19 +277,18 @@ EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh
 
     EncodedPage page;
     page.certifiedError = pageError(tree, geometry);
-    page.hardLeaves = static_cast<uint32_t>(tree.hard.size());
-    page.leaves = static_cast<uint32_t>(tree.soft.size()) + page.hardLeaves;
+    page.hardLeaves = uint32_t(tree.hard.size());
+    page.leaves = uint32_t(tree.soft.size()) + page.hardLeaves;
     PageHeader header;
-    header.log2Cells = static_cast<uint32_t>(std::countr_zero(static_cast<unsigned>(geometry.cells())));
+    header.log2Cells = uint32_t(std::countr_zero(unsigned(geometry.cells())));
     header.root = nodes.root;
-    header.groups = static_cast<uint32_t>(nodes.words.size() / 8);
-    header.faces = static_cast<uint32_t>(faces.faces.size());
-    header.triangles = static_cast<uint32_t>(triangles.records.size());
-    header.vertices = static_cast<uint32_t>(triangles.vertices.size());
-    header.softLeaves = static_cast<uint32_t>(tree.soft.size());
+    header.groups = uint32_t(nodes.words.size() / 8);
+    header.faces = uint32_t(faces.faces.size());
+    header.triangles = uint32_t(triangles.records.size());
+    header.vertices = uint32_t(triangles.vertices.size());
+    header.softLeaves = uint32_t(tree.soft.size());
     header.hardLeaves = page.hardLeaves;
-    header.certifiedError =
-        std::nextafter(static_cast<float>(page.certifiedError), std::numeric_limits<float>::infinity());
+    header.certifiedError = std::nextafter(float(page.certifiedError), std::numeric_limits<float>::infinity());
     const PageSections s = pageSections(header);
     page.geometry.resize(s.end);
     std::memcpy(page.geometry.data(), &header, sizeof header);

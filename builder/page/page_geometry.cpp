@@ -41,7 +41,7 @@ public:
         size_t i = (edge * 0x9e3779b97f4a7c15u) >> 32 & mask;
         while (slots_[i].edge != edge && slots_[i].edge != 0) i = (i + 1) & mask;
         slots_[i].edge = edge;
-        return static_cast<uint32_t>(i);
+        return uint32_t(i);
     }
     Slot& operator[](uint32_t i) { return slots_[i]; }
 
@@ -74,7 +74,7 @@ void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
         vertices_.push_back(mesh_.triangles[k]);
     }
     stamp_.assign(triangles_.size(), 0);
-    const size_t side = static_cast<size_t>(cells_) + 1;
+    const size_t side = size_t(cells_) + 1;
     gridCorner_.assign(side * side * side, 0);
 }
 
@@ -86,7 +86,7 @@ void PageGeometry::markBadEdges() {
             const uint32_t a = vertices_[k][i], b = vertices_[k][(i + 1) % 3];
             slots[k][i] = table.find(a, b);
             EdgeTable::Slot& slot = table[slots[k][i]];
-            slot.uses = static_cast<uint8_t>(std::min(slot.uses + 1, 3));
+            slot.uses = uint8_t(std::min(slot.uses + 1, 3));
             if (slot.uses == 1) slot.firstUse = 4 * k + i;
             slot.good = false;
             if (slot.uses != 2) continue;
@@ -97,13 +97,12 @@ void PageGeometry::markBadEdges() {
                         kCreaseCosine;
         }
     for (uint32_t k = 0; k < vertices_.size(); ++k)
-        for (int i = 0; i < 3; ++i)
-            triangles_[k].badEdges |= static_cast<uint8_t>((table[slots[k][i]].good ? 0u : 1u) << i);
+        for (int i = 0; i < 3; ++i) triangles_[k].badEdges |= uint8_t((table[slots[k][i]].good ? 0u : 1u) << i);
 }
 
 void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
     const int side = cells_ + 2 * kBorder;
-    const size_t cellCount = static_cast<size_t>(side) * side * side;
+    const size_t cellCount = size_t(side) * side * side;
     struct Entry {
         uint32_t list, triangle;
     };
@@ -113,7 +112,7 @@ void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
     listBegin_.assign(2 * cellCount + 2, 0);
     const auto add = [&](glm::ivec3 cell, uint32_t triangle, bool touches) {
         const size_t list = 2 * cellIndex(cell) + (touches ? 0 : 1);
-        entries.push_back({static_cast<uint32_t>(list), triangle});
+        entries.push_back({uint32_t(list), triangle});
         ++listBegin_[list + 2];
         return touches && std::min({cell.x, cell.y, cell.z}) >= 0 && std::max({cell.x, cell.y, cell.z}) < cells_;
     };
@@ -189,7 +188,7 @@ void PageGeometry::split(const NodeBox& box, std::span<const uint32_t> candidate
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x, ++how) {
-                    const size_t child = static_cast<size_t>(x + 2 * y + 4 * z);
+                    const size_t child = size_t(x + 2 * y + 4 * z);
                     if (*how) children.around[child].push_back(k);
                     if (*how == CellOverlap::kTouches) children.inside[child].push_back(k);
                 }
@@ -198,21 +197,21 @@ void PageGeometry::split(const NodeBox& box, std::span<const uint32_t> candidate
 
 const CornerVector& PageGeometry::corner(glm::ivec3 subcells) {
     const glm::ivec3 cell = subcells / kSubcells;
-    const size_t side = static_cast<size_t>(cells_) + 1;
+    const size_t side = size_t(cells_) + 1;
     uint32_t& number =
         cell * kSubcells == subcells
             ? gridCorner_[cell.x + side * (cell.y + side * cell.z)]
             : subcellCorner_[uint64_t(subcells.x) | uint64_t(subcells.y) << 20 | uint64_t(subcells.z) << 40];
     if (number == 0) {
         corners_.push_back(searchCorner(glm::dvec3(subcells) / double(kSubcells)));
-        number = static_cast<uint32_t>(corners_.size());
+        number = uint32_t(corners_.size());
     }
     return corners_[number - 1];
 }
 
 double PageGeometry::measureFound(glm::dvec3 p, size_t first, double least) {
     const glm::vec3 query(p);
-    float reach = static_cast<float>(std::min(std::sqrt(least), 1e9));
+    float reach = float(std::min(std::sqrt(least), 1e9));
     for (size_t i = first; i < found_.size(); ++i) {
         const Triangle& t = triangles_[found_[i].triangle];
         const float distance = glm::distance(query, t.centre);
@@ -227,7 +226,7 @@ double PageGeometry::measureFound(glm::dvec3 p, size_t first, double least) {
             if (found_[i].least > reach) continue;
             const float* corners = &triangles_[found_[i].triangle].corners[0].x;
             for (int c = 0; c < 9; ++c) batch.corners[c][count] = corners[c];
-            at[count++] = static_cast<uint32_t>(i);
+            at[count++] = uint32_t(i);
         }
         for (size_t k = count; k > 0 && k < TriangleBatch::kSize; ++k)
             for (auto& corners : batch.corners) corners[k] = corners[0];
@@ -237,7 +236,7 @@ double PageGeometry::measureFound(glm::dvec3 p, size_t first, double least) {
             found_[at[k]].squared = batch.squared[k];
             least = std::min(least, batch.squared[k]);
         }
-        reach = std::min(reach, static_cast<float>(std::sqrt(least)) + kBallRounding);
+        reach = std::min(reach, float(std::sqrt(least)) + kBallRounding);
     }
     return least;
 }
@@ -297,7 +296,7 @@ CornerVector PageGeometry::searchCorner(glm::dvec3 p) {
             double sum = 0.5;
             for (int i = 0; i < 3; ++i)
                 sum += best.weights[i] * double(mesh_.colours[vertices_[bestTriangle][i]] >> 8 * c & 255u);
-            corner.colour |= static_cast<uint32_t>(std::clamp(sum, 0.0, 255.0)) << 8 * c;
+            corner.colour |= uint32_t(std::clamp(sum, 0.0, 255.0)) << 8 * c;
         }
     }
     return corner;

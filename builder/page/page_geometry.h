@@ -106,7 +106,7 @@ private:
     double measureFound(glm::dvec3 p, size_t first, double least);
     [[nodiscard]] size_t cellIndex(glm::ivec3 cell) const {
         const int side = cells_ + 2 * kBorder;
-        return static_cast<size_t>(cell.x + kBorder + side * (cell.y + kBorder + side * (cell.z + kBorder)));
+        return size_t(cell.x + kBorder + side * (cell.y + kBorder + side * (cell.z + kBorder)));
     }
 
     static constexpr int kBorder = 2;  ///< cells around the page that are searched for closest points

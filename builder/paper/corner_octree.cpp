@@ -43,7 +43,7 @@ public:
         if (!(std::max({extent.x, extent.y, extent.z}) < RootGrid::kMaxCells / 2))
             return limit("the cells are too small for this mesh: more than 2^19 would lie across it");
         tree_.frame = RootGrid::around(mesh_.low(), mesh_.high(), options_.cell, 4);
-        levels_.resize(static_cast<size_t>(tree_.frame.rootLevel) + 1);
+        levels_.resize(size_t(tree_.frame.rootLevel) + 1);
         makeRoots();
         for (int level = tree_.frame.rootLevel; level > kBlockLevel; --level) {
             findEmpty(level, field_.band());
@@ -64,10 +64,10 @@ private:
     [[nodiscard]] CornerSample sampleAt(glm::ivec3 point) const {
         const glm::dvec3 p = tree_.frame.worldFromGrid(glm::dvec3(point));
         const auto nearest = mesh_.nearestPoint(p);
-        if (!nearest) return {glm::vec3(0), static_cast<float>(1e9)};
+        if (!nearest) return {glm::vec3(0), float(1e9)};
         CornerSample sample;
         sample.toSurface = glm::vec3((nearest->point - p) / options_.cell);
-        sample.distance = static_cast<float>(nearest->distance / options_.cell);
+        sample.distance = float(nearest->distance / options_.cell);
         if (field_.isSigned() && sides_->isInside(p, *nearest)) sample.distance = -sample.distance;
         return sample;
     }
@@ -81,7 +81,7 @@ private:
             return std::abs(known->distance);
         const auto nearest = mesh_.nearestPoint(tree_.frame.worldFromGrid(glm::dvec3(point)), within * options_.cell);
         if (!nearest) return {};
-        return static_cast<float>(nearest->distance / options_.cell);
+        return float(nearest->distance / options_.cell);
     }
     [[nodiscard]] CornerSamples cornersOf(glm::ivec3 low, int size) const {
         CornerSamples corners;
@@ -113,7 +113,7 @@ private:
         const int size = 1 << (level - 1);
         for (BuildNode& node : levels_[level]) {
             if (node.kind != Kind::Inner) continue;
-            node.first = static_cast<uint32_t>(children.size());
+            node.first = uint32_t(children.size());
             for (int k = 0; k < 8; ++k) children.push_back({node.low + size * octantOffset(k)});
             if (children.size() > CornerOctree::kEmpty / 2) return false;
         }
@@ -183,8 +183,8 @@ private:
                 const bool touches = std::min({from.x, from.y, from.z}) >= 0 && std::max({from.x, from.y, from.z}) <= 1;
                 ofLeaf = ofLeaf || (touches && levels_[level - 1][node.first + k].kind == Kind::Leaf);
             }
-            if (ofLeaf && field_.mergeError(corners, static_cast<float>(size), 0.5f * glm::vec3(at),
-                                            sampled(node.low + half * at)) > field_.mergeThreshold())
+            if (ofLeaf && field_.mergeError(corners, float(size), 0.5f * glm::vec3(at), sampled(node.low + half * at)) >
+                              field_.mergeThreshold())
                 return false;
         }
         return true;
@@ -203,8 +203,8 @@ private:
                 if (node.kind == Kind::Empty) empties_.push_back({level, i});
                 if (node.kind == Kind::Leaf) leaves_.push_back({level, i});
                 if (node.kind != Kind::Inner) continue;
-                const auto first = static_cast<uint32_t>(tree_.nodes.size());
-                tree_.nodes[node.word] = static_cast<int32_t>(first);
+                const auto first = uint32_t(tree_.nodes.size());
+                tree_.nodes[node.word] = int32_t(first);
                 tree_.nodes.resize(first + 8);
                 for (uint32_t k = 0; k < 8; ++k) {
                     levels_[level - 1][node.first + k].word = first + k;
@@ -230,7 +230,7 @@ private:
             if (options_.safeEmpty) least = std::max(least - kPointToBoundary, 0.0f);
             const double scaled = std::min(double(least) / tree_.cutoff, 1.0) * (CornerOctree::kEmpty - 1);
             const double code = (options_.safeEmpty ? std::floor(scaled) : std::ceil(scaled)) + CornerOctree::kEmpty;
-            tree_.nodes[node.word] = static_cast<int32_t>(code);
+            tree_.nodes[node.word] = int32_t(code);
         });
     }
 
@@ -287,7 +287,7 @@ private:
                          at(leaves_[i - 1]).low + along == at(leaves_[i]).low;
             slice[i] = adjoins[i] ? slices - 1 : slices;
             slices = slice[i] + 2;
-            tree_.nodes[at(leaves_[i]).word] = -static_cast<int32_t>(slice[i]) - 1;
+            tree_.nodes[at(leaves_[i]).word] = -int32_t(slice[i]) - 1;
         }
         tree_.largest = largestDistance();
         tree_.slices.resize(slices);

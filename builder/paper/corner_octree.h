@@ -72,7 +72,7 @@ public:
     [[nodiscard]] static bool isLeaf(int32_t word) { return word < 0; }
     /// Returns the distance of an empty node, in cells.
     [[nodiscard]] float emptyDistance(int32_t word) const {
-        return static_cast<float>(word - kEmpty) * (cutoff / static_cast<float>(kEmpty - 1));
+        return float(word - kEmpty) * (cutoff / float(kEmpty - 1));
     }
     /// Returns the eight codes, x slowest: code 4 x + 2 z + y.
     [[nodiscard]] const uint32_t* leafCodes(int32_t word) const { return slices[-(word + 1)].data(); }

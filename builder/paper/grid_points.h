@@ -54,12 +54,10 @@ public:
 
 private:
     static constexpr uint64_t kFree = ~uint64_t{0};
-    static uint64_t keyOf(glm::ivec3 p) {
-        return static_cast<uint64_t>(p.x) | static_cast<uint64_t>(p.y) << 21 | static_cast<uint64_t>(p.z) << 42;
-    }
+    static uint64_t keyOf(glm::ivec3 p) { return uint64_t(p.x) | uint64_t(p.y) << 21 | uint64_t(p.z) << 42; }
     static glm::ivec3 pointOf(uint64_t key) {
         constexpr uint64_t kMask = (1u << 21) - 1;
-        return {static_cast<int>(key & kMask), static_cast<int>(key >> 21 & kMask), static_cast<int>(key >> 42)};
+        return {int(key & kMask), int(key >> 21 & kMask), int(key >> 42)};
     }
     [[nodiscard]] size_t slotOf(uint64_t key) const {
         const size_t mask = slots_.size() - 1;

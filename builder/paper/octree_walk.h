@@ -88,8 +88,8 @@ void walkOctree(const Tree& tree, const GridRay& ray, Work& work, const Visit& v
             const glm::ivec3 room = last - c;
             if ((c.x | c.y | c.z | room.x | room.y | room.z) < 0) return;
         }
-        const auto changed = static_cast<unsigned>((old.x ^ c.x) | (old.y ^ c.y) | (old.z ^ c.z));
-        const int common = std::max(static_cast<int>(std::bit_width(changed)), level + 1);
+        const auto changed = unsigned((old.x ^ c.x) | (old.y ^ c.y) | (old.z ^ c.z));
+        const int common = std::max(int(std::bit_width(changed)), level + 1);
         if (common > tree.frame.rootLevel) {
             level = tree.frame.rootLevel;
             word = tree.rootWord(c);

@@ -24,15 +24,15 @@ constexpr uint64_t kMostPageBytes = uint64_t{1} << 28;
 Result<PageBytes> pageOf(const PaperCaster& octree) {
     const CornerOctree& tree = octree.tree();
     PaperPageHeader header;
-    header.rootLevel = static_cast<uint32_t>(tree.frame.rootLevel);
-    header.packing = static_cast<uint32_t>(octree.options().packing);
-    header.nodes = static_cast<uint32_t>(tree.nodes.size());
-    for (int axis = 0; axis < 3; ++axis) header.roots[axis] = static_cast<uint32_t>(tree.frame.roots[axis]);
-    header.slices = static_cast<uint32_t>(tree.slices.size());
+    header.rootLevel = uint32_t(tree.frame.rootLevel);
+    header.packing = uint32_t(octree.options().packing);
+    header.nodes = uint32_t(tree.nodes.size());
+    for (int axis = 0; axis < 3; ++axis) header.roots[axis] = uint32_t(tree.frame.roots[axis]);
+    header.slices = uint32_t(tree.slices.size());
     header.cutoff = tree.cutoff;
     header.longest = tree.largest;
-    header.leaves = static_cast<uint32_t>(tree.leaves);
-    header.emptyNodes = static_cast<uint32_t>(tree.emptyNodes);
+    header.leaves = uint32_t(tree.leaves);
+    header.emptyNodes = uint32_t(tree.emptyNodes);
     const PaperSections sections = paperSections(header);
     if (sections.end > kMostPageBytes)
         return Error{
@@ -54,8 +54,8 @@ PaperParameters parametersOf(const PaperOptions& options) {
     parameters.band = options.band;
     parameters.mergeThreshold = options.mergeThreshold;
     parameters.growRounds = options.growRounds;
-    parameters.packing = static_cast<uint32_t>(options.packing);
-    parameters.mergeScheme = static_cast<uint32_t>(options.mergeScheme);
+    parameters.packing = uint32_t(options.packing);
+    parameters.mergeScheme = uint32_t(options.mergeScheme);
     parameters.safeEmpty = options.safeEmpty ? 1 : 0;
     return parameters;
 }
@@ -90,8 +90,7 @@ FileHeader headerOf(const PaperCaster& octree, const SoupMeasures& mesh) {
     header.cell = grid.cell;
     header.levels = 1;
     header.pages = 1;
-    header.log2Cells =
-        static_cast<uint32_t>(std::bit_width(static_cast<uint32_t>(std::max({cells.x, cells.y, cells.z}) - 1)));
+    header.log2Cells = uint32_t(std::bit_width(uint32_t(std::max({cells.x, cells.y, cells.z}) - 1)));
     for (int axis = 0; axis < 3; ++axis) {
         header.origin[axis] = grid.low[axis];
         header.boundsMin[axis] = mesh.boundsMin[axis];
@@ -123,27 +122,25 @@ private:
 OutputRules rulesOf(const BuildOptions& options) { return {.overwrite = options.overwrite, .inputs = options.inputs}; }
 
 Result<uint64_t> write(const BuildOptions& options, const PaperFile& file) {
-    auto writer = VcpWriter::create(options.output, 1, rulesOf(options));
-    if (!writer) return writer.error();
-    VCP_TRY((*writer)->append(file.entry, compressPage(file.page.geometryBytes(), {})));
-    return (*writer)->commit(file.header);
+    VCP_TRY_ASSIGN(auto writer, VcpWriter::create(options.output, 1, rulesOf(options)));
+    VCP_TRY(writer->append(file.entry, compressPage(file.page.geometryBytes(), {})));
+    return writer->commit(file.header);
 }
 
 uint64_t peakRssBytes() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+    return uint64_t(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace
 
 Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh) {
-    auto page = pageOf(octree);
-    if (!page) return page.error();
+    VCP_TRY_ASSIGN(auto page, pageOf(octree));
     PageEntry entry;
-    entry.pageBytes = static_cast<uint32_t>(page->geometryBytes().size());
-    entry.leaves = static_cast<uint32_t>(octree.tree().leaves);
-    return PaperFile{headerOf(octree, measuresOf(mesh)), entry, std::move(*page)};
+    entry.pageBytes = uint32_t(page.geometryBytes().size());
+    entry.leaves = uint32_t(octree.tree().leaves);
+    return PaperFile{headerOf(octree, measuresOf(mesh)), entry, std::move(page)};
 }
 
 Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper) {
@@ -151,36 +148,31 @@ Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptio
     const auto began = std::chrono::steady_clock::now();
     const Stages stages(options);
     VCP_TRY(stages.at("reading", 0));
-    const auto inputs = expandInputs(options.inputs);
-    if (!inputs) return inputs.error();
-    const auto mesh = loadMesh(*inputs);
-    if (!mesh) return mesh.error();
-    const SoupMeasures measures = measuresOf(*mesh);
+    VCP_TRY_ASSIGN(const auto inputs, expandInputs(options.inputs));
+    VCP_TRY_ASSIGN(const auto mesh, loadMesh(inputs));
+    const SoupMeasures measures = measuresOf(mesh);
     if (!(measures.area > 0))
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "its triangles have no area",
                      .file = options.inputs.front().string()};
-    const auto frame = chooseFrame(options, measures);
-    if (!frame) return frame.error();
+    VCP_TRY_ASSIGN(const auto frame, chooseFrame(options, measures));
     VCP_TRY(stages.at("sorting", 0.2, measures.triangles));
-    const MeshBvh bvh(*mesh);
+    const MeshBvh bvh(mesh);
     VCP_TRY(stages.at("octree", 0.3, measures.triangles));
-    const auto octree = PaperCaster::create(bvh, paper, {.cell = frame->cell, .threads = options.threads});
-    if (!octree) return octree.error();
+    VCP_TRY_ASSIGN(const auto octree,
+                   PaperCaster::create(bvh, paper, {.cell = frame.cell, .threads = options.threads}));
     VCP_TRY(stages.at("writing", 0.9, measures.triangles));
-    const auto file = paperFile(*octree, *mesh);
-    if (!file) return file.error();
-    const auto bytes = write(options, *file);
-    if (!bytes) return bytes.error();
+    VCP_TRY_ASSIGN(const auto file, paperFile(octree, mesh));
+    VCP_TRY_ASSIGN(const auto bytes, write(options, file));
     BuildReport report;
     report.triangles = measures.triangles;
     report.degenerateTriangles = measures.degenerateTriangles;
     report.vertices = measures.vertices;
-    report.fileBytes = *bytes;
+    report.fileBytes = bytes;
     report.levels = 1;
     report.subvolumes = 1;
-    report.leaves = octree->tree().leaves;
-    report.cell = frame->cell;
+    report.leaves = octree.tree().leaves;
+    report.cell = frame.cell;
     report.certifiedErrorMax = std::numeric_limits<double>::quiet_NaN();
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     report.peakRssBytes = peakRssBytes();

@@ -17,13 +17,13 @@ struct AngleTables {
     AngleTables() {
         for (int i = 0; i < 512; ++i) {
             const double theta = (i / 511.0 - 0.5) * std::numbers::pi;
-            sinTheta[i] = static_cast<float>(std::sin(theta));
-            cosTheta[i] = static_cast<float>(std::cos(theta));
+            sinTheta[i] = float(std::sin(theta));
+            cosTheta[i] = float(std::cos(theta));
         }
         for (int i = 0; i < 1024; ++i) {
             const double phi = i / 1023.0 * 2 * std::numbers::pi;
-            sinPhi[i] = static_cast<float>(std::sin(phi));
-            cosPhi[i] = static_cast<float>(std::cos(phi));
+            sinPhi[i] = float(std::sin(phi));
+            cosPhi[i] = float(std::cos(phi));
         }
     }
 };
@@ -36,7 +36,7 @@ uint32_t packOctahedral(glm::vec3 v, float longest) {
     glm::vec2 o = glm::vec2(v.x, v.y) / norm;
     if (v.z < 0) o = (1.0f - glm::abs(glm::vec2(o.y, o.x))) * glm::vec2(o.x >= 0 ? 1 : -1, o.y >= 0 ? 1 : -1);
     const auto quantized = [](float unit, int steps) {
-        return static_cast<uint32_t>(std::lround(std::clamp(unit, 0.0f, 1.0f) * static_cast<float>(steps)));
+        return uint32_t(std::lround(std::clamp(unit, 0.0f, 1.0f) * float(steps)));
     };
     return quantized(std::sqrt(r / longest), 8191) | quantized(o.x * 0.5f + 0.5f, 1023) << 13 |
            quantized(o.y * 0.5f + 0.5f, 511) << 23;
@@ -45,7 +45,7 @@ uint32_t packOctahedral(glm::vec3 v, float longest) {
 LeafVectors vectorsAt(const CornerSamples& samples) {
     LeafVectors vectors;
     for (int k = 0; k < 8; ++k) {
-        const glm::vec3 v = samples[static_cast<size_t>((k >> 2) | (k & 1) << 1 | (k & 2) << 1)].toSurface;
+        const glm::vec3 v = samples[size_t((k >> 2) | (k & 1) << 1 | (k & 2) << 1)].toSurface;
         vectors.x[k] = v.x, vectors.y[k] = v.y, vectors.z[k] = v.z;
     }
     return vectors;
@@ -72,7 +72,7 @@ private:
 }  // namespace
 
 glm::vec3 interpolateVectors(const LeafVectors& corners, float size, glm::vec3 at, PaperScheme scheme) {
-    return paper::interpolateVectors(corners, size, at, static_cast<uint32_t>(scheme));
+    return paper::interpolateVectors(corners, size, at, uint32_t(scheme));
 }
 
 float vectorMergeError(const CornerSamples& corners, float size, glm::vec3 at, const CornerSample& exact,
@@ -106,9 +106,8 @@ Result<PaperCaster> PaperCaster::create(const MeshBvh& mesh, const PaperOptions&
     CornerOctreeOptions structure = build;
     structure.growRounds = options.growRounds;
     structure.safeEmpty = options.safeEmpty;
-    auto tree = buildCornerOctree(mesh, nullptr, VectorField(options), structure);
-    if (!tree) return tree.error();
-    return PaperCaster(std::move(*tree), options);
+    VCP_TRY_ASSIGN(auto tree, buildCornerOctree(mesh, nullptr, VectorField(options), structure));
+    return PaperCaster(std::move(tree), options);
 }
 
 }  // namespace vcp

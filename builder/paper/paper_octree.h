@@ -52,7 +52,7 @@ class PaperDecoder {
 public:
     PaperDecoder(float longest, PaperPacking packing) : packing_(packing), perStep_(std::sqrt(longest) / 8191) {}
     [[nodiscard]] glm::vec3 operator()(uint32_t code) const {
-        const float root = static_cast<float>(code & 8191u) * perStep_;
+        const float root = float(code & 8191u) * perStep_;
         return root * root * (packing_ == PaperPacking::Spherical ? spherical(code) : paper::octahedralDirection(code));
     }
 
@@ -118,7 +118,7 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
             work.cell();
             work.fetch(2);
         }
-        const auto size = static_cast<float>(1 << finder.level());
+        const auto size = float(1 << finder.level());
         const glm::vec3 v = interpolateVectors(corners, size, (p - glm::vec3(finder.low())) / size, rules.scheme);
         return {glm::length(v), true, v};
     };

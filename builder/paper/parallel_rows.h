@@ -12,8 +12,8 @@ void forEachRow(int rows, unsigned threads, const std::function<void(int)>& work
 template <class Work>
 void forEachIndex(size_t count, unsigned threads, const Work& work) {
     constexpr size_t kRow = 256;
-    forEachRow(static_cast<int>((count + kRow - 1) / kRow), threads, [&](int row) {
-        const size_t first = static_cast<size_t>(row) * kRow;
+    forEachRow(int((count + kRow - 1) / kRow), threads, [&](int row) {
+        const size_t first = size_t(row) * kRow;
         for (size_t i = first; i < count && i < first + kRow; ++i) work(i);
     });
 }

@@ -39,7 +39,7 @@ public:
             const glm::ivec3 low(glm::floor(frame_.gridFromWorld(glm::min(a, glm::min(b, c)))));
             const glm::ivec3 high(glm::ceil(frame_.gridFromWorld(glm::max(a, glm::max(b, c)))));
             const glm::dvec3 count = high - low + 1;
-            if (count.x * count.y * count.z < static_cast<double>(points_.slots()))
+            if (count.x * count.y * count.z < double(points_.slots()))
                 insertInto(t, low, high);
             else
                 insertIntoAll(t, low, high);
@@ -58,7 +58,7 @@ public:
         if (owners_[slot].triangle == kNoTriangle) return CornerSample::unreached();
         const glm::dvec3 p = worldOf(slot);
         const glm::dvec3 v = (closestTo(p, owners_[slot].triangle) - p) / frame_.cell;
-        return {glm::vec3(v), static_cast<float>(glm::length(v))};
+        return {glm::vec3(v), float(glm::length(v))};
     }
 
 private:
@@ -100,7 +100,7 @@ private:
                 k == 13 || glm::min(q, glm::ivec3(0)) != glm::ivec3(0) ? std::nullopt : points_.slotAt(q);
             if (!neighbour) continue;
             const uint32_t triangle = owners_[*neighbour].triangle;
-            const auto end = tried.begin() + static_cast<std::ptrdiff_t>(count);
+            const auto end = tried.begin() + std::ptrdiff_t(count);
             if (triangle == kNoTriangle || triangle == owners_[slot].triangle ||
                 std::find(tried.begin(), end, triangle) != end)
                 continue;

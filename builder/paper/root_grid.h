@@ -36,7 +36,7 @@ struct RootGrid {
         frame.cell = cell;
         const glm::dvec3 wanted = (boxHigh - boxLow) / cell + 2.0 * margin;
         const double longest = std::max({wanted.x, wanted.y, wanted.z, 1.0});
-        frame.rootLevel = std::max(2, static_cast<int>(std::ceil(std::log2(longest / kRootsAcross))));
+        frame.rootLevel = std::max(2, int(std::ceil(std::log2(longest / kRootsAcross))));
         frame.roots = glm::max(glm::ivec3(glm::ceil(wanted / double(1 << frame.rootLevel))), glm::ivec3(1));
         frame.low = 0.5 * (boxLow + boxHigh) - 0.5 * cell * glm::dvec3(frame.cells());
         return frame;

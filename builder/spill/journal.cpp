@@ -20,16 +20,15 @@ std::string hashed(const std::string& text) { return fmt::format("{:016x}", XXH3
 
 /// Returns the whole journal; nothing where there is none.
 Result<std::string> contentOf(const TempFolder& folder) {
-    const auto file = folder.open(kJournalName);
-    if (!file) return file.error();
+    VCP_TRY_ASSIGN(const auto file, folder.open(kJournalName));
     std::string text;
-    if (*file < 0) return text;
+    if (file < 0) return text;
     std::vector<char> part(size_t{1} << 16);
     ssize_t n = 0;
-    while ((n = ::read(*file, part.data(), part.size())) > 0 || (n < 0 && errno == EINTR))
-        if (n > 0) text.append(part.data(), static_cast<size_t>(n));
+    while ((n = ::read(file, part.data(), part.size())) > 0 || (n < 0 && errno == EINTR))
+        if (n > 0) text.append(part.data(), size_t(n));
     const int code = errno;
-    ::close(*file);
+    ::close(file);
     if (n < 0) return systemError(folder.path() / kJournalName, "cannot be read", code);
     return text;
 }
@@ -42,9 +41,8 @@ Journal::~Journal() {
 
 Result<nlohmann::json> Journal::read(const TempFolder& folder) {
     nlohmann::json all;
-    const auto text = contentOf(folder);
-    if (!text) return text.error();
-    std::istringstream lines(*text);
+    VCP_TRY_ASSIGN(const auto text, contentOf(folder));
+    std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
         if (line.size() < 18) continue;
         const std::string said = line.substr(17);

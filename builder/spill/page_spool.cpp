@@ -34,21 +34,17 @@ uint64_t PageSpool::hashOf(const PageEntry& entry, uint64_t number) const {
 }
 
 Result<void> PageSpool::append(PageEntry entry, const StoredPage& page) {
-    entry.storedBytes = static_cast<uint32_t>(page.geometry.size());
+    entry.storedBytes = uint32_t(page.geometry.size());
     entry.pageBytes = page.geometryBytes;
-    entry.colourStoredBytes = static_cast<uint32_t>(page.colour.size());
+    entry.colourStoredBytes = uint32_t(page.colour.size());
     entry.colourBytes = page.colourBytes;
     entry.hash = hashBytes(page.geometry);
     entry.colourHash = page.colour.empty() ? 0 : hashBytes(page.colour);
-    const auto at = pages_.append(page.geometry);
-    if (!at) return at.error();
-    entry.offset = *at;
-    const auto colour = pages_.append(page.colour);
-    if (!colour) return colour.error();
+    VCP_TRY_ASSIGN(entry.offset, pages_.append(page.geometry));
+    VCP_TRY(pages_.append(page.colour));
     const SpooledEntry spooled{entry, hashOf(entry, entries_.size())};
     entries_.push_back(entry);
-    const auto listed = directory_.append(std::as_bytes(std::span(&spooled, 1)));
-    if (!listed) return listed.error();
+    VCP_TRY(directory_.append(std::as_bytes(std::span(&spooled, 1))));
     return {};
 }
 

@@ -41,7 +41,7 @@ void toPlanes(const std::byte* records, size_t count, size_t recordBytes, std::b
             const uint32_t difference = word - before;
             const uint32_t folded = difference << 1 ^ (0 - (difference >> 31));
             before = word;
-            for (size_t b = 0; b < 4; ++b) plane[b * count + i] = static_cast<std::byte>(folded >> 8 * b);
+            for (size_t b = 0; b < 4; ++b) plane[b * count + i] = std::byte(folded >> 8 * b);
         }
     }
 }
@@ -53,7 +53,7 @@ void fromPlanes(const std::byte* planes, size_t count, size_t recordBytes, std::
         uint32_t before = 0;
         for (size_t i = 0; i < count; ++i) {
             uint32_t folded = 0;
-            for (size_t b = 0; b < 4; ++b) folded |= static_cast<uint32_t>(plane[b * count + i]) << 8 * b;
+            for (size_t b = 0; b < 4; ++b) folded |= uint32_t(plane[b * count + i]) << 8 * b;
             before += folded >> 1 ^ (0 - (folded & 1));
             std::memcpy(records + i * recordBytes + w * 4, &before, 4);
         }
@@ -104,16 +104,15 @@ Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& recor
     const size_t stored = ZSTD_compress(coded.data() + sizeof(BlockHeader), coded.size() - sizeof(BlockHeader),
                                         planes.data(), planes.size(), kFastCompression);
     BlockHeader header;
-    header.bin = static_cast<uint32_t>(bin);
-    header.records = static_cast<uint32_t>(count);
-    header.storedBytes = static_cast<uint32_t>(stored);  // cannot fail with a buffer of compressBound
+    header.bin = uint32_t(bin);
+    header.records = uint32_t(count);
+    header.storedBytes = uint32_t(stored);  // cannot fail with a buffer of compressBound
     header.payloadHash = XXH3_64bits(coded.data() + sizeof header, stored);
     header.hash = header.hashOfHeader();
     std::memcpy(coded.data(), &header, sizeof header);
-    const auto offset = file_.append(std::span(coded).first(sizeof header + stored));
-    if (!offset) return offset.error();
+    VCP_TRY_ASSIGN(const auto offset, file_.append(std::span(coded).first(sizeof header + stored)));
     const std::scoped_lock lock(mutex_);
-    blocks_[bin].push_back({*offset, header.records, header.storedBytes});
+    blocks_[bin].push_back({offset, header.records, header.storedBytes});
     return {};
 }
 

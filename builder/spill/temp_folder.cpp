@@ -135,9 +135,8 @@ Result<void> TempFolder::mark() const {
         return refused(path_,
                        "is not known to be a build's, since it has no file vcp-build, so nothing in it is touched; "
                        "delete it if it is of an earlier version, else move it away or give --temp another folder");
-    const auto file = create(kTempMark);
-    if (!file) return file.error();
-    ::close(*file);
+    VCP_TRY_ASSIGN(const auto file, create(kTempMark));
+    ::close(file);
     Result<void> durable = sync();
     if (durable) durable = syncFolder(path_.parent_path());
     if (!durable) unlink(kTempMark);

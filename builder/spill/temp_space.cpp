@@ -18,7 +18,7 @@ Error tempError(const std::filesystem::path& file, const char* what, int code) {
 }  // namespace
 
 void TempSpace::addDisk(int64_t bytes) {
-    const uint64_t now = disk_ += static_cast<uint64_t>(bytes);
+    const uint64_t now = disk_ += uint64_t(bytes);
     uint64_t peak = peakDisk_;
     while (now > peak && !peakDisk_.compare_exchange_weak(peak, now)) {
     }
@@ -74,17 +74,15 @@ Result<uint64_t> TempFile::append(std::span<const std::byte> bytes) {
 Result<void> TempFile::flush() {
     if (file_ < 0) {
         VCP_TRY(space_.folder().take());
-        const auto file = space_.folder().create(name_);
-        if (!file) return file.error();
-        file_ = *file;
+        VCP_TRY_ASSIGN(file_, space_.folder().create(name_));
     }
     uint64_t left = end_ - flushed_;
     for (const auto& piece : tail_) {
-        const size_t n = static_cast<size_t>(std::min<uint64_t>(left, kPieceBytes));
+        const size_t n = size_t(std::min<uint64_t>(left, kPieceBytes));
         VCP_TRY(writeAll(file_, flushed_, std::span(piece.get(), n), path(), kWhenTempIsFull));
         flushed_ += n;
         left -= n;
-        space_.addDisk(static_cast<int64_t>(n));
+        space_.addDisk(int64_t(n));
     }
     dropTail();
     return {};
@@ -102,13 +100,13 @@ Result<void> TempFile::read(uint64_t offset, std::span<std::byte> bytes) const {
             bytes = bytes.subspan(n);
             continue;
         }
-        const size_t wanted = static_cast<size_t>(std::min<uint64_t>(bytes.size(), flushed_ - offset));
+        const size_t wanted = size_t(std::min<uint64_t>(bytes.size(), flushed_ - offset));
         lock.unlock();
-        const ssize_t n = ::pread(file_, bytes.data(), wanted, static_cast<off_t>(offset));
+        const ssize_t n = ::pread(file_, bytes.data(), wanted, off_t(offset));
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) return tempError(path(), "read failed", n == 0 ? EIO : errno);
-        offset += static_cast<uint64_t>(n);
-        bytes = bytes.subspan(static_cast<size_t>(n));
+        offset += uint64_t(n);
+        bytes = bytes.subspan(size_t(n));
     }
     return {};
 }
@@ -123,17 +121,16 @@ Result<void> TempFile::sync() {
 }
 
 Result<void> TempFile::reopen(uint64_t bytes) {
-    const auto file = space_.folder().open(name_);
-    if (!file) return file.error();
-    file_ = *file;
+    VCP_TRY_ASSIGN(const auto file, space_.folder().open(name_));
+    file_ = file;
     const off_t size = file_ < 0 ? -1 : ::lseek(file_, 0, SEEK_END);
-    if (size < 0 || static_cast<uint64_t>(size) < bytes)
+    if (size < 0 || uint64_t(size) < bytes)
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "is shorter than the journal says; build again without --resume",
                      .file = path().string()};
-    if (::ftruncate(file_, static_cast<off_t>(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
+    if (::ftruncate(file_, off_t(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
     flushed_ = end_ = bytes;
-    space_.addDisk(static_cast<int64_t>(bytes));
+    space_.addDisk(int64_t(bytes));
     return {};
 }
 
@@ -143,7 +140,7 @@ void TempFile::remove() {
     if (file_ >= 0) {
         ::close(file_);
         space_.folder().unlink(name_);
-        space_.addDisk(-static_cast<int64_t>(flushed_));
+        space_.addDisk(-int64_t(flushed_));
     }
     file_ = -1;
     isNamed_ = false;

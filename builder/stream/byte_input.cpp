@@ -18,8 +18,8 @@ Result<size_t> FileInput::read(char* to, size_t capacity) {
         // strerror is not used: it may share its buffer between threads.
         if (got < 0)
             return Error{.code = ErrorCode::Io, .message = "cannot be read: " + std::generic_category().message(errno)};
-        taken_ += static_cast<uint64_t>(got);
-        return static_cast<size_t>(got);
+        taken_ += uint64_t(got);
+        return size_t(got);
     }
 }
 

@@ -35,7 +35,7 @@ Result<OpenFile> asInput(int file, bool owns) {
     if (S_ISREG(status.st_mode)) {
         const off_t begin = std::max<off_t>(::lseek(file, 0, SEEK_CUR), 0);
         ::posix_fadvise(file, 0, 0, POSIX_FADV_SEQUENTIAL);
-        return OpenFile{std::move(input), static_cast<uint64_t>(std::max<off_t>(status.st_size - begin, 0))};
+        return OpenFile{std::move(input), uint64_t(std::max<off_t>(status.st_size - begin, 0))};
     }
     if (!S_ISFIFO(status.st_mode) && !S_ISSOCK(status.st_mode))
         return ioError(::isatty(file) ? "is a terminal; pipe a mesh into it"
@@ -86,9 +86,8 @@ Result<ByteSource> ByteSource::fromInput(std::unique_ptr<ByteInput> input, std::
     ByteSource source(std::move(name), inputBytes.value_or(kUnknownSize), windowBytes);
     source.fileBytes_ = inputBytes.value_or(0);
     source.input_ = std::move(input);
-    const auto start = source.window(kCompressionMarkBytes);
-    if (!start) return start.error();
-    const Compression compression = compressionOf(*start);
+    VCP_TRY_ASSIGN(const auto start, source.window(kCompressionMarkBytes));
+    const Compression compression = compressionOf(start);
     if (compression == Compression::None) return source;
 
     std::string read(source.buffer_.data(), source.bufferFilled_);
@@ -103,15 +102,15 @@ Result<ByteSource> ByteSource::fromInput(std::unique_ptr<ByteInput> input, std::
 uint64_t ByteSource::fileBytesRead() const { return compressed_ ? input_->taken() : offset_; }
 
 Result<std::string_view> ByteSource::window(size_t atLeast) {
-    auto wanted = static_cast<size_t>(std::min<uint64_t>(atLeast, remaining()));
+    auto wanted = size_t(std::min<uint64_t>(atLeast, remaining()));
     if (memory_) {
-        const auto length = static_cast<size_t>(std::min<uint64_t>(std::max(wanted, windowBytes_), remaining()));
+        const auto length = size_t(std::min<uint64_t>(std::max(wanted, windowBytes_), remaining()));
         return std::string_view(memory_ + offset_, length);
     }
     const size_t heldBack = sizeKnown() ? 0 : 1;
     const bool inside = offset_ >= bufferStart_ && offset_ + wanted + heldBack <= bufferStart_ + bufferFilled_;
     if (!inside || wanted == 0) VCP_TRY(fill(wanted));
-    const auto skipped = static_cast<size_t>(offset_ - bufferStart_);
+    const auto skipped = size_t(offset_ - bufferStart_);
     return std::string_view(buffer_.data() + skipped, bufferFilled_ - skipped - (sizeKnown() ? 0 : 1));
 }
 
@@ -120,18 +119,18 @@ Result<std::string_view> ByteSource::window(size_t atLeast) {
 // window.
 Result<void> ByteSource::fill(size_t atLeast) {
     assert(offset_ >= bufferStart_ && offset_ <= bufferStart_ + bufferFilled_);
-    const auto skipped = static_cast<size_t>(offset_ - bufferStart_);
+    const auto skipped = size_t(offset_ - bufferStart_);
     bufferFilled_ -= skipped;
     if (skipped > 0) std::memmove(buffer_.data(), buffer_.data() + skipped, bufferFilled_);
     bufferStart_ = offset_;
-    const auto wanted = static_cast<size_t>(std::min<uint64_t>(std::max(atLeast, windowBytes_) + 1, remaining()));
+    const auto wanted = size_t(std::min<uint64_t>(std::max(atLeast, windowBytes_) + 1, remaining()));
     while (bufferFilled_ < wanted) {
         // The buffer grows with what arrives, not with what is asked for.
         if (buffer_.size() < wanted) buffer_.resize(std::min(wanted, std::max(windowBytes_ + 1, 2 * bufferFilled_)));
-        const auto got = readSome(buffer_.data() + bufferFilled_, std::min(wanted, buffer_.size()) - bufferFilled_);
-        if (!got) return got.error();
-        bufferFilled_ += *got;
-        if (*got == 0) {
+        VCP_TRY_ASSIGN(const auto got,
+                       readSome(buffer_.data() + bufferFilled_, std::min(wanted, buffer_.size()) - bufferFilled_));
+        bufferFilled_ += got;
+        if (got == 0) {
             size_ = bufferStart_ + bufferFilled_;
             break;
         }
@@ -163,13 +162,12 @@ Result<std::string_view> ByteSource::wholeWindow(WholeEnd wholeEnd, size_t limit
 
 Result<std::optional<std::string_view>> ByteSource::line(size_t limit) {
     const auto afterLastBreak = [](std::string_view text) { return text.rfind('\n') + 1; };
-    auto text = wholeWindow(afterLastBreak, limit);
-    if (!text) return text.error();
+    VCP_TRY_ASSIGN(auto text, wholeWindow(afterLastBreak, limit));
     if (atEnd()) return std::optional<std::string_view>();
-    std::string_view taken = text->substr(0, text->find('\n'));
+    std::string_view taken = text.substr(0, text.find('\n'));
     if (taken.size() > limit)
         return error(ErrorCode::Limit, "", offset_, fmt::format("a line is longer than {} bytes", limit));
-    advance(std::min(taken.size() + 1, text->size()));
+    advance(std::min(taken.size() + 1, text.size()));
     if (taken.ends_with('\r')) taken.remove_suffix(1);
     return std::optional(taken);
 }
@@ -182,9 +180,8 @@ void ByteSource::advance(uint64_t count) {
 Result<uint64_t> ByteSource::skip(uint64_t count) {
     uint64_t done = 0;
     while (done < count && !atEnd()) {
-        const auto text = window();
-        if (!text) return text.error();
-        const uint64_t step = std::min<uint64_t>(count - done, text->size());
+        VCP_TRY_ASSIGN(const auto text, window());
+        const uint64_t step = std::min<uint64_t>(count - done, text.size());
         advance(step);
         done += step;
     }

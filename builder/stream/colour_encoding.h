@@ -19,7 +19,7 @@ inline double srgbToLinear(double value) {
 inline const std::array<double, 256>& lightOfByte() {
     static const std::array<double, 256> table = [] {
         std::array<double, 256> t{};
-        for (size_t i = 0; i < t.size(); ++i) t[i] = srgbToLinear(static_cast<double>(i) / 255);
+        for (size_t i = 0; i < t.size(); ++i) t[i] = srgbToLinear(double(i) / 255);
         return t;
     }();
     return table;
@@ -32,7 +32,7 @@ inline double linearToSrgb(double light) {
 /// Converts 0..1 to 8 bits; values outside are clamped, NaN becomes 0.
 inline uint8_t toByte(double value) {
     // std::clamp is not used: here the order of the comparisons makes NaN 0.
-    return static_cast<uint8_t>(std::min(std::max(0.0, value), 1.0) * 255 + 0.5);
+    return uint8_t(std::min(std::max(0.0, value), 1.0) * 255 + 0.5);
 }
 
 inline Rgba8 packRgba(const std::array<uint8_t, 4>& c) {

@@ -11,7 +11,7 @@ constexpr std::array<int8_t, 256> base64Values() {
     std::array<int8_t, 256> values{};
     values.fill(-1);
     constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < kDigits.size(); ++i) values[static_cast<uint8_t>(kDigits[i])] = static_cast<int8_t>(i);
+    for (size_t i = 0; i < kDigits.size(); ++i) values[uint8_t(kDigits[i])] = int8_t(i);
     values['-'] = 62;  // the URL's variant
     values['_'] = 63;
     return values;
@@ -39,13 +39,13 @@ std::optional<std::string> decodeDataUri(std::string_view uri) {
     uint32_t bits = 0;
     int held = 0;
     for (const char digit : digits) {
-        const int8_t value = kValues[static_cast<uint8_t>(digit)];
+        const int8_t value = kValues[uint8_t(digit)];
         if (value < 0) return std::nullopt;
-        bits = bits << 6 | static_cast<uint32_t>(value);
+        bits = bits << 6 | uint32_t(value);
         held += 6;
         if (held < 8) continue;
         held -= 8;
-        data += static_cast<char>(bits >> held & 0xFF);
+        data += char(bits >> held & 0xFF);
     }
     return data;
 }
@@ -68,7 +68,7 @@ std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& fold
         const int high = uri[i] == '%' && i + 2 < uri.size() ? hexDigit(uri[i + 1]) : -1;
         const int low = high >= 0 ? hexDigit(uri[i + 2]) : -1;
         if (low >= 0) {
-            name += static_cast<char>(high * 16 + low);
+            name += char(high * 16 + low);
             i += 2;
         } else {
             name += uri[i];

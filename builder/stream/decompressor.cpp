@@ -51,10 +51,9 @@ protected:
     /// Reads more compressed bytes when none are left; returns false at their end.
     Result<bool> refill() {
         if (used_ < filled_) return true;
-        const auto got = inner_->read(buffer_.data(), buffer_.size());
-        if (!got) return got.error();
+        VCP_TRY_ASSIGN(const auto got, inner_->read(buffer_.data(), buffer_.size()));
         used_ = 0;
-        filled_ = *got;
+        filled_ = got;
         return filled_ > 0;
     }
 
@@ -100,16 +99,15 @@ private:
             return Error{.code = ErrorCode::Limit, .message = "not enough memory to decompress"};
         open_ = true;
         state_.next_out = reinterpret_cast<Bytef*>(to);
-        state_.avail_out = static_cast<uInt>(std::min<size_t>(capacity, 1u << 30));
+        state_.avail_out = uInt(std::min<size_t>(capacity, 1u << 30));
         const uInt room = state_.avail_out;
         while (state_.avail_out == room) {
-            const auto more = inMember_ ? refill() : toNextMember();
-            if (!more) return more.error();
-            if (!*more && !inMember_) return size_t{0};
-            if (!*more) return truncated("gzip");
+            VCP_TRY_ASSIGN(const auto more, inMember_ ? refill() : toNextMember());
+            if (!more && !inMember_) return size_t{0};
+            if (!more) return truncated("gzip");
             inMember_ = true;
             state_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(input().data()));
-            state_.avail_in = static_cast<uInt>(input().size());
+            state_.avail_in = uInt(input().size());
             const int status = ::inflate(&state_, Z_NO_FLUSH);
             use(input().size() - state_.avail_in);
             if (status == Z_STREAM_END) {
@@ -139,13 +137,12 @@ private:
         ::ZSTD_DCtx_setParameter(state_, ZSTD_d_windowLogMax, kLargestWindowLog);
         ZSTD_outBuffer out{to, capacity, 0};
         while (out.pos == 0) {
-            const auto more = inFrame_ ? refill() : toNextMember();
-            if (!more) return more.error();
-            if (!*more && !inFrame_) return size_t{0};
+            VCP_TRY_ASSIGN(const auto more, inFrame_ ? refill() : toNextMember());
+            if (!more && !inFrame_) return size_t{0};
             ZSTD_inBuffer in{input().data(), input().size(), 0};
             const size_t left = ::ZSTD_decompressStream(state_, &out, &in);
             if (::ZSTD_isError(left)) return damaged("zstd", ::ZSTD_getErrorName(left));
-            if (!*more && out.pos == 0 && left != 0) return truncated("zstd");
+            if (!more && out.pos == 0 && left != 0) return truncated("zstd");
             use(in.pos);
             inFrame_ = left != 0;
         }

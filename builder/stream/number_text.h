@@ -72,7 +72,7 @@ inline std::string shown(std::string_view word) {
 }
 
 inline std::string shownWord(const char* p, const char* end) {
-    return shown(std::string_view(p, static_cast<size_t>(wordEnd(p, end) - p)));
+    return shown(std::string_view(p, size_t(wordEnd(p, end) - p)));
 }
 
 }  // namespace vcp

@@ -22,13 +22,13 @@ Error systemError(std::string what, int code) {
 
 Result<void> readFully(int file, uint64_t offset, char* to, size_t count) {
     while (count > 0) {
-        const ssize_t got = ::pread(file, to, count, static_cast<off_t>(offset));
+        const ssize_t got = ::pread(file, to, count, off_t(offset));
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) return systemError("cannot be read", errno);
         if (got == 0) return Error{.code = ErrorCode::Io, .message = "the file became shorter while it was read"};
         to += got;
-        offset += static_cast<uint64_t>(got);
-        count -= static_cast<size_t>(got);
+        offset += uint64_t(got);
+        count -= size_t(got);
     }
     return {};
 }
@@ -76,7 +76,7 @@ Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path
     struct stat status {};
     if (::fstat(file.number(), &status) != 0 || !S_ISREG(status.st_mode))
         return refuse({.code = ErrorCode::Io, .message = "is not a regular file"});
-    const auto size = static_cast<uint64_t>(status.st_size);
+    const auto size = uint64_t(status.st_size);
     return std::unique_ptr<RandomBytes>(
         std::make_unique<FileBytes>(std::move(file), offset, size > offset ? size - offset : 0));
 }
@@ -121,7 +121,7 @@ Result<void> Spool::write(std::string_view bytes) {
             error.file = folder_.string();
             return error;
         }
-        bytes.remove_prefix(static_cast<size_t>(put));
+        bytes.remove_prefix(size_t(put));
     }
     return {};
 }

@@ -35,9 +35,8 @@ Result<void> checkSize(uint64_t width, uint64_t height, const ImageLimits& limit
 }
 
 Result<Image> decodePng(std::string_view file, const ImageLimits& limits) {
-    const auto chunks = checkPng(file);
-    if (!chunks) return chunks.error();
-    VCP_TRY(checkSize(chunks->width, chunks->height, limits));
+    VCP_TRY_ASSIGN(const auto chunks, checkPng(file));
+    VCP_TRY(checkSize(chunks.width, chunks.height, limits));
     const std::string texels = withoutText(file);
     png_image png{};
     png.version = PNG_IMAGE_VERSION;
@@ -157,18 +156,17 @@ Result<Image> decodeImage(std::string_view file, const ImageLimits& limits) {
 
 Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits) {
     if (source.bytes) return decodeImage(*source.bytes, limits);
-    auto bytes = openRandomBytes(source.path);
-    if (!bytes) return bytes.error();
+    VCP_TRY_ASSIGN(auto bytes, openRandomBytes(source.path));
     const auto named = [&](Error error) {
         error.file = source.path.string();
         return error;
     };
-    const uint64_t size = (*bytes)->size();
+    const uint64_t size = bytes->size();
     if (size > limits.fileBytes)
         return named({.code = ErrorCode::Limit,
                       .message = fmt::format("a picture file of more than {} MiB", limits.fileBytes >> 20)});
     std::string file(size, '\0');
-    if (const auto read = (*bytes)->read(0, file.data(), file.size()); !read) return named(read.error());
+    if (const auto read = bytes->read(0, file.data(), file.size()); !read) return named(read.error());
     auto image = decodeImage(file, limits);
     if (!image) return named(image.error());
     return image;

@@ -15,7 +15,7 @@ constexpr std::array<std::string_view, 7> kOfTexels{"tRNS", "gAMA", "cHRM", "sRG
 
 uint32_t wordAt(std::string_view bytes, size_t at) {
     uint32_t word = 0;
-    for (size_t i = 0; i < 4; ++i) word = word << 8 | static_cast<uint8_t>(bytes[at + i]);
+    for (size_t i = 0; i < 4; ++i) word = word << 8 | uint8_t(bytes[at + i]);
     return word;
 }
 
@@ -51,8 +51,8 @@ Result<PngChunks> checkPng(std::string_view file) {
         if (name != "IHDR" || data.size() != kHeaderBytes || chunks.bitsOfTexel > 0) return;
         chunks.width = wordAt(data, 0);
         chunks.height = wordAt(data, 4);
-        const auto bits = static_cast<uint8_t>(data[8]);
-        if (bits <= 16) chunks.bitsOfTexel = static_cast<uint8_t>(bits * channelsOf(static_cast<uint8_t>(data[9])));
+        const auto bits = uint8_t(data[8]);
+        if (bits <= 16) chunks.bitsOfTexel = uint8_t(bits * channelsOf(uint8_t(data[9])));
     });
     const auto damaged = [](std::string detail) {
         return Error{.code = ErrorCode::InvalidInput,

@@ -16,7 +16,7 @@ using Light = std::array<double, 4>;
 void add(Light& sum, Rgba8 texel, double weight) {
     const auto& table = lightOfByte();
     const double alpha = weight * (texel >> 24) / 255;
-    for (int c = 0; c < 3; ++c) sum[static_cast<size_t>(c)] += alpha * table[texel >> (8 * c) & 0xFF];
+    for (int c = 0; c < 3; ++c) sum[size_t(c)] += alpha * table[texel >> (8 * c) & 0xFF];
     sum[3] += alpha;
 }
 
@@ -39,7 +39,7 @@ struct Span {
 Span coverage(uint32_t coarse, uint32_t coarseSize, uint32_t size) {
     const double step = double(size) / coarseSize;
     const double begin = coarse * step, end = (coarse + 1) * step;
-    Span span{std::min(static_cast<uint32_t>(begin), size - 1), {}};
+    Span span{std::min(uint32_t(begin), size - 1), {}};
     for (uint32_t i = 0; i < 3 && span.first + i < size; ++i) {
         const double covered = std::min(end, double(span.first + i + 1)) - std::max(begin, double(span.first + i));
         span.weights[i] = std::max(covered, 0.0) / step;
@@ -68,11 +68,11 @@ Image halved(const Image& fine) {
 // Returns a texel's number inside 0..size-1. Any finite number of a float fits into int64_t after the clamp.
 uint32_t wrapped(double texel, uint32_t size, Wrap wrap) {
     const double edge = size;
-    if (wrap == Wrap::Clamp) return static_cast<uint32_t>(std::clamp(texel, 0.0, edge - 1));
+    if (wrap == Wrap::Clamp) return uint32_t(std::clamp(texel, 0.0, edge - 1));
     const double period = wrap == Wrap::Mirror ? 2 * edge : edge;
     double inside = texel - std::floor(texel / period) * period;
     if (wrap == Wrap::Mirror && inside >= edge) inside = period - 1 - inside;
-    return static_cast<uint32_t>(std::clamp(inside, 0.0, edge - 1));
+    return uint32_t(std::clamp(inside, 0.0, edge - 1));
 }
 
 }  // namespace
@@ -106,10 +106,10 @@ std::array<double, 4> Texture::bilinear(const Image& level, glm::dvec2 uv) const
 
 Rgba8 Texture::sample(glm::vec2 uv, float footprint) const {
     const double texels = double(footprint) * std::max(levels_[0].width, levels_[0].height);
-    const double coarsest = static_cast<double>(levels_.size() - 1);
+    const double coarsest = double(levels_.size() - 1);
     const double level = texels > 1 ? std::min(std::log2(texels), coarsest) : 0;
-    const auto finer = static_cast<size_t>(level);
-    const double share = level - static_cast<double>(finer);
+    const auto finer = size_t(level);
+    const double share = level - double(finer);
     Light sum{};
     add(sum, bilinear(levels_[finer], uv), 1 - share);
     if (share > 0) add(sum, bilinear(levels_[finer + 1], uv), share);

@@ -9,17 +9,15 @@ namespace vcp {
 
 Result<void> ComposeTarget::resize(Device& device, PictureSize size) {
     if (size == size_) return {};
-    auto depths = device.createBuffer(
-        (size.pixels() + 1) * 4,
-        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-        MemoryUse::Local);
-    if (!depths) return depths.error();
+    VCP_TRY_ASSIGN(auto depths,
+                   device.createBuffer((size.pixels() + 1) * 4,
+                                       VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                                           VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                       MemoryUse::Local));
     if (counted_.bytes() == 0) {
-        auto counted = device.createBuffer(4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
-        if (!counted) return counted.error();
-        counted_ = std::move(*counted);
+        VCP_TRY_ASSIGN(counted_, device.createBuffer(4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
     }
-    depths_ = std::move(*depths);
+    depths_ = std::move(depths);
     size_ = size;
     return {};
 }

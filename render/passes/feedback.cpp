@@ -24,14 +24,11 @@ Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
     const uint64_t bytes = std::bit_ceil(words) * 4;
     constexpr VkBufferUsageFlags kUsage =
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-    auto buffer = device.createBuffer(bytes, kUsage, MemoryUse::Local);
-    if (!buffer) return buffer.error();
-    if (buffer->mapped() == nullptr) {
-        auto readback = device.createBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
-        if (!readback) return readback.error();
-        readback_ = std::move(*readback);
+    VCP_TRY_ASSIGN(auto buffer, device.createBuffer(bytes, kUsage, MemoryUse::Local));
+    if (buffer.mapped() == nullptr) {
+        VCP_TRY_ASSIGN(readback_, device.createBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
     }
-    buffer_ = std::move(*buffer);
+    buffer_ = std::move(buffer);
     return {};
 }
 

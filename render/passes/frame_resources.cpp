@@ -51,23 +51,18 @@ constexpr uint64_t kListedTilesWord = 3;
 Result<std::unique_ptr<FrameResources>> FrameResources::create(Device& device) {
     std::unique_ptr<FrameResources> made(new FrameResources(device));
     VCP_TRY(made->createLayout());
-    auto constants =
+    VCP_TRY_ASSIGN(
+        made->constants_,
         device.createBuffer(sizeof(frame::FrameConstants),
-                            VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
-    if (!constants) return constants.error();
-    made->constants_ = std::move(*constants);
-    auto counters = device.createBuffer(
-        sizeof(frame::FrameCounters),
-        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-        MemoryUse::Local);
-    if (!counters) return counters.error();
-    made->counters_ = std::move(*counters);
-    auto counted = device.createBuffer(sizeof(FrameCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
-    if (!counted) return counted.error();
-    made->counted_ = std::move(*counted);
-    auto none = made->wordBuffer(16, 0, VK_FORMAT_R32G32B32A32_UINT);
-    if (!none) return none.error();
-    made->none_ = std::move(*none);
+                            VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local));
+    VCP_TRY_ASSIGN(made->counters_,
+                   device.createBuffer(sizeof(frame::FrameCounters),
+                                       VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                           VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                       MemoryUse::Local));
+    VCP_TRY_ASSIGN(made->counted_,
+                   device.createBuffer(sizeof(FrameCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
+    VCP_TRY_ASSIGN(made->none_, made->wordBuffer(16, 0, VK_FORMAT_R32G32B32A32_UINT));
     const glm::uvec4 empty[frame::kRecordTexels] = {};
     VCP_TRY(made->setTable(empty));
     return made;
@@ -90,7 +85,7 @@ Result<void> FrameResources::createLayout() {
     VCP_VK(vkCreatePipelineLayout, device_.handle(), &layout, nullptr, &layout_);
     VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool.maxSets = 1;
-    pool.poolSizeCount = static_cast<uint32_t>(sizes.size());
+    pool.poolSizeCount = uint32_t(sizes.size());
     pool.pPoolSizes = sizes.data();
     VCP_VK(vkCreateDescriptorPool, device_.handle(), &pool, nullptr, &descriptorPool_);
     VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
@@ -109,41 +104,35 @@ FrameResources::~FrameResources() {
 
 Result<WordBuffer> FrameResources::wordBuffer(uint64_t words, VkBufferUsageFlags more, VkFormat format) const {
     WordBuffer made;
-    auto buffer = device_.createBuffer(
-        words * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | more,
-        MemoryUse::Local);
-    if (!buffer) return buffer.error();
-    made.buffer = std::move(*buffer);
-    auto view = device_.createTexelView(made.buffer, format, words * 4);
-    if (!view) return view.error();
-    made.view = std::move(*view);
+    VCP_TRY_ASSIGN(auto buffer,
+                   device_.createBuffer(
+                       words * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | more,
+                       MemoryUse::Local));
+    made.buffer = std::move(buffer);
+    VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, format, words * 4));
     return made;
 }
 
 Result<void> FrameResources::resize(PictureSize size, uint32_t hitPlanes) {
     if (size == size_ && hitPlanes <= hitPlanes_) return {};
     const uint64_t tiles = uint64_t{size.tilesX()} * size.tilesY();
-    auto starts = wordBuffer(tiles, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
-    if (!starts) return starts.error();
-    auto list =
-        wordBuffer(frame::kTileListHeader + tiles, VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-                                                       VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT);
-    if (!list) return list.error();
-    auto hits = wordBuffer(size.pixels() * hitPlanes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
-    if (!hits) return hits.error();
-    auto picture = device_.createBuffer(
-        size.pixels() * 4,
-        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-        MemoryUse::Local);
-    if (!picture) return picture.error();
-    auto background = device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
-    if (!background) return background.error();
-    background_ = std::move(*background);
+    VCP_TRY_ASSIGN(auto starts, wordBuffer(tiles, VK_BUFFER_USAGE_TRANSFER_SRC_BIT));
+    VCP_TRY_ASSIGN(auto list, wordBuffer(frame::kTileListHeader + tiles, VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                                                             VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                                                                             VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT));
+    VCP_TRY_ASSIGN(auto hits, wordBuffer(size.pixels() * hitPlanes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT));
+    VCP_TRY_ASSIGN(auto picture,
+                   device_.createBuffer(size.pixels() * 4,
+                                        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                                            VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                        MemoryUse::Local));
+    VCP_TRY_ASSIGN(background_,
+                   device_.createBuffer(size.pixels() * 4, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload));
     backgroundRows_.clear();
-    tileStarts_ = std::move(*starts);
-    tileList_ = std::move(*list);
-    hits_ = std::move(*hits);
-    picture_ = std::move(*picture);
+    tileStarts_ = std::move(starts);
+    tileList_ = std::move(list);
+    hits_ = std::move(hits);
+    picture_ = std::move(picture);
     size_ = size;
     hitPlanes_ = hitPlanes;
     setStale_ = true;
@@ -160,9 +149,7 @@ void FrameResources::setBackground(std::vector<uint32_t> rows) {
 Result<void> FrameResources::setTable(std::span<const glm::uvec4> table) {
     if (table_.buffer.bytes() < table.size_bytes()) {
         const uint64_t words = std::bit_ceil(std::max<uint64_t>(table.size_bytes() / 4, 1024));
-        auto grown = wordBuffer(words, VK_BUFFER_USAGE_TRANSFER_DST_BIT, VK_FORMAT_R32G32B32A32_UINT);
-        if (!grown) return grown.error();
-        table_ = std::move(*grown);
+        VCP_TRY_ASSIGN(table_, wordBuffer(words, VK_BUFFER_USAGE_TRANSFER_DST_BIT, VK_FORMAT_R32G32B32A32_UINT));
         setStale_ = true;
     }
     if (std::byte* mapped = table_.buffer.mapped()) {
@@ -170,9 +157,8 @@ Result<void> FrameResources::setTable(std::span<const glm::uvec4> table) {
         return {};
     }
     if (tableUpload_.bytes() < table.size_bytes()) {
-        auto upload = device_.createBuffer(table_.buffer.bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
-        if (!upload) return upload.error();
-        tableUpload_ = std::move(*upload);
+        VCP_TRY_ASSIGN(tableUpload_, device_.createBuffer(table_.buffer.bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                                          MemoryUse::Upload));
     }
     std::memcpy(tableUpload_.mapped(), table.data(), table.size_bytes());
     tableToCopy_ = table.size_bytes();
@@ -290,9 +276,7 @@ Result<void> PipelineVariants::choose(FrameResources& resources, const PassConst
     values.insert(values.end(), more.begin(), more.end());
     ComputePipeline& variant = variants_[values];
     if (variant.handle() == VK_NULL_HANDLE) {
-        auto made = resources.pipeline(spirv_, values);
-        if (!made) return made.error();
-        variant = std::move(*made);
+        VCP_TRY_ASSIGN(variant, resources.pipeline(spirv_, values));
     }
     current_ = variant.handle();
     return {};

@@ -22,30 +22,19 @@ Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const mes
         texels.push_back(glm::vec4(ray.direction, float(ray.origin.z) >= arrays.record.extent.z ? 1 : 0));
     }
     count_ = uint32_t(rays.size());
-    auto words = resources_.words(arrays.words);
-    if (!words) return words.error();
-    words_ = std::move(*words);
-    auto input = resources_.vectors(texels);
-    if (!input) return input.error();
-    rays_ = std::move(*input);
-    auto results = resources_.storage(uint64_t{kResultWords} * 4 * count_);
-    if (!results) return results.error();
-    results_ = std::move(*results);
-    auto none = resources_.storage(16);
-    if (!none) return none.error();
-    none_ = std::move(*none);
-    auto constants = device_.createBuffer(
-        sizeof values_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
-    if (!constants) return constants.error();
-    constants_ = std::move(*constants);
+    VCP_TRY_ASSIGN(words_, resources_.words(arrays.words));
+    VCP_TRY_ASSIGN(rays_, resources_.vectors(texels));
+    VCP_TRY_ASSIGN(results_, resources_.storage(uint64_t{kResultWords} * 4 * count_));
+    VCP_TRY_ASSIGN(none_, resources_.storage(16));
+    VCP_TRY_ASSIGN(
+        auto constants,
+        device_.createBuffer(sizeof values_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                             MemoryUse::Local));
+    constants_ = std::move(constants);
     values_.record = arrays.record;
     values_.view.picture.x = count_;
-    auto set = resources_.makeSet({&constants_, &words_, &rays_, &results_, &none_, &none_});
-    if (!set) return set.error();
-    set_ = *std::move(set);
-    auto pipeline = resources_.pipeline(kMesoRaysSpirv, {arrays.constants.begin(), arrays.constants.end()});
-    if (!pipeline) return pipeline.error();
-    pipeline_ = *pipeline;
+    VCP_TRY_ASSIGN(set_, resources_.makeSet({&constants_, &words_, &rays_, &results_, &none_, &none_}));
+    VCP_TRY_ASSIGN(pipeline_, resources_.pipeline(kMesoRaysSpirv, {arrays.constants.begin(), arrays.constants.end()}));
     return {};
 }
 
@@ -59,11 +48,10 @@ void MesoRaysPass::record(VkCommandBuffer commands) const {
 }
 
 Result<std::vector<meso::MarchResult>> MesoRaysPass::read() {
-    const auto words = readWords(device_, results_, 0, uint64_t{kResultWords} * count_);
-    if (!words) return words.error();
+    VCP_TRY_ASSIGN(const auto words, readWords(device_, results_, 0, uint64_t{kResultWords} * count_));
     std::vector<meso::MarchResult> results(count_);
     for (uint32_t i = 0; i < count_; ++i) {
-        const uint32_t* w = words->data() + size_t{kResultWords} * i;
+        const uint32_t* w = words.data() + size_t{kResultWords} * i;
         const auto real = [&](int k) { return std::bit_cast<float>(w[k]); };
         results[i] = {
             static_cast<meso::MarchState>(w[0]), double(real(1)), {real(2), real(3), real(4)}, w[5], w[6], w[7]};

@@ -68,15 +68,10 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
                      .message = fmt::format("a mesostructure of {} words; this device reads {} at most", words.size(),
                                             device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    auto buffer = upload(std::as_bytes(words));
-    if (!buffer) return buffer.error();
-    made.buffer = std::move(*buffer);
-    auto view = device_.createTexelView(made.buffer, VK_FORMAT_R32_UINT, words.size_bytes());
-    if (!view) return view.error();
-    made.view = std::move(*view);
-    auto quads = device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, words.size_bytes());
-    if (!quads) return quads.error();
-    made.quads = std::move(*quads);
+    VCP_TRY_ASSIGN(auto buffer, upload(std::as_bytes(words)));
+    made.buffer = std::move(buffer);
+    VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, VK_FORMAT_R32_UINT, words.size_bytes()));
+    VCP_TRY_ASSIGN(made.quads, device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, words.size_bytes()));
     return made;
 }
 
@@ -88,12 +83,9 @@ Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint3
                      .message = fmt::format("{} texels of {}; this device reads {} at most", count, what,
                                             device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    auto buffer = upload(bytes);
-    if (!buffer) return buffer.error();
-    made.buffer = std::move(*buffer);
-    auto view = device_.createTexelView(made.buffer, format, bytes.size());
-    if (!view) return view.error();
-    made.view = std::move(*view);
+    VCP_TRY_ASSIGN(auto buffer, upload(bytes));
+    made.buffer = std::move(buffer);
+    VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, format, bytes.size()));
     return made;
 }
 
@@ -160,9 +152,8 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
 Result<VkPipeline> MesoResources::pipeline(std::span<const uint32_t> spirv, const std::vector<uint32_t>& constants) {
     const auto key = std::pair(spirv.data(), constants);
     if (const auto found = pipelines_.find(key); found != pipelines_.end()) return found->second.handle();
-    auto made = ComputePipeline::create(device_, layout_, spirv, constants);
-    if (!made) return made.error();
-    return pipelines_.emplace(key, std::move(*made)).first->second.handle();
+    VCP_TRY_ASSIGN(auto made, ComputePipeline::create(device_, layout_, spirv, constants));
+    return pipelines_.emplace(key, std::move(made)).first->second.handle();
 }
 
 }  // namespace vcp

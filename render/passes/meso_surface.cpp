@@ -60,28 +60,23 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
         made.arrays = surface.arrays;
         auto& words = uploaded[surface.arrays.get()];
         if (!words) {
-            auto texels = resources_.words(surface.arrays->words);
-            if (!texels) return texels.error();
-            words = std::make_shared<MesoTexels>(std::move(*texels));
+            VCP_TRY_ASSIGN(auto texels, resources_.words(surface.arrays->words));
+            words = std::make_shared<MesoTexels>(std::move(texels));
         }
         made.words = words;
         const std::vector<uint64_t> texels = lookOf(surface, made.view);
         auto& look = looks[{surface.far.get(), surface.colours.get(), surface.normals.get()}];
         if (!look && !texels.empty()) {
-            auto uploadedLook = resources_.halfs(texels);
-            if (!uploadedLook) return uploadedLook.error();
-            look = std::make_shared<MesoTexels>(std::move(*uploadedLook));
+            VCP_TRY_ASSIGN(auto uploadedLook, resources_.halfs(texels));
+            look = std::make_shared<MesoTexels>(std::move(uploadedLook));
         }
         made.look = look;
         // A surface that rays may come through must be marched.
         made.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
         made.view.far.y = made.isFarDrawn ? float(surface.far->height) : 0.0f;
-        auto shell = resources_.vectors(surface.shell.texels);
-        if (!shell) return shell.error();
-        made.shell = std::move(*shell);
-        auto constants = device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local);
-        if (!constants) return constants.error();
-        made.constants = std::move(*constants);
+        VCP_TRY_ASSIGN(auto shell, resources_.vectors(surface.shell.texels));
+        made.shell = std::move(shell);
+        VCP_TRY_ASSIGN(made.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
         made.origin = surface.shell.origin;
         made.view.picture = {0, 0, surface.shell.nodes, surface.withBase ? 1 : 0};
         made.view.light.w = float(surface.lift);
@@ -109,18 +104,15 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
         target = {};
         for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
                                             std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
-            auto made = resources_.storage(bytes);
-            if (!made) return made.error();
-            *buffer = std::move(*made);
+            VCP_TRY_ASSIGN(*buffer, resources_.storage(bytes));
         }
-        auto counted = device_.createBuffer(sizeof(MesoCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
-        if (!counted) return counted.error();
-        target.counted = std::move(*counted);
+        VCP_TRY_ASSIGN(target.counted,
+                       device_.createBuffer(sizeof(MesoCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
         for (const Placed& surface : surfaces_) {
-            auto set = resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits,
-                                           &picture, &target.counters, surface.look.get()});
-            if (!set) return set.error();
-            target.sets.push_back(*std::move(set));
+            VCP_TRY_ASSIGN(auto set,
+                           resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits,
+                                               &picture, &target.counters, surface.look.get()}));
+            target.sets.push_back(std::move(set));
         }
         target.size = size, target.surfaces = version_, target.picture = picture.handle();
     }
@@ -130,19 +122,13 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
         constants.push_back((surface.view.colours.w > 0 ? frame::kMesoColours : 0) |
                             (surface.view.normals.w > 0 ? frame::kMesoNormals : 0));
         constants.push_back(surface.isFarDrawn ? 1 : 0);
-        auto cast = resources_.pipeline(kMesoSurfaceSpirv, constants);
-        if (!cast) return cast.error();
-        surface.cast = *cast;
+        VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kMesoSurfaceSpirv, constants));
         if (!shadows) continue;
         // The shadow pass reads no textures.
         constants[4] = 1, constants[5] = 0;
-        auto shadow = resources_.pipeline(kMesoSurfaceSpirv, constants);
-        if (!shadow) return shadow.error();
-        surface.shadow = *shadow;
+        VCP_TRY_ASSIGN(surface.shadow, resources_.pipeline(kMesoSurfaceSpirv, constants));
     }
-    auto shade = resources_.pipeline(kMesoShadeSpirv, {});
-    if (!shade) return shade.error();
-    shade_ = *shade;
+    VCP_TRY_ASSIGN(shade_, resources_.pipeline(kMesoShadeSpirv, {}));
     return {};
 }
 

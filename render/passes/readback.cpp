@@ -16,14 +16,13 @@ Result<std::vector<uint32_t>> readWords(Device& device, const Buffer& source, ui
         std::memcpy(result.data(), mapped + firstWord * 4, words * 4);
         return result;
     }
-    auto staging = device.createBuffer(words * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
-    if (!staging) return staging.error();
+    VCP_TRY_ASSIGN(auto staging, device.createBuffer(words * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
     VCP_TRY(device.submitAndWait([&](VkCommandBuffer commands) {
         const VkBufferCopy region{firstWord * 4, 0, words * 4};
-        vkCmdCopyBuffer(commands, source.handle(), staging->handle(), 1, &region);
+        vkCmdCopyBuffer(commands, source.handle(), staging.handle(), 1, &region);
         barrierTransferToHost(commands);
     }));
-    std::memcpy(result.data(), staging->mapped(), words * 4);
+    std::memcpy(result.data(), staging.mapped(), words * 4);
     return result;
 }
 
@@ -38,16 +37,16 @@ Result<std::vector<uint32_t>> readEach(Device& device, std::span<const WordPlace
             hidden.push_back(i);
     }
     if (hidden.empty()) return result;
-    auto staging = device.createBuffer(hidden.size() * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback);
-    if (!staging) return staging.error();
+    VCP_TRY_ASSIGN(auto staging,
+                   device.createBuffer(hidden.size() * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
     VCP_TRY(device.submitAndWait([&](VkCommandBuffer commands) {
         for (size_t i = 0; i < hidden.size(); ++i) {
             const VkBufferCopy region{places[hidden[i]].word * 4, i * 4, 4};
-            vkCmdCopyBuffer(commands, places[hidden[i]].source->handle(), staging->handle(), 1, &region);
+            vkCmdCopyBuffer(commands, places[hidden[i]].source->handle(), staging.handle(), 1, &region);
         }
         barrierTransferToHost(commands);
     }));
-    for (size_t i = 0; i < hidden.size(); ++i) std::memcpy(&result[hidden[i]], staging->mapped() + i * 4, 4);
+    for (size_t i = 0; i < hidden.size(); ++i) std::memcpy(&result[hidden[i]], staging.mapped() + i * 4, 4);
     return result;
 }
 

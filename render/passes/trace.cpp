@@ -7,7 +7,7 @@ namespace vcp {
 TracePass::TracePass() : pipelines_(kTraceSpirv) {}
 
 Result<void> TracePass::prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections) {
-    return pipelines_.choose(resources, constants, {static_cast<uint32_t>(sections)});
+    return pipelines_.choose(resources, constants, {uint32_t(sections)});
 }
 
 void TracePass::record(VkCommandBuffer commands, const FrameResources& resources) const {

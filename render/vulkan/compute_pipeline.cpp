@@ -17,8 +17,8 @@ Result<ComputePipeline> ComputePipeline::create(const Device& device, VkPipeline
 
     std::vector<VkSpecializationMapEntry> entries;
     for (uint32_t i = 0; i < constants.size(); ++i) entries.push_back({i, i * 4, 4});
-    const VkSpecializationInfo specialization{static_cast<uint32_t>(entries.size()), entries.data(),
-                                              constants.size_bytes(), constants.data()};
+    const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), constants.size_bytes(),
+                                              constants.data()};
     VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
     info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO};
     info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;

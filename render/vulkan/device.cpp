@@ -50,16 +50,14 @@ void Device::describe(VkPhysicalDevice physical, const DeviceInfo& info) {
 
 Result<std::unique_ptr<Device>> Device::create(const Instance& instance, const std::string& choice,
                                                VkSurfaceKHR surface, bool forWindows, const DeviceFaults& faults) {
-    auto physical = instance.physicalDevices();
-    if (!physical) return physical.error();
+    VCP_TRY_ASSIGN(auto physical, instance.physicalDevices());
     std::vector<DeviceInfo> infos;
-    for (uint32_t i = 0; i < physical->size(); ++i) infos.push_back(describeDevice((*physical)[i], i));
-    auto chosen = chooseDevice(infos, choice);
-    if (!chosen) return chosen.error();
+    for (uint32_t i = 0; i < physical.size(); ++i) infos.push_back(describeDevice(physical[i], i));
+    VCP_TRY_ASSIGN(auto chosen, chooseDevice(infos, choice));
 
     std::unique_ptr<Device> made(new Device);
     made->faults_ = faults;
-    made->describe((*physical)[*chosen], infos[*chosen]);
+    made->describe(physical[chosen], infos[chosen]);
     VCP_TRY(made->chooseQueue(surface, forWindows));
     made->hasSwapchain_ = forWindows;
     VCP_TRY(made->createDevice());
@@ -155,7 +153,7 @@ Result<void> Device::createDevice() {
 
     const char* swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
     VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
-    info.queueCreateInfoCount = static_cast<uint32_t>(queues.size());
+    info.queueCreateInfoCount = uint32_t(queues.size());
     info.pQueueCreateInfos = queues.data();
     info.enabledExtensionCount = hasSwapchain_ ? 1 : 0;
     info.ppEnabledExtensionNames = &swapchain;
@@ -246,17 +244,16 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
     const std::array families{family_, copyFamily_.value_or(family_)};
     if (families[0] != families[1]) {
         info.sharingMode = VK_SHARING_MODE_CONCURRENT;
-        info.queueFamilyIndexCount = static_cast<uint32_t>(families.size());
+        info.queueFamilyIndexCount = uint32_t(families.size());
         info.pQueueFamilyIndices = families.data();
     }
     VCP_VK(vkCreateBuffer, device_, &info, nullptr, &made.buffer_);
     VkMemoryRequirements needs;
     vkGetBufferMemoryRequirements(device_, made.buffer_, &needs);
-    auto type = memoryType(needs.memoryTypeBits, use);
-    if (!type) return type.error();
+    VCP_TRY_ASSIGN(auto type, memoryType(needs.memoryTypeBits, use));
     VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocation.allocationSize = needs.size;
-    allocation.memoryTypeIndex = *type;
+    allocation.memoryTypeIndex = type;
     const bool fits = made.bytes_ <= faults_.memoryBytes && allocated_ <= faults_.memoryBytes - made.bytes_;
     const VkResult allocated =
         fits ? vkAllocateMemory(device_, &allocation, nullptr, &made.memory_) : VK_ERROR_OUT_OF_DEVICE_MEMORY;
@@ -268,7 +265,7 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
     allocated_ += made.bytes_;
     VCP_VK(vkBindBufferMemory, device_, made.buffer_, made.memory_, 0);
     const bool isHidden = use == MemoryUse::Local && faults_.separateMemory;
-    if (!isHidden && (memory_.memoryTypes[*type].propertyFlags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {
+    if (!isHidden && (memory_.memoryTypes[type].propertyFlags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {
         void* mapped = nullptr;
         VCP_VK(vkMapMemory, device_, made.memory_, 0, VK_WHOLE_SIZE, 0, &mapped);
         made.mapped_ = static_cast<std::byte*>(mapped);
@@ -305,7 +302,7 @@ Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
     if (wait != VK_NULL_HANDLE) waitFirst(wait, VK_PIPELINE_STAGE_TRANSFER_BIT);
     if (copiesAwaited_) waitFirst(copiesDone_, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT);
     VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-    submit.waitSemaphoreCount = static_cast<uint32_t>(waits.size());
+    submit.waitSemaphoreCount = uint32_t(waits.size());
     submit.pWaitSemaphores = waits.data();
     submit.pWaitDstStageMask = stages.data();
     submit.commandBufferCount = 1;

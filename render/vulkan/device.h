@@ -114,9 +114,8 @@ public:
     /// Hands `record` a command buffer, submits it and waits until it is done.
     template <class Record>
     Result<void> submitAndWait(Record record) {
-        auto commands = beginCommands();
-        if (!commands) return commands.error();
-        record(*commands);
+        VCP_TRY_ASSIGN(auto commands, beginCommands());
+        record(commands);
         return endCommandsAndWait();
     }
     Result<VkCommandBuffer> beginCommands();

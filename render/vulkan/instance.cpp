@@ -54,12 +54,11 @@ bool hasComputeQueue(VkPhysicalDevice device) {
 int typeScore(const DeviceInfo& device) {
     constexpr const char* kOrder[] = {"cpu", "other", "virtual", "integrated", "discrete"};
     const auto* at = std::find(std::begin(kOrder), std::end(kOrder), device.type);
-    return static_cast<int>(at - std::begin(kOrder));
+    return int(at - std::begin(kOrder));
 }
 
 std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
     return text;
 }
 
@@ -117,9 +116,9 @@ Result<std::unique_ptr<Instance>> Instance::create(bool validation, const std::v
     VkInstanceCreateInfo info{VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO};
     info.pNext = validation ? &messenger : nullptr;
     info.pApplicationInfo = &application;
-    info.enabledLayerCount = static_cast<uint32_t>(layers.size());
+    info.enabledLayerCount = uint32_t(layers.size());
     info.ppEnabledLayerNames = layers.data();
-    info.enabledExtensionCount = static_cast<uint32_t>(names.size());
+    info.enabledExtensionCount = uint32_t(names.size());
     info.ppEnabledExtensionNames = names.data();
     VCP_VK(vkCreateInstance, &info, nullptr, &made->instance_);
     if (validation) VCP_TRY(made->connectLog());
@@ -205,15 +204,12 @@ Result<uint32_t> chooseDevice(const std::vector<DeviceInfo>& devices, const std:
 }
 
 Result<std::vector<DeviceInfo>> listDevices(const std::string& choice) {
-    auto instance = Instance::create(false, {});
-    if (!instance) return instance.error();
-    auto physical = (*instance)->physicalDevices();
-    if (!physical) return physical.error();
+    VCP_TRY_ASSIGN(auto instance, Instance::create(false, {}));
+    VCP_TRY_ASSIGN(auto physical, instance->physicalDevices());
     std::vector<DeviceInfo> devices;
-    for (uint32_t i = 0; i < physical->size(); ++i) devices.push_back(describeDevice((*physical)[i], i));
-    auto chosen = chooseDevice(devices, choice);
-    if (!chosen) return chosen.error();
-    devices[*chosen].chosen = true;
+    for (uint32_t i = 0; i < physical.size(); ++i) devices.push_back(describeDevice(physical[i], i));
+    VCP_TRY_ASSIGN(auto chosen, chooseDevice(devices, choice));
+    devices[chosen].chosen = true;
     return devices;
 }
 

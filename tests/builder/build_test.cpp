@@ -48,13 +48,13 @@ void writeStl(const IndexedMesh& mesh, const fs::path& path) {
     std::ofstream out(path, std::ios::binary);
     const std::string header(80, ' ');
     out << header;
-    const auto count = static_cast<uint32_t>(mesh.triangles.size());
+    const auto count = uint32_t(mesh.triangles.size());
     out.write(reinterpret_cast<const char*>(&count), 4);
     for (size_t k = 0; k < mesh.triangles.size(); ++k) {
         float values[12] = {};
         const auto t = mesh.corners(k);
         for (int i = 0; i < 3; ++i)
-            for (int a = 0; a < 3; ++a) values[3 + 3 * i + a] = static_cast<float>(t[i][a]);
+            for (int a = 0; a < 3; ++a) values[3 + 3 * i + a] = float(t[i][a]);
         out.write(reinterpret_cast<const char*>(values), 48);
         out.write("\0\0", 2);
     }
@@ -65,7 +65,7 @@ void roundToFloat(IndexedMesh& mesh) {
     for (glm::dvec3& p : mesh.positions)
         for (int axis = 0; axis < 3; ++axis) {
             // GCC 12 vectorizes double(float(x)) to x.
-            const volatile float rounded = static_cast<float>(p[axis]);
+            const volatile float rounded = float(p[axis]);
             p[axis] = double(rounded);
         }
 }
@@ -171,7 +171,7 @@ TEST_F(Build, SameBytesForAnyMemory) {
 TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
     IndexedMesh mesh = largeScene();
     std::vector<uint32_t> colours(mesh.positions.size());
-    for (size_t v = 0; v < colours.size(); ++v) colours[v] = static_cast<uint32_t>(0xff000000u | (v * 77 & 0xffffff));
+    for (size_t v = 0; v < colours.size(); ++v) colours[v] = uint32_t(0xff000000u | (v * 77 & 0xffffff));
     writePly(mesh, folder_ / "straight.ply", colours);
     BuildOptions o = options({folder_ / "straight.ply"}, "straight.vcp");
     o.memoryBytes = 150 << 20;
@@ -189,7 +189,7 @@ TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
     }
     for (auto& t : shuffled.triangles) {
         for (uint32_t& v : t) v = names[v];
-        std::rotate(t.begin(), t.begin() + static_cast<ptrdiff_t>(random() % 3), t.end());
+        std::rotate(t.begin(), t.begin() + ptrdiff_t(random() % 3), t.end());
     }
     std::shuffle(shuffled.triangles.begin(), shuffled.triangles.end(), random);
     writePly(shuffled, folder_ / "shuffled.ply", itsColours);
@@ -273,7 +273,7 @@ TEST_F(Build, SoupEqualsIndexedMesh) {
         std::array<uint32_t, 3> r{};
         for (int i = 0; i < 3; ++i) {
             if (names[t[i]] == ~0u) {
-                names[t[i]] = static_cast<uint32_t>(ordered.positions.size());
+                names[t[i]] = uint32_t(ordered.positions.size());
                 ordered.positions.push_back(mesh.positions[t[i]]);
             }
             r[i] = names[t[i]];
@@ -300,7 +300,7 @@ TEST_F(Build, DegenerateTrianglesAreCounted) {
     mesh.triangles.push_back({5, 5, 9});
     mesh.triangles.push_back({7, 7, 7});
     // Two vertices at one place, and three in a line.
-    const auto n = static_cast<uint32_t>(mesh.positions.size());
+    const auto n = uint32_t(mesh.positions.size());
     mesh.positions.push_back(mesh.positions[3]);
     mesh.positions.push_back({1, 0, 0});
     mesh.positions.push_back({1.25, 0, 0});
@@ -448,7 +448,7 @@ TEST_F(Build, AbsurdScalesEndWell) {
 TEST_F(Build, ColourFollowsTheOption) {
     const IndexedMesh mesh = test::torusMesh(glm::dvec3(0), 2, 0.7, 40, 20);
     std::vector<uint32_t> colours(mesh.positions.size());
-    for (size_t v = 0; v < colours.size(); ++v) colours[v] = static_cast<uint32_t>(0xff000000u | (v * 77 & 0xffffff));
+    for (size_t v = 0; v < colours.size(); ++v) colours[v] = uint32_t(0xff000000u | (v * 77 & 0xffffff));
     writePly(mesh, folder_ / "colour.ply", colours);
     BuildOptions o = options({folder_ / "colour.ply"});
     ASSERT_TRUE(buildOctree(o).ok());

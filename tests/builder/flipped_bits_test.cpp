@@ -22,7 +22,7 @@ public:
             return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
         if (!out.empty()) std::memcpy(out.data(), bytes_.data() + offset, out.size());
         if (bit_ / 8 >= offset && bit_ / 8 - offset < out.size())
-            out[bit_ / 8 - offset] ^= std::byte{1} << static_cast<int>(bit_ % 8);
+            out[bit_ / 8 - offset] ^= std::byte{1} << int(bit_ % 8);
         return {};
     }
     [[nodiscard]] uint64_t size() const override { return bytes_.size(); }

@@ -26,11 +26,11 @@ TEST(LatticeSnapper, SnapsToTheNearestPoint) {
                 WorldTriangle<double> t{};
                 for (auto& p : t.corner)
                     p = origin + cell * 100.0 * glm::dvec3(unit(random), unit(random), unit(random));
-                for (uint32_t& c : t.colour) c = static_cast<uint32_t>(random());
+                for (uint32_t& c : t.colour) c = uint32_t(random());
                 int pieces = 0;
                 snapper.add(t, [&](const LatticeTriangle& s) {
                     ++pieces;
-                    ASSERT_EQ(s.stray, static_cast<float>(kLatticeRounding));
+                    ASSERT_EQ(s.stray, float(kLatticeRounding));
                     for (int k = 0; k < 3; ++k) {
                         ASSERT_EQ(s.colour[k], t.colour[k]);
                         const glm::dvec3 back = origin + glm::dvec3(s.corner[k]) * (cell / kLatticePerCell);
@@ -95,8 +95,7 @@ TEST(SplitLongEdges, ClosedStaysClosedAndKeepsItsArea) {
         const double area = test::areaOf(box);
         const LatticeMesh mesh = meshFrom(box);
         expectShortEdges(mesh);
-        EXPECT_EQ(test::edgeUses(mesh.triangles),
-                  (std::map<int, int>{{2, static_cast<int>(mesh.triangles.size() * 3 / 2)}}));
+        EXPECT_EQ(test::edgeUses(mesh.triangles), (std::map<int, int>{{2, int(mesh.triangles.size() * 3 / 2)}}));
         EXPECT_NEAR(test::areaOf(test::inCells(mesh)), area, 2e-4 * area);
         // No corner of the pieces is farther from the old mesh than its stray.
         const MeshBvh bvh(box);
@@ -121,8 +120,7 @@ TEST(SplitLongEdges, RandomClosedMeshesOfLongTriangles) {
         const LatticeMesh lattice = meshFrom(mesh);
         ASSERT_GT(lattice.triangles.size(), mesh.triangles.size());
         expectShortEdges(lattice);
-        EXPECT_EQ(test::edgeUses(lattice.triangles),
-                  (std::map<int, int>{{2, static_cast<int>(lattice.triangles.size() * 3 / 2)}}))
+        EXPECT_EQ(test::edgeUses(lattice.triangles), (std::map<int, int>{{2, int(lattice.triangles.size() * 3 / 2)}}))
             << seed;
         EXPECT_NEAR(test::areaOf(test::inCells(lattice)), area, 1e-5 * area) << seed;
     }

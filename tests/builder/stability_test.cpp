@@ -57,7 +57,7 @@ std::vector<Ray> raysAt(const Built& built, size_t count, uint64_t seed) {
                 break;
             }
             case 4: {  // along an axis, in a plane of the grid
-                const int axis = static_cast<int>(random() % 3);
+                const int axis = int(random() % 3);
                 direction = glm::dvec3(0);
                 direction[axis] = random() % 2 ? 1 : -1;
                 const int across = (axis + 1) % 3;
@@ -149,7 +149,7 @@ TEST(Stability, SliversInASurface) {
         for (size_t k = 0; k < mesh.triangles.size(); k += 2) {
             const auto [a, b, c] = mesh.triangles[k];
             const glm::dvec3 pa = mesh.positions[a], pb = mesh.positions[b], pc = mesh.positions[c];
-            const auto m = static_cast<uint32_t>(mesh.positions.size());
+            const auto m = uint32_t(mesh.positions.size());
             mesh.positions.push_back(0.4 * pa + 0.6 * pc + height * (pb - pa));
             for (const std::array<uint32_t, 3> t :
                  {std::array{a, b, m}, std::array{b, c, m}, std::array{a, m, c}, mesh.triangles[k + 1]})
@@ -203,7 +203,7 @@ TEST(Stability, SliverFanInASmoothSurface) {
 
 TEST(Stability, PointAndSegmentTriangles) {
     IndexedMesh mesh = sheet(16);
-    const auto n = static_cast<uint32_t>(mesh.positions.size());
+    const auto n = uint32_t(mesh.positions.size());
     for (uint32_t i = 0; i < n; i += 3) mesh.triangles.push_back({i, i, i});
     for (uint32_t i = 0; i + 1 < n; i += 3) mesh.triangles.push_back({i, i + 1, i});
     // Points away from the surface: nothing is built of them.
@@ -243,7 +243,7 @@ TEST(Stability, NonManifold) {
     for (int k = 0; k <= 10; ++k) mesh.positions.push_back({0, 0, k * 0.1});
     for (int fin = 0; fin < 5; ++fin) {
         const double a = fin * 1.1;
-        const auto v = static_cast<uint32_t>(mesh.positions.size());
+        const auto v = uint32_t(mesh.positions.size());
         for (int k = 0; k <= 10; ++k) mesh.positions.push_back({0.6 * std::cos(a), 0.6 * std::sin(a), k * 0.1});
         for (uint32_t k = 0; k < 10; ++k) {
             mesh.triangles.push_back({k, k + 1, v + k});

@@ -125,13 +125,13 @@ TEST_F(UnfinishedBuild, FlippedBitsAreFoundOrHarmless) {
             uint64_t bit = random() % bits;
             while (bit >= file->second.size() * 8) bit -= file++->second.size() * 8;
             if (i % 2 == 1) {
-                do file = std::next(left_.begin(), static_cast<ptrdiff_t>(random() % left_.size()));
+                do file = std::next(left_.begin(), ptrdiff_t(random() % left_.size()));
                 while (file->second.empty());
                 bit = random() % (file->second.size() * 8);
             }
             restore();
             std::string damaged = file->second;
-            damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ 1 << bit % 8);
+            damaged[bit / 8] = char(damaged[bit / 8] ^ 1 << bit % 8);
             std::ofstream(temp() / file->first, std::ios::binary) << damaged;
             expectSameOrError(fmt::format("{}: {}, bit {} of {}", stages[stage], file->first, bit, damaged.size() * 8),
                               endings);
@@ -156,7 +156,7 @@ TEST_F(UnfinishedBuild, FlippedBitsInTheSameRunAreFound) {
             for (const auto& entry : fs::directory_iterator(temp())) {
                 if (!entry.path().filename().string().starts_with(name)) continue;
                 std::string bytes = contentOf(entry.path());
-                bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 8);
+                bytes[bytes.size() / 2] = char(bytes[bytes.size() / 2] ^ 8);
                 std::fstream(entry.path(), std::ios::in | std::ios::out | std::ios::binary) << bytes;
                 isDone = true;
             }

@@ -31,12 +31,12 @@ Indexed randomMesh(uint32_t vertices, uint32_t triangles, uint32_t reach, uint64
     Indexed mesh;
     for (uint32_t v = 0; v < vertices; ++v) {
         mesh.positions.emplace_back(unit(random), double(v), unit(random));
-        mesh.colours.push_back(static_cast<uint32_t>(random()));
+        mesh.colours.push_back(uint32_t(random()));
     }
     for (uint32_t k = 0; k < triangles; ++k) {
         const uint64_t base = random() % vertices;
         std::array<uint32_t, 3> t{};
-        for (uint32_t& v : t) v = static_cast<uint32_t>((base + random() % reach) % vertices);
+        for (uint32_t& v : t) v = uint32_t((base + random() % reach) % vertices);
         mesh.triangles.push_back(t);
         mesh.uvs.push_back({glm::vec2(float(k), 0), glm::vec2(0, float(k)), glm::vec2(0.5f)});
         mesh.materials.push_back(k % 7);
@@ -174,10 +174,10 @@ TEST_F(Join, VerticesThatComeBackDamaged) {
         chunk.triangles.push_back({0, 1, 3 * kLeastResident + 99});
         ASSERT_TRUE(join.add(chunk, 0).ok());
         std::fstream file(folder_ / "temp" / "vertices.spill", std::ios::in | std::ios::out | std::ios::binary);
-        file.seekg(static_cast<std::streamoff>(vertex * 32 + 3));
+        file.seekg(std::streamoff(vertex * 32 + 3));
         const int byte = file.get();
-        file.seekp(static_cast<std::streamoff>(vertex * 32 + 3));
-        file.put(static_cast<char>(byte ^ 4));
+        file.seekp(std::streamoff(vertex * 32 + 3));
+        file.put(char(byte ^ 4));
         file.close();
         const auto joined = join.finish("mesh.ply");
         ASSERT_FALSE(joined.ok()) << vertex;

@@ -7,7 +7,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
     if (!vcp::isExr(bytes)) {
-        (void)vcp::decodeHeights(bytes, 0.1);
+        static_cast<void>(vcp::decodeHeights(bytes, 0.1));
         return 0;
     }
     const auto picture = vcp::decodeExr(bytes, 512);
@@ -15,6 +15,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (picture->values.size() != size_t(picture->size.x) * size_t(picture->size.y)) std::abort();
     for (const float value : picture->values)
         if (!std::isfinite(value)) std::abort();
-    (void)vcp::heightsOf(*picture, 0.1);
+    static_cast<void>(vcp::heightsOf(*picture, 0.1));
     return 0;
 }

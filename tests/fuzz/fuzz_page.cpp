@@ -27,7 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (!block.ok()) return 0;
     const auto bytes = std::as_bytes(std::span(*block));
     require(bytes.size() == pageBytes / 16 * 16, "size of the page");
-    (void)vcp::parsePaperPage(bytes, 20);
+    static_cast<void>(vcp::parsePaperPage(bytes, 20));
     const auto page = vcp::parsePage(bytes);
     if (!page.ok()) return 0;
     const auto again = vcp::unpackGeometry(vcp::packPage(bytes, {}).geometry, bytes.size());
@@ -36,6 +36,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     require(view.ok(), "a stored page comes back");
     require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves,
             "with its leaves");
-    (void)vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page);
+    static_cast<void>(vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page));
     return 0;
 }

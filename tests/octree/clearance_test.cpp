@@ -13,7 +13,7 @@ TEST(Clearance, IsThatOfTheNearestOccupiedCell) {
         SCOPED_TRACE(seed);
         std::mt19937 random(seed);
         const int n = 2 << seed % 6;
-        const auto any = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
+        const auto any = [&](int below) { return int(random() % unsigned(below)); };
         Clearance clearance(n);
         std::vector<std::pair<glm::ivec3, int>> boxes;
         for (auto i = random() % 4; i > 0; --i) {

@@ -108,7 +108,7 @@ TEST_F(DurableFile, InterruptedWritesGoOn) {
             }
             const ssize_t n = ::read(ends[0], buffer, std::min(sizeof buffer, bytes.size() - read.size()));
             if (n <= 0) return;
-            read.append(buffer, static_cast<size_t>(n));
+            read.append(buffer, size_t(n));
         } while (read.size() < bytes.size());
     });
     const auto result = appendAll(ends[1], bytes, "pipe");

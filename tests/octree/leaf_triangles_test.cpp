@@ -42,11 +42,11 @@ TEST(CubeTest, AgreesWithClipping) {
     for (int i = 0; i < 60000; ++i) {
         SCOPED_TRACE(i);
         const int range = 1 << (2 + i % 10);
-        const auto any = [&] { return static_cast<int>(random() % static_cast<unsigned>(2 * range)) - range; };
+        const auto any = [&] { return int(random() % unsigned(2 * range)) - range; };
         const std::array<glm::i32vec3, 3> t{glm::i32vec3(any(), any(), any()), glm::i32vec3(any(), any(), any()),
                                             glm::i32vec3(any(), any(), any())};
         const glm::i32vec3 lower(any(), any(), any());
-        const int edge = 1 + static_cast<int>(random() % static_cast<unsigned>(range));
+        const int edge = 1 + int(random() % unsigned(range));
         const Touch expected = clipped(t, lower, edge);
         // The bounding boxes must overlap.
         bool boxes = true;

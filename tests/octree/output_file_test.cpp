@@ -29,7 +29,7 @@ protected:
         return {std::istreambuf_iterator<char>(file), {}};
     }
     size_t files() const {
-        return static_cast<size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
+        return size_t(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
     }
     static std::string refusal(const Result<void>& result) { return result ? "" : result.error().line(); }
 

@@ -108,7 +108,7 @@ TEST(Packing, EveryDirectionCodeIsAFiniteUnitVector) {
 TEST(Packing, RepackingIsStable) {
     std::mt19937 random(4);
     for (int i = 0; i < 100000; ++i) {
-        const uint32_t code = static_cast<uint32_t>(random());
+        const uint32_t code = uint32_t(random());
         const glm::dvec3 n = f64::decodeDirection(code >> 11);
         const uint32_t again = packVector(f64::decodeDistance(code), n, (code >> 31) != 0);
         ASSERT_EQ(again & kPackedDistanceMax, code & kPackedDistanceMax);

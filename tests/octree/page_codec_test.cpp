@@ -131,10 +131,10 @@ TEST(PageCodec, TriangleSoupsComeBack) {
         SCOPED_TRACE(seed);
         std::mt19937 random(seed);
         const uint32_t log2Cells = 1 + seed % 3, depth = log2Cells + seed % (kMaxSubcellDepth + 1);
-        expectRoundTrip(soup(seed, log2Cells, std::min(depth, 4u), 8 + static_cast<uint32_t>(random() % 30),
-                             1 + static_cast<uint32_t>(random() % 40))
-                            .build(seed),
-                        kCoded);
+        expectRoundTrip(
+            soup(seed, log2Cells, std::min(depth, 4u), 8 + uint32_t(random() % 30), 1 + uint32_t(random() % 40))
+                .build(seed),
+            kCoded);
     }
 }
 
@@ -219,7 +219,7 @@ bool decodes(std::span<const std::byte> bytes, const WholePage& like) {
         return false;
     }
     EXPECT_EQ(geometry->size(), like.geometry.size());
-    (void)parsePage(asBytes(*geometry));
+    static_cast<void>(parsePage(asBytes(*geometry)));
     return true;
 }
 
@@ -228,8 +228,7 @@ TEST(PageCodec, EveryTruncationIsRefused) {
     const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
     for (size_t size = 0; size < packed.geometry.size(); ++size) {
         // A copy of its own, so that a read behind the end is seen.
-        const std::vector<std::byte> part(packed.geometry.begin(),
-                                          packed.geometry.begin() + static_cast<std::ptrdiff_t>(size));
+        const std::vector<std::byte> part(packed.geometry.begin(), packed.geometry.begin() + std::ptrdiff_t(size));
         // The last bytes may be rounding that a decoder does not need.
         const bool decoded = decodes(part, page);
         EXPECT_TRUE(!decoded || size + 4 >= packed.geometry.size()) << size;
@@ -258,11 +257,11 @@ TEST(PageCodec, HostileBytesAreHarmless) {
             std::vector<std::byte> bytes = packed.geometry;
             // Mostly behind the counts, which lie in the first bytes of either stream.
             for (auto k = 1 + random() % 3; k > 0; --k)
-                bytes[1 + random() % (bytes.size() - 1)] ^= static_cast<std::byte>(1u << random() % 8);
+                bytes[1 + random() % (bytes.size() - 1)] ^= std::byte(1u << random() % 8);
             decodes(bytes, page);
             if (page.colour.empty()) continue;
             std::vector<std::byte> colour = packed.colour;
-            colour[1 + random() % (colour.size() - 1)] ^= static_cast<std::byte>(1u << random() % 8);
+            colour[1 + random() % (colour.size() - 1)] ^= std::byte(1u << random() % 8);
             const auto decoded =
                 unpackColour(colour, page.colour.size() * 16,
                              *parsePage(asBytes(*unpackGeometry(packed.geometry, page.geometry.size() * 16))));
@@ -270,7 +269,7 @@ TEST(PageCodec, HostileBytesAreHarmless) {
         }
         for (int i = 0; i < 3000; ++i) {
             std::vector<std::byte> bytes(random() % 400);
-            for (std::byte& b : bytes) b = static_cast<std::byte>(random());
+            for (std::byte& b : bytes) b = std::byte(random());
             if (!bytes.empty()) bytes[0] = kCoded;
             decodes(bytes, page);
         }

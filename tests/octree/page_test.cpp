@@ -31,19 +31,19 @@ struct PageParts {
 
     /// Fills the header's counts.
     void count() {
-        header.groups = static_cast<uint32_t>(nodes.size() / 8);
-        header.faces = static_cast<uint32_t>(faces.size());
-        header.triangles = static_cast<uint32_t>(triangles.size());
-        header.vertices = static_cast<uint32_t>(vertices.size());
+        header.groups = uint32_t(nodes.size() / 8);
+        header.faces = uint32_t(faces.size());
+        header.triangles = uint32_t(triangles.size());
+        header.vertices = uint32_t(vertices.size());
     }
 
     /// In a block of exactly their size, so that sanitizers see a read behind it.
     [[nodiscard]] std::vector<uint4> bytes() const {
         PageHeader sized = header;
-        sized.groups = static_cast<uint32_t>(nodes.size() / 8);
-        sized.faces = static_cast<uint32_t>(faces.size());
-        sized.triangles = static_cast<uint32_t>(triangles.size());
-        sized.vertices = static_cast<uint32_t>(vertices.size());
+        sized.groups = uint32_t(nodes.size() / 8);
+        sized.faces = uint32_t(faces.size());
+        sized.triangles = uint32_t(triangles.size());
+        sized.vertices = uint32_t(vertices.size());
         const PageSections s = pageSections(sized);
         std::vector<uint4> out(s.end / 16);
         auto* at = reinterpret_cast<std::byte*>(out.data());
@@ -123,7 +123,7 @@ private:
                 return;
             }
             default:
-                sum += static_cast<uint64_t>(nodeClearance(node));
+                sum += uint64_t(nodeClearance(node));
         }
     }
 
@@ -219,7 +219,7 @@ TEST(Page, NoBitFlipLeadsOutOfThePage) {
     for (size_t bit = 0; bit < block.size() * 128; ++bit) {
         SCOPED_TRACE(bit);
         std::vector<uint4> changed = block;
-        reinterpret_cast<uint8_t*>(changed.data())[bit / 8] ^= static_cast<uint8_t>(1u << bit % 8);
+        reinterpret_cast<uint8_t*>(changed.data())[bit / 8] ^= uint8_t(1u << bit % 8);
         refused += !parseAndWalk(changed);
         if (HasFailure()) return;
     }
@@ -238,9 +238,8 @@ TEST(Page, NoRandomDamageLeadsOutOfThePage) {
         for (uint32_t k = 0; k < count; ++k) {
             // Mostly node words, mostly near what is valid: else nothing but the first check is reached.
             const size_t at = random() % 4 == 0 ? random() % (block.size() * 4) : 16 + random() % 16;
-            const auto any = [&](uint32_t below) { return static_cast<uint32_t>(random() % below); };
-            words[at] =
-                any(2) == 0 ? word(any(4), any(8) | any(3) << kHardCountShift) : static_cast<uint32_t>(random());
+            const auto any = [&](uint32_t below) { return uint32_t(random() % below); };
+            words[at] = any(2) == 0 ? word(any(4), any(8) | any(3) << kHardCountShift) : uint32_t(random());
         }
         parseAndWalk(changed);
         if (HasFailure()) return;

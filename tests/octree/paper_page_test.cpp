@@ -83,13 +83,13 @@ TEST(PaperPage, WrongPagesAreRefused) {
 TEST(PaperPage, EveryFlippedBitIsReadOrRefused) {
     for (size_t bit = 0; bit < smallPage().geometryBytes().size() * 8; ++bit) {
         PageBytes page = smallPage();
-        reinterpret_cast<uint8_t*>(page.geometry.data())[bit / 8] ^= static_cast<uint8_t>(1u << bit % 8);
+        reinterpret_cast<uint8_t*>(page.geometry.data())[bit / 8] ^= uint8_t(1u << bit % 8);
         const auto view = parsePaperPage(page.geometryBytes(), kLog2Cells);
         if (!view) continue;
         for (const int32_t word : view->nodes) {
             const bool isLeaf = word < 0, isInner = word >= 0 && word < paper::kPaperEmpty;
-            EXPECT_TRUE(!isLeaf || static_cast<uint32_t>(-(word + 1)) + 1 < view->slices.size()) << bit;
-            EXPECT_TRUE(!isInner || static_cast<size_t>(word) + 8 <= view->nodes.size()) << bit;
+            EXPECT_TRUE(!isLeaf || uint32_t(-(word + 1)) + 1 < view->slices.size()) << bit;
+            EXPECT_TRUE(!isInner || size_t(word) + 8 <= view->nodes.size()) << bit;
         }
     }
 }

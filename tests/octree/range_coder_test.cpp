@@ -24,31 +24,31 @@ struct Item {
 };
 
 Item randomItem(std::mt19937& random, double skew) {
-    const int kind = static_cast<int>(random() % 7);
-    const auto magnitude = [&] { return static_cast<int64_t>(random() >> (3 + random() % 29)); };
+    const int kind = int(random() % 7);
+    const auto magnitude = [&] { return int64_t(random() >> (3 + random() % 29)); };
     const bool rare = std::generate_canonical<double, 32>(random) < skew;
     switch (kind) {
         case 0:
             return {kind, rare ? 1 : 0};
         case 1:
-            return {kind, rare ? static_cast<int64_t>(random() % 16) : 15};
+            return {kind, rare ? int64_t(random() % 16) : 15};
         case 2:
-            return {kind, static_cast<int64_t>(random() % 3)};
+            return {kind, int64_t(random() % 3)};
         case 3:
             return {kind, magnitude()};
         case 4:
         case 5:
             return {kind, rare ? -magnitude() : magnitude() % 200};
         default:
-            return {kind, static_cast<int64_t>(random() % 8192)};
+            return {kind, int64_t(random() % 8192)};
     }
 }
 
 template <class Coder>
 int64_t code(Coder& coder, Models& m, int kind, int64_t value) {
     bool b = value != 0;
-    uint32_t u = static_cast<uint32_t>(value);
-    int32_t s = static_cast<int32_t>(value);
+    uint32_t u = uint32_t(value);
+    int32_t s = int32_t(value);
     switch (kind) {
         case 0:
             coder.bit(m.bit[0], b);

@@ -190,7 +190,7 @@ TEST_F(VcpFile, OriginsAndEdges) {
     EXPECT_EQ(dataset->edgeOf(dataset->pages[0]), 8);
     EXPECT_EQ(dataset->originOf(dataset->pages[0]), glm::dvec3(-1));
     for (size_t i = 1; i < 9; ++i) {
-        const int octant = static_cast<int>(i - 1);
+        const int octant = int(i - 1);
         EXPECT_EQ(dataset->edgeOf(dataset->pages[i]), 4);
         EXPECT_EQ(dataset->originOf(dataset->pages[i]),
                   glm::dvec3(-1) + 4.0 * glm::dvec3(octant & 1, octant >> 1 & 1, octant >> 2));
@@ -504,7 +504,7 @@ void replacePage(Forgery& forgery, uint64_t page, std::span<const std::byte> sto
     PageEntry& e = forgery.entry(page);
     ASSERT_LE(stored.size(), e.storedBytes);
     std::memcpy(&forgery.bytes[e.offset], stored.data(), stored.size());
-    e.storedBytes = static_cast<uint32_t>(stored.size());
+    e.storedBytes = uint32_t(stored.size());
     e.pageBytes = pageBytes;
     e.hash = hashBytes(stored);
     forgery.seal();
@@ -599,7 +599,7 @@ std::vector<Bytes> hostileCopies(const Bytes& bytes, uint64_t at, char kind) {
                                    -1e300};
     for (const double value : kDoubles) {
         if (kind == 'd') add(value);
-        if (kind == 'f') add(static_cast<float>(value));
+        if (kind == 'f') add(float(value));
     }
     constexpr uint64_t kIntegers[] = {0,
                                       1,
@@ -620,8 +620,8 @@ std::vector<Bytes> hostileCopies(const Bytes& bytes, uint64_t at, char kind) {
                                       0xffffffffffffff00,
                                       ~uint64_t{0}};
     for (const uint64_t value : kIntegers) {
-        if (kind == '1') add(static_cast<uint8_t>(value));
-        if (kind == '4') add(static_cast<uint32_t>(value));
+        if (kind == '1') add(uint8_t(value));
+        if (kind == '4') add(uint32_t(value));
         if (kind == '8') add(value);
     }
     return copies;

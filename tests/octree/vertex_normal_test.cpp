@@ -21,7 +21,7 @@ TEST(VertexNormal, GridPointsComeBackAndAreNear) {
     for (int i = 0; i < 20000; ++i) {
         SCOPED_TRACE(i);
         const int bits = 1 + i % 40;
-        const auto any = [&] { return static_cast<int64_t>(random() | uint64_t{random()} << 32) >> (63 - bits); };
+        const auto any = [&] { return int64_t(random() | uint64_t{random()} << 32) >> (63 - bits); };
         const WideVector sum(any(), any(), any());
         if (sum == WideVector(0)) continue;
         const bool crease = i % 2 != 0;
@@ -43,7 +43,7 @@ TEST(VertexNormal, CreasesTurnByFortyDegrees) {
     for (const int degrees : {0, 10, 38, 42, 80, 138, 142, 180}) {
         const double a = degrees * 3.14159265358979 / 180;
         const WideVector sum(0, 0, 1 << 20);
-        const WideVector normal(static_cast<int64_t>(std::sin(a) * 1e6), 0, static_cast<int64_t>(std::cos(a) * 1e6));
+        const WideVector normal(int64_t(std::sin(a) * 1e6), 0, int64_t(std::cos(a) * 1e6));
         const std::vector<std::array<uint32_t, 3>> triangles{{0, 0, 0}};
         EXPECT_EQ(creases(std::span(&normal, 1), std::span(&sum, 1), triangles)[0] != 0, degrees > 40 && degrees < 140)
             << degrees;

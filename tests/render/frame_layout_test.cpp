@@ -40,7 +40,7 @@ Offsets offsetsIn(std::span<const uint32_t> spirv) {
     return result;
 }
 
-#define OFFSET(member) static_cast<uint32_t>(offsetof(frame::FrameConstants, member))
+#define OFFSET(member) uint32_t(offsetof(frame::FrameConstants, member))
 
 void expectSameLayout(std::span<const uint32_t> spirv) {
     const Offsets offsets = offsetsIn(spirv);

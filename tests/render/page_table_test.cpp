@@ -31,7 +31,7 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
     std::vector<ResidentPage> resident(dataset.pages.size());
     for (uint64_t page = 0; page < resident.size(); ++page) {
         std::memcpy(&resident[page].header, made.pages[page].geometryBytes().data(), sizeof(PageHeader));
-        resident[page].texel = static_cast<uint32_t>(1000 * page);
+        resident[page].texel = uint32_t(1000 * page);
     }
     const auto table = pageTable(dataset, cut, [&](uint64_t page) { return std::optional(resident[page]); });
 

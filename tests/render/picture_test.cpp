@@ -20,7 +20,7 @@ protected:
     }
     void TearDown() override { fs::remove_all(folder_); }
     [[nodiscard]] size_t files() const {
-        return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+        return size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
     }
     fs::path folder_;
 };
@@ -28,7 +28,7 @@ protected:
 Picture noise(uint32_t width, uint32_t height) {
     Picture picture{width, height, std::vector<uint8_t>(size_t{4} * width * height)};
     std::mt19937 random(width * 31 + height);
-    for (uint8_t& byte : picture.rgba) byte = static_cast<uint8_t>(random());
+    for (uint8_t& byte : picture.rgba) byte = uint8_t(random());
     return picture;
 }
 
@@ -66,7 +66,7 @@ TEST_F(PictureFile, HostileFilesAreErrors) {
     std::ifstream in(folder_ / "a.png", std::ios::binary);
     const std::string whole((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     for (size_t length = 0; length < whole.size() - 12; length += 7) {
-        std::ofstream(folder_ / "b.png", std::ios::binary).write(whole.data(), static_cast<std::streamsize>(length));
+        std::ofstream(folder_ / "b.png", std::ios::binary).write(whole.data(), std::streamsize(length));
         EXPECT_FALSE(readPng(folder_ / "b.png")) << length;
     }
     EXPECT_FALSE(readPng(folder_ / "absent.png"));

@@ -520,7 +520,7 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
         SCOPED_TRACE(lostAt);
         options.faults.separateMemory = separateMemory;
         options.faults.separateCopies = separateCopies;
-        options.faults.lostAtSubmission = static_cast<uint64_t>(lostAt);
+        options.faults.lostAtSubmission = uint64_t(lostAt);
         start(options);
         show(scene);
         uint32_t losses = 0, told = 0;
@@ -546,7 +546,7 @@ TEST_F(RendererTest, AFrameIsOneSubmissionWhereTheMemoryIsSeparate) {
     start(options);
     show(scene);
     for (int view = 0; view < 8; ++view) {
-        FrameRequest request = requestOf(cameras(scene)[static_cast<size_t>(view % 4)].camera, 64, 48);
+        FrameRequest request = requestOf(cameras(scene)[size_t(view % 4)].camera, 64, 48);
         request.errorPixels = view < 4 ? 0.001 : 0.5;
         for (int frame = 0; frame < 3; ++frame) {
             ASSERT_TRUE(renderer_->update(request).ok());
@@ -572,7 +572,7 @@ TEST_F(RendererTest, PagesGoThroughStagingWhereTheMemoryIsSeparate) {
             start(options);
             show(scene);
             for (int view = 0; view < 4; ++view) {
-                FrameRequest request = requestOf(cameras(scene)[static_cast<size_t>(view)].camera, 64, 48);
+                FrameRequest request = requestOf(cameras(scene)[size_t(view)].camera, 64, 48);
                 request.errorPixels = 0.001;
                 pictures[way].push_back(drawAllTheWay(*renderer_, request));
             }

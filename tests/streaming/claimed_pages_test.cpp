@@ -44,7 +44,7 @@ public:
             e.storedBytes = 16;
             e.pageBytes = 4096;
             while (page >= h.level[level].firstEntry + h.level[level].pages) ++level;
-            e.level = static_cast<uint8_t>(level);
+            e.level = uint8_t(level);
             e.morton = page - h.level[level].firstEntry;
             e.childMask = page == 0 ? 0xff : 0;
             e.firstChild = page == 0 ? 1 : 0;
@@ -56,7 +56,7 @@ public:
     }
     Result<void> read(uint64_t offset, std::span<std::byte> to) const override {
         if (offset + to.size() <= head_.size())
-            std::copy_n(head_.begin() + static_cast<std::ptrdiff_t>(offset), to.size(), to.begin());
+            std::copy_n(head_.begin() + std::ptrdiff_t(offset), to.size(), to.begin());
         else if (offset == size() - sizeof commit_ && to.size() == sizeof commit_)
             std::memcpy(to.data(), &commit_, sizeof commit_);
         else
@@ -91,7 +91,7 @@ private:
 uint64_t residentBytes() {
     uint64_t all = 0, resident = 0;
     std::ifstream("/proc/self/statm") >> all >> resident;
-    return resident * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+    return resident * uint64_t(::sysconf(_SC_PAGESIZE));
 }
 
 uint64_t grownSince(uint64_t before) {

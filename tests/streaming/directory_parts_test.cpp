@@ -155,10 +155,10 @@ TEST(DirectoryParts, AMovingViewAsksForBlocksOfWhatComesLater) {
             });
         };
         blocksWished(0, true);
-        now += static_cast<int>(blocksWished(0.1, true));
+        now += int(blocksWished(0.1, true));
         EXPECT_EQ(blocksWished(0.2, false), 0) << "a still view looks at nothing ahead";
         view.eye *= 0.9;
-        ahead += static_cast<int>(blocksWished(0.3, false));
+        ahead += int(blocksWished(0.3, false));
     }
     EXPECT_GT(now, 0);
     EXPECT_GT(ahead, 0);

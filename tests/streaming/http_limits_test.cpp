@@ -164,8 +164,7 @@ TEST(ExchangePace, ASteadyTrickleFailsAndWhatIsFastEnoughGoesOn) {
         ExchangePace pace(options, 1'000'000, 0);
         std::optional<std::string> problem;
         double now = 0;
-        for (; now < 500 && !problem; now += 0.25)
-            problem = pace.problem(now, static_cast<uint64_t>(now * double(perSecond)), true);
+        for (; now < 500 && !problem; now += 0.25) problem = pace.problem(now, uint64_t(now * double(perSecond)), true);
         EXPECT_EQ(problem.has_value(), perSecond < 1000) << perSecond;
         EXPECT_TRUE(!problem || now < 11) << perSecond;
     }

@@ -81,7 +81,7 @@ TEST_F(HttpReaderTest, TheFirstViewOfALargeFileTakesTwoRequestsToo) {
     const std::vector<std::byte> bytes = test::directoryFile(tree);
     ASSERT_GT(tree.pages.blocks() * kBlockBytes, wholeDirectoryBytes(kLeadBytes));
     std::ofstream(folder_ / "large.vcp", std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+        .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
     const auto reader = open("large.vcp");
     ASSERT_TRUE(reader) << reader.error().line();
     const auto dataset = readDatasetStart(**reader);

@@ -31,7 +31,7 @@ public:
         niceness = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
         if (page == failing) return Error{.code = ErrorCode::Io, .message = "broken", .element = "page 13"};
         PageBytes bytes;
-        bytes.geometry.assign(words_, uint4(static_cast<uint32_t>(page)));
+        bytes.geometry.assign(words_, uint4(uint32_t(page)));
         if (withColour) bytes.colour.assign(1, uint4(7));
         return bytes;
     }

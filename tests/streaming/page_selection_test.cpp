@@ -27,11 +27,11 @@ Dataset fullTree(uint32_t levels, double error) {
         for (const glm::u32vec3 place : places) {
             PageEntry page;
             page.morton = mortonEncode(place);
-            page.level = static_cast<uint8_t>(level);
-            page.certifiedError = static_cast<float>(error * std::exp2(-double(level)));
+            page.level = uint8_t(level);
+            page.certifiedError = float(error * std::exp2(-double(level)));
             if (level + 1 < levels) {
                 page.childMask = 255;
-                page.firstChild = static_cast<uint32_t>(firstOfNext + next.size());
+                page.firstChild = uint32_t(firstOfNext + next.size());
                 for (uint32_t o = 0; o < 8; ++o) next.push_back(place * 2u + glm::u32vec3(o & 1, o >> 1 & 1, o >> 2));
             }
             dataset.pages.push_back(page);

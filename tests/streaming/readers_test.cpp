@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 class CountingBytes final : public ByteReader {
 public:
     explicit CountingBytes(uint64_t size) : size_(size) {}
-    static std::byte at(uint64_t offset) { return static_cast<std::byte>(offset * 2654435761u >> 13); }
+    static std::byte at(uint64_t offset) { return std::byte(offset * 2654435761u >> 13); }
 
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
         if (offset > size_ || bytes.size() > size_ - offset)
@@ -222,7 +222,7 @@ TEST(PageSource, RunsGiveTheSamePagesInFewerReads) {
     test::writeSphereFile(folder / "scan.vcp", 3);
     const auto reader = std::make_shared<CountingReader>(*openFile(folder / "scan.vcp"));
     const auto dataset = std::make_shared<const Dataset>(*readDataset(*reader));
-    const auto pages = static_cast<uint32_t>(dataset->pages.size());
+    const auto pages = uint32_t(dataset->pages.size());
     ASSERT_GT(pages, 8u);
     for (const uint64_t runBytes : {uint64_t{0}, uint64_t{8192}, uint64_t{1} << 30}) {
         const FilePageSource source(reader, dataset, runBytes);
@@ -313,7 +313,7 @@ TEST(PageSource, ADamagedPageIsAnErrorOfItsOwn) {
     const auto dataset = std::make_shared<const Dataset>(*readDataset(**openFile(folder / "scan.vcp")));
     {
         std::fstream file(folder / "scan.vcp", std::ios::binary | std::ios::in | std::ios::out);
-        file.seekp(static_cast<std::streamoff>(dataset->pages[2].offset + 3));
+        file.seekp(std::streamoff(dataset->pages[2].offset + 3));
         file.put('\x5a');
     }
     const auto reader = std::make_shared<CountingReader>(*openFile(folder / "scan.vcp"));

@@ -126,7 +126,7 @@ TEST(RequestQueue, AnyHistoryEnds) {
                 EXPECT_LE(++attempts[wish->request.number], 4);
             }
             if (!underWay.empty() && random() % 2 == 0) {
-                const auto at = underWay.begin() + static_cast<std::ptrdiff_t>(random() % underWay.size());
+                const auto at = underWay.begin() + std::ptrdiff_t(random() % underWay.size());
                 const uint64_t page = *at;
                 underWay.erase(at);
                 const bool fails = random() % 3 == 0;

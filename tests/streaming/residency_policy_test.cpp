@@ -48,7 +48,7 @@ public:
         for (size_t i = 0; i < c_.perRound; ++i) {
             begin();
             if (underWay_.empty()) break;
-            const auto at = underWay_.begin() + static_cast<std::ptrdiff_t>(random_() % underWay_.size());
+            const auto at = underWay_.begin() + std::ptrdiff_t(random_() % underWay_.size());
             const uint64_t page = *at;
             underWay_.erase(at);
             if (c_.bad.contains(page) || double(random_() % 1000) < 1000 * c_.failRate) {
@@ -177,7 +177,7 @@ uint64_t allBytes(const Dataset& dataset) {
 uint64_t randomBudget(const Dataset& dataset, std::mt19937_64& random) {
     const uint64_t least = (pageUnits(dataset.pages[0], dataset.hasColour()) + 1) * kPoolUnitBytes;
     const double part = std::pow(double(random() % 1000) / 999, 2);
-    return least + static_cast<uint64_t>(part * double(allBytes(dataset)));
+    return least + uint64_t(part * double(allBytes(dataset)));
 }
 
 /// What a view should settle on, from selection alone.

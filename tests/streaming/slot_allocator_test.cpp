@@ -32,7 +32,7 @@ TEST(SlotAllocator, NeverOverlapsNeverExceedsNeverCrossesAChunk) {
                 taken[*first] = size;
                 sum += size;
             } else if (!taken.empty()) {
-                auto at = std::next(taken.begin(), static_cast<std::ptrdiff_t>(random() % taken.size()));
+                auto at = std::next(taken.begin(), std::ptrdiff_t(random() % taken.size()));
                 slots.release({at->first, at->second});
                 sum -= at->second;
                 taken.erase(at);

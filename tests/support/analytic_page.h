@@ -68,9 +68,9 @@ public:
         collectLeaves(glm::ivec3(0), 1 << header_.log2Cells);
         layFaces();
         header_.root = node(glm::ivec3(0), 1 << header_.log2Cells);
-        header_.groups = static_cast<uint32_t>(nodes_.size() / 8);
-        header_.faces = static_cast<uint32_t>(faces_.size());
-        header_.softLeaves = static_cast<uint32_t>(leaves_.size());
+        header_.groups = uint32_t(nodes_.size() / 8);
+        header_.faces = uint32_t(faces_.size());
+        header_.softLeaves = uint32_t(leaves_.size());
         const PageSections s = pageSections(header_);
         AnalyticPage page;
         page.softLeaves = header_.softLeaves;
@@ -106,7 +106,7 @@ private:
         for (auto& [key, face] : leaves_) {
             const bool continues = key[0] == last[0] && key[1] == last[1] && key[2] == last[2] + 1;
             if (!continues) faces_.push_back(faceAt(key));
-            face = static_cast<uint32_t>(faces_.size() - 1);
+            face = uint32_t(faces_.size() - 1);
             faces_.push_back(faceAt({key[0], key[1], key[2] + 1}));
             last = key;
         }
@@ -139,7 +139,7 @@ private:
         nodes_.resize(nodes_.size() + 8);
         for (int o = 0; o < 8; ++o)
             nodes_[8 * group + o] = node(lowest + glm::ivec3(o & 1, o >> 1 & 1, o >> 2) * (edge / 2), edge / 2);
-        return static_cast<uint32_t>(group);
+        return uint32_t(group);
     }
 
     const SignedDistanceField& field_;
@@ -181,19 +181,16 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
     const auto makePage = [&](uint32_t level, glm::u32vec3 at, AnalyticPage& page) {
         const double cell = o.finestCell * std::exp2(double(o.levels - 1 - level));
         const glm::dvec3 origin = o.origin + glm::dvec3(at) * cell * std::exp2(double(o.log2Cells));
-        page =
-            AnalyticPageBuilder(field, origin, cell, o.log2Cells, o.axis, static_cast<float>(o.errorCells), o.wallCode)
-                .build();
+        page = AnalyticPageBuilder(field, origin, cell, o.log2Cells, o.axis, float(o.errorCells), o.wallCode).build();
         return page.softLeaves > 0;
     };
     const auto add = [&](uint32_t level, glm::u32vec3 at, AnalyticPage page) {
         PageEntry entry;
         entry.morton = mortonEncode(at);
-        entry.level = static_cast<uint8_t>(level);
+        entry.level = uint8_t(level);
         entry.leaves = page.softLeaves;
-        entry.pageBytes = static_cast<uint32_t>(page.bytes.geometryBytes().size());
-        entry.certifiedError =
-            static_cast<float>(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
+        entry.pageBytes = uint32_t(page.bytes.geometryBytes().size());
+        entry.certifiedError = float(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
         result.dataset.pages.push_back(entry);
         result.pages.push_back(std::move(page.bytes));
         ++h.level[level].pages;
@@ -207,12 +204,12 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
         h.level[level].firstEntry = end;
         for (size_t parent = first; parent < end; ++parent) {
             const glm::u32vec3 at = mortonDecode(result.dataset.pages[parent].morton);
-            result.dataset.pages[parent].firstChild = static_cast<uint32_t>(result.dataset.pages.size());
+            result.dataset.pages[parent].firstChild = uint32_t(result.dataset.pages.size());
             for (uint32_t octant = 0; octant < 8; ++octant) {
                 const glm::u32vec3 child = at * 2u + glm::u32vec3(octant & 1, octant >> 1 & 1, octant >> 2);
                 AnalyticPage childPage;
                 if (!makePage(level, child, childPage)) continue;
-                result.dataset.pages[parent].childMask |= static_cast<uint8_t>(1u << octant);
+                result.dataset.pages[parent].childMask |= uint8_t(1u << octant);
                 add(level, child, std::move(childPage));
             }
         }

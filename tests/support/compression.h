@@ -15,9 +15,9 @@ inline std::string gzipped(std::string_view bytes) {
     ::deflateInit2(&state, 6, Z_DEFLATED, kGzip, 8, Z_DEFAULT_STRATEGY);
     std::string out(::deflateBound(&state, bytes.size()) + 64, '\0');
     state.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    state.avail_in = static_cast<uInt>(bytes.size());
+    state.avail_in = uInt(bytes.size());
     state.next_out = reinterpret_cast<Bytef*>(out.data());
-    state.avail_out = static_cast<uInt>(out.size());
+    state.avail_out = uInt(out.size());
     ::deflate(&state, Z_FINISH);
     out.resize(state.total_out);
     ::deflateEnd(&state);

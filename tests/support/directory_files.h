@@ -16,7 +16,7 @@ public:
     Result<void> read(uint64_t offset, std::span<std::byte> to) const override {
         if (offset > bytes.size() || to.size() > bytes.size() - offset)
             return Error{.code = ErrorCode::Io, .message = "past the end", .file = name_};
-        std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset), to.size(), to.begin());
+        std::copy_n(bytes.begin() + std::ptrdiff_t(offset), to.size(), to.begin());
         ++reads;
         bytesRead += to.size();
         return {};

@@ -17,8 +17,7 @@ inline std::string base64(std::string_view bytes) {
     std::string text;
     for (size_t i = 0; i < bytes.size(); i += 3) {
         uint32_t bits = 0;
-        for (size_t j = 0; j < 3; ++j)
-            bits = bits << 8 | (i + j < bytes.size() ? static_cast<uint8_t>(bytes[i + j]) : 0);
+        for (size_t j = 0; j < 3; ++j) bits = bits << 8 | (i + j < bytes.size() ? uint8_t(bytes[i + j]) : 0);
         for (size_t j = 0; j < 4; ++j) text += i + j > bytes.size() ? '=' : kDigits[bits >> (18 - 6 * j) & 63];
     }
     return text;
@@ -69,7 +68,7 @@ struct GltfFile {
         std::string text = json(""), binary = buffer;
         while (text.size() % 4) text += ' ';
         while (binary.size() % 4) binary += '\0';
-        const auto word = [](size_t value) { return bytesOf({static_cast<uint32_t>(value)}); };
+        const auto word = [](size_t value) { return bytesOf({uint32_t(value)}); };
         return "glTF" + word(2) + word(28 + text.size() + binary.size()) + word(text.size()) + "JSON" + text +
                word(binary.size()) + std::string("BIN\0", 4) + binary;
     }

@@ -16,7 +16,7 @@ inline constexpr bool kMemoryIsMeasured = true;
 inline uint64_t peakBytes() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+    return uint64_t(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace vcp::test

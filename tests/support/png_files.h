@@ -11,22 +11,22 @@ namespace vcp::test {
 
 inline std::string bigEndian(uint32_t word) {
     std::string bytes;
-    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(word >> shift);
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += char(word >> shift);
     return bytes;
 }
 
 inline std::string pngChunk(std::string_view name, std::string_view data) {
     std::string body(name);
     body += data;
-    const auto sum = ::crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
-    return bigEndian(static_cast<uint32_t>(data.size())) + body + bigEndian(static_cast<uint32_t>(sum));
+    const auto sum = ::crc32(0, reinterpret_cast<const Bytef*>(body.data()), uInt(body.size()));
+    return bigEndian(uint32_t(data.size())) + body + bigEndian(uint32_t(sum));
 }
 
 inline std::string deflated(std::string_view data) {
-    uLongf bytes = ::compressBound(static_cast<uLong>(data.size()));
+    uLongf bytes = ::compressBound(uLong(data.size()));
     std::string out(bytes, '\0');
     ::compress2(reinterpret_cast<Bytef*>(out.data()), &bytes, reinterpret_cast<const Bytef*>(data.data()),
-                static_cast<uLong>(data.size()), 9);
+                uLong(data.size()), 9);
     out.resize(bytes);
     return out;
 }
@@ -35,7 +35,7 @@ inline std::string deflated(std::string_view data) {
 inline std::string pngFile(uint32_t width, uint32_t height, int bits, int type, std::string_view rows,
                            std::string_view extra = "", bool isInterlaced = false) {
     std::string header = bigEndian(width) + bigEndian(height);
-    for (const int value : {bits, type, 0, 0, isInterlaced ? 1 : 0}) header += static_cast<char>(value);
+    for (const int value : {bits, type, 0, 0, isInterlaced ? 1 : 0}) header += char(value);
     return "\x89PNG\r\n\x1a\n" + pngChunk("IHDR", header) + std::string(extra) + pngChunk("IDAT", deflated(rows)) +
            pngChunk("IEND", "");
 }

@@ -31,7 +31,7 @@ inline Block randomColours(const PageView& page, uint32_t seed) {
     Block colours(colourPageBytes(page.header) / 16, uint4(0));
     auto* bytes = reinterpret_cast<uint8_t*>(colours.data());
     const size_t used = size_t{16} * page.header.faces + size_t{4} * page.header.vertices;
-    for (size_t i = 0; i < used; ++i) bytes[i] = static_cast<uint8_t>(i % 4 == 3 ? 255 : 100 + random() % 40);
+    for (size_t i = 0; i < used; ++i) bytes[i] = uint8_t(i % 4 == 3 ? 255 : 100 + random() % 40);
     return colours;
 }
 
@@ -42,7 +42,7 @@ public:
 
     uint32_t vertex(glm::i32vec3 p) {
         positions_.push_back(p);
-        return static_cast<uint32_t>(positions_.size() - 1);
+        return uint32_t(positions_.size() - 1);
     }
     void triangle(uint32_t a, uint32_t b, uint32_t c) { triangles_.push_back({a, b, c}); }
 
@@ -60,9 +60,9 @@ public:
                 nodes_.push_back(
                     node(queue[i].first + edge * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), queue[i].second + 1, queue));
             }
-        header_.groups = static_cast<uint32_t>(nodes_.size() / 8);
-        header_.triangles = static_cast<uint32_t>(records_.size());
-        header_.vertices = static_cast<uint32_t>(numbers_.size());
+        header_.groups = uint32_t(nodes_.size() / 8);
+        header_.triangles = uint32_t(records_.size());
+        header_.vertices = uint32_t(numbers_.size());
         const PageSections s = pageSections(header_);
         WholePage page{Block(s.end / 16), {}};
         auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
@@ -73,13 +73,11 @@ public:
         auto* normals = reinterpret_cast<uint32_t*>(out + s.normals);
         for (const auto& [v, number] : numbers_) {
             const glm::i32vec3 p = positions_[v] + kLatticeBias;
-            vertices[number] =
-                pack21(static_cast<uint32_t>(p.x), static_cast<uint32_t>(p.y), static_cast<uint32_t>(p.z));
+            vertices[number] = pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z));
             // As computed, near that, or any at all.
             NormalGridPoint point = normalGridPoint(sums_[v]);
-            if (random() % 4 == 0) point.u = static_cast<uint32_t>(random() % (kNormalSteps + 1));
-            normals[number] =
-                random() % 8 == 0 ? static_cast<uint32_t>(random()) : packGridNormal(point, random() % 5 == 0);
+            if (random() % 4 == 0) point.u = uint32_t(random() % (kNormalSteps + 1));
+            normals[number] = random() % 8 == 0 ? uint32_t(random()) : packGridNormal(point, random() % 5 == 0);
         }
         page.colour = randomColours(*parsePage(asBytes(page.geometry)), seed);
         return page;
@@ -104,19 +102,19 @@ private:
         if (inside.empty()) return emptyNode(0.25 * double(depth));
         if (depth < depth_) {
             queue.emplace_back(lower, depth);
-            return kNodeInternal << kNodeTypeShift | static_cast<uint32_t>(queue.size() - 1);
+            return kNodeInternal << kNodeTypeShift | uint32_t(queue.size() - 1);
         }
         ++header_.hardLeaves;
         if (forgetATriangle && inside.size() > 1) {
             inside.pop_back();
             forgetATriangle = false;
         }
-        const uint32_t first = static_cast<uint32_t>(records_.size()), count = static_cast<uint32_t>(inside.size());
+        const uint32_t first = uint32_t(records_.size()), count = uint32_t(inside.size());
         if (count >= kHardCountLong) records_.emplace_back(count, 0u);
         for (const uint32_t k : inside) {
             uint32_t v[3];
             for (size_t i = 0; i < 3; ++i)
-                v[i] = numbers_.try_emplace(triangles_[k][i], static_cast<uint32_t>(numbers_.size())).first->second;
+                v[i] = numbers_.try_emplace(triangles_[k][i], uint32_t(numbers_.size())).first->second;
             records_.push_back(pack21(v[0], v[1], v[2]));
         }
         return kNodeHard << kNodeTypeShift | std::min(count, kHardCountLong) << kHardCountShift | first;
@@ -133,7 +131,7 @@ private:
 };
 
 inline glm::i32vec3 randomPoint(std::mt19937& random, int edge) {
-    const auto any = [&] { return static_cast<int>(random() % static_cast<unsigned>(edge)); };
+    const auto any = [&] { return int(random() % unsigned(edge)); };
     return {any(), any(), any()};
 }
 
@@ -146,7 +144,7 @@ inline SoupPage soup(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_t
     std::set<std::array<uint32_t, 3>> made;
     while (made.size() < triangles) {
         std::array<uint32_t, 3> v;
-        for (uint32_t& at : v) at = static_cast<uint32_t>(random() % vertices);
+        for (uint32_t& at : v) at = uint32_t(random() % vertices);
         std::array<uint32_t, 3> sorted = v;
         std::sort(sorted.begin(), sorted.end());
         if (sorted[0] == sorted[1] || sorted[1] == sorted[2] || !made.insert(sorted).second) continue;
@@ -162,9 +160,7 @@ inline SoupPage sheet(uint32_t seed, uint32_t log2Cells, uint32_t depth, uint32_
     const int edge = kLatticePerCell << log2Cells;
     for (uint32_t y = 0; y <= n; ++y)
         for (uint32_t x = 0; x <= n; ++x)
-            page.vertex({static_cast<int>(x) * edge / static_cast<int>(n),
-                         static_cast<int>(y) * edge / static_cast<int>(n),
-                         edge / 2 + static_cast<int>(random() % 300)});
+            page.vertex({int(x) * edge / int(n), int(y) * edge / int(n), edge / 2 + int(random() % 300)});
     for (uint32_t y = 0; y < n; ++y)
         for (uint32_t x = 0; x < n; ++x) {
             const uint32_t a = x + (n + 1) * y, b = a + 1, c = a + n + 1, d = c + 1;

@@ -81,8 +81,7 @@ inline IndexedMesh boxMesh(glm::dvec3 low, glm::dvec3 high, uint32_t n) {
     IndexedMesh mesh;
     std::map<std::array<uint32_t, 3>, uint32_t> numbers;
     const auto vertex = [&](glm::uvec3 at) {
-        const auto [entry, isNew] =
-            numbers.try_emplace({at.x, at.y, at.z}, static_cast<uint32_t>(mesh.positions.size()));
+        const auto [entry, isNew] = numbers.try_emplace({at.x, at.y, at.z}, uint32_t(mesh.positions.size()));
         if (isNew) mesh.positions.push_back(low + (high - low) * glm::dvec3(at) / double(n));
         return entry->second;
     };
@@ -106,7 +105,7 @@ inline IndexedMesh boxMesh(glm::dvec3 low, glm::dvec3 high, uint32_t n) {
 }
 
 inline void append(IndexedMesh& to, const IndexedMesh& from) {
-    const auto base = static_cast<uint32_t>(to.positions.size());
+    const auto base = uint32_t(to.positions.size());
     to.positions.insert(to.positions.end(), from.positions.begin(), from.positions.end());
     for (const auto& t : from.triangles) to.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
 }

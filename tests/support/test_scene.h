@@ -128,7 +128,7 @@ inline Scene cubeScene(uint32_t split) {
     std::vector<uint32_t> normals;
     for (uint32_t corner = 0; corner < 8; ++corner) {
         const auto at = [&](uint32_t bit) {
-            return static_cast<uint32_t>(((corner >> bit & 1) != 0 ? 12 : 4) * kLatticePerCell + kLatticeBias);
+            return uint32_t(((corner >> bit & 1) != 0 ? 12 : 4) * kLatticePerCell + kLatticeBias);
         };
         vertices.push_back(pack21(at(0), at(1), at(2)));
         normals.push_back(packNormal({0, 0, 1}, true));
@@ -142,7 +142,7 @@ inline Scene cubeScene(uint32_t split) {
     // Every leaf has records of its own, as the format wants it.
     const std::vector<glm::u32vec2> twelve = std::exchange(triangles, {});
     const auto leaf = [&] {
-        const auto first = static_cast<uint32_t>(triangles.size());
+        const auto first = uint32_t(triangles.size());
         triangles.insert(triangles.end(), twelve.begin(), twelve.end());
         return kNodeHard << kNodeTypeShift | 12u << kHardCountShift | first;
     };
@@ -159,10 +159,10 @@ inline Scene cubeScene(uint32_t split) {
                 nodes.push_back(layer + 1 < split ? firstOfNext++ : leaf());
         leaves = groupsInLayer;
     }
-    header.groups = static_cast<uint32_t>(nodes.size() / 8);
-    header.triangles = static_cast<uint32_t>(triangles.size());
-    header.vertices = static_cast<uint32_t>(vertices.size());
-    header.hardLeaves = static_cast<uint32_t>(leaves);
+    header.groups = uint32_t(nodes.size() / 8);
+    header.triangles = uint32_t(triangles.size());
+    header.vertices = uint32_t(vertices.size());
+    header.hardLeaves = uint32_t(leaves);
     const PageSections s = pageSections(header);
     AnalyticDataset made;
     PageBytes bytes;
@@ -178,8 +178,8 @@ inline Scene cubeScene(uint32_t split) {
     h.levels = 1;
     h.log2Cells = 4;
     PageEntry entry;
-    entry.pageBytes = static_cast<uint32_t>(bytes.geometryBytes().size());
-    entry.leaves = entry.hardLeaves = static_cast<uint32_t>(leaves);
+    entry.pageBytes = uint32_t(bytes.geometryBytes().size());
+    entry.leaves = entry.hardLeaves = uint32_t(leaves);
     made.dataset.pages.push_back(entry);
     made.pages.push_back(std::move(bytes));
     return sceneOf("cube" + std::to_string(split), std::move(made));
@@ -192,7 +192,7 @@ inline void paint(Scene& scene, AnalyticDataset made, uint32_t rgba) {
         PageHeader header;
         std::memcpy(&header, made.pages[page].geometryBytes().data(), sizeof(header));
         made.pages[page].colour.assign(colourPageBytes(header) / 16, uint4(rgba));
-        made.dataset.pages[page].colourBytes = static_cast<uint32_t>(colourPageBytes(header));
+        made.dataset.pages[page].colourBytes = uint32_t(colourPageBytes(header));
     }
     scene = sceneOf("painted", std::move(made));
 }

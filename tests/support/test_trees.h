@@ -26,15 +26,15 @@ inline Dataset randomTree(uint64_t seed, uint32_t levels, double density, uint32
         for (const uint64_t place : places) {
             PageEntry page;
             page.morton = place;
-            page.level = static_cast<uint8_t>(level);
-            page.certifiedError = static_cast<float>((0.005 + 0.01 * unit(random)) * std::exp2(-double(level)));
-            page.pageBytes = 16 + static_cast<uint32_t>(random() % maxBytes) / 16 * 16;
+            page.level = uint8_t(level);
+            page.certifiedError = float((0.005 + 0.01 * unit(random)) * std::exp2(-double(level)));
+            page.pageBytes = 16 + uint32_t(random() % maxBytes) / 16 * 16;
             page.storedBytes = page.pageBytes / 3 + 1;
             if (dataset.hasColour()) page.colourBytes = page.colourStoredBytes = page.pageBytes / 64 * 16 + 16;
-            page.firstChild = static_cast<uint32_t>(firstOfNext + next.size());
+            page.firstChild = uint32_t(firstOfNext + next.size());
             for (uint32_t octant = 0; octant < 8 && level + 1 < levels; ++octant) {
                 if (unit(random) > density) continue;
-                page.childMask = static_cast<uint8_t>(page.childMask | 1u << octant);
+                page.childMask = uint8_t(page.childMask | 1u << octant);
                 next.push_back(place << 3 | octant);
             }
             if (page.childMask == 0) page.firstChild = 0;

@@ -15,7 +15,7 @@ struct Ran {
     int status = -1;  ///< 1000 + the signal that ended it
     std::string out, err;
 
-    [[nodiscard]] size_t errLines() const { return static_cast<size_t>(std::count(err.begin(), err.end(), '\n')); }
+    [[nodiscard]] size_t errLines() const { return size_t(std::count(err.begin(), err.end(), '\n')); }
 };
 
 /// Its output goes to the files "stdout" and "stderr" of `folder`, its cache to "cache"; it finds no display. One at a

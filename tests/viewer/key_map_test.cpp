@@ -21,7 +21,7 @@ TEST(KeyMap, TheDocumentHasEveryRow) {
 
 TEST(KeyMap, TextHasALineEach) {
     const std::string text = keyMapText();
-    EXPECT_EQ(static_cast<size_t>(std::count(text.begin(), text.end(), '\n')), keyMap().size());
+    EXPECT_EQ(size_t(std::count(text.begin(), text.end(), '\n')), keyMap().size());
 }
 
 }  // namespace

@@ -241,8 +241,8 @@ TEST_F(ViewerTest, PictureShowsTheDatasetAndBackground) {
     openViewer();
     settle();
     const double pixels = kSize.x * kSize.y;
-    EXPECT_GT(static_cast<double>(viewer_->status().frame.hitPixels), 0.2 * pixels);
-    EXPECT_LT(static_cast<double>(viewer_->status().frame.hitPixels), 0.7 * pixels);
+    EXPECT_GT(double(viewer_->status().frame.hitPixels), 0.2 * pixels);
+    EXPECT_LT(double(viewer_->status().frame.hitPixels), 0.7 * pixels);
     const auto centre = viewer_->pointAt(glm::dvec2(kSize) / 2.0);
     ASSERT_TRUE(centre);
     EXPECT_NEAR(glm::length(*centre), 1, 0.06);
@@ -514,9 +514,9 @@ TEST_F(ViewerTest, BrokenPageIsSaidAndTheRestIsShown) {
         auto dataset = readDataset(**openFile(file)).value();
         ASSERT_GT(dataset.pages.size(), 1u) << "the ball has one page only";
         std::FILE* bytes = std::fopen(file.c_str(), "r+b");
-        std::fseek(bytes, static_cast<long>(dataset.pages[1].offset + 20), SEEK_SET);
+        std::fseek(bytes, long(dataset.pages[1].offset + 20), SEEK_SET);
         const int old = std::fgetc(bytes);
-        std::fseek(bytes, static_cast<long>(dataset.pages[1].offset + 20), SEEK_SET);
+        std::fseek(bytes, long(dataset.pages[1].offset + 20), SEEK_SET);
         std::fputc(old ^ 1, bytes);
         std::fclose(bytes);
     }
@@ -593,7 +593,7 @@ TEST_F(ViewerTest, TwoDatasetsAreOneScene) {
     const auto pages = viewer_->renderer().residentPages();
     EXPECT_EQ(pages.size(), viewer_->status().update.pagesResident);
     const auto drawn = std::count_if(pages.begin(), pages.end(), [](const PageBox& page) { return page.isDrawn; });
-    EXPECT_EQ(static_cast<uint32_t>(drawn), viewer_->status().update.pagesInCut);
+    EXPECT_EQ(uint32_t(drawn), viewer_->status().update.pagesInCut);
     for (const PageBox& page : pages) EXPECT_NEAR(glm::length(page.edges[0]), glm::length(page.edges[2]), 1e-9);
     EXPECT_FALSE(viewer_->renderer().feedbackPicture());
     viewer_->renderer().keepFeedback(true);

@@ -292,10 +292,9 @@ bool readsExr() { return true; }
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge) {
     if (!isExr(file)) return wrong(ErrorCode::InvalidInput, "is not an EXR");
     HeaderWalk walk(file);
-    const auto size = walk.sizeOf(mostEdge);
-    if (!size) return size.error();
+    VCP_TRY_ASSIGN(const auto size, walk.sizeOf(mostEdge));
     try {
-        return decoded(file, walk.header(), *size);
+        return decoded(file, walk.header(), size);
     } catch (const std::exception& failure) {
         return damaged(failure.what());
     }

@@ -82,17 +82,15 @@ Result<std::vector<std::byte>> wholeFile(std::FILE* file) {
 }
 
 Result<meso::HeightMap> exrHeights(std::span<const std::byte> file, double range) {
-    const auto picture = decodeExr(file, meso::kMaxGridEdge);
-    if (!picture) return picture.error();
-    return heightsOf(*picture, range);
+    VCP_TRY_ASSIGN(const auto picture, decodeExr(file, meso::kMaxGridEdge));
+    return heightsOf(picture, range);
 }
 
 /// Decodes a PNG, which may be hostile. Errors, without file: as checkPng(), InvalidInput (damaged), Limit (above
 /// `kMaxGridEdge`).
 Result<meso::HeightMap> pngHeights(std::string_view file, double range) {
-    const auto chunks = checkPng(file);
-    if (!chunks) return chunks.error();
-    const uint32_t width = chunks->width, height = chunks->height;
+    VCP_TRY_ASSIGN(const auto chunks, checkPng(file));
+    const uint32_t width = chunks.width, height = chunks.height;
     if (width > uint32_t(meso::kMaxGridEdge) || height > uint32_t(meso::kMaxGridEdge))
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("{} x {} texels; a height map has at most {} an edge", width, height,
@@ -156,9 +154,8 @@ Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double ra
 }
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {
-    const auto file = openRegularStream(path);
-    if (!file) return file.error();
-    const auto bytes = wholeFile(file->get());
+    VCP_TRY_ASSIGN(const auto file, openRegularStream(path));
+    const auto bytes = wholeFile(file.get());
     auto map = bytes ? decodeHeights(*bytes, range) : Result<meso::HeightMap>(bytes.error());
     if (map) return map;
     Error error = map.error();

@@ -17,14 +17,12 @@ Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshO
     constexpr size_t kMost = 10'000'000;
     MeshOpenOptions open;
     open.materials = false;
-    auto stream = openMesh(path, open);
-    if (!stream) return stream.error();
+    VCP_TRY_ASSIGN(auto stream, openMesh(path, open));
     std::vector<glm::dvec3> positions;
     std::vector<std::array<uint64_t, 3>> triangles;
     for (MeshChunk chunk;;) {
-        const auto more = (*stream)->next(chunk);
-        if (!more) return more.error();
-        if (!*more) break;
+        VCP_TRY_ASSIGN(const auto more, stream->next(chunk));
+        if (!more) break;
         for (const glm::dvec3 p : chunk.positions)
             positions.push_back(options.up == 'x'   ? glm::dvec3(p.y, p.z, p.x)
                                 : options.up == 'y' ? glm::dvec3(p.z, p.x, p.y)

@@ -81,21 +81,21 @@ Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject,
     const BuildOptions build = buildOptionsFor(options, subject, variant);
     for (int repetition = 0; repetition < options.repetitions; ++repetition) {
         const double part = 1.0 / options.repetitions;
-        const auto outcome = runInChild(
-            [&](const ChildProgress& progress) -> Result<std::string> {
-                BuildOptions own = build;
-                own.progress = [&](const BuildProgress& at) { return progress(at.stage, at.fraction); };
-                const auto built = buildOctree(own);
-                if (!built) return built.error();
-                return bytesOf<BuildFigures>(*built);
-            },
-            asChildProgress(report, subject.name + ": building", repetition * part, (repetition + 1) * part));
-        if (!outcome) return outcome.error();
-        const auto built = valueAt<BuildFigures>(outcome->value, 0);
+        VCP_TRY_ASSIGN(
+            const auto outcome,
+            runInChild(
+                [&](const ChildProgress& progress) -> Result<std::string> {
+                    BuildOptions own = build;
+                    own.progress = [&](const BuildProgress& at) { return progress(at.stage, at.fraction); };
+                    VCP_TRY_ASSIGN(const auto built, buildOctree(own));
+                    return bytesOf<BuildFigures>(built);
+                },
+                asChildProgress(report, subject.name + ": building", repetition * part, (repetition + 1) * part)));
+        const auto built = valueAt<BuildFigures>(outcome.value, 0);
         seconds.push_back(built.seconds);
-        cpuSeconds.push_back(outcome->cpuSeconds);
+        cpuSeconds.push_back(outcome.cpuSeconds);
         row.triangles = built.triangles;
-        row.peakRssBytes = std::max(row.peakRssBytes, outcome->peakRssBytes);
+        row.peakRssBytes = std::max(row.peakRssBytes, outcome.peakRssBytes);
         row.tempBytes = std::max(row.tempBytes, built.tempBytes);
         row.fileBytes = built.fileBytes;
         row.leaves = built.leaves;
@@ -106,21 +106,20 @@ Result<void> timeBuild(const BenchBuildOptions& options, const Subject& subject,
     }
     row.seconds = upperQuantile(seconds, 0.5);
     row.cpuSeconds = upperQuantile(cpuSeconds, 0.5);
-    row.trianglesPerSecond = static_cast<double>(row.triangles) / row.seconds;
+    row.trianglesPerSecond = double(row.triangles) / row.seconds;
     return {};
 }
 
 /// Runs in a child: measures the distance between a dataset and the mesh that it was built from.
 Result<SurfaceDistance> distanceOf(const fs::path& file, const MeshBvh& mesh, const BenchBuildOptions& options,
                                    const std::function<bool(double)>& progress) {
-    auto cache = PageCache::open(file);
-    if (!cache) return cache.error();
-    VCP_TRY(cache->loadLevel(cache->dataset().header.levels - 1));
+    VCP_TRY_ASSIGN(auto cache, PageCache::open(file));
+    VCP_TRY(cache.loadLevel(cache.dataset().header.levels - 1));
     SurfaceDistanceOptions measuring;
     measuring.samples = options.samples;
     measuring.threads = options.threads;
     measuring.progress = progress;
-    return measureSurfaceDistance(*cache, mesh, measuring);
+    return measureSurfaceDistance(cache, mesh, measuring);
 }
 
 /// Runs in a child: returns the median time of Embree's tree (0 without Embree), then a SurfaceDistance for each file.
@@ -128,26 +127,23 @@ Result<std::string> judge(const BenchBuildOptions& options, const fs::path& mode
                           const ChildProgress& progress) {
     const auto cancelled = [] { return Error{ErrorCode::Cancelled, "cancelled"}; };
     if (!progress("reading the mesh", 0)) return cancelled();
-    const auto mesh = loadMesh(model);
-    if (!mesh) return mesh.error();
+    VCP_TRY_ASSIGN(const auto mesh, loadMesh(model));
     std::vector<double> embreeSeconds;
     for (int repetition = 0; benchHasEmbree() && repetition < options.repetitions; ++repetition) {
         if (!progress("Embree's tree", 0.1 + 0.3 * repetition / options.repetitions)) return cancelled();
-        const auto time = timeEmbreeBuild(*mesh, options.threads);
-        if (!time) return time.error();
-        embreeSeconds.push_back(*time);
+        VCP_TRY_ASSIGN(const auto time, timeEmbreeBuild(mesh, options.threads));
+        embreeSeconds.push_back(time);
     }
     std::string value = bytesOf(upperQuantile(embreeSeconds, 0.5));
     if (files.empty()) return value;
     if (!progress("sorting the mesh", 0.4)) return cancelled();
-    const MeshBvh bvh(*mesh);
+    const MeshBvh bvh(mesh);
     for (size_t i = 0; i < files.size(); ++i) {
-        const auto distance = distanceOf(files[i], bvh, options, [&](double fraction) {
-            return progress("measuring the distance",
-                            0.5 + 0.5 * (static_cast<double>(i) + fraction) / static_cast<double>(files.size()));
-        });
-        if (!distance) return distance.error();
-        value += bytesOf(*distance);
+        VCP_TRY_ASSIGN(const auto distance, distanceOf(files[i], bvh, options, [&](double fraction) {
+                           return progress("measuring the distance",
+                                           0.5 + 0.5 * (double(i) + fraction) / double(files.size()));
+                       }));
+        value += bytesOf(distance);
     }
     return value;
 }
@@ -160,16 +156,16 @@ Result<void> judgeVariants(const BenchBuildOptions& options, const Subject& subj
     if (options.samples > 0 && !subject.isGenerated)
         for (const Variant& variant : variants) files.push_back(variant.file);
     if (files.empty() && !benchHasEmbree()) return {};
-    const auto outcome =
+    VCP_TRY_ASSIGN(
+        const auto outcome,
         runInChild([&](const ChildProgress& progress) { return judge(options, subject.mesh, files, progress); },
-                   asChildProgress(report, subject.name, 0, 1));
-    if (!outcome) return outcome.error();
+                   asChildProgress(report, subject.name, 0, 1)));
     for (size_t i = 0; i < variants.size(); ++i) {
         BenchBuildRow& row = variants[i].row;
-        row.embreeBvhSeconds = valueAt<double>(outcome->value, 0);
+        row.embreeBvhSeconds = valueAt<double>(outcome.value, 0);
         row.ratioToEmbree = row.embreeBvhSeconds / row.seconds;
         if (i < files.size())
-            row.distance = valueAt<SurfaceDistance>(outcome->value, sizeof(double) + i * sizeof(SurfaceDistance));
+            row.distance = valueAt<SurfaceDistance>(outcome.value, sizeof(double) + i * sizeof(SurfaceDistance));
     }
     return {};
 }
@@ -190,7 +186,7 @@ Result<std::vector<BenchBuildRow>> measure(const BenchBuildOptions& options, con
         variant.file = subject.folder /
                        (i == 0 ? subject.name + ".vcp" : fmt::format("{}_error_{:g}.vcp", subject.name, errors[i]));
         const auto part = [&, i](const std::string& what, double fraction) {
-            return report(what, 0.7 * (static_cast<double>(i) + fraction) / static_cast<double>(errors.size()));
+            return report(what, 0.7 * (double(i) + fraction) / double(errors.size()));
         };
         VCP_TRY(timeBuild(options, subject, variant, part));
         variants.push_back(std::move(variant));
@@ -210,10 +206,9 @@ Result<std::vector<BenchBuildRow>> measureScan(const BenchBuildOptions& options,
     subject.folder = folder;
     subject.mesh = (options.temp.empty() ? folder : options.temp) / fmt::format("{}-{}.ply", subject.name, ::getpid());
     subject.isGenerated = true;
-    const auto made =
+    VCP_TRY(
         runProgram({options.makeScan.string(), "--triangles", std::to_string(triangles), "-o", subject.mesh.string()},
-                   [&] { return report(subject.name + ": making the scan", 0).ok(); });
-    if (!made) return made.error();
+                   [&] { return report(subject.name + ": making the scan", 0).ok(); }));
     auto rows = measure(options, subject,
                         [&](const std::string& what, double fraction) { return report(what, 0.1 + 0.9 * fraction); });
     std::error_code ignored;
@@ -226,9 +221,7 @@ Result<BenchBuildReport> measureAll(const BenchBuildOptions& options, const fs::
     const size_t count = options.models.size() + options.generated.size();
     for (size_t i = 0; i < count; ++i) {
         const Report report = [&](const std::string& what, double fraction) -> Result<void> {
-            if (!options.progress ||
-                options.progress(what, (static_cast<double>(i) + fraction) / static_cast<double>(count)))
-                return {};
+            if (!options.progress || options.progress(what, (double(i) + fraction) / double(count))) return {};
             return Error{ErrorCode::Cancelled, "cancelled"};
         };
         const bool isModel = i < options.models.size();

@@ -50,9 +50,7 @@ struct BenchBuildRow {
     double certifiedCells = 0;                ///< certified error in cells
     std::optional<SurfaceDistance> distance;  ///< measured; world units
 
-    [[nodiscard]] double bytesPerTriangle() const {
-        return static_cast<double>(fileBytes) / static_cast<double>(triangles > 0 ? triangles : 1);
-    }
+    [[nodiscard]] double bytesPerTriangle() const { return double(fileBytes) / double(triangles > 0 ? triangles : 1); }
     /// Returns the larger of the two directions, in cells. Precondition: `distance` is there.
     [[nodiscard]] Quantiles distanceCells() const;
 };

@@ -68,11 +68,11 @@ std::string benchBuildMarkdown(const BenchBuildReport& report) {
         "Embree | tolerance | certified | p50 | p99 | max cells |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for (const BenchBuildRow& row : report.rows) {
-        text += fmt::format(
-            "| {} | {} | {:.2f} | {:.3f} | {:.0f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ", row.model,
-            row.triangles, row.seconds, row.trianglesPerSecond * 1e-6, static_cast<double>(row.peakRssBytes) * 1e-6,
-            static_cast<double>(row.fileBytes) * 1e-6, row.bytesPerTriangle(), row.embreeBvhSeconds, row.ratioToEmbree,
-            row.errorCells, row.certifiedCells);
+        text +=
+            fmt::format("| {} | {} | {:.2f} | {:.3f} | {:.0f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} ",
+                        row.model, row.triangles, row.seconds, row.trianglesPerSecond * 1e-6,
+                        double(row.peakRssBytes) * 1e-6, double(row.fileBytes) * 1e-6, row.bytesPerTriangle(),
+                        row.embreeBvhSeconds, row.ratioToEmbree, row.errorCells, row.certifiedCells);
         if (row.distance) {
             const Quantiles cells = row.distanceCells();
             text += fmt::format("| {:.4f} | {:.4f} | {:.4f} |\n", cells.p50, cells.p99, cells.max);
@@ -106,10 +106,10 @@ std::vector<std::pair<std::string, std::string>> benchBuildPlots(const BenchBuil
     for (const BenchBuildRow& row : report.rows) {
         // The first row of a model is the default build.
         if (const bool isDefault = !last || last->model != row.model; isDefault) {
-            const double triangles = static_cast<double>(row.triangles);
+            const double triangles = double(row.triangles);
             const std::string series = row.isGenerated ? "generated scans" : row.model;
             add(cost, series, {triangles, 1e6 * row.seconds / triangles});
-            add(memory, series, {triangles, static_cast<double>(row.peakRssBytes)});
+            add(memory, series, {triangles, double(row.peakRssBytes)});
         }
         last = &row;
         if (row.distance)

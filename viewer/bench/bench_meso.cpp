@@ -49,12 +49,9 @@ struct Subject {
 
 Result<std::unique_ptr<Subject>> subjectOf(const std::string& name) {
     auto subject = std::make_unique<Subject>();
-    auto asset = openMesoAsset(name);
-    if (!asset) return asset.error();
-    subject->asset = *std::move(asset);
-    auto shape = shapeOf(subject->asset);
-    if (!shape) return shape.error();
-    subject->shape = *std::move(shape);
+    VCP_TRY_ASSIGN(auto asset, openMesoAsset(name));
+    subject->asset = std::move(asset);
+    VCP_TRY_ASSIGN(subject->shape, shapeOf(subject->asset));
     // The measured arrays are built here, not copied from the file.
     Asset& a = subject->asset;
     a.field.reset(), a.occupancy.reset(), a.distances.reset(), a.compressed.reset(), a.boxes.reset(), a.patches.reset();
@@ -186,13 +183,9 @@ Result<Measured> measuredOf(const Subject& subject, const Entry& entry) {
     Measured method;
     method.name = entry.options.name, method.knob = entry.knob;
     const auto start = Clock::now();
-    auto made = buildMethod(subject.asset, *subject.shape, entry.options);
-    if (!made) return made.error();
-    method.method = *std::move(made);
+    VCP_TRY_ASSIGN(method.method, buildMethod(subject.asset, *subject.shape, entry.options));
     method.preprocessSeconds = secondsSince(start);
-    auto marcher = method.method.marcher();
-    if (!marcher) return marcher.error();
-    method.marcher = *std::move(marcher);
+    VCP_TRY_ASSIGN(method.marcher, method.method.marcher());
     return method;
 }
 
@@ -204,16 +197,12 @@ Result<void> compareCompression(std::vector<MesoPublished>& published) {
         double ratio;
     };
     for (const Row& row : {Row{"beads", 2, 4}, Row{"kitten", 4, 12.8}, Row{"ball", 8, 256}}) {
-        const auto subject = subjectOf(row.asset);
-        if (!subject) return subject.error();
-        const auto occupancy = occupy(*(*subject)->shape, cellsOf(**subject, 256));
-        if (!occupancy) return occupancy.error();
-        const auto map = buildDistanceMap(*occupancy, {.cones = {1, 1}});
-        if (!map) return map.error();
-        const auto compressed = compressMap(*map, std::array{row.block});
-        if (!compressed) return compressed.error();
+        VCP_TRY_ASSIGN(const auto subject, subjectOf(row.asset));
+        VCP_TRY_ASSIGN(const auto occupancy, occupy(*subject->shape, cellsOf(*subject, 256)));
+        VCP_TRY_ASSIGN(const auto map, buildDistanceMap(occupancy, {.cones = {1, 1}}));
+        VCP_TRY_ASSIGN(const auto compressed, compressMap(map, std::array{row.block}));
         published.push_back({fmt::format("Table 3: texels, blocks of {}", row.block), row.asset, "texels", row.ratio,
-                             row.ratio, compressed->texelRatio(), 0});
+                             row.ratio, compressed.texelRatio(), 0});
     }
     return {};
 }
@@ -248,10 +237,9 @@ Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMeso
         const bool isPeer = entry.options.name == peerName && entry.isDefault;
         if (!isPeer && !isMeasured(entry)) continue;
         if (!told(entry.options.name)) return cancelled();
-        auto made = measuredOf(subject, entry);
-        if (!made) return made.error();
+        VCP_TRY_ASSIGN(auto made, measuredOf(subject, entry));
         if (isPeer) peer = methods.size();
-        methods.push_back(*std::move(made));
+        methods.push_back(std::move(made));
         isShown.push_back(isMeasured(entry));
     }
     std::vector<std::vector<BenchMesoRow>> byMethod(methods.size());
@@ -261,12 +249,10 @@ Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMeso
         const std::vector<MarchRay> rays = raysOf(subject, view, options.rays);
         std::vector<TruthHit> truths;
         for (const MarchRay& ray : rays) truths.push_back(subject.shape->trace(ray.origin, ray.direction, ray.tMax));
-        const auto marched = march(renderer, methods, rays, options.repetitions);
-        if (!marched) return marched.error();
+        VCP_TRY_ASSIGN(const auto marched, march(renderer, methods, rays, options.repetitions));
         for (size_t m = 0; m < methods.size(); ++m) {
             if (!isShown[m]) continue;
-            byMethod[m].push_back(
-                rowOf(subject, methods[m], view, rays, truths, (*marched)[m], (*marched)[peer].nsPerRay));
+            byMethod[m].push_back(rowOf(subject, methods[m], view, rays, truths, marched[m], marched[peer].nsPerRay));
             if (renderer != nullptr) byMethod[m].back().device = renderer->device().name;
         }
     }
@@ -301,26 +287,21 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
                   "chain", "weave",       "ball",   "scales", "kitten"};
     std::unique_ptr<MesoMarcher> renderer;
     if (options.device) {
-        auto made = MesoMarcher::create({.device = *options.device});
-        if (!made) return made.error();
-        renderer = *std::move(made);
+        VCP_TRY_ASSIGN(renderer, MesoMarcher::create({.device = *options.device}));
     }
     BenchMesoReport report;
     for (size_t a = 0; a < assets.size(); ++a) {
         const auto told = [&](const std::string& what) {
             return !options.progress || options.progress(assets[a] + ": " + what, double(a) / double(assets.size()));
         };
-        const auto subject = subjectOf(assets[a]);
-        if (!subject) return subject.error();
-        auto rows = rowsOf(**subject, options, renderer.get(), told);
-        if (!rows) return rows.error();
-        report.rows.insert(report.rows.end(), rows->begin(), rows->end());
+        VCP_TRY_ASSIGN(const auto subject, subjectOf(assets[a]));
+        VCP_TRY_ASSIGN(auto rows, rowsOf(*subject, options, renderer.get(), told));
+        report.rows.insert(report.rows.end(), rows.begin(), rows.end());
         if (options.checkRays == 0) continue;
         if (!told("conservative maps")) return cancelled();
-        const auto checks =
-            checkMesoMaps((*subject)->asset.name, *(*subject)->shape, (*subject)->texel, options.checkRays);
-        if (!checks) return checks.error();
-        report.checks.insert(report.checks.end(), checks->begin(), checks->end());
+        VCP_TRY_ASSIGN(const auto checks,
+                       checkMesoMaps(subject->asset.name, *subject->shape, subject->texel, options.checkRays));
+        report.checks.insert(report.checks.end(), checks.begin(), checks.end());
     }
     if (report.rows.empty())
         return Error{.code = ErrorCode::Usage, .message = "none of these methods is of these assets"};

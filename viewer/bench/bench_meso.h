@@ -48,7 +48,7 @@ struct MesoJudged {
     double p50 = 0, p95 = 0, p99 = 0, max = 0;
     double normalP50 = 0, normalP95 = 0;  ///< degrees, of the methods that give normals
 
-    [[nodiscard]] double fraction(MesoClass c) const { return fractions[static_cast<size_t>(c)]; }
+    [[nodiscard]] double fraction(MesoClass c) const { return fractions[size_t(c)]; }
     /// The fraction that is missed, false, of a wrong feature or unresolved.
     [[nodiscard]] double wrong() const { return 1 - fraction(MesoClass::Hit) - fraction(MesoClass::Miss); }
 };

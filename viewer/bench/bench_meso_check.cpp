@@ -27,9 +27,8 @@ struct CheckedMap {
 
 Result<void> addDistances(std::vector<CheckedMap>& maps, const char* name, const Occupancy& occupancy,
                           const DistanceOptions& options, const Shape& shape) {
-    auto made = buildDistanceMap(occupancy, options, &shape);
-    if (!made) return made.error();
-    const auto map = std::make_shared<const DistanceMap>(*std::move(made));
+    VCP_TRY_ASSIGN(auto made, buildDistanceMap(occupancy, options, &shape));
+    const auto map = std::make_shared<const DistanceMap>(std::move(made));
     maps.push_back({name, [map, borders = ConeBorders(map->cones)](glm::dvec3, glm::dvec3 direction, glm::ivec3 cell) {
                         return double(map->length(coneOf(borders, glm::vec3(direction)), cell));
                     }});
@@ -85,26 +84,24 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const Sha
     const glm::dvec3 extent = shape.extent();
     const glm::ivec3 cells(kCells, std::max(1, int(std::lround(kCells * extent.y))),
                            std::max(4, int(std::ceil(extent.z * kCells))));
-    const auto occupancy = occupy(shape, cells);
-    if (!occupancy) return occupancy.error();
-    const auto maps = mapsOf(*occupancy, shape);
-    if (!maps) return maps.error();
+    VCP_TRY_ASSIGN(const auto occupancy, occupy(shape, cells));
+    VCP_TRY_ASSIGN(const auto maps, mapsOf(occupancy, shape));
     std::vector<MesoCheck> checks;
-    for (const CheckedMap& map : *maps) checks.push_back({.asset = asset, .map = map.name});
+    for (const CheckedMap& map : maps) checks.push_back({.asset = asset, .map = map.name});
     std::mt19937_64 random(31);
     std::uniform_real_distribution<double> unit(0, 1);
-    std::vector<double> lengths(maps->size());
+    std::vector<double> lengths(maps.size());
     uint64_t asked = 0;
     // A tile that is all surface has hardly a cell to test.
     for (uint64_t tries = 0; asked < rays && tries < 100 * rays; ++tries) {
         const glm::dvec3 from(unit(random) * extent.x, unit(random) * extent.y, unit(random) * extent.z),
             direction = directionFrom(random);
-        const glm::ivec3 cell = glm::min(glm::ivec3(glm::floor(from / occupancy->grid.cell)), cells - 1);
-        if (occupancy->at(cell) || shape.field(from) <= 0) continue;
+        const glm::ivec3 cell = glm::min(glm::ivec3(glm::floor(from / occupancy.grid.cell)), cells - 1);
+        if (occupancy.at(cell) || shape.field(from) <= 0) continue;
         ++asked;
-        for (size_t i = 0; i < maps->size(); ++i) lengths[i] = (*maps)[i].length(from, direction, cell);
+        for (size_t i = 0; i < maps.size(); ++i) lengths[i] = maps[i].length(from, direction, cell);
         const TruthHit truth = shape.trace(from, direction, *std::ranges::max_element(lengths));
-        for (size_t i = 0; i < maps->size(); ++i) {
+        for (size_t i = 0; i < maps.size(); ++i) {
             ++checks[i].rays;
             if (truth.hit && truth.t < lengths[i])
                 ++checks[i].oversteps,

@@ -62,7 +62,7 @@ bool writeAll(int descriptor, const std::string& bytes) {
         const ssize_t count = ::write(descriptor, bytes.data() + done, bytes.size() - done);
         if (count < 0 && errno == EINTR) continue;
         if (count < 0) return false;
-        done += static_cast<size_t>(count);
+        done += size_t(count);
     }
     return true;
 }
@@ -109,7 +109,7 @@ Error unpacked(std::string text) {
     // The child notices at its next report that the parent is gone, not by a signal.
     std::signal(SIGPIPE, SIG_IGN);
     const auto send = [&](Frame kind, const std::string& payload) {
-        return writeAll(out, std::string(1, static_cast<char>(kind)) + sized(payload));
+        return writeAll(out, std::string(1, char(kind)) + sized(payload));
     };
     const auto report = [&](const std::string& what, double fraction) {
         pollfd asked{stop, POLLIN, 0};
@@ -157,7 +157,7 @@ void listen(int from, const std::function<void(const char*, size_t)>& hear, cons
         if (::poll(&waiting, 1, kPollMilliseconds) > 0) {
             const ssize_t count = ::read(from, buffer, sizeof(buffer));
             if (count == 0 || (count < 0 && errno != EINTR)) return;
-            if (count > 0) hear(buffer, static_cast<size_t>(count));
+            if (count > 0) hear(buffer, size_t(count));
         }
         if (!stopping && !goOn()) {
             stopping = true;
@@ -166,9 +166,7 @@ void listen(int from, const std::function<void(const char*, size_t)>& hear, cons
     }
 }
 
-double seconds(const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-}
+double seconds(const timeval& time) { return double(time.tv_sec) + 1e-6 * double(time.tv_usec); }
 
 int waitFor(pid_t child, rusage& usage) {
     int status = 0;
@@ -182,22 +180,21 @@ std::string firstLine(const std::string& text) { return text.substr(0, text.find
 }  // namespace
 
 Result<ChildOutcome> runInChild(const ChildWork& work, const ChildProgress& progress) {
-    auto out = makePipe(), stop = makePipe();
-    if (!out) return out.error();
-    if (!stop) return stop.error();
+    VCP_TRY_ASSIGN(auto out, makePipe());
+    VCP_TRY_ASSIGN(auto stop, makePipe());
     const pid_t child = ::fork();
     if (child < 0) return lastError("no child process");
     if (child == 0) {
-        out->read.close();
-        stop->write.close();
-        beChild(work, stop->read.number(), out->write.number());
+        out.read.close();
+        stop.write.close();
+        beChild(work, stop.read.number(), out.write.number());
     }
-    out->write.close();
-    stop->read.close();
+    out.write.close();
+    stop.read.close();
     Heard heard;
     listen(
-        out->read.number(), [&](const char* bytes, size_t count) { heard.take(bytes, count); },
-        [&] { return !progress || progress(heard.what, heard.fraction); }, [&] { stop->write.close(); });
+        out.read.number(), [&](const char* bytes, size_t count) { heard.take(bytes, count); },
+        [&] { return !progress || progress(heard.what, heard.fraction); }, [&] { stop.write.close(); });
     rusage usage{};
     const int status = waitFor(child, usage);
     if (!heard.result) {
@@ -208,12 +205,11 @@ Result<ChildOutcome> runInChild(const ChildWork& work, const ChildProgress& prog
     }
     if (!*heard.result) return heard.result->error();
     return ChildOutcome{**heard.result, seconds(usage.ru_utime) + seconds(usage.ru_stime),
-                        static_cast<uint64_t>(usage.ru_maxrss) * 1024};
+                        uint64_t(usage.ru_maxrss) * 1024};
 }
 
 Result<void> runProgram(const std::vector<std::string>& arguments, const std::function<bool()>& progress) {
-    auto errors = makePipe();
-    if (!errors) return errors.error();
+    VCP_TRY_ASSIGN(auto errors, makePipe());
     std::vector<char*> argv;
     for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
     argv.push_back(nullptr);
@@ -221,16 +217,16 @@ Result<void> runProgram(const std::vector<std::string>& arguments, const std::fu
     if (child < 0) return lastError("no child process");
     if (child == 0) {
         ::dup2(::open("/dev/null", O_WRONLY | O_CLOEXEC), STDOUT_FILENO);
-        ::dup2(errors->write.number(), STDERR_FILENO);
+        ::dup2(errors.write.number(), STDERR_FILENO);
         ::execv(argv[0], argv.data());
-        (void)writeAll(STDERR_FILENO, std::string("cannot be started: ") + std::strerror(errno));
+        static_cast<void>(writeAll(STDERR_FILENO, std::string("cannot be started: ") + std::strerror(errno)));
         ::_exit(127);
     }
-    errors->write.close();
+    errors.write.close();
     bool cancelled = false;
     std::string said;
     listen(
-        errors->read.number(),
+        errors.read.number(),
         [&](const char* bytes, size_t count) {
             if (said.size() < kLongestComplaint) said.append(bytes, count);
         },

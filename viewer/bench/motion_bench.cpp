@@ -36,10 +36,9 @@ public:
 
     Result<bool> turn() {
         if (options_.cancel && options_.cancel()) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
-        const auto next = viewer_.update(seconds());
-        if (!next) return next.error();
-        if (!next->draw) {
-            std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(next->waitSeconds, 0.0, 0.002)));
+        VCP_TRY_ASSIGN(const auto next, viewer_.update(seconds()));
+        if (!next.draw) {
+            std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(next.waitSeconds, 0.0, 0.002)));
             return false;
         }
         VCP_TRY(viewer_.draw());
@@ -49,9 +48,8 @@ public:
     /// Waits until all is read and drawn, and a second frame at full size has been timed: the first one compiles.
     Result<void> settle() {
         for (bool again = true;;) {
-            const auto drew = turn();
-            if (!drew) return drew.error();
-            if (*drew || !viewer_.status().update.settled) continue;
+            VCP_TRY_ASSIGN(const auto drew, turn());
+            if (drew || !viewer_.status().update.settled) continue;
             if (!std::exchange(again, false)) return {};
             viewer_.act(ViewerAction::ToggleLight);
         }
@@ -68,39 +66,36 @@ double MotionReport::quantileMs(double part) const { return quantile(frameMs, pa
 
 Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
                                    const MotionOptions& options) {
-    auto viewer = Viewer::create(options.viewer);
-    if (!viewer) return viewer.error();
+    VCP_TRY_ASSIGN(auto viewer, Viewer::create(options.viewer));
     OrbitCamera start;
     start.look(View::Front, bounds, options.size);
-    (*viewer)->resize(options.size);
-    VCP_TRY((*viewer)->open(std::move(datasets), {}, start, "motion"));
-    Motion motion(**viewer, options);
+    viewer->resize(options.size);
+    VCP_TRY(viewer->open(std::move(datasets), {}, start, "motion"));
+    Motion motion(*viewer, options);
     VCP_TRY(motion.settle());
     MotionReport report;
-    report.device = (*viewer)->status().device;
+    report.device = viewer->status().device;
     report.size = options.size;
-    report.stillMs = (*viewer)->status().frame.msFrame;
+    report.stillMs = viewer->status().frame.msFrame;
     const double began = seconds();
     double last = began;
     while (last - began < options.seconds) {
-        (*viewer)->setCamera(cameraAt(start, bounds.centre(), (seconds() - began) / options.seconds));
-        const auto drew = motion.turn();
-        if (!drew) return drew.error();
+        viewer->setCamera(cameraAt(start, bounds.centre(), (seconds() - began) / options.seconds));
+        VCP_TRY_ASSIGN(const auto drew, motion.turn());
         const double now = seconds();
-        if (*drew) {
+        if (drew) {
             report.frameMs.push_back(1e3 * (now - last));
-            ++report.byReduction[(*viewer)->status().reduction];
+            ++report.byReduction[viewer->status().reduction];
         }
-        last = *drew ? now : last;
+        last = drew ? now : last;
         report.seconds = now - began;
-        if (!*drew && report.seconds > 2 * options.seconds) break;
+        if (!drew && report.seconds > 2 * options.seconds) break;
     }
     // The camera rests from here on, until the frame at full size is there.
     const double stopped = seconds();
     while (!report.fullSizeAfterMs && seconds() - stopped <= kLongestRest) {
-        const auto drew = motion.turn();
-        if (!drew) return drew.error();
-        if ((*viewer)->status().reduction == 1) report.fullSizeAfterMs = 1e3 * (seconds() - stopped);
+        VCP_TRY(motion.turn());
+        if (viewer->status().reduction == 1) report.fullSizeAfterMs = 1e3 * (seconds() - stopped);
     }
     return report;
 }

@@ -32,9 +32,7 @@ struct MotionReport {
     std::string device;
     glm::ivec2 size{0};
 
-    [[nodiscard]] double framesPerSecond() const {
-        return seconds > 0 ? static_cast<double>(frameMs.size()) / seconds : 0;
-    }
+    [[nodiscard]] double framesPerSecond() const { return seconds > 0 ? double(frameMs.size()) / seconds : 0; }
     /// Returns the smallest time that `part` of the frames did not exceed; 0 without frames.
     [[nodiscard]] double quantileMs(double part) const;
 };

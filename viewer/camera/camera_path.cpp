@@ -52,8 +52,8 @@ std::vector<Key> blendable(std::span<const OrbitCamera> cameras) {
 
 /// Returns a key; beyond the ends the path goes straight on.
 Key keyAt(const std::vector<Key>& keys, std::ptrdiff_t i) {
-    const auto last = static_cast<std::ptrdiff_t>(keys.size()) - 1;
-    const auto at = [&](std::ptrdiff_t k) { return keys[static_cast<size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))]; };
+    const auto last = std::ptrdiff_t(keys.size()) - 1;
+    const auto at = [&](std::ptrdiff_t k) { return keys[size_t(std::clamp<std::ptrdiff_t>(k, 0, last))]; };
     if (i < 0) return at(0) * 2 + at(1) * -1;
     if (i > last) return at(last) * 2 + at(last - 1) * -1;
     return at(i);
@@ -86,17 +86,15 @@ std::vector<OrbitCamera> cameraPath(std::span<const OrbitCamera> keys, int count
     const std::vector<Key> blended = blendable(keys);
     std::vector<OrbitCamera> cameras;
     for (int i = 0; i < count; ++i) {
-        const double at = count > 1 ? static_cast<double>(i) / (count - 1) * static_cast<double>(keys.size() - 1) : 0;
-        const size_t before = std::min(static_cast<size_t>(at), keys.size() - 1),
-                     after = std::min(before + 1, keys.size() - 1);
-        const double t = at - static_cast<double>(before);
+        const double at = count > 1 ? double(i) / (count - 1) * double(keys.size() - 1) : 0;
+        const size_t before = std::min(size_t(at), keys.size() - 1), after = std::min(before + 1, keys.size() - 1);
+        const double t = at - double(before);
         OrbitCamera camera = keys[before];
         if (t > 0) {
             const std::array<double, 4> weights = catmullRomWeights(t);
-            Key sum = keyAt(blended, static_cast<std::ptrdiff_t>(before) - 1) * weights[0];
+            Key sum = keyAt(blended, std::ptrdiff_t(before) - 1) * weights[0];
             for (std::ptrdiff_t k = 1; k < 4; ++k)
-                sum =
-                    sum + keyAt(blended, static_cast<std::ptrdiff_t>(before) - 1 + k) * weights[static_cast<size_t>(k)];
+                sum = sum + keyAt(blended, std::ptrdiff_t(before) - 1 + k) * weights[size_t(k)];
             camera.orientation = glm::normalize(sum.orientation);
             camera.focusDistance = std::exp(sum.logDistance);
             camera.position = sum.focus - camera.forwardVector() * camera.focusDistance;
@@ -123,10 +121,9 @@ Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const st
 }
 
 Result<std::vector<OrbitCamera>> readCameras(const std::filesystem::path& path) {
-    const auto text =
-        readText(path, kLargestFile, "a path of cameras", "cannot be opened; a path is a JSON array of cameras");
-    if (!text) return text.error();
-    return camerasFromJson(*text, path.string());
+    VCP_TRY_ASSIGN(const auto text, readText(path, kLargestFile, "a path of cameras",
+                                             "cannot be opened; a path is a JSON array of cameras"));
+    return camerasFromJson(text, path.string());
 }
 
 }  // namespace vcp

@@ -313,7 +313,7 @@ private:
 
 Error notJson(std::string_view text, size_t byte, const std::string& name) {
     const size_t at = std::min(byte > 0 ? byte - 1 : 0, text.size());
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');
     return {ErrorCode::InvalidInput, "not a camera: the JSON breaks off or goes wrong here", name,
             "line " + std::to_string(line), at};
 }
@@ -358,16 +358,15 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
 
 Result<OrbitCamera> readCamera(const std::filesystem::path& path) {
     constexpr size_t kLimit = 1 << 20;
-    const auto text =
-        readText(path, kLimit, "a camera file", "cannot be opened; views are " + viewNames() + " or a JSON file");
-    if (!text) return text.error();
-    auto camera = cameraFromJson(*text, path.string());
+    VCP_TRY_ASSIGN(const auto text, readText(path, kLimit, "a camera file",
+                                             "cannot be opened; views are " + viewNames() + " or a JSON file"));
+    auto camera = cameraFromJson(text, path.string());
     if (camera) return camera;
     Error error = camera.error();
     // A field stands in quotes; a text that is no camera has no line.
     if (error.element.starts_with('"'))
         error.element = fmt::format(
-            "line {}: {}", LinesOf(*text)("/" + error.element.substr(1, error.element.size() - 2)), error.element);
+            "line {}: {}", LinesOf(text)("/" + error.element.substr(1, error.element.size() - 2)), error.element);
     return error;
 }
 

@@ -121,9 +121,7 @@ Result<int> runBuild(const BuildBenchCommand& command) {
     options.models = command.modelPaths();
     for (const std::string& size : command.generated) options.generated.push_back(*parseCount(size));
     if (!options.generated.empty()) {
-        auto makeScan = findMakeScan();
-        if (!makeScan) return makeScan.error();
-        options.makeScan = *makeScan;
+        VCP_TRY_ASSIGN(options.makeScan, findMakeScan());
     }
     VCP_TRY(makeFolder(command.out));
     options.errors = command.errors;
@@ -429,7 +427,7 @@ Command addBench(CLI::App& vcp) {
     return {app, [=] {
                 const auto all = app->get_subcommands([](CLI::App*) { return true; });
                 const auto at = std::ranges::find_if(all, [](const CLI::App* each) { return each->parsed(); });
-                return runs[static_cast<size_t>(at - all.begin())]();
+                return runs[size_t(at - all.begin())]();
             }};
 }
 

@@ -51,7 +51,7 @@ Json toJson(const BuildReport& report) {
 }
 
 std::string summary(const std::string& output, const BuildReport& report) {
-    const double triangles = static_cast<double>(std::max<uint64_t>(report.triangles, 1));
+    const double triangles = double(std::max<uint64_t>(report.triangles, 1));
     std::string text = fmt::format("{}: {} triangles in {} ({:.2f} M/s), peak memory {}\n", output,
                                    formatCount(report.triangles), formatSeconds(report.seconds),
                                    1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
@@ -59,7 +59,7 @@ std::string summary(const std::string& output, const BuildReport& report) {
         text += fmt::format("  {} triangles without area were left out\n", formatCount(report.degenerateTriangles));
     for (const std::string& warning : report.warnings) text += fmt::format("  {}\n", warning);
     text += fmt::format("  {} ({:.1f} bytes a triangle), {} levels, {} subvolumes, {} leaves, {} of them hard\n",
-                        formatBytes(report.fileBytes), static_cast<double>(report.fileBytes) / triangles, report.levels,
+                        formatBytes(report.fileBytes), double(report.fileBytes) / triangles, report.levels,
                         formatCount(report.subvolumes), formatCount(report.leaves), formatCount(report.hardLeaves));
     text += fmt::format("  cell {}, ", formatLength(report.cell));
     if (std::isnan(report.certifiedErrorMax)) return text + "no certified error";
@@ -109,12 +109,11 @@ std::string summary(const BuildEstimate& estimate) {
 
 /// Reports what the build would need; nothing is written.
 Result<int> tell(const BuildOptions& options, bool asJson) {
-    const auto estimate = estimateBuild(options);
-    if (!estimate) return estimate.error();
+    VCP_TRY_ASSIGN(const auto estimate, estimateBuild(options));
     if (asJson)
-        VCP_TRY(printJson(toJson(*estimate)));
+        VCP_TRY(printJson(toJson(estimate)));
     else
-        VCP_TRY(printLine(summary(*estimate)));
+        VCP_TRY(printLine(summary(estimate)));
     return 0;
 }
 

@@ -38,12 +38,11 @@ std::string table(const std::vector<DeviceInfo>& devices) {
 }
 
 Result<int> run(const DevicesCommand& command) {
-    const auto devices = listDevices(command.device);
-    if (!devices) return devices.error();
+    VCP_TRY_ASSIGN(const auto devices, listDevices(command.device));
     if (command.report.json)
-        VCP_TRY(printJson(toJson(*devices)));
+        VCP_TRY(printJson(toJson(devices)));
     else
-        VCP_TRY(printLine(table(*devices)));
+        VCP_TRY(printLine(table(devices)));
     return 0;
 }
 

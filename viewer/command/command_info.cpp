@@ -77,7 +77,7 @@ std::string paperLine(const PaperParameters& p) {
         "  method      paper: band {:g} cells, {}, {}, {} vectors, {} empty nodes\n", p.band,
         p.mergeThreshold < 0 ? std::string("not merged") : fmt::format("merged below {:g} cells", p.mergeThreshold),
         p.growRounds < 0 ? std::string("exact points") : fmt::format("{} rounds of region growing", p.growRounds),
-        p.packing == static_cast<uint32_t>(PaperPacking::Spherical) ? "spherical" : "octahedral",
+        p.packing == uint32_t(PaperPacking::Spherical) ? "spherical" : "octahedral",
         p.safeEmpty != 0 ? "safe" : "published");
 }
 
@@ -112,14 +112,12 @@ std::string summary(const std::string& file, const Dataset& dataset) {
 
 Result<int> run(const InfoCommand& command) {
     const InterruptScope catching;
-    const auto reader = openReader(command.file, command.source);
-    if (!reader) return reader.error();
-    const auto dataset = readDataset(**reader);
-    if (!dataset) return dataset.error();
+    VCP_TRY_ASSIGN(const auto reader, openReader(command.file, command.source));
+    VCP_TRY_ASSIGN(const auto dataset, readDataset(*reader));
     if (command.report.json)
-        VCP_TRY(printJson(toJson((*reader)->name(), *dataset)));
+        VCP_TRY(printJson(toJson(reader->name(), dataset)));
     else
-        VCP_TRY(printLine(summary((*reader)->name(), *dataset)));
+        VCP_TRY(printLine(summary(reader->name(), dataset)));
     return 0;
 }
 

@@ -89,10 +89,9 @@ Result<void> readSource(const BuildMeso& c, Asset& asset) {
     std::string extension = std::filesystem::path(c.source).extension().string();
     std::ranges::transform(extension, extension.begin(), [](unsigned char letter) { return std::tolower(letter); });
     if (isIn(heightFieldNames()) || extension == ".png" || extension == ".exr") {
-        auto map = isIn(heightFieldNames()) ? makeHeightField(c.source, c.texels, c.seed)
-                                            : readHeightImage(c.source, c.height > 0 ? c.height : 0.1);
-        if (!map) return map.error();
-        asset.heights = *std::move(map);
+        VCP_TRY_ASSIGN(asset.heights, isIn(heightFieldNames())
+                                          ? makeHeightField(c.source, c.texels, c.seed)
+                                          : readHeightImage(c.source, c.height > 0 ? c.height : 0.1));
         if (c.height > 0) asset.heights->range = c.height;
         return {};
     }
@@ -108,9 +107,8 @@ Result<void> readSource(const BuildMeso& c, Asset& asset) {
             return wrong("--period must be like 4 or 4,2 in the mesh's units, not \"" + c.period + "\"");
         options.period = glm::dvec2(x->value, y->value);
     }
-    auto mesh = readTileMesh(c.source, options);
-    if (!mesh) return mesh.error();
-    asset.triangles = std::move(mesh->triangles), asset.extent = mesh->extent;
+    VCP_TRY_ASSIGN(auto mesh, readTileMesh(c.source, options));
+    asset.triangles = std::move(mesh.triangles), asset.extent = mesh.extent;
     return {};
 }
 
@@ -173,8 +171,7 @@ std::string summary(const std::string& file, uint64_t fileBytes, const Asset& a)
 
 Result<int> runBuild(const BuildMeso& command) {
     const auto start = std::chrono::steady_clock::now();
-    auto options = optionsOf(command);
-    if (!options) return options.error();
+    VCP_TRY_ASSIGN(auto options, optionsOf(command));
     const OutputRules rules{.overwrite = command.overwrite, .inputs = {command.source}};
     VCP_TRY(checkOutput(command.out, OutputKind::Asset, rules));
     Asset asset;
@@ -186,30 +183,26 @@ Result<int> runBuild(const BuildMeso& command) {
     // The shape gives the extent, by which --grid N is measured.
     const auto shape = shapeOf(asset);
     if (!shape) return named(shape.error());
-    const auto cells = cellsOf(command.grid, (*shape)->extent());
-    if (!cells) return cells.error();
-    options->cells = *cells;
-    if (const auto built = buildAsset(asset, *options); !built) return named(built.error());
-    const auto bytes = writeAsset(command.out, asset, rules);
-    if (!bytes) return bytes.error();
-    Json json = toJson(command.out, *bytes, asset);
+    VCP_TRY_ASSIGN(options.cells, cellsOf(command.grid, (*shape)->extent()));
+    if (const auto built = buildAsset(asset, options); !built) return named(built.error());
+    VCP_TRY_ASSIGN(const auto bytes, writeAsset(command.out, asset, rules));
+    Json json = toJson(command.out, bytes, asset);
     json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (command.report.json)
         VCP_TRY(printJson(json));
     else
-        VCP_TRY(printLine(summary(command.out, *bytes, asset)));
+        VCP_TRY(printLine(summary(command.out, bytes, asset)));
     return 0;
 }
 
 Result<int> runInfo(const InfoMeso& command) {
-    const auto asset = readAsset(command.file);
-    if (!asset) return asset.error();
+    VCP_TRY_ASSIGN(const auto asset, readAsset(command.file));
     std::error_code ignored;
     const uint64_t bytes = std::filesystem::file_size(command.file, ignored);
     if (command.report.json)
-        VCP_TRY(printJson(toJson(command.file, bytes, *asset)));
+        VCP_TRY(printJson(toJson(command.file, bytes, asset)));
     else
-        VCP_TRY(printLine(summary(command.file, bytes, *asset)));
+        VCP_TRY(printLine(summary(command.file, bytes, asset)));
     return 0;
 }
 

@@ -79,8 +79,7 @@ Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
     constexpr const char* kColours[] = {"0.78,0.76,0.72", "0.95,0.74,0.22", "0.55,0.68,0.8", "0.72,0.45,0.36"};
     MesoSurfaceDescription d = c.description;
     const size_t count = c.assets.size();
-    const auto surface = valueOf(c.surfaces, i, count, std::string("quad"), "--surface");
-    if (!surface) return surface.error();
+    VCP_TRY_ASSIGN(const auto surface, valueOf(c.surfaces, i, count, std::string("quad"), "--surface"));
     const auto tiles = valueOf(c.tiles, i, count, 4.0, "--tiles"),
                height = valueOf(c.heights, i, count, 1.0, "--height"),
                scale = valueOf(c.scales, i, count, 1.0, "--scale");
@@ -107,8 +106,8 @@ Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
         if (!*value) return value->error();
     d.withFar = c.errorPixels > 0;
     d.colourTexture = *texture, d.normalTexture = *normals;
-    d.asset = c.assets[i], d.base = *surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale,
-    d.place = *at, d.colour = glm::vec3(*rgb), d.up = upOf(c);
+    d.asset = c.assets[i], d.base = surface, d.tiles = *tiles, d.heightScale = *height, d.scale = *scale, d.place = *at,
+    d.colour = glm::vec3(*rgb), d.up = upOf(c);
     d.method.cones = {cones->x, cones->y};
     return d;
 }
@@ -116,17 +115,16 @@ Result<MesoSurfaceDescription> descriptionOf(const RenderMeso& c, size_t i) {
 Result<std::vector<MesoSurfaceDescription>> descriptionsOf(const RenderMeso& c) {
     std::vector<MesoSurfaceDescription> all;
     for (size_t i = 0; i < c.assets.size(); ++i) {
-        auto d = descriptionOf(c, i);
-        if (!d) return d.error();
+        VCP_TRY_ASSIGN(auto d, descriptionOf(c, i));
         // A base is drawn once: with its first asset, and not beside a quad where that lies a little lower.
         const auto hides = [&](const MesoSurfaceDescription& other) {
-            if (other.base != d->base) return false;
-            if (other.place == d->place && other.scale == d->scale) return true;
-            const glm::dvec3 off = glm::abs(other.place - d->place);
-            return d->base == "quad" && std::max(off.x, d->up == UpAxis::Y ? off.z : off.y) < other.scale;
+            if (other.base != d.base) return false;
+            if (other.place == d.place && other.scale == d.scale) return true;
+            const glm::dvec3 off = glm::abs(other.place - d.place);
+            return d.base == "quad" && std::max(off.x, d.up == UpAxis::Y ? off.z : off.y) < other.scale;
         };
-        d->withBase = !c.noBase && std::ranges::none_of(all, hides);
-        all.push_back(*std::move(d));
+        d.withBase = !c.noBase && std::ranges::none_of(all, hides);
+        all.push_back(std::move(d));
     }
     return all;
 }
@@ -135,9 +133,8 @@ Result<Camera> cameraOf(const RenderMeso& c, const Box& bounds, glm::ivec2 size)
     if (!c.camera.empty()) {
         RenderSettings settings;
         settings.camera = c.camera, settings.up = c.up;
-        const auto camera = settings.cameraFor(bounds, size);
-        if (!camera) return camera.error();
-        return camera->current();
+        VCP_TRY_ASSIGN(const auto camera, settings.cameraFor(bounds, size));
+        return camera.current();
     }
     const std::vector<double> view = numbersOf(c.view);
     if (view.size() < 2 || view.size() > 3 || std::abs(view[1]) >= 90 || (view.size() == 3 && !(view[2] > 0)))
@@ -175,15 +172,12 @@ Picture besideEachOther(const std::vector<Panel>& panels) {
 }
 
 Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, int frames) {
-    const auto update = renderer.settle(request, interrupted);
-    if (!update) return update.error();
-    if (!update->problems.empty()) return update->problems.front();
+    VCP_TRY_ASSIGN(const auto update, renderer.settle(request, interrupted));
+    if (!update.problems.empty()) return update.problems.front();
     FrameStats stats;
     std::vector<double> times;
     for (int i = 0; i <= frames; ++i) {
-        const auto drawn = renderer.render(request);
-        if (!drawn) return drawn.error();
-        stats = *drawn;
+        VCP_TRY_ASSIGN(stats, renderer.render(request));
         if (i > 0) times.push_back(stats.msFrame);
     }
     if (!times.empty()) stats.msFrame = upperQuantile(times, 0.5);
@@ -192,42 +186,37 @@ Result<FrameStats> drawFrames(Renderer& renderer, const FrameRequest& request, i
 
 Result<Panel> drawPanel(Renderer& renderer, const FrameRequest& request, const RenderMeso& command,
                         const OutputRules& rules, const std::string& method) {
-    const auto stats = drawFrames(renderer, request, command.frames);
-    if (!stats) return stats.error();
-    auto picture = renderer.readPicture();
-    if (!picture) return picture.error();
+    VCP_TRY_ASSIGN(const auto stats, drawFrames(renderer, request, command.frames));
+    VCP_TRY_ASSIGN(auto picture, renderer.readPicture());
     if (!command.depth.empty()) {
-        const auto depth = renderer.readDepth();
-        if (!depth) return depth.error();
-        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth, rules));
+        VCP_TRY_ASSIGN(const auto depth, renderer.readDepth());
+        VCP_TRY(writeDepth(depth, request.width, request.height, command.depth, rules));
     }
-    const auto iterations = renderer.readIterations();
-    if (!iterations) return iterations.error();
+    VCP_TRY_ASSIGN(const auto iterations, renderer.readIterations());
     const std::vector<std::string> problems = renderer.validationMessages();
     if (!problems.empty()) return Error{.code = ErrorCode::Device, .message = problems.front()};
-    const double mean = std::accumulate(iterations->begin(), iterations->end(), 0.0) / double(iterations->size());
-    return Panel{*std::move(picture),
+    const double mean = std::accumulate(iterations.begin(), iterations.end(), 0.0) / double(iterations.size());
+    return Panel{std::move(picture),
                  {{"method", method},
-                  {"ms_per_frame", stats->msFrame},
-                  {"hit_pixels", stats->hitPixels},
+                  {"ms_per_frame", stats.msFrame},
+                  {"hit_pixels", stats.hitPixels},
                   {"iterations_mean", mean},
-                  {"unresolved", stats->unresolvedRays},
-                  {"far_hits", stats->farHits},
-                  {"asset_bytes", stats->surfaceBytes}},
-                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats->msFrame,
-                             mean, stats->unresolvedRays, formatBytes(stats->surfaceBytes))};
+                  {"unresolved", stats.unresolvedRays},
+                  {"far_hits", stats.farHits},
+                  {"asset_bytes", stats.surfaceBytes}},
+                 fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", method, stats.msFrame, mean,
+                             stats.unresolvedRays, formatBytes(stats.surfaceBytes))};
 }
 
 Result<FrameRequest> requestOf(const RenderMeso& command, const Box& bounds) {
     const auto size = parseSize(command.size);
     if (!size) return wrong("--size must be like 960x640, not \"" + command.size + "\"");
-    const auto camera = cameraOf(command, bounds, *size);
-    if (!camera) return camera.error();
+    VCP_TRY_ASSIGN(const auto camera, cameraOf(command, bounds, *size));
     const auto light =
         command.light.empty() ? turnedUp({0.5, -0.4, 0.75}, upOf(command)) : parseDirection(command.light);
     if (!light) return wrong("--light must be a direction like 0.5,0.4,0.8, not \"" + command.light + "\"");
     FrameRequest request;
-    request.camera = *camera;
+    request.camera = camera;
     if (command.errorPixels > 0) request.errorPixels = command.errorPixels;  // else surfaces are always marched
     request.width = uint32_t(size->x), request.height = uint32_t(size->y);
     request.shading.mode = command.heat ? ShadingMode::Steps : ShadingMode::Lit;
@@ -263,44 +252,37 @@ OutputRules rulesOf(const RenderMeso& command, const std::vector<MesoSurfaceDesc
 
 Result<int> runRender(const RenderMeso& command) {
     if (command.methods.size() > 1 && !command.depth.empty()) return wrong("--depth is of one method");
-    auto descriptions = descriptionsOf(command);
-    if (!descriptions) return descriptions.error();
+    VCP_TRY_ASSIGN(auto descriptions, descriptionsOf(command));
     // Errors are reported before anything is made.
-    const OutputRules rules = rulesOf(command, *descriptions);
+    const OutputRules rules = rulesOf(command, descriptions);
     VCP_TRY(checkOutput(command.out, OutputKind::Png, rules));
     if (const auto request = requestOf(command, {glm::dvec3(-1), glm::dvec3(1)}); !request) return request.error();
     OpenedScene behind;
     if (!command.scan.empty()) {
         SourceSettings source;
         source.cancelled = interrupted;
-        auto opened = openSceneShown({command.scan}, BuildSettings{}, source, ProgressStyle::None);
-        if (!opened) return opened.error();
-        behind = *std::move(opened);
+        VCP_TRY_ASSIGN(behind, openSceneShown({command.scan}, BuildSettings{}, source, ProgressStyle::None));
     }
     const InterruptScope catching;
     RendererOptions options;
     options.device = command.device, options.validation = command.validation;
-    auto renderer = Renderer::create(options);
-    if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->open(behind.placed()));
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
+    VCP_TRY(renderer->open(behind.placed()));
     std::vector<std::string> warnings = behind.surfaces.warnings;
     std::vector<Panel> panels;
     for (const std::string& method : command.methods) {
-        for (MesoSurfaceDescription& d : *descriptions) d.method.name = method;
-        auto scene = makeMesoScene(*descriptions);
-        if (!scene) return scene.error();
-        if (panels.empty()) warnings.insert(warnings.end(), scene->warnings.begin(), scene->warnings.end());
-        const auto request = requestOf(command, scene->bounds.joined(behind.bounds()));
-        if (!request) return request.error();
+        for (MesoSurfaceDescription& d : descriptions) d.method.name = method;
+        VCP_TRY_ASSIGN(auto scene, makeMesoScene(descriptions));
+        if (panels.empty()) warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
+        VCP_TRY_ASSIGN(const auto request, requestOf(command, scene.bounds.joined(behind.bounds())));
         std::vector<MesoSurface> surfaces = behind.surfaces.surfaces;
-        std::ranges::move(scene->surfaces, std::back_inserter(surfaces));
-        VCP_TRY((*renderer)->setSurfaces(surfaces));
-        auto panel = drawPanel(**renderer, *request, command, rules, method);
-        if (!panel) return panel.error();
-        panels.push_back(*std::move(panel));
+        std::ranges::move(scene.surfaces, std::back_inserter(surfaces));
+        VCP_TRY(renderer->setSurfaces(surfaces));
+        VCP_TRY_ASSIGN(auto panel, drawPanel(*renderer, request, command, rules, method));
+        panels.push_back(std::move(panel));
     }
     VCP_TRY(writePng(besideEachOther(panels), command.out, rules));
-    return report(command, panels, warnings, (*renderer)->device());
+    return report(command, panels, warnings, renderer->device());
 }
 
 }  // namespace

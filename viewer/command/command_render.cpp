@@ -61,9 +61,7 @@ struct Drawing {
 
     /// Of the timed frames; of the first when none was timed.
     [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : upperQuantile(frameMs, 0.5); }
-    [[nodiscard]] double raysPerSecond() const {
-        return static_cast<double>(stats.rays) / std::max(1e-3 * medianMs(), 1e-9);
-    }
+    [[nodiscard]] double raysPerSecond() const { return double(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
 };
 
 /// Without --settle: updates until the coarsest page is there, and shows what there is.
@@ -77,20 +75,19 @@ Result<UpdateResult> updateUntilDrawable(Renderer& renderer, const FrameRequest&
 }
 
 Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const RenderCommand& command) {
-    auto update = command.settle ? renderer.settle(request, interrupted) : updateUntilDrawable(renderer, request);
-    if (!update) return update.error();
-    if (!update->problems.empty()) return update->problems.front();
+    VCP_TRY_ASSIGN(auto update,
+                   command.settle ? renderer.settle(request, interrupted) : updateUntilDrawable(renderer, request));
+    if (!update.problems.empty()) return update.problems.front();
     Drawing drawing;
-    drawing.update = *std::move(update);
+    drawing.update = std::move(update);
     for (int i = 0; i <= command.framesToTime(); ++i) {
         if (interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
-        auto stats = renderer.render(request);
-        if (!stats) return stats.error();
-        drawing.stats = *stats;
+        VCP_TRY_ASSIGN(auto stats, renderer.render(request));
+        drawing.stats = stats;
         if (i == 0)
-            drawing.firstFrameMs = stats->msFrame;
+            drawing.firstFrameMs = stats.msFrame;
         else
-            drawing.frameMs.push_back(stats->msFrame);
+            drawing.frameMs.push_back(stats.msFrame);
     }
     return drawing;
 }
@@ -98,18 +95,15 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
 Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command,
                         const OutputRules& rules) {
     if (!command.depth.empty()) {
-        const auto depth = renderer.readDepth();
-        if (!depth) return depth.error();
-        VCP_TRY(writeDepth(*depth, request.width, request.height, command.depth, rules));
+        VCP_TRY_ASSIGN(const auto depth, renderer.readDepth());
+        VCP_TRY(writeDepth(depth, request.width, request.height, command.depth, rules));
     }
     if (!command.normals.empty()) {
-        const auto normals = renderer.readNormals();
-        if (!normals) return normals.error();
-        VCP_TRY(writeNormals(*normals, request.width, request.height, command.normals, rules));
+        VCP_TRY_ASSIGN(const auto normals, renderer.readNormals());
+        VCP_TRY(writeNormals(normals, request.width, request.height, command.normals, rules));
     }
-    const auto picture = renderer.readPicture();
-    if (!picture) return picture.error();
-    return writePng(*picture, command.output, rules);
+    VCP_TRY_ASSIGN(const auto picture, renderer.readPicture());
+    return writePng(picture, command.output, rules);
 }
 
 Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
@@ -159,9 +153,8 @@ Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitC
     if (command.turntable > 0) {
         cameras = turntable(camera, bounds.centre(), command.turntable);
     } else if (!command.path.empty()) {
-        const auto keys = readCameras(command.path);
-        if (!keys) return keys.error();
-        cameras = cameraPath(*keys, command.frames > 0 ? command.frames : kPathFrames);
+        VCP_TRY_ASSIGN(const auto keys, readCameras(command.path));
+        cameras = cameraPath(keys, command.frames > 0 ? command.frames : kPathFrames);
     }
     std::vector<Camera> current;
     for (const OrbitCamera& each : cameras) current.push_back(each.current());
@@ -173,8 +166,8 @@ Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& d
             {"height", request.height},
             {"pictures", pictures},
             {"tiles", total.tiles},
-            {"ms_per_frame", total.ms / static_cast<double>(pictures)},
-            {"rays_per_second", static_cast<double>(total.rays) / std::max(1e-3 * total.ms, 1e-9)},
+            {"ms_per_frame", total.ms / double(pictures)},
+            {"rays_per_second", double(total.rays) / std::max(1e-3 * total.ms, 1e-9)},
             {"rays", total.rays},
             {"hit_pixels", total.hitPixels},
             {"device", device.name},
@@ -197,9 +190,7 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
                                         .rules = rules,
                                         .problem = {}});
     for (bool isDone = false; !isDone;) {
-        const auto step = sequence.step();
-        if (!step) return step.error();
-        isDone = *step;
+        VCP_TRY_ASSIGN(isDone, sequence.step());
         display.update("drawing", sequence.fraction());
         if (!isDone && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
         if (sequence.isWaiting()) renderer.waitForPage(kWait);
@@ -251,28 +242,25 @@ Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     const glm::ivec2 size = parseSize(command.size).value();
-    const auto open =
-        openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle());
-    if (!open) return open.error();
-    if (open->parts.size() == 1) VCP_TRY(command.render.checkFor(*open->parts.front().open.dataset));
-    const SceneFile& scene = open->file;
-    for (const std::string& warning : open->surfaces.warnings) warnOnTerminal(warning);
-    const Box bounds = open->bounds();
-    const auto camera =
-        command.render.camera == "fit" && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size);
-    if (!camera) return camera.error();
-    const auto cameras = camerasOf(command, *camera, bounds);
-    if (!cameras) return cameras.error();
-    const OutputRules rules = rulesOf(command, open->filesRead);
-    VCP_TRY(checkOutputs(command, rules, cameras->size()));
-    auto renderer = Renderer::create(command.render.rendererOptions());
-    if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->open(open->placed(), open->surfaces.surfaces));
+    VCP_TRY_ASSIGN(const auto open, openSceneShown(command.inputs, command.build, command.render.source,
+                                                   command.report.progressStyle()));
+    if (open.parts.size() == 1) VCP_TRY(command.render.checkFor(*open.parts.front().open.dataset));
+    const SceneFile& scene = open.file;
+    for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
+    const Box bounds = open.bounds();
+    VCP_TRY_ASSIGN(const auto camera, command.render.camera == "fit" && scene.camera
+                                          ? *scene.camera
+                                          : command.render.cameraFor(bounds, size));
+    VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
+    const OutputRules rules = rulesOf(command, open.filesRead);
+    VCP_TRY(checkOutputs(command, rules, cameras.size()));
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(command.render.rendererOptions()));
+    VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
 
     FrameRequest request;
-    request.camera = camera->current();
-    request.width = static_cast<uint32_t>(size.x);
-    request.height = static_cast<uint32_t>(size.y);
+    request.camera = camera.current();
+    request.width = uint32_t(size.x);
+    request.height = uint32_t(size.y);
     request.errorPixels = command.render.errorPixels;
     request.shading = command.render.shadingChosen();
     request.shading.transparent = command.transparent;
@@ -289,20 +277,19 @@ Result<int> run(const RenderCommand& command) {
     request.march = command.render.march;
     const InterruptScope catching;
     if (command.isTiled(request)) {
-        VCP_TRY(makeTiled(**renderer, request, *cameras, command, rules));
+        VCP_TRY(makeTiled(*renderer, request, cameras, command, rules));
         return 0;
     }
-    const auto drawing = draw(**renderer, request, command);
-    if (!drawing) return drawing.error();
-    VCP_TRY(writeFiles(**renderer, request, command, rules));
-    if (drawing->stats.unresolvedRays > 0)
+    VCP_TRY_ASSIGN(const auto drawing, draw(*renderer, request, command));
+    VCP_TRY(writeFiles(*renderer, request, command, rules));
+    if (drawing.stats.unresolvedRays > 0)
         warnOnTerminal(
             fmt::format("{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
-                        drawing->stats.unresolvedRays));
+                        drawing.stats.unresolvedRays));
     if (command.report.json)
-        VCP_TRY(printJson(toJson(*drawing, (*renderer)->device(), request, *camera)));
+        VCP_TRY(printJson(toJson(drawing, renderer->device(), request, camera)));
     else
-        VCP_TRY(printLineAbout(command.output, summary(command, *drawing, (*renderer)->device())));
+        VCP_TRY(printLineAbout(command.output, summary(command, drawing, renderer->device())));
     return 0;
 }
 

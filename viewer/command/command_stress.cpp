@@ -79,26 +79,24 @@ Result<int> runMotion(const StressCommand& command, const OpenDataset& open, con
     options.size = parseSize(command.size).value();
     options.seconds = command.motionSeconds;
     options.cancel = interrupted;
-    const auto report = measureMotion({{open.dataset, open.source, {}}}, open.bounds(), options);
-    if (!report) return report.error();
-    VCP_TRY(command.report.json ? printJsonText(motionJson(*report)) : printLine(motionText(*report)));
+    VCP_TRY_ASSIGN(const auto report, measureMotion({{open.dataset, open.source, {}}}, open.bounds(), options));
+    VCP_TRY(command.report.json ? printJsonText(motionJson(report)) : printLine(motionText(report)));
     return 0;
 }
 
 Result<int> run(const StressCommand& command) {
     const InterruptScope catching;
     const auto start = std::chrono::steady_clock::now();
-    const auto open = openDataset(command.file, command.source);
-    if (!open) return open.error();
-    StressOptions options = optionsFor(command, *open);
-    if (command.motionSeconds > 0) return runMotion(command, *open, options.renderer);
+    VCP_TRY_ASSIGN(const auto open, openDataset(command.file, command.source));
+    StressOptions options = optionsFor(command, open);
+    if (command.motionSeconds > 0) return runMotion(command, open, options.renderer);
     options.openSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = [&](const std::string& what, double fraction) {
         display.update(what, fraction);
         return !interrupted();
     };
-    auto report = runStress(*open, options);
+    auto report = runStress(open, options);
     display.finish();
     if (!report) return report.error();
     report->faults = command.faults;

@@ -33,8 +33,7 @@ struct ByteProgress {
 
 bool showBytes(void* user, uint64_t done) {
     const auto* progress = static_cast<const ByteProgress*>(user);
-    progress->display->update("checking",
-                              static_cast<double>(done) / static_cast<double>(std::max<uint64_t>(progress->size, 1)));
+    progress->display->update("checking", double(done) / double(std::max<uint64_t>(progress->size, 1)));
     return !interrupted();
 }
 
@@ -52,18 +51,16 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     display.update("reading the mesh", 0);
     const std::vector<std::filesystem::path> meshes(command.against.begin(), command.against.end());
-    const auto mesh = loadMesh(meshes);
-    if (!mesh) return mesh.error();
+    VCP_TRY_ASSIGN(const auto mesh, loadMesh(meshes));
     display.update("sorting the mesh", 0.1);
-    const MeshBvh bvh(*mesh);
+    const MeshBvh bvh(mesh);
     display.update("reading the level", 0.2);
-    auto cache = PageCache::open(command.file);
-    if (!cache) return cache.error();
-    const uint32_t levels = cache->dataset().header.levels;
+    VCP_TRY_ASSIGN(auto cache, PageCache::open(command.file));
+    const uint32_t levels = cache.dataset().header.levels;
     if (command.level != UINT32_MAX && command.level >= levels)
         return Error{ErrorCode::Usage, fmt::format("has no level {}, only 0 to {}", command.level, levels - 1),
                      command.file};
-    VCP_TRY(cache->loadLevel(std::min(command.level, levels - 1)));
+    VCP_TRY(cache.loadLevel(std::min(command.level, levels - 1)));
 
     SurfaceDistanceOptions options;
     options.samples = command.samples;
@@ -73,7 +70,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
         display.update("measuring", 0.3 + 0.7 * fraction);
         return !interrupted();
     };
-    return measureSurfaceDistance(*cache, bvh, options);
+    return measureSurfaceDistance(cache, bvh, options);
 }
 
 /// Whether a distance is within its bound; measured ones are kept in single precision, whose rounding is forgiven.
@@ -131,9 +128,8 @@ Result<int> run(const VerifyCommand& command) {
     if (isHttpUrl(command.file) && !command.against.empty())
         return Error{ErrorCode::Usage, "--against needs a local file"};
     const InterruptScope catching;
-    const auto reader = openReader(command.file, command.source);
-    if (!reader) return reader.error();
-    const ReadAhead ahead(*reader);
+    VCP_TRY_ASSIGN(const auto reader, openReader(command.file, command.source));
+    const ReadAhead ahead(reader);
     const auto dataset = checkBytes(ahead, command.report.progressStyle());
     if (!dataset) return broken(command, dataset.error());
 
@@ -143,9 +139,7 @@ Result<int> run(const VerifyCommand& command) {
     bool within = true;
     std::optional<SurfaceDistance> distance;
     if (!command.against.empty()) {
-        auto measured = measure(command);
-        if (!measured) return measured.error();
-        distance = *measured;
+        VCP_TRY_ASSIGN(distance, measure(command));
         within = isWithin(*distance);
         json["ok"] = within;
         addDistances(json, *distance);

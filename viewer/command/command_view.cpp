@@ -48,20 +48,17 @@ Json toJson(const WindowReport& report) {
 /// Finds errors before a window is opened: a missing mesh, a .vcp that is none.
 Result<void> checkInputs(const ViewCommand& command) {
     std::vector<std::string> inputs = command.inputs;
-    const auto kind = kindOf(inputs);
-    if (!kind) return kind.error();
-    if (*kind == InputKind::Scene) {
-        const auto scene = readScene(inputs.front());
-        if (!scene) return scene.error();
+    VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
+    if (kind == InputKind::Scene) {
+        VCP_TRY_ASSIGN(const auto scene, readScene(inputs.front()));
         inputs.clear();
-        for (const SceneDataset& each : scene->datasets) inputs.push_back(each.file);
+        for (const SceneDataset& each : scene.datasets) inputs.push_back(each.file);
     }
     for (const std::string& input : inputs) {
         if (isHttpUrl(input)) continue;
         if (looksLikeDataset(input)) {
-            const auto open = openDataset(input, command.render.source);
-            if (!open) return open.error();
-            if (inputs.size() == 1) VCP_TRY(command.render.checkFor(*open->dataset));
+            VCP_TRY_ASSIGN(const auto open, openDataset(input, command.render.source));
+            if (inputs.size() == 1) VCP_TRY(command.render.checkFor(*open.dataset));
         } else if (std::error_code failed; !std::filesystem::exists(input, failed)) {
             return Error{ErrorCode::Io, "cannot be opened: there is no such file", input};
         }
@@ -91,17 +88,15 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     options.catchInterrupts = [] { return std::make_shared<InterruptScope>(); };
     options.interrupted = interrupted;
     if (!command.size.empty()) options.size = parseSize(command.size).value();
-    const auto report = showWindow(options);
-    if (!report) return report.error();
+    VCP_TRY_ASSIGN(const auto report, showWindow(options));
     if (settingsPath) {
         // The session itself worked: that it cannot be remembered is no failure.
-        const auto saved = saveChanges(report->changes, *settingsPath);
+        const auto saved = saveChanges(report.changes, *settingsPath);
         if (!saved || !saved->empty()) warn(saved ? *saved : saved.error().line());
     }
-    if (command.report.json) VCP_TRY(printJson(toJson(*report)));
-    if (!report->firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
-    if (!report->firstPictureSeconds && !report->problem.empty())
-        return Error{ErrorCode::InvalidInput, report->problem};
+    if (command.report.json) VCP_TRY(printJson(toJson(report)));
+    if (!report.firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+    if (!report.firstPictureSeconds && !report.problem.empty()) return Error{ErrorCode::InvalidInput, report.problem};
     return 0;
 }
 

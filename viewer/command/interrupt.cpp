@@ -17,7 +17,7 @@ extern "C" void onInterrupt(int) { came.store(true); }
 InterruptScope::InterruptScope() {
     struct sigaction action {};
     action.sa_handler = onInterrupt;
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    action.sa_flags = int(SA_RESETHAND);
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, &interrupt_);
     sigaction(SIGTERM, &action, &terminate_);

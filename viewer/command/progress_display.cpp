@@ -50,7 +50,7 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
     if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction, facts);
 
     const int steps = style_ == ProgressStyle::Json ? 100 : 10;
-    const int step = static_cast<int>(std::floor(fraction * steps));
+    const int step = int(std::floor(fraction * steps));
     const bool isDue = elapsed - lastSeconds_ >= (style_ == ProgressStyle::Json ? kJsonSeconds : kPlainSeconds);
     if (stage == lastStage_ && step == lastStep_ && !isDue) return;
     lastSeconds_ = elapsed;
@@ -62,7 +62,7 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
         if (isKnown) json["seconds_left"] = left;
         if (details.triangles > 0) {
             json["triangles"] = details.triangles;
-            json["triangles_per_second"] = fraction * static_cast<double>(details.triangles) / std::max(elapsed, 1e-9);
+            json["triangles_per_second"] = fraction * double(details.triangles) / std::max(elapsed, 1e-9);
             json["temp_bytes"] = details.tempBytes;
         }
         line = terminalJson(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
@@ -74,7 +74,7 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
 }
 
 void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std::string& facts) {
-    const int perMille = static_cast<int>(1000 * fraction);
+    const int perMille = int(1000 * fraction);
     const bool isDue = seconds() - lastSeconds_ >= kBarSeconds;
     if (stage == lastStage_ && perMille == lastPerMille_ && !isDue) return;
     lastSeconds_ = seconds();
@@ -83,14 +83,13 @@ void ProgressDisplay::drawBar(std::string_view stage, double fraction, const std
     const int columns = std::max(20, terminalColumns(out_) - 1);
     const std::string head = fmt::format("{:3.0f} % ", 100 * fraction);
     const std::string tail = fmt::format(" {}{}", terminalText(stage), facts);
-    const int room = std::clamp(columns - static_cast<int>(head.size() + tail.size()) - 2, 0, 40);
-    const int filled = static_cast<int>(std::lround(fraction * room));
-    const std::string bar = head + "[" + std::string(static_cast<size_t>(filled), '=') +
-                            std::string(static_cast<size_t>(room - filled), ' ') + "]" + tail;
-    lastBar_ = bar.substr(0, static_cast<size_t>(columns));
+    const int room = std::clamp(columns - int(head.size() + tail.size()) - 2, 0, 40);
+    const int filled = int(std::lround(fraction * room));
+    const std::string bar =
+        head + "[" + std::string(size_t(filled), '=') + std::string(size_t(room - filled), ' ') + "]" + tail;
+    lastBar_ = bar.substr(0, size_t(columns));
     // A character of several bytes is cut off as a whole.
-    while (lastBar_.size() < bar.size() && (static_cast<uint8_t>(bar[lastBar_.size()]) & 0xc0) == 0x80)
-        lastBar_.pop_back();
+    while (lastBar_.size() < bar.size() && (uint8_t(bar[lastBar_.size()]) & 0xc0) == 0x80) lastBar_.pop_back();
     std::fprintf(out_, "\r%s\x1b[K", lastBar_.c_str());
     std::fflush(out_);
 }

@@ -55,7 +55,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
                    "to 6 times")
         ->type_name("PLANE")
         ->take_all()
-        ->expected(1, static_cast<int>(kMostSections))
+        ->expected(1, int(kMostSections))
         ->allow_extra_args(false)
         ->check(checkPlane);
     app.add_flag("--caps", settings.caps, "Fill what sections cut open (for closed surfaces)");

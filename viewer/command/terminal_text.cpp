@@ -16,7 +16,7 @@ struct Character {
 
 /// Returns the first character of a text that is not empty. A byte that is not UTF-8 counts as one character.
 Character firstOf(std::string_view text) {
-    const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
+    const auto byte = [&](size_t i) { return uint8_t(text[i]); };
     const uint8_t lead = byte(0);
     if (lead < 0x80) return {lead, 1, true};
     const size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
@@ -57,7 +57,7 @@ std::string escaped(std::string_view text, bool keepLines, Spell&& spell) {
 
 std::string byBytes(const Character&, std::string_view bytes) {
     std::string text;
-    for (const char byte : bytes) text += fmt::format("\\x{:02x}", static_cast<uint8_t>(byte));
+    for (const char byte : bytes) text += fmt::format("\\x{:02x}", uint8_t(byte));
     return text;
 }
 

@@ -16,7 +16,7 @@ namespace {
 int32_t createSurface(void* window, VkInstance instance, uint64_t* surface) {
     VkSurfaceKHR made = VK_NULL_HANDLE;
     const VkResult result = glfwCreateWindowSurface(instance, static_cast<GLFWwindow*>(window), nullptr, &made);
-    *surface = (uint64_t)made;
+    *surface = uint64_t(made);
     return result;
 }
 

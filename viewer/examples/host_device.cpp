@@ -127,7 +127,7 @@ void run(const char* file) {
     view.settle(60);
 
     vcp_host_image target = vcp::widget::sized<vcp_host_image>();
-    target.image = (uint64_t)host.image;
+    target.image = uint64_t(host.image);
     target.width = kWidth;
     target.height = kHeight;
     target.layout_after = VK_IMAGE_LAYOUT_GENERAL;

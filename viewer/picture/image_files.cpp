@@ -60,10 +60,9 @@ std::vector<uint8_t> greyRows(std::span<const float> depth) {
     std::vector<uint8_t> rows;
     rows.reserve(2 * depth.size());
     for (const float d : depth) {
-        const auto grey =
-            std::isfinite(d) ? static_cast<uint32_t>(std::lround(1 + scale * (double(d) - range.nearest))) : 0u;
-        rows.push_back(static_cast<uint8_t>(grey >> 8));
-        rows.push_back(static_cast<uint8_t>(grey & 255));
+        const auto grey = std::isfinite(d) ? uint32_t(std::lround(1 + scale * (double(d) - range.nearest))) : 0u;
+        rows.push_back(uint8_t(grey >> 8));
+        rows.push_back(uint8_t(grey & 255));
     }
     return rows;
 }
@@ -73,9 +72,8 @@ std::vector<uint8_t> normalRows(std::span<const glm::vec3> normals) {
     rows.reserve(3 * normals.size());
     for (const glm::vec3& n : normals)
         for (int axis = 0; axis < 3; ++axis)
-            rows.push_back(n == glm::vec3(0)
-                               ? uint8_t(0)
-                               : static_cast<uint8_t>(std::lround(128 + 127 * std::clamp(n[axis], -1.0f, 1.0f))));
+            rows.push_back(n == glm::vec3(0) ? uint8_t(0)
+                                             : uint8_t(std::lround(128 + 127 * std::clamp(n[axis], -1.0f, 1.0f))));
     return rows;
 }
 

@@ -14,7 +14,7 @@ std::filesystem::path numbered(const std::filesystem::path& path, size_t number)
 
 double PictureSequence::fraction() const {
     const double begun = picture_ ? picture_->fraction() : 0;
-    return (static_cast<double>(finished_) + begun) / static_cast<double>(o_.cameras.size());
+    return (double(finished_) + begun) / double(o_.cameras.size());
 }
 
 Result<bool> PictureSequence::step() {
@@ -29,9 +29,7 @@ Result<bool> PictureSequence::step() {
 Result<void> PictureSequence::begin() {
     FrameRequest request = o_.request;
     request.camera = o_.cameras[finished_];
-    auto png = PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules);
-    if (!png) return png.error();
-    png_ = *std::move(png);
+    VCP_TRY_ASSIGN(png_, PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules));
     const TiledPictureOptions options{
         .tile = o_.tile, .depth = !o_.files.depth.empty(), .normals = !o_.files.normals.empty(), .problem = o_.problem};
     picture_ = std::make_unique<TiledPicture>(*renderer_, request, options,

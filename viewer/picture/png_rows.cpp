@@ -71,9 +71,8 @@ Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& pa
     if (width < 1 || height < 1 || width > kLargest || height > kLargest)
         return Error{
             .code = ErrorCode::Usage, .message = "a picture has 1 to 2^20 pixels a side", .file = path.string()};
-    auto output = OutputFile::create(path, OutputKind::Png, rules);
-    if (!output) return output.error();
-    std::unique_ptr<PngRows> rows(new PngRows(std::make_unique<Encoder>(*std::move(output))));
+    VCP_TRY_ASSIGN(auto output, OutputFile::create(path, OutputKind::Png, rules));
+    std::unique_ptr<PngRows> rows(new PngRows(std::make_unique<Encoder>(std::move(output))));
     Encoder& e = *rows->encoder_;
     e.width = width;
     e.height = height;
@@ -97,8 +96,8 @@ Result<void> PngRows::add(std::span<const uint8_t> rgba) {
     const uint64_t rowBytes = uint64_t{4} * e.width, count = rgba.size() / rowBytes;
     if (rgba.size() % rowBytes != 0 || count > e.height - e.rows)
         return e.error(ErrorCode::Usage, "rows that the picture does not have");
-    if (!e.write(rgba.data(), static_cast<uint32_t>(count))) return e.ioError();
-    e.rows += static_cast<uint32_t>(count);
+    if (!e.write(rgba.data(), uint32_t(count))) return e.ioError();
+    e.rows += uint32_t(count);
     return {};
 }
 

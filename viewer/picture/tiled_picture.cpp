@@ -37,9 +37,9 @@ TiledPicture::Rect TiledPicture::outer() const {
 }
 
 double TiledPicture::fraction() const {
-    const double rows = static_cast<double>(y_) * whole_.width;
-    const double inRow = y_ < whole_.height ? static_cast<double>(x_) * inner().height : 0;
-    return (rows + inRow) / (static_cast<double>(whole_.width) * whole_.height);
+    const double rows = double(y_) * whole_.width;
+    const double inRow = y_ < whole_.height ? double(x_) * inner().height : 0;
+    return (rows + inRow) / (double(whole_.width) * whole_.height);
 }
 
 Result<bool> TiledPicture::step() {
@@ -50,14 +50,13 @@ Result<bool> TiledPicture::step() {
     request.height = with.height;
     if (with.width != whole_.width || with.height != whole_.height)
         request.tile = {with.x, with.y, whole_.width, whole_.height};
-    auto update = renderer_->update(request);
-    if (!update) return update.error();
-    if (!update->problems.empty() && !options_.problem) return update->problems.front();
-    for (const Error& problem : update->problems) options_.problem(problem);
-    isWaiting_ = !update->settled;
+    VCP_TRY_ASSIGN(auto update, renderer_->update(request));
+    if (!update.problems.empty() && !options_.problem) return update.problems.front();
+    for (const Error& problem : update.problems) options_.problem(problem);
+    isWaiting_ = !update.settled;
     if (isWaiting_) return false;
-    stats_.errorPixels = std::max(stats_.errorPixels, update->errorPixels);
-    stats_.update = *std::move(update);
+    stats_.errorPixels = std::max(stats_.errorPixels, update.errorPixels);
+    stats_.update = std::move(update);
     VCP_TRY(draw(request));
     VCP_TRY(copyTile(with, tile));
     x_ += tile.width;
@@ -70,12 +69,11 @@ Result<bool> TiledPicture::step() {
 }
 
 Result<void> TiledPicture::draw(const FrameRequest& request) {
-    const auto stats = renderer_->render(request);
-    if (!stats) return stats.error();
+    VCP_TRY_ASSIGN(const auto stats, renderer_->render(request));
     ++stats_.tiles;
-    stats_.rays += stats->rays;
-    stats_.hitPixels += stats->hitPixels;
-    stats_.ms += stats->msFrame;
+    stats_.rays += stats.rays;
+    stats_.hitPixels += stats.hitPixels;
+    stats_.ms += stats.msFrame;
     return {};
 }
 
@@ -86,18 +84,15 @@ Result<void> TiledPicture::copyTile(const Rect& outer, const Rect& inner) {
         band_.depth.resize(options_.depth ? pixels : 0);
         band_.normals.resize(options_.normals ? pixels : 0);
     }
-    const auto picture = renderer_->readPicture();
-    if (!picture) return picture.error();
-    copyInto(band_.picture.rgba, whole_.width, picture->rgba, outer, inner, 4);
+    VCP_TRY_ASSIGN(const auto picture, renderer_->readPicture());
+    copyInto(band_.picture.rgba, whole_.width, picture.rgba, outer, inner, 4);
     if (options_.depth) {
-        const auto depth = renderer_->readDepth();
-        if (!depth) return depth.error();
-        copyInto(band_.depth, whole_.width, *depth, outer, inner, 1);
+        VCP_TRY_ASSIGN(const auto depth, renderer_->readDepth());
+        copyInto(band_.depth, whole_.width, depth, outer, inner, 1);
     }
     if (options_.normals) {
-        const auto normals = renderer_->readNormals();
-        if (!normals) return normals.error();
-        copyInto(band_.normals, whole_.width, *normals, outer, inner, 1);
+        VCP_TRY_ASSIGN(const auto normals, renderer_->readNormals());
+        copyInto(band_.normals, whole_.width, normals, outer, inner, 1);
     }
     return {};
 }

@@ -131,13 +131,11 @@ private:
 };
 
 Result<meso::BaseSurface> readStream(const std::filesystem::path& path, double tiles) {
-    auto stream = openMesh(path);
-    if (!stream) return stream.error();
+    VCP_TRY_ASSIGN(auto stream, openMesh(path));
     meso::BaseSurface made;
     for (MeshChunk chunk;;) {
-        const auto more = (*stream)->next(chunk);
-        if (!more) return more.error();
-        if (!*more) break;
+        VCP_TRY_ASSIGN(const auto more, stream->next(chunk));
+        if (!more) break;
         if (chunk.uvs.size() != chunk.triangles.size()) return noMap(path.string());
         made.positions.insert(made.positions.end(), chunk.positions.begin(), chunk.positions.end());
         for (size_t i = 0; i < chunk.triangles.size(); ++i) {
@@ -165,9 +163,8 @@ Result<meso::BaseSurface> readBaseMesh(const std::filesystem::path& path, double
     std::string extension = path.extension().string();
     for (char& letter : extension) letter = char(std::tolower(static_cast<unsigned char>(letter)));
     if (extension != ".obj") return readStream(path, tiles);
-    auto source = ByteSource::open(path);
-    if (!source) return source.error();
-    return readBaseObj(*std::move(source), tiles);
+    VCP_TRY_ASSIGN(auto source, ByteSource::open(path));
+    return readBaseObj(std::move(source), tiles);
 }
 
 }  // namespace vcp

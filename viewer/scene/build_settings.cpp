@@ -39,8 +39,8 @@ BuildOptions BuildSettings::optionsFor(const std::vector<std::string>& inputs) c
 
 Result<InputKind> kindOf(const std::vector<std::string>& inputs) {
     const auto isDataset = [](const std::string& input) { return isHttpUrl(input) || looksLikeDataset(input); };
-    const auto datasets = static_cast<size_t>(std::count_if(inputs.begin(), inputs.end(), isDataset));
-    const auto scenes = static_cast<size_t>(std::count_if(inputs.begin(), inputs.end(), isSceneName));
+    const auto datasets = size_t(std::count_if(inputs.begin(), inputs.end(), isDataset));
+    const auto scenes = size_t(std::count_if(inputs.begin(), inputs.end(), isSceneName));
     if (scenes > 0 && inputs.size() > 1) return Error{ErrorCode::Usage, "a scene file (.json) is opened alone"};
     if (scenes > 0) return InputKind::Scene;
     if (datasets > 0 && datasets < inputs.size())

@@ -16,21 +16,17 @@ std::string nameOf(const std::vector<std::string>& inputs) {
 
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
                               const SourceAccess& source, const std::function<bool(const BuildProgress&)>& progress) {
-    const auto kind = kindOf(inputs);
-    if (!kind) return kind.error();
+    VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
     SceneFile file;
-    if (*kind == InputKind::Scene) {
-        auto read = readScene(inputs.front());
-        if (!read) return read.error();
-        file = *std::move(read);
-    } else if (*kind == InputKind::Datasets) {
+    if (kind == InputKind::Scene) {
+        VCP_TRY_ASSIGN(file, readScene(inputs.front()));
+    } else if (kind == InputKind::Datasets) {
         for (const std::string& input : inputs) file.datasets.push_back({input, {}});
     } else {
-        const auto path = datasetFor(inputs, build, progress);
-        if (!path) return path.error();
-        file.datasets.push_back({path->string(), {}});
+        VCP_TRY_ASSIGN(const auto path, datasetFor(inputs, build, progress));
+        file.datasets.push_back({path.string(), {}});
     }
-    const auto count = static_cast<double>(file.datasets.size());
+    const auto count = double(file.datasets.size());
     double opened = 0;
     std::vector<std::filesystem::path> filesRead = filesOf(file);
     filesRead.insert(filesRead.end(), inputs.begin(), inputs.end());
@@ -38,14 +34,13 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         const auto named = sideFilesOf(meshes, build);
         filesRead.insert(filesRead.end(), named.begin(), named.end());
     };
-    if (*kind == InputKind::Meshes) addSideFiles(inputs);
+    if (kind == InputKind::Meshes) addSideFiles(inputs);
     auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
         if (progress && !progress({.stage = "opening", .fraction = opened++ / count}))
             return Error{ErrorCode::Cancelled, "cancelled"};
-        const auto path = datasetFor({each}, build, progress);
-        if (!path) return path.error();
+        VCP_TRY_ASSIGN(const auto path, datasetFor({each}, build, progress));
         addSideFiles({each});
-        return openDataset(path->string(), source);
+        return openDataset(path.string(), source);
     });
     if (scene) scene->filesRead = std::move(filesRead);
     return scene;

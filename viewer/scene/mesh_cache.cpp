@@ -53,13 +53,11 @@ Result<std::string> identity(const fs::path& mesh) {
 
 /// Returns a hash of what is known of a dataset before it is built.
 Result<std::string> keyOf(const BuildOptions& options) {
-    std::string text =
-        fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell, options.error,
-                    options.errorIsRelative, static_cast<int>(options.colour), options.format);
+    std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell,
+                                   options.error, options.errorIsRelative, int(options.colour), options.format);
     for (const fs::path& mesh : options.inputs) {
-        auto id = identity(mesh);
-        if (!id) return id.error();
-        text += *id;
+        VCP_TRY_ASSIGN(auto id, identity(mesh));
+        text += id;
     }
     return hashOf(text);
 }
@@ -93,7 +91,7 @@ void writeList(const fs::path& path, const std::vector<fs::path>& files) {
     }
     std::string text;
     for (const fs::path& each : files) text += each.string() + '\0';
-    (void)writeFile(path, OutputKind::Text, std::as_bytes(std::span(text)), {.overwrite = true});
+    static_cast<void>(writeFile(path, OutputKind::Text, std::as_bytes(std::span(text)), {.overwrite = true}));
 }
 
 /// Checks that the inputs did not change while they were read. Errors: InvalidInput.
@@ -102,9 +100,8 @@ Result<void> checkUnchanged(const BuildOptions& options, const std::string& keyB
         return Error{ErrorCode::InvalidInput, "was changed while it was read; open it again once it is whole",
                      file.string()};
     };
-    const auto key = keyOf(options);
-    if (!key) return key.error();
-    if (*key != keyBefore) return changed(options.inputs.front());
+    VCP_TRY_ASSIGN(const auto key, keyOf(options));
+    if (key != keyBefore) return changed(options.inputs.front());
     for (const SideFile& each : report.sideFiles)
         if (fileStamp(each.path) != each.stamp) return changed(each.path);
     return {};
@@ -171,16 +168,14 @@ std::vector<fs::path> MeshCache::sideFilesOf(const BuildOptions& options) const 
 }
 
 Result<fs::path> MeshCache::pathFor(const BuildOptions& options) const {
-    const auto key = keyOf(options);
-    if (!key) return key.error();
-    return folder_ / fmt::format("{}{}", nameOf(*key, readList(listOf(folder_, *key))), kExtension);
+    VCP_TRY_ASSIGN(const auto key, keyOf(options));
+    return folder_ / fmt::format("{}{}", nameOf(key, readList(listOf(folder_, key))), kExtension);
 }
 
 Result<fs::path> MeshCache::dataset(BuildOptions options, const Builder& build) {
-    const auto key = keyOf(options);
-    if (!key) return key.error();
-    const fs::path list = listOf(folder_, *key);
-    fs::path path = folder_ / fmt::format("{}{}", nameOf(*key, readList(list)), kExtension);
+    VCP_TRY_ASSIGN(const auto key, keyOf(options));
+    const fs::path list = listOf(folder_, key);
+    fs::path path = folder_ / fmt::format("{}{}", nameOf(key, readList(list)), kExtension);
     std::error_code failed;
     if (isWhole(path)) {
         // The list comes last: a list used longer ago than every dataset belongs to none.
@@ -190,17 +185,16 @@ Result<fs::path> MeshCache::dataset(BuildOptions options, const Builder& build) 
     fs::create_directories(folder_, failed);
     if (failed) return ioError(folder_, "the cache folder cannot be made; set XDG_CACHE_HOME to one that can", failed);
 
-    options.output = folder_ / fmt::format("{}.{}.building{}", *key, getpid(), kExtension);
-    const auto report = build(options);
-    if (!report) return report.error();
-    if (const auto unchanged = checkUnchanged(options, *key, *report); !unchanged) {
+    options.output = folder_ / fmt::format("{}.{}.building{}", key, getpid(), kExtension);
+    VCP_TRY_ASSIGN(const auto report, build(options));
+    if (const auto unchanged = checkUnchanged(options, key, report); !unchanged) {
         fs::remove(options.output, failed);
         return unchanged.error();
     }
     std::vector<fs::path> sideFiles;
-    for (const SideFile& each : report->sideFiles)
+    for (const SideFile& each : report.sideFiles)
         sideFiles.push_back(fs::absolute(each.path, failed).lexically_normal());
-    path = folder_ / fmt::format("{}{}", nameOf(*key, sideFiles), kExtension);
+    path = folder_ / fmt::format("{}{}", nameOf(key, sideFiles), kExtension);
     fs::rename(options.output, path, failed);
     if (failed) return ioError(path, "cannot be put into the cache", failed);
     writeList(list, sideFiles);

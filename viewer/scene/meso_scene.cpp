@@ -19,19 +19,15 @@ namespace {
 constexpr int kTexels = 256;
 
 Result<std::shared_ptr<const MesoArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
-    const auto shape = shapeOf(asset);
-    if (!shape) return shape.error();
-    const auto method = buildMethod(asset, **shape, options);
-    if (!method) return method.error();
-    auto arrays = packMesoArrays(*method);
-    if (!arrays) return arrays.error();
-    return std::make_shared<const MesoArrays>(*std::move(arrays));
+    VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
+    VCP_TRY_ASSIGN(const auto method, buildMethod(asset, *shape, options));
+    VCP_TRY_ASSIGN(auto arrays, packMesoArrays(method));
+    return std::make_shared<const MesoArrays>(std::move(arrays));
 }
 
 Result<std::shared_ptr<const Appearance>> farOf(const Asset& asset, double heightScale) {
-    const auto shape = shapeOf(asset);
-    if (!shape) return shape.error();
-    return std::make_shared<const Appearance>(appearanceOf(**shape, heightScale));
+    VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
+    return std::make_shared<const Appearance>(appearanceOf(*shape, heightScale));
 }
 
 bool isFile(const MesoSurfaceDescription& d) {
@@ -61,9 +57,8 @@ private:
         if (file.empty()) return Texture();
         Texture& texture = known[file];
         if (texture) return texture;
-        auto made = readTexture(file);
-        if (!made) return made.error();
-        return texture = std::make_shared<const MesoTexture>(*std::move(made));
+        VCP_TRY_ASSIGN(auto made, readTexture(file));
+        return texture = std::make_shared<const MesoTexture>(std::move(made));
     }
     Known colours_, normals_;
 };
@@ -95,9 +90,7 @@ Result<Asset> openMesoAsset(const std::string& name) {
     const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
     asset.name = name;
     if (isIn(heightFieldNames())) {
-        auto map = makeHeightField(name, kTexels, 1);
-        if (!map) return map.error();
-        asset.heights = *std::move(map);
+        VCP_TRY_ASSIGN(asset.heights, makeHeightField(name, kTexels, 1));
     } else if (isIn(solidNames())) {
         asset.solid = name, asset.seed = 1;
     } else {
@@ -107,9 +100,8 @@ Result<Asset> openMesoAsset(const std::string& name) {
                              "\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
         return readAsset(name);
     }
-    const auto shape = shapeOf(asset);
-    if (!shape) return shape.error();
-    asset.extent = (*shape)->extent();
+    VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
+    asset.extent = shape->extent();
     return asset;
 }
 
@@ -146,9 +138,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (d.withFar) {
             auto& far = appearances[{d.asset, d.heightScale}];
             if (!far) {
-                auto made = farOf(*asset, d.heightScale);
-                if (!made) return made.error();
-                far = *std::move(made);
+                VCP_TRY_ASSIGN(far, farOf(*asset, d.heightScale));
             }
             surface.far = far;
         }

@@ -7,19 +7,16 @@ namespace vcp {
 
 Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access) {
     if (!isHttpUrl(where)) {
-        auto file = openFile(where);
-        if (!file) return file.error();
-        return std::shared_ptr<const ByteReader>(*file);
+        VCP_TRY_ASSIGN(auto file, openFile(where));
+        return std::shared_ptr<const ByteReader>(file);
     }
     HttpOptions options;
     options.caFile = access.caFile;
     options.cancelled = access.cancelled;
-    auto http = HttpReader::open(where, options);
-    if (!http) return http.error();
-    if (access.cache.empty()) return std::shared_ptr<const ByteReader>(*http);
-    auto cached = CachingReader::open(*http, (*http)->identity(), access.cache, access.cacheBytes);
-    if (!cached) return cached.error();
-    return std::shared_ptr<const ByteReader>(*cached);
+    VCP_TRY_ASSIGN(auto http, HttpReader::open(where, options));
+    if (access.cache.empty()) return std::shared_ptr<const ByteReader>(http);
+    VCP_TRY_ASSIGN(auto cached, CachingReader::open(http, http->identity(), access.cache, access.cacheBytes));
+    return std::shared_ptr<const ByteReader>(cached);
 }
 
 Box OpenDataset::bounds() const {
@@ -28,14 +25,12 @@ Box OpenDataset::bounds() const {
 }
 
 Result<OpenDataset> openDataset(const std::string& where, const SourceAccess& access) {
-    auto reader = openReader(where, access);
-    if (!reader) return reader.error();
-    auto dataset = readDatasetStart(**reader);
-    if (!dataset) return dataset.error();
+    VCP_TRY_ASSIGN(auto reader, openReader(where, access));
+    VCP_TRY_ASSIGN(auto dataset, readDatasetStart(*reader));
     OpenDataset open;
     open.isRemote = isHttpUrl(where);
-    open.reader = *reader;
-    open.dataset = std::make_shared<const Dataset>(*std::move(dataset));
+    open.reader = reader;
+    open.dataset = std::make_shared<const Dataset>(std::move(dataset));
     open.source = std::make_shared<const FilePageSource>(open.reader, open.dataset, open.runBytes());
     return open;
 }

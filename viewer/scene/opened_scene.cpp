@@ -31,9 +31,7 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
         if (!opened) return each.from.blamed(opened.error());
         scene.parts.push_back({*std::move(opened), each.placement});
     }
-    auto surfaces = makeMesoScene(scene.file.surfaces);
-    if (!surfaces) return surfaces.error();
-    scene.surfaces = *std::move(surfaces);
+    VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces));
     const Box all = scene.bounds();
     if (!std::isfinite(glm::length(all.high - all.low)))
         return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together",

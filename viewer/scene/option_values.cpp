@@ -25,7 +25,7 @@ bool takeNumber(std::string_view& text, Number& number) {
         if (parsed.ec != std::errc()) return false;
         stop = parsed.ptr;
     }
-    text.remove_prefix(static_cast<size_t>(stop - text.data()));
+    text.remove_prefix(size_t(stop - text.data()));
     return true;
 }
 
@@ -86,14 +86,14 @@ std::optional<uint64_t> parseBytes(std::string_view text) {
         constexpr std::string_view kPrefixes = "KMGT";
         const size_t power = kPrefixes.find(text.front() & ~0x20);
         if (power != std::string_view::npos) {
-            number = std::ldexp(number, static_cast<int>(10 * (power + 1)));
+            number = std::ldexp(number, int(10 * (power + 1)));
             text.remove_prefix(1);
             if (text == "iB") text = {};
         }
         if (text == "B") text = {};
     }
     if (!text.empty() || number > 0x1p60 || number < 1) return std::nullopt;
-    return static_cast<uint64_t>(number);
+    return uint64_t(number);
 }
 
 std::string budgetProblem(const std::string& text) {
@@ -106,7 +106,7 @@ std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {
     if (!text.ends_with('%')) return parseBytes(text);
     double percent = 0;
     if (!takeNumber(text, percent) || text != "%" || !(percent > 0) || percent > 100) return std::nullopt;
-    return static_cast<uint64_t>(percent / 100 * static_cast<double>(whole));
+    return uint64_t(percent / 100 * double(whole));
 }
 
 std::optional<uint64_t> parseCount(std::string_view text) {
@@ -121,7 +121,7 @@ std::optional<uint64_t> parseCount(std::string_view text) {
         number *= kFactors[power];
     }
     if (!(number >= 1) || number > 1e15 || number != std::floor(number)) return std::nullopt;
-    return static_cast<uint64_t>(number);
+    return uint64_t(number);
 }
 
 std::optional<glm::ivec2> parseSize(std::string_view text) {
@@ -141,7 +141,7 @@ std::string formatCount(uint64_t count) {
 
 std::string formatBytes(uint64_t bytes) {
     constexpr const char* kUnits[] = {"B", "kB", "MB", "GB", "TB", "PB", "EB"};
-    double value = static_cast<double>(bytes);
+    double value = double(bytes);
     size_t unit = 0;
     while (value >= 999.95 && unit + 1 < std::size(kUnits)) value /= 1000, ++unit;
     return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, kUnits[unit]);
@@ -151,7 +151,7 @@ std::string formatLength(double length) { return fmt::format("{:.4g}", length); 
 
 std::string formatSeconds(double seconds) {
     if (seconds < 60) return fmt::format("{:.2f} s", seconds);
-    const auto whole = static_cast<int64_t>(seconds);
+    const auto whole = int64_t(seconds);
     if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
     return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }

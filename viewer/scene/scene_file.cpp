@@ -317,7 +317,7 @@ std::optional<Error> notJson(std::string_view text, const std::string& name) {
     FirstMistake mistake;
     if (Json::sax_parse(text, &mistake)) return std::nullopt;
     const size_t at = std::min(mistake.at, text.size());
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');
     const char* what = mistake.isNumber ? "a number is out of range" : "the JSON breaks off or goes wrong here";
     return Error{ErrorCode::InvalidInput, what, name, fmt::format("line {}", line), at};
 }
@@ -366,9 +366,8 @@ Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, 
 }
 
 Result<SceneFile> readScene(const std::filesystem::path& path) {
-    const auto text = readText(path, kLargestFile, "a scene file");
-    if (!text) return text.error();
-    return sceneFromJson(*text, path.string(), path.parent_path());
+    VCP_TRY_ASSIGN(const auto text, readText(path, kLargestFile, "a scene file"));
+    return sceneFromJson(text, path.string(), path.parent_path());
 }
 
 }  // namespace vcp

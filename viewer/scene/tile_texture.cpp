@@ -17,14 +17,13 @@ int byteOf(Rgba8 texel, int channel) { return int(texel >> (8 * channel) & 0xff)
 
 template <class ToVector>
 Result<MesoTexture> readTexture(const std::filesystem::path& path, ToVector toVector) {
-    const auto image = loadImage({.path = path, .bytes = nullptr}, {.edge = kMostEdge});
-    if (!image) return image.error();
+    VCP_TRY_ASSIGN(const auto image, loadImage({.path = path, .bytes = nullptr}, {.edge = kMostEdge}));
     std::vector<glm::vec4> texels;
-    texels.reserve(image->texels.size());
-    for (uint32_t y = image->height; y-- > 0;)
-        for (uint32_t x = 0; x < image->width; ++x)
-            texels.push_back(toVector(image->texels[size_t{y} * image->width + x]));
-    return makeMesoTexture({image->width, image->height}, std::move(texels));
+    texels.reserve(image.texels.size());
+    for (uint32_t y = image.height; y-- > 0;)
+        for (uint32_t x = 0; x < image.width; ++x)
+            texels.push_back(toVector(image.texels[size_t{y} * image.width + x]));
+    return makeMesoTexture({image.width, image.height}, std::move(texels));
 }
 
 }  // namespace

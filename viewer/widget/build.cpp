@@ -105,20 +105,19 @@ bool tellHost(const vcp_build_options& given, const BuildProgress& at) {
 }
 
 Result<void> buildFor(const vcp_build_options& given, vcp_build_report* out) {
-    auto options = buildOptions(given);
-    if (!options) return options.error();
+    VCP_TRY_ASSIGN(auto options, buildOptions(given));
     if (out)
         if (const auto size = structSize(out); !size) return size.error();
-    const auto report = BuildRun(*std::move(options)).run([&](const BuildProgress& at) { return tellHost(given, at); });
-    if (!report) return report.error();
+    VCP_TRY_ASSIGN(const auto report,
+                   BuildRun(std::move(options)).run([&](const BuildProgress& at) { return tellHost(given, at); }));
     if (!out) return {};
     vcp_build_report made{};
-    made.levels = report->levels;
-    made.triangles = report->triangles;
-    made.file_bytes = report->fileBytes;
-    made.cell = report->cell;
-    made.certified_error = report->certifiedErrorMax;
-    made.seconds = report->seconds;
+    made.levels = report.levels;
+    made.triangles = report.triangles;
+    made.file_bytes = report.fileBytes;
+    made.cell = report.cell;
+    made.certified_error = report.certifiedErrorMax;
+    made.seconds = report.seconds;
     return give(out, made);
 }
 
@@ -131,9 +130,7 @@ using namespace vcp::widget;
 extern "C" vcp_status vcp_build(const vcp_build_options* given, vcp_build_report* report) {
     vcp_build_options options{};
     const Outcome outcome = outcomeOf([&]() -> Outcome {
-        const auto read = taken(given);
-        if (!read) return read.error();
-        options = *read;
+        VCP_TRY_ASSIGN(options, taken(given));
         return buildFor(options, report);
     });
     copyText(options.error_text, options.error_text_size, outcome.text);

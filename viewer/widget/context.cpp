@@ -16,9 +16,7 @@ constexpr double kLongestWait = 3600;
 
 Result<std::unique_ptr<vcp_context>> createContext(const vcp_context_options& given) {
     auto made = std::make_unique<vcp_context>();
-    const auto callbacks = taken(given.callbacks);
-    if (!callbacks) return callbacks.error();
-    made->callbacks = *callbacks;
+    VCP_TRY_ASSIGN(made->callbacks, taken(given.callbacks));
     RendererOptions options;
     options.device = textOf(given.device);
     if (given.gpu_bytes > 0) options.budgetBytes = given.gpu_bytes;
@@ -27,17 +25,13 @@ Result<std::unique_ptr<vcp_context>> createContext(const vcp_context_options& gi
     if (given.loader_threads > 0) options.loaderThreads = given.loader_threads;
     options.colour = given.without_colour == 0;
     if (given.host_device) {
-        const auto host = taken(given.host_device);
-        if (!host) return host.error();
-        options.host = HostDevice{host->instance, host->physical_device, host->device, host->queue, host->queue_family};
+        VCP_TRY_ASSIGN(const auto host, taken(given.host_device));
+        options.host = HostDevice{host.instance, host.physical_device, host.device, host.queue, host.queue_family};
     } else if (given.windows != 0) {
-        auto extensions = windowExtensions();
-        if (!extensions) return extensions.error();
-        options.windowExtensions = *std::move(extensions);
+        VCP_TRY_ASSIGN(options.windowExtensions, windowExtensions());
     }
-    auto renderer = Renderer::create(options);
-    if (!renderer) return renderer.error();
-    made->renderer = *std::move(renderer);
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
+    made->renderer = std::move(renderer);
     made->hasWindows = options.host || given.windows != 0;
     made->gpuBytes = options.budgetBytes;
     made->ramBytes = options.ramBytes;
@@ -47,10 +41,9 @@ Result<std::unique_ptr<vcp_context>> createContext(const vcp_context_options& gi
 }
 
 Result<SourceAccess> accessFor(const vcp_open_options* given) {
-    const auto options = taken(given);
-    if (!options) return options.error();
-    SourceAccess access{textOf(options->ca_file), textOf(options->cache_folder)};
-    if (options->cache_bytes > 0) access.cacheBytes = options->cache_bytes;
+    VCP_TRY_ASSIGN(const auto options, taken(given));
+    SourceAccess access{textOf(options.ca_file), textOf(options.cache_folder)};
+    if (options.cache_bytes > 0) access.cacheBytes = options.cache_bytes;
     return access;
 }
 
@@ -83,20 +76,18 @@ void cancelOpening(vcp_context& context) {
 
 Result<OpenedScene> openCancellably(vcp_context& context, SceneFile file, const std::string& name,
                                     const vcp_open_options* options) {
-    auto access = accessFor(options);
-    if (!access) return access.error();
+    VCP_TRY_ASSIGN(auto access, accessFor(options));
     const Opening opening(context);
-    access->cancelled = opening.cancelled();
-    return openScene(std::move(file), name, [&](const std::string& each) { return openDataset(each, *access); });
+    access.cancelled = opening.cancelled();
+    return openScene(std::move(file), name, [&](const std::string& each) { return openDataset(each, access); });
 }
 
 Result<void> openFor(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
-    auto open = openCancellably(context, std::move(file), name, options);
-    if (!open) return open.error();
+    VCP_TRY_ASSIGN(auto open, openCancellably(context, std::move(file), name, options));
     context.finest.reset();
     context.open.reset();
-    VCP_TRY(context.renderer->open(open->placed(), open->surfaces.surfaces));
-    context.open = *std::move(open);
+    VCP_TRY(context.renderer->open(open.placed(), open.surfaces.surfaces));
+    context.open = std::move(open);
     context.name = std::filesystem::path(shownAddress(name)).filename().string();
     context.finest = std::make_unique<ScenePick>();
     for (const OpenedScene::Part& part : context.open->parts) {
@@ -120,9 +111,8 @@ Result<void> openPath(vcp_context& context, const char* path, const vcp_open_opt
         file.datasets.push_back({path, {}});
         return openFor(context, std::move(file), path, options);
     }
-    auto read = readScene(path);
-    if (!read) return read.error();
-    return openFor(context, *std::move(read), path, options);
+    VCP_TRY_ASSIGN(auto read, readScene(path));
+    return openFor(context, std::move(read), path, options);
 }
 
 Result<SceneDataset> placedFrom(const vcp_placed& given, uint32_t number) {
@@ -146,19 +136,17 @@ Result<void> openPlaced(vcp_context& context, const vcp_placed* datasets, uint32
                         const vcp_open_options* options) {
     if (count < 1 || count > kMostSceneDatasets)
         return wrong(fmt::format("a scene has 1 to {} datasets", kMostSceneDatasets));
-    const auto stride = structSize(datasets);
-    if (!stride) return stride.error();
+    VCP_TRY_ASSIGN(const auto stride, structSize(datasets));
     SceneFile file;
     for (uint32_t i = 0; i < count; ++i) {
         // The host's structs may be longer than ours.
-        const void* at = reinterpret_cast<const char*>(datasets) + size_t{*stride} * i;
-        if (const auto size = structSize(at); !size || *size != *stride)
+        const void* at = reinterpret_cast<const char*>(datasets) + size_t{stride} * i;
+        if (const auto size = structSize(at); !size || *size != stride)
             return wrong("struct_size is not the same in all of an array");
         vcp_placed each{};
         VCP_TRY(takeStruct(at, &each, sizeof(each)));
-        auto dataset = placedFrom(each, i);
-        if (!dataset) return dataset.error();
-        file.datasets.push_back(*std::move(dataset));
+        VCP_TRY_ASSIGN(auto dataset, placedFrom(each, i));
+        file.datasets.push_back(std::move(dataset));
     }
     const std::string name = file.datasets.front().file;
     return openFor(context, std::move(file), name, options);
@@ -166,7 +154,7 @@ Result<void> openPlaced(vcp_context& context, const vcp_placed* datasets, uint32
 
 vcp_dataset_info infoOf(const OpenedScene& open) {
     vcp_dataset_info info{};
-    info.datasets = static_cast<uint32_t>(open.parts.size());
+    info.datasets = uint32_t(open.parts.size());
     info.cell = open.parts.empty() ? 0 : std::numeric_limits<double>::infinity();
     for (const OpenedScene::Part& part : open.parts) {
         const FileHeader& header = part.open.dataset->header;
@@ -193,12 +181,9 @@ vcp_status vcp_context_create(const vcp_context_options* given, vcp_context** co
     *context = nullptr;
     vcp_context_options options{};
     const Outcome outcome = outcomeOf([&]() -> Outcome {
-        const auto read = taken(given);
-        if (!read) return read.error();
-        options = *read;
-        auto made = createContext(options);
-        if (!made) return made.error();
-        *context = made->release();
+        VCP_TRY_ASSIGN(options, taken(given));
+        VCP_TRY_ASSIGN(auto made, createContext(options));
+        *context = made.release();
         return {};
     });
     copyText(options.error_text, options.error_text_size, outcome.text);

@@ -81,21 +81,19 @@ Result<uint32_t> structSize(const void* given) {
 }
 
 Result<void> takeStruct(const void* given, void* value, size_t size) {
-    const auto theirs = structSize(given);
-    if (!theirs) return theirs.error();
+    VCP_TRY_ASSIGN(const auto theirs, structSize(given));
     const auto* bytes = static_cast<const unsigned char*>(given);
-    if (*theirs > size && std::any_of(bytes + size, bytes + *theirs, [](unsigned char byte) { return byte != 0; }))
+    if (theirs > size && std::any_of(bytes + size, bytes + theirs, [](unsigned char byte) { return byte != 0; }))
         return wrong("a struct asks for what this version of vcp does not know");
-    std::memcpy(value, given, std::min<size_t>(size, *theirs));
+    std::memcpy(value, given, std::min<size_t>(size, theirs));
     return {};
 }
 
 Result<void> giveStruct(void* out, const void* value, size_t size) {
-    const auto theirs = structSize(out);
-    if (!theirs) return theirs.error();
+    VCP_TRY_ASSIGN(const auto theirs, structSize(out));
     constexpr size_t kBehind = sizeof(uint32_t);
     std::memcpy(static_cast<char*>(out) + kBehind, static_cast<const char*>(value) + kBehind,
-                std::min<size_t>(size, *theirs) - kBehind);
+                std::min<size_t>(size, theirs) - kBehind);
     return {};
 }
 

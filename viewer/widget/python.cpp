@@ -185,5 +185,5 @@ PYBIND11_MODULE(vcp, module) {
                                        {"TOP", VCP_VIEW_TOP},
                                        {"ISOMETRIC", VCP_VIEW_ISOMETRIC},
                                        {"NEXT_SHADING", VCP_NEXT_SHADING}})
-        module.attr(name) = static_cast<int>(action);
+        module.attr(name) = int(action);
 }

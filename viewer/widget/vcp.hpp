@@ -100,7 +100,7 @@ public:
             std::copy(dataset.worldFromDataset.begin(), dataset.worldFromDataset.end(),
                       placed.back().world_from_dataset);
         }
-        check(vcp_context_open_placed(handle(), placed.data(), static_cast<uint32_t>(placed.size()), options));
+        check(vcp_context_open_placed(handle(), placed.data(), uint32_t(placed.size()), options));
     }
     [[nodiscard]] vcp_dataset_info dataset() const { return got(vcp_context_dataset); }
     [[nodiscard]] vcp_device_info device() const { return got(vcp_context_device); }
@@ -237,7 +237,7 @@ inline vcp_build_report build(const std::vector<std::string>& inputs, const std:
     for (const std::string& input : inputs) paths.push_back(input.c_str());
     std::array<char, 512> text{};
     options.inputs = paths.data();
-    options.input_count = static_cast<uint32_t>(paths.size());
+    options.input_count = uint32_t(paths.size());
     options.output = output.c_str();
     options.user = const_cast<void*>(static_cast<const void*>(&progress));
     if (progress)

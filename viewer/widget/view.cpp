@@ -21,14 +21,12 @@ constexpr glm::ivec2 kUsualSize(1280, 720);
 constexpr double kPollSeconds = 0.1;
 
 Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_view_options& given) {
-    auto surface = surfaceSource(given);
-    if (!surface) return surface.error();
-    if (*surface && !context.hasWindows) return wrong("the context was made without windows");
+    VCP_TRY_ASSIGN(auto surface, surfaceSource(given));
+    if (surface && !context.hasWindows) return wrong("the context was made without windows");
     if (given.width > kLargestSide || given.height > kLargestSide)
         return wrong("a view has at most 16384 pixels a side");
     if (!(given.moving_frame_ms >= 0) || !(given.move_seconds >= 0)) return wrong("a time is below 0 or not a number");
-    auto renderer = context.renderer->addView(*surface);
-    if (!renderer) return renderer.error();
+    VCP_TRY_ASSIGN(auto renderer, context.renderer->addView(surface));
     ViewerOptions options;
     options.renderer.budgetBytes = context.gpuBytes;
     options.renderer.ramBytes = context.ramBytes;
@@ -36,9 +34,9 @@ Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_vie
     options.moveSeconds = given.move_seconds;
     auto made = std::make_unique<vcp_view>();
     made->context = &context;
-    made->hasWindow = surface->has_value();
+    made->hasWindow = surface.has_value();
     made->up = given.z_is_up != 0 ? UpAxis::Z : UpAxis::Y;
-    made->viewer = Viewer::on(*std::move(renderer), options);
+    made->viewer = Viewer::on(std::move(renderer), options);
     made->viewer->resize({given.width, given.height});
     if (context.open) made->showScene();
     context.views.push_back(made.get());
@@ -62,9 +60,7 @@ void tellOfUpdate(vcp_view& view) {
 
 Result<void> update(vcp_view& view) {
     view.viewer->fly(view.fly);
-    const auto next = view.viewer->update(view.context->now());
-    if (!next) return next.error();
-    view.next = *next;
+    VCP_TRY_ASSIGN(view.next, view.viewer->update(view.context->now()));
     view.isUpdated = true;
     tellOfUpdate(view);
     return {};
@@ -76,7 +72,7 @@ Result<void> render(vcp_view& view) {
     view.next.draw = false;
     const glm::ivec2 size = view.viewer->size();
     if (!view.hasWindow || size.x == 0 || size.y == 0) return {};
-    return view.viewer->renderer().present(static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
+    return view.viewer->renderer().present(uint32_t(size.x), uint32_t(size.y));
 }
 
 Result<void> settle(vcp_view& view, double seconds) {
@@ -88,12 +84,12 @@ Result<void> settle(vcp_view& view, double seconds) {
         if (view.viewer->status().update.settled && std::isinf(view.next.waitSeconds)) break;
         const double left = begin + seconds - view.context->now();
         isLate = left <= 0;
-        const std::chrono::milliseconds wait(static_cast<int>(1000 * std::clamp(left, 0.0, kPollSeconds)));
+        const std::chrono::milliseconds wait(int(1000 * std::clamp(left, 0.0, kPollSeconds)));
         if (!view.viewer->status().update.settled)
             view.viewer->renderer().waitForPage(wait);
         else
-            std::this_thread::sleep_for(std::min(wait, std::chrono::milliseconds(static_cast<int>(
-                                                           1000 * std::min(view.next.waitSeconds, kPollSeconds)))));
+            std::this_thread::sleep_for(
+                std::min(wait, std::chrono::milliseconds(int(1000 * std::min(view.next.waitSeconds, kPollSeconds)))));
     }
     VCP_TRY(render(view));
     if (isLate)
@@ -102,38 +98,34 @@ Result<void> settle(vcp_view& view, double seconds) {
 }
 
 Result<void> readFrame(vcp_view& view, vcp_frame* out) {
-    auto frame = taken(out);
-    if (!frame) return frame.error();
+    VCP_TRY_ASSIGN(auto frame, taken(out));
     if (!out) return wrong("there is no frame to write to");
-    const auto picture = view.viewer->renderer().readPicture();
-    if (!picture) return picture.error();
-    frame->width = picture->width;
-    frame->height = picture->height;
-    VCP_TRY(give(out, *frame));
-    const size_t pixels = size_t{picture->width} * picture->height;
-    if ((frame->rgba && frame->rgba_size < 4 * pixels) || (frame->depth && frame->depth_size < pixels))
+    VCP_TRY_ASSIGN(const auto picture, view.viewer->renderer().readPicture());
+    frame.width = picture.width;
+    frame.height = picture.height;
+    VCP_TRY(give(out, frame));
+    const size_t pixels = size_t{picture.width} * picture.height;
+    if ((frame.rgba && frame.rgba_size < 4 * pixels) || (frame.depth && frame.depth_size < pixels))
         return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("too little room for {} x {} pixels", picture->width, picture->height)};
-    if (frame->rgba) std::memcpy(frame->rgba, picture->rgba.data(), picture->rgba.size());
-    if (!frame->depth) return {};
-    const auto depth = view.viewer->renderer().readDepth();
-    if (!depth) return depth.error();
-    std::copy(depth->begin(), depth->end(), frame->depth);
+                     .message = fmt::format("too little room for {} x {} pixels", picture.width, picture.height)};
+    if (frame.rgba) std::memcpy(frame.rgba, picture.rgba.data(), picture.rgba.size());
+    if (!frame.depth) return {};
+    VCP_TRY_ASSIGN(const auto depth, view.viewer->renderer().readDepth());
+    std::copy(depth.begin(), depth.end(), frame.depth);
     return {};
 }
 
 Result<void> copyToImage(vcp_view& view, const vcp_host_image* given) {
     if (!given) return wrong("there is no image");
-    const auto image = taken(given);
-    if (!image) return image.error();
+    VCP_TRY_ASSIGN(const auto image, taken(given));
     ImageTarget target;
     // A handle is a pointer or a number, depending on the machine.
-    std::memcpy(&target.image, &image->image, sizeof(target.image));
-    std::memcpy(&target.wait, &image->wait, sizeof(target.wait));
-    std::memcpy(&target.signal, &image->signal, sizeof(target.signal));
-    target.width = image->width;
-    target.height = image->height;
-    if (image->layout_after != 0) target.layoutAfter = static_cast<VkImageLayout>(image->layout_after);
+    std::memcpy(&target.image, &image.image, sizeof(target.image));
+    std::memcpy(&target.wait, &image.wait, sizeof(target.wait));
+    std::memcpy(&target.signal, &image.signal, sizeof(target.signal));
+    target.width = image.width;
+    target.height = image.height;
+    if (image.layout_after != 0) target.layoutAfter = static_cast<VkImageLayout>(image.layout_after);
     return view.viewer->renderer().copyPicture(target);
 }
 
@@ -143,15 +135,15 @@ Result<void> pick(vcp_view& view, double x, double y, vcp_pick* out) {
     vcp_pick picked{};
     if (x >= 0 && y >= 0 && x < size.x && y < size.y) {
         const CameraRay through = view.viewer->camera().rayThrough({x, y}, size);
-        const auto hit = view.context->finest->cast({through.origin, through.direction}, view.viewer->sections());
-        if (!hit) return hit.error();
-        if (*hit) {
+        VCP_TRY_ASSIGN(const auto hit,
+                       view.context->finest->cast({through.origin, through.direction}, view.viewer->sections()));
+        if (hit) {
             picked.hit = 1;
-            for (int i = 0; i < 3; ++i) picked.position[i] = (*hit)->position[i], picked.normal[i] = (*hit)->normal[i];
-            picked.distance = (*hit)->t;
-            picked.error = (*hit)->certifiedError;
-            picked.level = (*hit)->level;
-            picked.dataset = static_cast<uint32_t>((*hit)->dataset);
+            for (int i = 0; i < 3; ++i) picked.position[i] = hit->position[i], picked.normal[i] = hit->normal[i];
+            picked.distance = hit->t;
+            picked.error = hit->certifiedError;
+            picked.level = hit->level;
+            picked.dataset = uint32_t(hit->dataset);
         }
     }
     return give(out, picked);
@@ -182,14 +174,13 @@ vcp_camera cameraOf(const OrbitCamera& camera) {
 
 Result<OrbitCamera> cameraFrom(const vcp_camera* given, const OrbitCamera& before) {
     if (!given) return wrong("there is no camera");
-    const auto wanted = taken(given);
-    if (!wanted) return wanted.error();
-    if (!isFinite(wanted->position, 3) || !isFinite(wanted->target, 3) || !isFinite(wanted->up, 3))
+    VCP_TRY_ASSIGN(const auto wanted, taken(given));
+    if (!isFinite(wanted.position, 3) || !isFinite(wanted.target, 3) || !isFinite(wanted.up, 3))
         return wrong("a number of the camera is not finite");
     OrbitCamera camera = before;
-    camera.position = vectorFrom(wanted->position);
-    const glm::dvec3 ahead = vectorFrom(wanted->target) - camera.position;
-    glm::dvec3 up = vectorFrom(wanted->up);
+    camera.position = vectorFrom(wanted.position);
+    const glm::dvec3 ahead = vectorFrom(wanted.target) - camera.position;
+    glm::dvec3 up = vectorFrom(wanted.up);
     if (up == glm::dvec3(0)) up = before.up == UpAxis::Z ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
     camera.focusDistance = glm::length(ahead);
     if (!(camera.focusDistance > 0) || !std::isfinite(camera.focusDistance))
@@ -197,8 +188,8 @@ Result<OrbitCamera> cameraFrom(const vcp_camera* given, const OrbitCamera& befor
     if (!(glm::length(glm::cross(up, ahead)) > 1e-9 * glm::length(up) * camera.focusDistance))
         return wrong("the camera's up is along its view");
     camera.orientation = facing(ahead, up);
-    camera.projection = wanted->orthographic != 0 ? Projection::Orthographic : Projection::Perspective;
-    camera.fovY = wanted->fov_y == 0 ? std::numbers::pi / 4 : wanted->fov_y;
+    camera.projection = wanted.orthographic != 0 ? Projection::Orthographic : Projection::Perspective;
+    camera.fovY = wanted.fov_y == 0 ? std::numbers::pi / 4 : wanted.fov_y;
     if (!(camera.fovY >= 1e-5 && camera.fovY <= 3.12)) return wrong("fov_y is not between 1e-5 and 3.12");
     return camera;
 }
@@ -245,24 +236,23 @@ Result<void> checkLook(const vcp_look& look) {
 
 Result<void> setLook(Viewer& viewer, const vcp_look* given) {
     if (!given) return wrong("there is no look");
-    const auto look = taken(given, lookOf(viewer));
-    if (!look) return look.error();
-    VCP_TRY(checkLook(*look));
+    VCP_TRY_ASSIGN(const auto look, taken(given, lookOf(viewer)));
+    VCP_TRY(checkLook(look));
     Shading shading = viewer.shading();
-    shading.mode = static_cast<ShadingMode>(look->shading);
-    shading.shadows = look->shadows != 0;
-    shading.occlusionRays = look->occlusion_rays;
-    shading.occlusionRadius = look->occlusion_radius;
-    shading.lightFollowsCamera = look->light_in_world == 0;
-    shading.transparent = look->transparent != 0;
-    shading.lightDirection = vectorFrom(look->light);
-    shading.backgroundTop = vectorFrom(look->background_top);
-    shading.backgroundBottom = vectorFrom(look->background_bottom);
+    shading.mode = static_cast<ShadingMode>(look.shading);
+    shading.shadows = look.shadows != 0;
+    shading.occlusionRays = look.occlusion_rays;
+    shading.occlusionRadius = look.occlusion_radius;
+    shading.lightFollowsCamera = look.light_in_world == 0;
+    shading.transparent = look.transparent != 0;
+    shading.lightDirection = vectorFrom(look.light);
+    shading.backgroundTop = vectorFrom(look.background_top);
+    shading.backgroundBottom = vectorFrom(look.background_bottom);
     std::vector<SectionPlane> sections;
-    for (uint32_t i = 0; i < look->section_count; ++i)
-        sections.push_back({vectorFrom(look->sections[i]), look->sections[i][3]});
+    for (uint32_t i = 0; i < look.section_count; ++i)
+        sections.push_back({vectorFrom(look.sections[i]), look.sections[i][3]});
     viewer.setShading(shading);
-    viewer.setErrorPixels(look->error_pixels);
+    viewer.setErrorPixels(look.error_pixels);
     viewer.setSections(std::move(sections));
     return {};
 }
@@ -274,7 +264,7 @@ vcp_stats statsOf(const Viewer& viewer) {
     stats.settled = update.settled ? 1 : 0;
     stats.drawable = update.drawable ? 1 : 0;
     stats.relaxed = update.relaxed ? 1 : 0;
-    stats.reduction = static_cast<uint32_t>(status.reduction);
+    stats.reduction = uint32_t(status.reduction);
     stats.device_losses = update.deviceLosses;
     stats.frames = viewer.framesDrawn();
     stats.frame_ms = status.frame.msFrame;
@@ -306,9 +296,8 @@ vcp_status changing(vcp_view* view, Call call) noexcept {
 
 vcp_status toCamera(vcp_view* view, const vcp_camera* camera, void (Viewer::*go)(const OrbitCamera&)) noexcept {
     return changing(view, [&](vcp_view& v) -> Result<void> {
-        const auto wanted = cameraFrom(camera, v.viewer->camera());
-        if (!wanted) return wanted.error();
-        (v.viewer.get()->*go)(*wanted);
+        VCP_TRY_ASSIGN(const auto wanted, cameraFrom(camera, v.viewer->camera()));
+        (v.viewer.get()->*go)(wanted);
         return {};
     });
 }
@@ -340,13 +329,12 @@ void pressKey(vcp_view& view, uint32_t key, bool isPressed) {
 
 }  // namespace
 
-static_assert(VCP_VIEW_ISOMETRIC == static_cast<int>(ViewerAction::ViewIsometric) &&
-              VCP_TOGGLE_FLY == static_cast<int>(ViewerAction::ToggleFly) &&
-              VCP_TOGGLE_SECTION == static_cast<int>(ViewerAction::ToggleSection) &&
-              VCP_NEXT_SHADING == static_cast<int>(ViewerAction::NextShading));
-static_assert(VCP_SHADING_ERROR == static_cast<int>(ShadingMode::Error) &&
-              VCP_SHADING_STEPS == static_cast<int>(ShadingMode::Steps));
-static_assert(VCP_RIGHT == static_cast<int>(MouseButton::Right) && VCP_MIDDLE == static_cast<int>(MouseButton::Middle));
+static_assert(VCP_VIEW_ISOMETRIC == int(ViewerAction::ViewIsometric) &&
+              VCP_TOGGLE_FLY == int(ViewerAction::ToggleFly) &&
+              VCP_TOGGLE_SECTION == int(ViewerAction::ToggleSection) &&
+              VCP_NEXT_SHADING == int(ViewerAction::NextShading));
+static_assert(VCP_SHADING_ERROR == int(ShadingMode::Error) && VCP_SHADING_STEPS == int(ShadingMode::Steps));
+static_assert(VCP_RIGHT == int(MouseButton::Right) && VCP_MIDDLE == int(MouseButton::Middle));
 
 }  // namespace vcp::widget
 
@@ -381,10 +369,9 @@ vcp_status vcp_view_create(vcp_context* context, const vcp_view_options* given, 
     if (view) *view = nullptr;
     return inTurn(context, [&]() -> vcp::Result<void> {
         if (!view) return wrong("there is nowhere to put the view");
-        const auto options = taken(given);
-        if (!options) return options.error();
-        auto made = createView(*context, *options);
-        copyText(options->error_text, options->error_text_size, made ? "" : made.error().line());
+        VCP_TRY_ASSIGN(const auto options, taken(given));
+        auto made = createView(*context, options);
+        copyText(options.error_text, options.error_text_size, made ? "" : made.error().line());
         if (!made) return made.error();
         *view = made->release();
         return {};
@@ -413,10 +400,9 @@ vcp_status vcp_view_resize(vcp_view* view, uint32_t width, uint32_t height) {
 
 vcp_status vcp_view_mouse_press(vcp_view* view, vcp_button button, double x, double y, uint32_t modifiers) {
     return changing(view, [&](vcp_view& v) -> vcp::Result<void> {
-        const auto at = cursorAt(v, x, y);
-        if (!at) return at.error();
+        VCP_TRY_ASSIGN(const auto at, cursorAt(v, x, y));
         if (button < VCP_LEFT || button > VCP_RIGHT) return wrong("there is no such button");
-        v.viewer->press(static_cast<vcp::MouseButton>(button), *at,
+        v.viewer->press(static_cast<vcp::MouseButton>(button), at,
                         {(modifiers & VCP_SHIFT) != 0, (modifiers & VCP_CONTROL) != 0});
         return {};
     });
@@ -424,11 +410,10 @@ vcp_status vcp_view_mouse_press(vcp_view* view, vcp_button button, double x, dou
 
 vcp_status vcp_view_mouse_move(vcp_view* view, double x, double y) {
     return inTurn(view, [&](vcp_view& v) -> vcp::Result<void> {
-        const auto at = cursorAt(v, x, y);
-        if (!at) return at.error();
+        VCP_TRY_ASSIGN(const auto at, cursorAt(v, x, y));
         const vcp::Camera camera = v.viewer->camera().current();
         const vcp::Shading shading = v.viewer->shading();
-        v.viewer->move(*at);
+        v.viewer->move(at);
         if (v.viewer->camera().current() != camera || v.viewer->shading() != shading) v.redrawIsNeeded();
         return {};
     });
@@ -444,10 +429,9 @@ vcp_status vcp_view_mouse_release(vcp_view* view, vcp_button button) {
 
 vcp_status vcp_view_mouse_scroll(vcp_view* view, double x, double y, double notches, uint32_t modifiers) {
     return changing(view, [&](vcp_view& v) -> vcp::Result<void> {
-        const auto at = cursorAt(v, x, y);
-        if (!at) return at.error();
+        VCP_TRY_ASSIGN(const auto at, cursorAt(v, x, y));
         if (!std::isfinite(notches)) return wrong("the wheel turned by what is not a number");
-        v.viewer->scroll(*at, notches, (modifiers & VCP_SHIFT) != 0);
+        v.viewer->scroll(at, notches, (modifiers & VCP_SHIFT) != 0);
         return {};
     });
 }

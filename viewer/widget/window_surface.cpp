@@ -51,7 +51,7 @@ VkResult createWayland(VkInstance instance, void* display, uint64_t window, VkSu
     VkWaylandSurfaceCreateInfoKHR info{};
     info.sType = VK_STRUCTURE_TYPE_WAYLAND_SURFACE_CREATE_INFO_KHR;
     info.display = static_cast<wl_display*>(display);
-    info.surface = reinterpret_cast<wl_surface*>(static_cast<uintptr_t>(window));
+    info.surface = reinterpret_cast<wl_surface*>(uintptr_t(window));
     return create<PFN_vkCreateWaylandSurfaceKHR>(instance, "vkCreateWaylandSurfaceKHR", info, surface);
 }
 

@@ -63,7 +63,7 @@ void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
 ImU32 heatColour(float x, int alpha) {
     const glm::vec3 c =
         255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
-    return IM_COL32(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z), alpha);
+    return IM_COL32(int(c.x), int(c.y), int(c.z), alpha);
 }
 
 /// Draws the part of a line of the world that is before the eye.
@@ -140,7 +140,7 @@ void Interface::layOutStatus() {
     if (session_->isMeasuring) line += session_->isPicking() ? "measuring ... | " : "measuring: click | ";
     const std::string hint = "F1 keys  Tab panel";
     const float room = size_.x - ImGui::CalcTextSize(hint.c_str()).x - 5 * kMargin * scale_;
-    const auto most = static_cast<size_t>(std::max(0.0f, room / ImGui::CalcTextSize("0").x));
+    const auto most = size_t(std::max(0.0f, room / ImGui::CalcTextSize("0").x));
     text(line + statusLine(viewer.status(), most - std::min(most, line.size())));
     ImGui::End();
     ImGui::SetNextWindowPos({size_.x, size_.y - statusHeight_}, ImGuiCond_Always, {1, 0});
@@ -216,14 +216,14 @@ void Interface::layOutViews() {
     if (ImGui::Button("Paste")) pasteCamera();
     text("Bookmarks");
     const auto* kept = session_->bookmarks();
-    for (int number = 1; kept && number <= static_cast<int>(UserSettings::kMostBookmarks); ++number) {
+    for (int number = 1; kept && number <= int(UserSettings::kMostBookmarks); ++number) {
         if (!kept->contains(number)) continue;
         ImGui::SameLine();
         if (ImGui::SmallButton(std::to_string(number).c_str())) session_->goToBookmark(number);
     }
     int free = 1;
     while (kept && kept->contains(free)) ++free;
-    if (free > static_cast<int>(UserSettings::kMostBookmarks)) return;
+    if (free > int(UserSettings::kMostBookmarks)) return;
     ImGui::SameLine();
     if (ImGui::SmallButton("+")) session_->keepBookmark(free);
 }
@@ -231,9 +231,8 @@ void Interface::layOutViews() {
 void Interface::layOutLooks() {
     Viewer& viewer = session_->viewer();
     Shading shading = viewer.shading();
-    int mode = static_cast<int>(shading.mode);
-    if (ImGui::Combo("shading", &mode, kModes, static_cast<int>(std::size(kModes))))
-        shading.mode = static_cast<ShadingMode>(mode);
+    int mode = int(shading.mode);
+    if (ImGui::Combo("shading", &mode, kModes, int(std::size(kModes)))) shading.mode = static_cast<ShadingMode>(mode);
     // On files that are drawn without shadows, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
     ImGui::Checkbox("shadows", &shading.shadows);
@@ -257,14 +256,13 @@ void Interface::layOutLooks() {
 void Interface::layOutLimits() {
     Viewer& viewer = session_->viewer();
     const ViewerStatus& status = viewer.status();
-    auto error = static_cast<float>(viewer.errorPixels());
+    auto error = float(viewer.errorPixels());
     if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic))
-        viewer.setErrorPixels(static_cast<double>(error));
+        viewer.setErrorPixels(double(error));
     const UpdateResult& update = status.update;
     wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels),
                         update.relaxed ? ": the budget is too small for less" : ""));
-    const float part =
-        static_cast<float>(update.residentBytes) / static_cast<float>(std::max<uint64_t>(status.budgetBytes, 1));
+    const float part = float(update.residentBytes) / float(std::max<uint64_t>(status.budgetBytes, 1));
     const std::string filled =
         fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
     ImGui::ProgressBar(part, ImVec2(-1, 0), filled.c_str());
@@ -295,7 +293,7 @@ void Interface::layOutMeasuring() {
 }
 
 void Interface::layOutPicture() {
-    ImGui::Combo("size", &pictureSize_, kPictureSizeNames, static_cast<int>(std::size(kPictureSizeNames)));
+    ImGui::Combo("size", &pictureSize_, kPictureSizeNames, int(std::size(kPictureSizeNames)));
     ImGui::Checkbox("transparent", &picture_.transparent);
     ImGui::SameLine();
     ImGui::Checkbox("depth (.pfm)", &picture_.depth);
@@ -317,7 +315,7 @@ void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
     wrapped(saving.pictures > 1 ? fmt::format("{}: {} of {} pictures", saving.name, saving.finished, saving.pictures)
                                 : saving.name);
     const std::string percent = fmt::format("{:.0f} %", 100 * saving.fraction);
-    ImGui::ProgressBar(static_cast<float>(saving.fraction), ImVec2(-1, 0), percent.c_str());
+    ImGui::ProgressBar(float(saving.fraction), ImVec2(-1, 0), percent.c_str());
     if (ImGui::Button("Cancel (Esc)")) session_->cancelSaving();
     ImGui::End();
 }
@@ -353,7 +351,7 @@ void Interface::layOutOpening() {
     ImGui::Begin("opening", nullptr, kBare);
     wrapped(nameOf(opening.inputs()) + (progress.stage.empty() ? ": opening" : ": " + progress.stage));
     const std::string percent = fmt::format("{:.0f} %", 100 * progress.fraction);
-    ImGui::ProgressBar(static_cast<float>(progress.fraction), ImVec2(-1, 0), percent.c_str());
+    ImGui::ProgressBar(float(progress.fraction), ImVec2(-1, 0), percent.c_str());
     if (progress.triangles > 0) text(formatCount(progress.triangles) + " triangles");
     if (ImGui::Button("Cancel (Esc)")) opening.cancel();
     ImGui::End();
@@ -371,8 +369,8 @@ void Interface::layOutHelp() {
 void Interface::drawScaleBar() const {
     const Viewer& viewer = session_->viewer();
     const double unitsPerPixel = viewer.camera().viewHeight() / std::max(1, viewer.size().y);
-    const double length = roundLength(static_cast<double>(kScaleBarLargest * scale_) * unitsPerPixel);
-    const auto pixels = static_cast<float>(length / unitsPerPixel);
+    const double length = roundLength(double(kScaleBarLargest * scale_) * unitsPerPixel);
+    const auto pixels = float(length / unitsPerPixel);
     if (!std::isfinite(pixels)) return;
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
     const glm::vec2 from(2 * kMargin * scale_, size_.y - statusHeight_ - 2 * kMargin * scale_);
@@ -414,9 +412,8 @@ void Interface::drawSectionHandles() const {
         };
         std::vector<ImVec2> ring;
         for (const glm::dvec2 at : handle.ring) ring.push_back(vec(glm::vec2(at)));
-        list.AddPolyline(ring.data(), static_cast<int>(ring.size()), kShade, ImDrawFlags_Closed, 5 * scale_);
-        list.AddPolyline(ring.data(), static_cast<int>(ring.size()), colourOf(SectionGrip::Turn), ImDrawFlags_Closed,
-                         2.5f * scale_);
+        list.AddPolyline(ring.data(), int(ring.size()), kShade, ImDrawFlags_Closed, 5 * scale_);
+        list.AddPolyline(ring.data(), int(ring.size()), colourOf(SectionGrip::Turn), ImDrawFlags_Closed, 2.5f * scale_);
         const glm::vec2 foot(handle.foot), tip(handle.tip);
         const ImU32 colour = colourOf(SectionGrip::Move);
         list.AddCircleFilled(vec(foot), 8 * scale_, kShade);
@@ -434,11 +431,11 @@ void Interface::drawPages() const {
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
     Viewer& viewer = session_->viewer();
     const std::vector<PageBox> pages = viewer.renderer().residentPages();
-    const float finest = static_cast<float>(std::max(1u, viewer.status().levels - 1));
+    const float finest = float(std::max(1u, viewer.status().levels - 1));
     size_t drawn = 0;
     for (const PageBox& page : pages) {
         if (!page.isDrawn || ++drawn > kMostBoxes) continue;
-        const ImU32 colour = heatColour(static_cast<float>(page.level) / finest, 150);
+        const ImU32 colour = heatColour(float(page.level) / finest, 150);
         for (int axis = 0; axis < 3; ++axis)
             for (int side = 0; side < 4; ++side) {
                 const glm::dvec3 from = page.corner + page.edges[size_t(axis + 1) % 3] * double(side & 1) +
@@ -470,10 +467,8 @@ void Interface::drawFeedback() const {
         asking += asks ? 1 : 0;
         const glm::vec2 at = corner + cell * glm::vec2(i % FeedbackPicture::kWidth, i / FeedbackPicture::kWidth);
         // Green where the page is fine enough, yellow to red where a finer one is asked for.
-        const auto urgency =
-            static_cast<float>(asks ? std::min(std::log2(error / tolerated) / kUrgentDoublings, 1.0) : 0);
-        const ImU32 colour =
-            asks ? IM_COL32(255, static_cast<int>(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
+        const auto urgency = float(asks ? std::min(std::log2(error / tolerated) / kUrgentDoublings, 1.0) : 0);
+        const ImU32 colour = asks ? IM_COL32(255, int(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
         list.AddRectFilled(vec(at), vec(at + cell - scale_), colour);
     }
     const std::string said =

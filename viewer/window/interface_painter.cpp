@@ -28,8 +28,8 @@ uint64_t hashOf(const ImDrawData& drawing) {
     const auto add = [&](uint64_t more) { hash = hash * 0x9e3779b97f4a7c15u + more; };
     for (int i = 0; i < drawing.CmdListsCount; ++i) {
         const ImDrawList& list = *drawing.CmdLists[i];
-        add(hashOf(list.VtxBuffer.Data, static_cast<size_t>(list.VtxBuffer.size_in_bytes())));
-        add(hashOf(list.IdxBuffer.Data, static_cast<size_t>(list.IdxBuffer.size_in_bytes())));
+        add(hashOf(list.VtxBuffer.Data, size_t(list.VtxBuffer.size_in_bytes())));
+        add(hashOf(list.IdxBuffer.Data, size_t(list.IdxBuffer.size_in_bytes())));
         for (const ImDrawCmd& command : list.CmdBuffer) add(hashOf(&command.ClipRect, sizeof(command.ClipRect)));
     }
     return hash;
@@ -135,7 +135,7 @@ Result<void> InterfacePainter::uploadFont() {
 
 void InterfacePainter::begin(glm::ivec2 framebuffer) {
     ImGuiIO& io = ImGui::GetIO();
-    io.DisplaySize = ImVec2(static_cast<float>(framebuffer.x), static_cast<float>(framebuffer.y));
+    io.DisplaySize = ImVec2(float(framebuffer.x), float(framebuffer.y));
     io.DeltaTime = 1.0f / 60;
     ImGui_ImplVulkan_NewFrame();
     ImGui::NewFrame();
@@ -151,8 +151,8 @@ DrawOver InterfacePainter::drawOver() {
     return [](VkCommandBuffer commands, VkExtent2D size) {
         ImDrawData* drawing = ImGui::GetDrawData();
         // A window that has just changed its size is laid out anew at once.
-        const bool fits = drawing && drawing->DisplaySize.x <= static_cast<float>(size.width) &&
-                          drawing->DisplaySize.y <= static_cast<float>(size.height);
+        const bool fits =
+            drawing && drawing->DisplaySize.x <= float(size.width) && drawing->DisplaySize.y <= float(size.height);
         if (fits) ImGui_ImplVulkan_RenderDrawData(drawing, commands);
     };
 }

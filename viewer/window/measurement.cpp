@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 /// Returns the digits after the point that an error leaves: one beyond its own first digit.
 int digitsFor(double error) {
     if (!(error > 0)) return 9;
-    return static_cast<int>(std::clamp(1 - std::floor(std::log10(error)), 0.0, 15.0));
+    return int(std::clamp(1 - std::floor(std::log10(error)), 0.0, 15.0));
 }
 
 std::string rounded(double value, double error) { return fmt::format("{:.{}f}", value, digitsFor(error)); }

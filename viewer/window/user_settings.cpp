@@ -55,7 +55,7 @@ public:
         if (!field || !field->is_array() || field->size() != 3) return;
         for (const Json& part : *field)
             if (!part.is_number() || !(part.get<double>() >= 0 && part.get<double>() <= 1)) return;
-        for (int i = 0; i < 3; ++i) value[i] = (*field)[static_cast<size_t>(i)].get<float>();
+        for (int i = 0; i < 3; ++i) value[i] = (*field)[size_t(i)].get<float>();
     }
     [[nodiscard]] const Json* find(const char* name) const {
         const auto at = json_.find(name);
@@ -180,7 +180,7 @@ Result<FileText> readText(const fs::path& path) {
         if (count < 0)
             return Error{ErrorCode::Io, "cannot be read: " + std::generic_category().message(errno), path.string()};
         if (count == 0) return read;
-        read.text.append(buffer, static_cast<size_t>(count));
+        read.text.append(buffer, size_t(count));
         if (read.text.size() > kLargestFile)
             return Error{ErrorCode::InvalidInput, "is larger than 1 MiB, which no file of settings is", path.string()};
     }
@@ -276,10 +276,9 @@ Result<fs::path> userSettingsPath() {
 }
 
 Result<UserSettings> readUserSettings(const fs::path& path) {
-    const auto file = readText(path);
-    if (!file) return file.error();
-    if (!file->exists) return UserSettings{};
-    const Json json = Json::parse(file->text, nullptr, false);
+    VCP_TRY_ASSIGN(const auto file, readText(path));
+    if (!file.exists) return UserSettings{};
+    const Json json = Json::parse(file.text, nullptr, false);
     if (!json.is_object()) return Error{ErrorCode::InvalidInput, "is no JSON object", path.string()};
     return settingsFrom(json);
 }
@@ -292,17 +291,15 @@ Result<std::string> saveChanges(const SettingsChanges& changes, const fs::path& 
     if (failed) return notSaved(path, failed.message());
     const auto target = linkTarget(path);
     if (!target) return notSaved(path, target.error().message);
-    const auto lock = FolderLock::of(*target);
-    if (!lock) return lock.error();
+    VCP_TRY(FolderLock::of(*target));
     const auto before = readText(*target);
     if (!before && before.error().code != ErrorCode::InvalidInput) return notSaved(path, before.error().message);
     Json json = !before ? Json() : before->exists ? Json::parse(before->text, nullptr, false) : Json::object();
     std::string warning;
     if (!json.is_object()) {
-        const auto aside = putAside(*target);
-        if (!aside) return aside.error();
+        VCP_TRY_ASSIGN(const auto aside, putAside(*target));
         warning = fmt::format("{}: was no file of settings; it is kept as {}, and a new one is begun", path.string(),
-                              aside->string());
+                              aside.string());
         json = Json::object();
     }
     applyChanges(changes, json);

@@ -64,9 +64,8 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
     viewerOptions.shading.backgroundBottom = options.user.backgroundBottom;
     viewerOptions.sectionCaps = options.render.caps;
     viewerOptions.march = options.render.march;
-    auto viewer = Viewer::create(viewerOptions);
-    if (!viewer) return viewer.error();
-    return std::unique_ptr<ViewSession>(new ViewSession(options, *std::move(viewer)));
+    VCP_TRY_ASSIGN(auto viewer, Viewer::create(viewerOptions));
+    return std::unique_ptr<ViewSession>(new ViewSession(options, std::move(viewer)));
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)

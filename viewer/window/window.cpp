@@ -129,18 +129,17 @@ public:
                 catching_.reset();
             else if (!catching_ && options_->catchInterrupts)
                 catching_ = options_->catchInterrupts();
-            const auto next = session_->update(seconds());
-            if (!next) return next.error();
+            VCP_TRY_ASSIGN(const auto next, session_->update(seconds()));
             Viewer& viewer = session_->viewer();
-            if (next->draw) VCP_TRY(viewer.draw());
+            if (next.draw) VCP_TRY(viewer.draw());
             if (!painter_) VCP_TRY(makePainter());
-            VCP_TRY(present(next->draw));
+            VCP_TRY(present(next.draw));
             if (!report.windowSeconds) report.windowSeconds = seconds();
             const bool isShown =
                 viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);
             if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
             if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
-            wait(*next);
+            wait(next);
             // By now the window system has given the window its size.
             if (!shownSize) shownSize = system_->size();
             if (options_->interrupted && options_->interrupted()) break;
@@ -166,11 +165,8 @@ private:
 
     /// Makes the painter anew, on the device that replaces a lost one.
     Result<void> makePainter() {
-        const auto drawing = session_->viewer().renderer().windowDrawing();
-        if (!drawing) return drawing.error();
-        auto made = InterfacePainter::create(*drawing, system_->contentScale());
-        if (!made) return made.error();
-        painter_ = std::move(*made);
+        VCP_TRY_ASSIGN(const auto drawing, session_->viewer().renderer().windowDrawing());
+        VCP_TRY_ASSIGN(painter_, InterfacePainter::create(drawing, system_->contentScale()));
         mustPresent_ = true;
         return {};
     }
@@ -192,7 +188,7 @@ private:
     void layOut() {
         if (framebuffer_.x == 0 || framebuffer_.y == 0) return;
         painter_->begin(framebuffer_);
-        session_->viewer().showSectionHandles(static_cast<double>(painter_->scale()));
+        session_->viewer().showSectionHandles(double(painter_->scale()));
         interface_.layOut(framebuffer_, painter_->scale());
         mustPresent_ = painter_->end() || mustPresent_;
     }
@@ -200,7 +196,7 @@ private:
     void moveCursor(glm::dvec2 cursor) {
         cursor_ = cursor;
         const glm::dvec2 pixel = pixelAt(cursor);
-        ImGui::GetIO().MousePos = ImVec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y));
+        ImGui::GetIO().MousePos = ImVec2(float(pixel.x), float(pixel.y));
         if (glm::distance(pixel, pressedAt_) > kClickPixels) isClick_ = false;
         session_->viewer().move(pixel);
         if (!isDragging_) layOut();
@@ -247,7 +243,7 @@ private:
         const bool shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
                            glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
         if (ImGui::GetIO().WantCaptureMouse) {
-            ImGui::GetIO().MouseWheel += static_cast<float>(steps);
+            ImGui::GetIO().MouseWheel += float(steps);
             layOut();
         } else {
             session_->viewer().scroll(pixelAt(cursor_), steps, shift);
@@ -262,7 +258,7 @@ private:
     void key(int key, int action, int mods) {
         if (action == GLFW_REPEAT) return;
         const bool mayFly = (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE);
-        if (mayFly && holdFlyKey(held_, static_cast<uint32_t>(key), action == GLFW_PRESS)) {
+        if (mayFly && holdFlyKey(held_, uint32_t(key), action == GLFW_PRESS)) {
             session_->viewer().fly(session_->viewer().isFlying() ? held_ : glm::dvec3(0));
             return;
         }
@@ -323,7 +319,7 @@ private:
                 break;
             default:
                 // GLFW names keys by the capitals on them.
-                if (const auto action = actionOf(static_cast<uint32_t>(key))) session_->act(*action);
+                if (const auto action = actionOf(uint32_t(key))) session_->act(*action);
         }
     }
 
@@ -360,8 +356,8 @@ private:
         if (session_->viewer().framesDrawn() == 0 || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
         if (!drawn && !mustPresent_) return {};
         mustPresent_ = false;
-        return session_->viewer().renderer().present(static_cast<uint32_t>(framebuffer_.x),
-                                                     static_cast<uint32_t>(framebuffer_.y), painter_->drawOver());
+        return session_->viewer().renderer().present(uint32_t(framebuffer_.x), uint32_t(framebuffer_.y),
+                                                     painter_->drawOver());
     }
 
     void wait(const NextStep& next) {
@@ -400,14 +396,11 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     WindowSystem system;
     VCP_TRY(
         system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
-    auto session = ViewSession::create(options.session, system.surfaceSource());
-    if (!session) return session.error();
-    (*session)->open(inputs);
-    const auto drawing = (*session)->viewer().renderer().windowDrawing();
-    if (!drawing) return drawing.error();
-    auto painter = InterfacePainter::create(*drawing, system.contentScale());
-    if (!painter) return painter.error();
-    return ViewWindow(system, **session, std::move(*painter), options).run(start);
+    VCP_TRY_ASSIGN(auto session, ViewSession::create(options.session, system.surfaceSource()));
+    session->open(inputs);
+    VCP_TRY_ASSIGN(const auto drawing, session->viewer().renderer().windowDrawing());
+    VCP_TRY_ASSIGN(auto painter, InterfacePainter::create(drawing, system.contentScale()));
+    return ViewWindow(system, *session, std::move(painter), options).run(start);
 }
 
 }  // namespace vcp

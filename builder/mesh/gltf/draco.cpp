@@ -34,7 +34,7 @@ uint64_t addressSpaceBytes() {
         if (std::fscanf(file, "%lu", &value) == 1) pages = value;
         std::fclose(file);
     }
-    return pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+    return pages * uint64_t(::sysconf(_SC_PAGESIZE));
 }
 
 void limit(decltype(RLIMIT_AS) what, uint64_t value) {
@@ -136,7 +136,7 @@ private:
         char* p = static_cast<char*>(to);
         while (bytes > 0) {
             pollfd ready{pipe_, POLLIN, 0};
-            const int some = ::poll(&ready, 1, static_cast<int>(std::min<uint64_t>(2 * seconds_, 1'000'000) * 1000));
+            const int some = ::poll(&ready, 1, int(std::min<uint64_t>(2 * seconds_, 1'000'000) * 1000));
             if (some < 0 && errno == EINTR) continue;
             if (some == 0)
                 return error(ErrorCode::Limit, fmt::format("the Draco decoder sent nothing for {} s", 2 * seconds_));
@@ -145,7 +145,7 @@ private:
             if (got < 0) return systemError("the pipe of the Draco decoder cannot be read");
             if (got == 0) return deathOfChild();
             p += got;
-            bytes -= static_cast<size_t>(got);
+            bytes -= size_t(got);
         }
         return {};
     }
@@ -168,7 +168,7 @@ private:
     }
 
     Error childError() {
-        const auto code = std::min(reply_.failed - 1, static_cast<uint32_t>(ErrorCode::Limit));
+        const auto code = std::min(reply_.failed - 1, uint32_t(ErrorCode::Limit));
         std::string message(std::min<size_t>(reply_.messageBytes, kMostMessage), '\0');
         if (const auto done = receive(message.data(), message.size()); !done) return done.error();
         std::ranges::replace(message, '\n', ' ');
@@ -233,10 +233,9 @@ Result<std::unique_ptr<MeshStream>> openDraco(ByteSource source, uint64_t memory
     const auto everything = [&]() -> Result<std::string> {
         std::string all;
         while (!source.atEnd()) {
-            const auto window = source.window();
-            if (!window) return window.error();
-            all += *window;
-            source.advance(window->size());
+            VCP_TRY_ASSIGN(const auto window, source.window());
+            all += window;
+            source.advance(window.size());
         }
         return all;
     };

@@ -32,14 +32,14 @@ void send(int pipe, const void* data, size_t bytes) {
         if (put < 0 && errno == EINTR) continue;
         if (put < 0) leave();
         p += put;
-        bytes -= static_cast<size_t>(put);
+        bytes -= size_t(put);
     }
 }
 
 [[noreturn]] void refuse(int pipe, ErrorCode code, const std::string& message) {
     DracoReply reply;
-    reply.failed = static_cast<uint32_t>(code) + 1;
-    reply.messageBytes = static_cast<uint32_t>(message.size());
+    reply.failed = uint32_t(code) + 1;
+    reply.messageBytes = uint32_t(message.size());
     send(pipe, &reply, sizeof reply);
     send(pipe, message.data(), message.size());
     leave();
@@ -51,7 +51,7 @@ const draco::PointAttribute* attribute(const draco::Mesh& mesh, std::optional<ui
 }
 
 Rgba8 colourOf(const draco::PointAttribute& colours, draco::AttributeValueIndex value, bool linear) {
-    const auto components = static_cast<int8_t>(std::min<int>(colours.num_components(), 4));
+    const auto components = int8_t(std::min<int>(colours.num_components(), 4));
     if (colours.data_type() == draco::DT_UINT8 && !linear) {
         std::array<uint8_t, 4> bytes{0, 0, 0, 255};
         colours.ConvertValue<uint8_t>(value, components, bytes.data());

@@ -22,17 +22,15 @@ uint32_t wordAt(std::string_view bytes, size_t offset) {
 
 Result<std::unique_ptr<RandomBytes>> openGlbBinary(ByteSource& source, const std::filesystem::path& path,
                                                    const std::filesystem::path& tempFolder) {
-    const auto header = source.window(kChunkHeaderBytes);
-    if (!header) return header.error();
-    if (header->size() < kChunkHeaderBytes || wordAt(*header, 4) != kBinaryChunk) return std::unique_ptr<RandomBytes>();
-    const uint64_t bytes = wordAt(*header, 0);
+    VCP_TRY_ASSIGN(const auto header, source.window(kChunkHeaderBytes));
+    if (header.size() < kChunkHeaderBytes || wordAt(header, 4) != kBinaryChunk) return std::unique_ptr<RandomBytes>();
+    const uint64_t bytes = wordAt(header, 0);
     source.advance(kChunkHeaderBytes);
     if (source.isPlainFile()) return openRandomBytes(path, source.offset());
     auto spool = std::make_unique<Spool>(tempFolder);
     while (spool->size() < bytes && !source.atEnd()) {
-        const auto window = source.window();
-        if (!window) return window.error();
-        const std::string_view taken = window->substr(0, bytes - spool->size());
+        VCP_TRY_ASSIGN(const auto window, source.window());
+        const std::string_view taken = window.substr(0, bytes - spool->size());
         VCP_TRY(spool->append(taken));
         source.advance(taken.size());
     }
@@ -40,15 +38,14 @@ Result<std::unique_ptr<RandomBytes>> openGlbBinary(ByteSource& source, const std
 }
 
 Result<uint64_t> readGlbHeader(ByteSource& source) {
-    const auto start = source.window(kGlbHeaderBytes + kChunkHeaderBytes);
-    if (!start) return start.error();
-    if (start->size() < kGlbHeaderBytes + kChunkHeaderBytes)
+    VCP_TRY_ASSIGN(const auto start, source.window(kGlbHeaderBytes + kChunkHeaderBytes));
+    if (start.size() < kGlbHeaderBytes + kChunkHeaderBytes)
         return source.error(ErrorCode::InvalidInput, "header", source.size(), "the file ends inside the GLB header");
-    if (wordAt(*start, 4) != 2)
+    if (wordAt(start, 4) != 2)
         return source.error(ErrorCode::Unsupported, "header", 4,
-                            fmt::format("is GLB version {}; 2 is read", wordAt(*start, 4)));
-    const uint64_t bytes = wordAt(*start, 12);
-    if (wordAt(*start, 16) != kJsonChunk)
+                            fmt::format("is GLB version {}; 2 is read", wordAt(start, 4)));
+    const uint64_t bytes = wordAt(start, 12);
+    if (wordAt(start, 16) != kJsonChunk)
         return source.error(ErrorCode::InvalidInput, "header", 16, "its first chunk is not JSON");
     source.advance(kGlbHeaderBytes + kChunkHeaderBytes);
     if (bytes > source.remaining())

@@ -54,9 +54,8 @@ public:
     [[nodiscard]] std::span<const std::string> warnings() const override { return warnings_; }
     [[nodiscard]] std::span<const SideFile> sideFiles() const override { return buffers_.sideFiles; }
     [[nodiscard]] uint64_t bytesRead() const override {
-        const double share =
-            static_cast<double>(placement_) / static_cast<double>(std::max<size_t>(placements_.size(), 1));
-        return std::min(info_.fileBytes, static_cast<uint64_t>(share * static_cast<double>(info_.fileBytes)));
+        const double share = double(placement_) / double(std::max<size_t>(placements_.size(), 1));
+        return std::min(info_.fileBytes, uint64_t(share * double(info_.fileBytes)));
     }
 
     Result<bool> next(MeshChunk& chunk) override {
@@ -104,9 +103,8 @@ private:
         std::vector<ImageSource> images;
         uint64_t bytes = 0;
         for (size_t i = 0; i < document_.images.size(); ++i) {
-            auto image = imageOf(i, bytes);
-            if (!image) return image.error();
-            images.push_back(*std::move(image));
+            VCP_TRY_ASSIGN(auto image, imageOf(i, bytes));
+            images.push_back(std::move(image));
         }
         for (const GltfMaterial& from : document_.materials) {
             Material material;
@@ -173,9 +171,8 @@ private:
             const uint64_t corners = primitive.indices ? accessors[*primitive.indices].count : here;
             const auto* const node = document_.nodes.empty() ? nullptr : &document_.nodes[placement.node];
             const uint64_t times = node && node->instancing ? node->instancing->count : 1;
-            tooMany =
-                tooMany || std::max(here, corners) > kMost || times > kMost ||
-                static_cast<double>(std::max(here, corners)) * static_cast<double>(times) > static_cast<double>(kMost);
+            tooMany = tooMany || std::max(here, corners) > kMost || times > kMost ||
+                      double(std::max(here, corners)) * double(times) > double(kMost);
             if (tooMany) return;
             vertices += here * times;
             faces += (primitive.mode == GltfMode::Triangles ? corners / 3 : std::max<uint64_t>(corners, 2) - 2) * times;
@@ -248,9 +245,7 @@ private:
         };
         // Opened here, so that the error of a missing buffer keeps its file.
         VCP_TRY(buffers_.read(view, 0, nullptr, 0, element));
-        auto part = decodeDraco(bytes, size, selection, options_.decoderBytes, name_, element);
-        if (!part) return part.error();
-        part_ = *std::move(part);
+        VCP_TRY_ASSIGN(part_, decodeDraco(bytes, size, selection, options_.decoderBytes, name_, element));
         return {};
     }
 
@@ -352,27 +347,21 @@ bool looksLikeGltf(std::string_view start) {
 
 Result<std::unique_ptr<MeshStream>> openGltf(ByteSource source, const std::filesystem::path& path,
                                              const MeshOpenOptions& options) {
-    const auto start = source.window(kGlbMark.size());
-    if (!start) return start.error();
-    const bool binary = start->starts_with(kGlbMark);
+    VCP_TRY_ASSIGN(const auto start, source.window(kGlbMark.size()));
+    const bool binary = start.starts_with(kGlbMark);
     uint64_t jsonBytes = ByteSource::kUnknownSize;
     if (binary) {
-        const auto bytes = readGlbHeader(source);
-        if (!bytes) return bytes.error();
-        jsonBytes = *bytes;
+        VCP_TRY_ASSIGN(jsonBytes, readGlbHeader(source));
     }
-    auto document = readGltfDocument(source, jsonBytes);
-    if (!document) return document.error();
+    VCP_TRY_ASSIGN(auto document, readGltfDocument(source, jsonBytes));
     std::unique_ptr<RandomBytes> chunk;
     if (binary) {
-        auto read = openGlbBinary(source, path, options.tempFolder);
-        if (!read) return read.error();
-        chunk = *std::move(read);
+        VCP_TRY_ASSIGN(chunk, openGlbBinary(source, path, options.tempFolder));
     }
     std::filesystem::path folder;
     if (!path.empty() && path != "-") folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     auto stream =
-        std::make_unique<GltfStream>(source.name(), std::move(folder), options, *std::move(document), std::move(chunk));
+        std::make_unique<GltfStream>(source.name(), std::move(folder), options, std::move(document), std::move(chunk));
     VCP_TRY(stream->begin(binary ? "GLB" : "glTF", source.fileBytes()));
     return std::unique_ptr<MeshStream>(std::move(stream));
 }

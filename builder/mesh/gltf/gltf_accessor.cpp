@@ -18,7 +18,7 @@ template <class T>
 double component(const char* p, double scale) {
     T value;
     std::memcpy(&value, p, sizeof value);
-    return scale == 1 ? static_cast<double>(value) : std::max(static_cast<double>(value) / scale, -1.0);
+    return scale == 1 ? double(value) : std::max(double(value) / scale, -1.0);
 }
 
 double component(GltfComponent type, const char* p, bool normalized) {
@@ -100,10 +100,9 @@ Result<uint64_t> GltfBuffers::placeOfDecoded(uint32_t number) {
                                              "without meshopt compression, or in smaller meshes",
                                              needed >> 20, room_.decoderBytes >> 20)});
     // A buffer that is shorter than declared is noticed before anything is allocated.
-    auto buffer = open(from.buffer);
-    if (!buffer) return buffer.error();
+    VCP_TRY_ASSIGN(auto buffer, open(from.buffer));
     std::string bytes(from.bytes, '\0');
-    if (const auto done = (*buffer)->read(from.offset, bytes.data(), bytes.size()); !done) return named(done.error());
+    if (const auto done = buffer->read(from.offset, bytes.data(), bytes.size()); !done) return named(done.error());
     const auto values = decodeMeshopt(from, bytes);
     if (!values) return named(values.error());
     const uint64_t at = decoded_.size();
@@ -116,13 +115,10 @@ Result<void> GltfBuffers::read(uint32_t view, uint64_t offset, char* to, size_t 
     const GltfView& v = document_.views[view];
     RandomBytes* from = &decoded_;
     if (v.compressed) {
-        const auto place = placeOfDecoded(view);
-        if (!place) return place.error();
-        offset += *place;
+        VCP_TRY_ASSIGN(const auto place, placeOfDecoded(view));
+        offset += place;
     } else {
-        const auto bytes = open(v.buffer);
-        if (!bytes) return bytes.error();
-        from = *bytes;
+        VCP_TRY_ASSIGN(from, open(v.buffer));
         offset += v.offset;
     }
     auto done = from->read(offset, to, count);
@@ -140,7 +136,7 @@ GltfAccessorReader::GltfAccessorReader(const GltfDocument& document, GltfBuffers
       element_(fmt::format("accessor {}", accessor)) {}
 
 Result<void> GltfAccessorReader::read(size_t most, std::vector<double>& out) {
-    const auto count = static_cast<size_t>(std::min<uint64_t>(most, left()));
+    const auto count = size_t(std::min<uint64_t>(most, left()));
     out.assign(count * accessor_.components, 0.0);
     if (accessor_.view) VCP_TRY(readDense(count, out));
     if (accessor_.sparse) VCP_TRY(applySparse(count, out));
@@ -201,7 +197,7 @@ Result<void> GltfAccessorReader::nextSparseIndex() {
     const GltfSparse& sparse = *accessor_.sparse;
     if (sparseUsed_ < sparseIndices_.size()) return {};
     const size_t bytes = byteSize(sparse.indexType);
-    const auto count = static_cast<size_t>(std::min<uint64_t>(kReadBytes / bytes, sparse.count - sparseRead_));
+    const auto count = size_t(std::min<uint64_t>(kReadBytes / bytes, sparse.count - sparseRead_));
     bytes_.resize(count * bytes);
     VCP_TRY(buffers_.read(sparse.indexView, sparse.indexOffset + sparseRead_ * bytes, bytes_.data(), bytes_.size(),
                           element_));
@@ -210,7 +206,7 @@ Result<void> GltfAccessorReader::nextSparseIndex() {
     for (size_t i = 0; i < count; ++i) {
         const double index = component(sparse.indexType, bytes_.data() + i * bytes, false);
         if (!(index >= 0 && index < 4294967296.0)) return sparseError("a sparse index is not a whole number");
-        sparseIndices_.push_back(static_cast<uint64_t>(index));
+        sparseIndices_.push_back(uint64_t(index));
     }
     sparseRead_ += count;
     return {};

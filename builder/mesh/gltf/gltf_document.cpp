@@ -164,7 +164,7 @@ private:
         accessor.type = *type;
         const std::string shape = f.text("type");
         if (shape == "SCALAR") accessor.components = 1;
-        if (shape.size() == 4 && shape.starts_with("VEC")) accessor.components = static_cast<uint32_t>(shape[3] - '0');
+        if (shape.size() == 4 && shape.starts_with("VEC")) accessor.components = uint32_t(shape[3] - '0');
         if (accessor.components > 4 || (accessor.components == 0 && !shape.starts_with("MAT")))
             return f.fail("its type is unknown");
         const Json* const normalized = f.find("normalized");
@@ -316,7 +316,7 @@ private:
         std::array<double, 16> m{};
         if (f.numbers("matrix", m)) {
             glm::dmat4 matrix;
-            for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[static_cast<size_t>(i)];
+            for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[size_t(i)];
             return matrix;
         }
         std::array<double, 3> t{0, 0, 0}, s{1, 1, 1};
@@ -399,11 +399,10 @@ private:
 }  // namespace
 
 Result<GltfDocument> readGltfDocument(ByteSource& source, uint64_t jsonBytes) {
-    const auto json = readJson(source, jsonBytes, kTextLimit);
-    if (!json) return json.error();
-    if (!json->is_object())
+    VCP_TRY_ASSIGN(const auto json, readJson(source, jsonBytes, kTextLimit));
+    if (!json.is_object())
         return source.error(ErrorCode::InvalidInput, "JSON", std::nullopt, "is not a JSON object; it is not glTF");
-    return DocumentReader(source, *json).read();
+    return DocumentReader(source, json).read();
 }
 
 }  // namespace vcp

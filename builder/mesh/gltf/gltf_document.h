@@ -23,7 +23,7 @@ enum class GltfComponent : uint8_t { Int8, Uint8, Int16, Uint16, Uint32, Float }
 
 constexpr size_t byteSize(GltfComponent type) {
     constexpr size_t kSizes[] = {1, 1, 2, 2, 4, 4};
-    return kSizes[static_cast<size_t>(type)];
+    return kSizes[size_t(type)];
 }
 
 struct GltfBuffer {

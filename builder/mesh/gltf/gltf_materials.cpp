@@ -94,7 +94,7 @@ private:
         material.image = texture.image;
         material.wrapU = texture.wrapU;
         material.wrapV = texture.wrapV;
-        material.texCoord = static_cast<uint32_t>(f.whole("texCoord", 0));
+        material.texCoord = uint32_t(f.whole("texCoord", 0));
         if (!texture.image)
             document_.warnings.push_back(where_ + ": its texture is in a format that is not read; it is left out");
         const Json* const extensions = f.find("extensions");
@@ -113,7 +113,7 @@ private:
         const double c = std::cos(angle), s = std::sin(angle);
         material.uvMatrix = {glm::dvec3(c * scale[0], s * scale[1], offset[0]),
                              glm::dvec3(-s * scale[0], c * scale[1], offset[1])};
-        material.texCoord = static_cast<uint32_t>(f.whole("texCoord", material.texCoord));
+        material.texCoord = uint32_t(f.whole("texCoord", material.texCoord));
     }
 
     const Json& json_;

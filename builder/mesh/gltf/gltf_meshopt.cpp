@@ -130,18 +130,18 @@ bool meshoptIsInProportion(const GltfDocument& document) {
     double decoded = 0, stored = 0;
     for (const GltfView& view : document.views) {
         if (!view.compressed) continue;
-        decoded += static_cast<double>(view.bytes);
+        decoded += double(view.bytes);
         if (sources.insert(view.compressed->buffer).second)
-            stored += static_cast<double>(document.buffers[view.compressed->buffer].bytes);
+            stored += double(document.buffers[view.compressed->buffer].bytes);
     }
     return decoded <= kExpansion * stored + kSmallTotal;
 }
 
 Result<std::string> decodeMeshopt(const GltfMeshopt& from, std::string_view bytes) {
     constexpr std::array<uint8_t, 3> kMarks{0xA0, 0xE0, 0xD0};  // by mode
-    const uint8_t first = bytes.empty() ? uint8_t{0} : static_cast<uint8_t>(bytes[0]);
-    const auto version = static_cast<uint8_t>(first & 0x0F);
-    const bool isMarked = (first & 0xF0) == kMarks[static_cast<size_t>(from.mode)];
+    const uint8_t first = bytes.empty() ? uint8_t{0} : uint8_t(bytes[0]);
+    const auto version = uint8_t(first & 0x0F);
+    const bool isMarked = (first & 0xF0) == kMarks[size_t(from.mode)];
     const auto damaged = [](std::string detail) {
         return Error{.code = ErrorCode::InvalidInput, .message = "its meshopt data are damaged" + std::move(detail)};
     };

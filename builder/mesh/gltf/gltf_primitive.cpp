@@ -39,8 +39,8 @@ public:
         while (indices.left() > 0) {
             VCP_TRY(indices.read(kElements, values_));
             for (const double value : values_) {
-                least = std::min(least, static_cast<uint64_t>(value));
-                most = std::max(most, static_cast<uint64_t>(value));
+                least = std::min(least, uint64_t(value));
+                most = std::max(most, uint64_t(value));
             }
         }
         if (most >= vertices_ || least > most) return {};  // an error that is reported when they are read in earnest
@@ -85,8 +85,7 @@ private:
         if (colours_) VCP_TRY(readColours(count, chunk));
         if (!uvValues_) return {};
         VCP_TRY(uvValues_->read(count, values_));
-        for (size_t i = 0; i < count; ++i)
-            VCP_TRY(uvs_.append({static_cast<float>(values_[2 * i]), static_cast<float>(values_[2 * i + 1])}));
+        for (size_t i = 0; i < count; ++i) VCP_TRY(uvs_.append({float(values_[2 * i]), float(values_[2 * i + 1])}));
         return {};
     }
 
@@ -103,7 +102,7 @@ private:
     Result<void> readCorners(MeshChunk& chunk) {
         if (indices_) {
             VCP_TRY(indices_->read(kElements, values_));
-            for (const double value : values_) VCP_TRY(takeCorner(static_cast<uint64_t>(value), chunk));
+            for (const double value : values_) VCP_TRY(takeCorner(uint64_t(value), chunk));
             return {};
         }
         const uint64_t end = std::min(corners_, corner_ + kElements);
@@ -144,9 +143,7 @@ private:
         std::array<glm::vec2, 3> uvs;
         const std::array<uint64_t, 3> corners{a, b, c};
         for (size_t i = 0; i < 3; ++i) {
-            const auto uv = uvs_.at(corners[i]);
-            if (!uv) return uv.error();
-            uvs[i] = *uv;
+            VCP_TRY_ASSIGN(uvs[i], uvs_.at(corners[i]));
         }
         chunk.uvs.push_back(uvs);
         return {};

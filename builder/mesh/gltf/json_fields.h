@@ -52,7 +52,7 @@ public:
             fail(std::string("'") + key + "' is not a whole number of 0 or more");
             return std::nullopt;
         }
-        return static_cast<uint64_t>(number);
+        return uint64_t(number);
     }
     [[nodiscard]] uint64_t whole(const char* key, uint64_t missing) const { return whole(key).value_or(missing); }
     [[nodiscard]] uint64_t needWhole(const char* key) const {
@@ -69,7 +69,7 @@ public:
                  std::to_string(count));
             return std::nullopt;
         }
-        return static_cast<uint32_t>(*value);
+        return uint32_t(*value);
     }
 
     [[nodiscard]] std::string text(const char* key) const {

@@ -76,7 +76,7 @@ TEST(CollapsedTriangles, APointIsKeptUnlessOthersMeetThere) {
 TEST(CollapsedTriangles, BothBinsOfALineKeepTheSame) {
     std::mt19937 random(1);
     for (int i = 0; i < 500; ++i) {
-        const auto coordinate = [&] { return static_cast<int>(random() % 2000); };
+        const auto coordinate = [&] { return int(random() % 2000); };
         const glm::i32vec3 a{coordinate(), coordinate(), 999}, b{coordinate(), coordinate(), 1000};
         const auto inA = kept({triangle(a, b, a)}, pageOf(a)), inB = kept({triangle(b, a, b)}, pageOf(b));
         ASSERT_EQ(inA.size(), 1u);
@@ -92,7 +92,7 @@ TEST(CollapsedTriangles, TheOrderDoesNotMatter) {
     std::vector<LatticeTriangle> soup;
     for (int i = 0; i < 300; ++i) {
         const auto point = [&] { return glm::i32vec3(random() % 6, random() % 6, 3); };
-        soup.push_back(triangle(point(), point(), point(), static_cast<uint32_t>(random() % 3)));
+        soup.push_back(triangle(point(), point(), point(), uint32_t(random() % 3)));
     }
     const auto meshOfKept = [&] { return meshOf(kept(soup), false); };
     const LatticeMesh first = meshOfKept();

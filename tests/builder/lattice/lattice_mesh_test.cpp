@@ -61,7 +61,7 @@ TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
     // Of the two orientations the one that ascends, whichever comes first.
     for (size_t first = 0; first < copies.size(); ++first) {
         std::vector<LatticeTriangle> soup = copies;
-        std::rotate(soup.begin(), soup.begin() + static_cast<ptrdiff_t>(first), soup.end());
+        std::rotate(soup.begin(), soup.begin() + ptrdiff_t(first), soup.end());
         const LatticeMesh mesh = meshOf(soup, false);
         EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}}));
         EXPECT_EQ(mesh.stray, (std::vector<float>{5}));
@@ -97,16 +97,16 @@ TEST(HasArea, IsExactOverTheWholeLattice) {
 
 std::vector<LatticeTriangle> randomSoup(uint64_t seed) {
     std::mt19937_64 random(seed);
-    const auto any = [&](int n) { return static_cast<int>(random() % static_cast<uint64_t>(n)); };
+    const auto any = [&](int n) { return int(random() % uint64_t(n)); };
     std::vector<LatticeTriangle> soup;
     const int side = seed % 2 ? 6 : 100000;
     while (soup.size() < 500) {
         const auto point = [&] { return glm::i32vec3(any(side), any(side), any(side)); };
-        LatticeTriangle t = triangle(point(), point(), point(), static_cast<float>(any(100)));
+        LatticeTriangle t = triangle(point(), point(), point(), float(any(100)));
         if (!soup.empty() && any(3) == 0) std::copy_n(soup[random() % soup.size()].corner, 3, t.corner);
         if (any(2)) std::swap(t.corner[0], t.corner[1]);
         if (hasArea(t.corner[0], t.corner[1], t.corner[2]))
-            soup.push_back(coloured(t, static_cast<uint32_t>(random()), static_cast<uint32_t>(random()), 0xff00ff00u));
+            soup.push_back(coloured(t, uint32_t(random()), uint32_t(random()), 0xff00ff00u));
     }
     return soup;
 }
@@ -149,7 +149,7 @@ TEST(MeshOf, OrderDoesNotMatter) {
         std::shuffle(soup.begin(), soup.end(), random);
         // Which corner comes first does not matter either.
         for (LatticeTriangle& t : soup) {
-            const auto turn = static_cast<ptrdiff_t>(random() % 3);
+            const auto turn = ptrdiff_t(random() % 3);
             std::rotate(t.corner, t.corner + turn, t.corner + 3);
             std::rotate(t.colour, t.colour + turn, t.colour + 3);
         }

@@ -30,8 +30,7 @@ TEST(PageGrid, NearPagesAreThoseThatTheTriangleOverlaps) {
         const glm::i32vec3 base(random() % (64 * kCell), random() % (64 * kCell), random() % (64 * kCell));
         const int reach = i % 3 == 0 ? 40 * kCell : 2 * kCell;
         for (auto& c : corner) {
-            c = base + glm::i32vec3(random() % static_cast<uint64_t>(reach), random() % static_cast<uint64_t>(reach),
-                                    random() % static_cast<uint64_t>(reach));
+            c = base + glm::i32vec3(random() % uint64_t(reach), random() % uint64_t(reach), random() % uint64_t(reach));
             c = glm::min(c, 64 * kCell);
         }
         const double margin = i % 2 ? 4 : 0.25;

@@ -51,11 +51,11 @@ private:
 
 void expectClosest(glm::dvec3 query, const Triangle3& t, double scale, uint64_t seed) {
     const ClosestPoint c = closestOnTriangle(query, t);
-    const double truth = static_cast<double>(slowDistance(query, t));
+    const double truth = double(slowDistance(query, t));
     ASSERT_NEAR(std::sqrt(c.squared), truth, 1e-9 * scale) << "seed " << seed;
     ASSERT_NEAR(c.squared, glm::dot(c.offset, c.offset), 1e-12 * scale * scale) << "seed " << seed;
     // The answer is a point of the triangle, and the weights say which.
-    ASSERT_LT(static_cast<double>(slowDistance(query + c.offset, t)), 1e-9 * scale) << "seed " << seed;
+    ASSERT_LT(double(slowDistance(query + c.offset, t)), 1e-9 * scale) << "seed " << seed;
     ASSERT_NEAR(c.weights.x + c.weights.y + c.weights.z, 1, 1e-9);
     ASSERT_GE(std::min({c.weights.x, c.weights.y, c.weights.z}), -1e-9) << "seed " << seed;
 }
@@ -89,7 +89,7 @@ TEST(ClosestOnTriangle, SegmentsAndPoints) {
         for (const Triangle3& t : {Triangle3{a, b, b}, Triangle3{a, a, b}, Triangle3{a, b, a}, Triangle3{a, a, a},
                                    Triangle3{a, b, (a + b) / 2.0}}) {
             const ClosestPoint c = closestOnTriangle(query, t);
-            ASSERT_NEAR(std::sqrt(c.squared), static_cast<double>(slowDistance(query, t)), 1e-12) << seed;
+            ASSERT_NEAR(std::sqrt(c.squared), double(slowDistance(query, t)), 1e-12) << seed;
         }
         const ClosestPoint self = closestOnTriangle(a, {a, b, b});
         ASSERT_EQ(self.squared, 0);
@@ -102,7 +102,7 @@ TEST(ClosestOnTriangle, FarQueries) {
         const Triangle3 t{p.latticePoint(4), p.latticePoint(4), p.latticePoint(4)};
         const glm::dvec3 query = p.point(2000);
         const ClosestPoint c = closestOnTriangle(query, t);
-        ASSERT_NEAR(std::sqrt(c.squared), static_cast<double>(slowDistance(query, t)), 1e-9) << seed;
+        ASSERT_NEAR(std::sqrt(c.squared), double(slowDistance(query, t)), 1e-9) << seed;
     }
 }
 
@@ -131,7 +131,7 @@ TEST(SquaredDistances, AreThoseOfTheTriangles) {
             if (i % 4 == 2) t[2] = (t[0] + t[1]) / 2.0;                                 // no area
             if (i == 3) t[2] = t[1] = t[0];
             if (i == 7) t[0] = query;
-            for (int c = 0; c < 9; ++c) batch.corners[c][i] = static_cast<float>(t[c / 3][c % 3]);
+            for (int c = 0; c < 9; ++c) batch.corners[c][i] = float(t[c / 3][c % 3]);
             for (glm::dvec3& corner : t) corner = glm::dvec3(glm::vec3(corner));
         }
         squaredDistances(query, batch);
@@ -228,11 +228,9 @@ TEST(ClipToBox, AreasAndPoints) {
         for (const glm::dvec3& q : polygon) {
             fast.emplace_back(q);
             for (int axis = 0; axis < 3; ++axis) ASSERT_LE(std::abs(q[axis] - centre[axis]), half + 1e-12) << seed;
-            ASSERT_LT(static_cast<double>(slowDistance(q, t)), 1e-12) << seed;
+            ASSERT_LT(double(slowDistance(q, t)), 1e-12) << seed;
         }
-        ASSERT_NEAR(static_cast<double>(slowArea(fast)),
-                    static_cast<double>(slowArea(slowClip(t, centre - half, centre + half))), 1e-11)
-            << seed;
+        ASSERT_NEAR(double(slowArea(fast)), double(slowArea(slowClip(t, centre - half, centre + half))), 1e-11) << seed;
         ASSERT_LE(polygon.size(), 9u);
     }
 }
@@ -252,7 +250,7 @@ TEST(ClipToBox, BoxesThatTileKeepTheArea) {
                     sum += slowArea(part);
                 }
         const Long whole = slowArea({Long3(t[0]), Long3(t[1]), Long3(t[2])});
-        ASSERT_NEAR(static_cast<double>(sum), static_cast<double>(whole), 1e-12) << seed;
+        ASSERT_NEAR(double(sum), double(whole), 1e-12) << seed;
     }
 }
 

@@ -24,7 +24,7 @@ IndexedMesh randomSurface(uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
     const double radius = 2 + 12 * unit(random), noise = unit(random) < 0.7 ? 0.3 * unit(random) : 1.5;
-    IndexedMesh mesh = seed % 2 ? test::sphereMesh({24, 24, 24}, radius, static_cast<uint32_t>(8 + seed % 23))
+    IndexedMesh mesh = seed % 2 ? test::sphereMesh({24, 24, 24}, radius, uint32_t(8 + seed % 23))
                                 : test::torusMesh({24, 24, 24}, radius, radius / 3, 40, 16);
     for (glm::dvec3& p : mesh.positions) p += noise * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5);
     if (seed % 3 == 0) mesh.triangles.resize(mesh.triangles.size() * 2 / 3);  // a border
@@ -39,7 +39,7 @@ IndexedMesh randomSoup(uint64_t seed) {
     for (int i = 0; i < 120; ++i) {
         const glm::dvec3 centre = 20.0 * glm::dvec3(unit(random), unit(random), unit(random)) + 5.0;
         const double size = std::pow(10, -3 + 4 * unit(random));
-        const uint32_t first = static_cast<uint32_t>(mesh.positions.size());
+        const uint32_t first = uint32_t(mesh.positions.size());
         for (int c = 0; c < 3; ++c)
             mesh.positions.push_back(
                 glm::max(centre + size * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5), 0.0));
@@ -165,7 +165,7 @@ TEST(Coarsen, IslandsDoNotVanish) {
         const glm::dvec3 centre =
             4.0 * glm::dvec3(i % 4, i / 4 % 4, i / 16) + 2.0 + glm::dvec3(unit(random), unit(random), unit(random));
         const double size = i % 3 == 0 ? 0.001 : 0.02;
-        const uint32_t first = static_cast<uint32_t>(dust.positions.size());
+        const uint32_t first = uint32_t(dust.positions.size());
         for (const glm::dvec3 corner : {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)})
             dust.positions.push_back(centre + size * corner);
         for (const Index3& t : {Index3{0, 1, 2}, Index3{0, 1, 3}, Index3{0, 2, 3}, Index3{1, 2, 3}})
@@ -211,7 +211,7 @@ TEST(Coarsen, LongTrianglesCountByTheirCorners) {
 TEST(Coarsen, AClusterMayHaveThousandsOfTriangles) {
     // A fan about one point and a ball that is much smaller than a cluster.
     IndexedMesh mesh = test::sphereMesh({5.3, 5.3, 5.3}, 0.2, 60);
-    const uint32_t hub = static_cast<uint32_t>(mesh.positions.size());
+    const uint32_t hub = uint32_t(mesh.positions.size());
     mesh.positions.push_back({12, 12, 4});
     for (uint32_t i = 0; i < 3000; ++i) {
         const double a = test::kTwoPi * i / 3000;
@@ -253,7 +253,7 @@ TEST(Coarsen, NumberingDoesNotMatter) {
     for (uint64_t seed = 0; seed < 12; ++seed) {
         std::mt19937_64 random(seed);
         LatticeMesh mesh = withoutStray(seed % 2 ? randomSoup(seed) : randomSurface(seed));
-        for (size_t v = 0; v < mesh.positions.size(); ++v) mesh.colours.push_back(static_cast<uint32_t>(random()));
+        for (size_t v = 0; v < mesh.positions.size(); ++v) mesh.colours.push_back(uint32_t(random()));
         for (float& stray : mesh.stray) stray = float(random() % 100) / 1000;
         std::vector<uint32_t> vertex(mesh.positions.size()), triangle(mesh.triangles.size());
         std::iota(vertex.begin(), vertex.end(), 0u);

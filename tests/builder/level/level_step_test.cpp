@@ -146,7 +146,7 @@ IndexedMesh randomMesh(uint64_t seed) {
     std::uniform_real_distribution<double> unit(0, 1);
     const double radius = 12 + 12 * unit(random), noise = 0.5 * unit(random);
     IndexedMesh mesh = seed % 2 ? test::torusMesh({31, 33, 30}, radius, radius / 4, 60, 30)
-                                : test::sphereMesh({32, 31, 33}, radius, static_cast<uint32_t>(10 + seed % 30));
+                                : test::sphereMesh({32, 31, 33}, radius, uint32_t(10 + seed % 30));
     for (glm::dvec3& p : mesh.positions) p += noise * (glm::dvec3(unit(random), unit(random), unit(random)) - 0.5);
     return mesh;
 }
@@ -156,17 +156,17 @@ IndexedMesh longMesh(uint64_t seed) {
     IndexedMesh mesh = test::randomTriangles(300, seed, true);
     for (size_t i = 0; i < mesh.positions.size(); ++i) mesh.positions[i] = mesh.positions[i] * 60.0 + 2.0;
     for (size_t i = 0; i + 3 <= mesh.positions.size(); i += 9)
-        mesh.triangles.push_back({static_cast<uint32_t>(i), static_cast<uint32_t>((i * 7 + 1) % mesh.positions.size()),
-                                  static_cast<uint32_t>((i * 13 + 2) % mesh.positions.size())});
+        mesh.triangles.push_back({uint32_t(i), uint32_t((i * 7 + 1) % mesh.positions.size()),
+                                  uint32_t((i * 13 + 2) % mesh.positions.size())});
     test::append(mesh, test::boxMesh({3, 3, 3}, {61, 60, 62}, 1));
     test::append(mesh, test::sphereMesh({20, 20, 20}, 8, 20));
     return mesh;
 }
 
 std::vector<uint32_t> randomColours(const IndexedMesh& mesh, uint64_t seed) {
-    std::mt19937 random(static_cast<uint32_t>(seed));
+    std::mt19937 random{uint32_t(seed)};
     std::vector<uint32_t> colours(mesh.positions.size());
-    for (uint32_t& c : colours) c = static_cast<uint32_t>(random());
+    for (uint32_t& c : colours) c = uint32_t(random());
     return colours;
 }
 

@@ -189,7 +189,7 @@ public:
         auto* positions = static_cast<float*>(
             rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
         for (const glm::dvec3& p : mesh.positions)
-            for (int a = 0; a < 3; ++a) *positions++ = static_cast<float>(p[a]);
+            for (int a = 0; a < 3; ++a) *positions++ = float(p[a]);
         auto* triangles = static_cast<uint32_t*>(
             rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
         for (const auto& t : mesh.triangles)
@@ -209,10 +209,8 @@ public:
     /// Distance, or infinity.
     double cast(glm::dvec3 o, glm::dvec3 d) const {
         RTCRayHit r{};
-        r.ray.org_x = static_cast<float>(o.x), r.ray.org_y = static_cast<float>(o.y),
-        r.ray.org_z = static_cast<float>(o.z);
-        r.ray.dir_x = static_cast<float>(d.x), r.ray.dir_y = static_cast<float>(d.y),
-        r.ray.dir_z = static_cast<float>(d.z);
+        r.ray.org_x = float(o.x), r.ray.org_y = float(o.y), r.ray.org_z = float(o.z);
+        r.ray.dir_x = float(d.x), r.ray.dir_y = float(d.y), r.ray.dir_z = float(d.z);
         r.ray.tfar = std::numeric_limits<float>::infinity();
         r.ray.mask = ~0u;
         r.hit.geomID = RTC_INVALID_GEOMETRY_ID;

@@ -38,7 +38,7 @@ TEST(SurfaceDistance, SphereAgainstItsMesh) {
     EXPECT_LT(d.surfaceToMesh.p50, 2e-3);
     EXPECT_LT(d.surfaceToMesh.max, 1e-2);
     EXPECT_EQ(d.cell, 1);
-    EXPECT_FLOAT_EQ(static_cast<float>(d.certifiedErrorMax), 0.05f);
+    EXPECT_FLOAT_EQ(float(d.certifiedErrorMax), 0.05f);
     EXPECT_GT(d.samples, 12000u);
 }
 

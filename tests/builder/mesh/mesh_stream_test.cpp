@@ -158,7 +158,7 @@ TEST_F(OpenMesh, AFileWithoutPermissionIsOneClearError) {
 uint64_t peakResidentBytes() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+    return uint64_t(usage.ru_maxrss) * 1024;
 }
 
 std::vector<std::filesystem::path> suiteMeshes() {
@@ -166,8 +166,7 @@ std::vector<std::filesystem::path> suiteMeshes() {
     std::error_code absent;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(kData / "suites", absent)) {
         std::string extension = entry.path().extension().string();
-        std::ranges::transform(extension, extension.begin(),
-                               [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
         if (extension == ".ply" || extension == ".obj" || extension == ".stl") meshes.push_back(entry.path());
     }
     std::ranges::sort(meshes);

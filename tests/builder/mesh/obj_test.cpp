@@ -121,7 +121,7 @@ TEST(Obj, ReadsMoreThanAChunk) {
     ASSERT_FALSE(mesh.error) << mesh.line();
     ASSERT_EQ(mesh.triangles.size(), kMany);
     for (uint64_t i = 0; i < kMany; ++i) {
-        ASSERT_EQ(mesh.positions[i].x, static_cast<double>(i));
+        ASSERT_EQ(mesh.positions[i].x, double(i));
         ASSERT_EQ(mesh.triangles[i], (Triangle{i, 0, kMany - 1}));
     }
 }
@@ -142,7 +142,7 @@ TEST(Obj, EverySingleBitFlipIsReadOrRefused) {
     const std::string text = "# c\n" + kSquare + "f 1/1/1 \\\n2/2/2 -1\nf 1 2 3 4\n";
     for (size_t bit = 0; bit < 8 * text.size(); ++bit) {
         std::string flipped = text;
-        flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << bit % 8));
+        flipped[bit / 8] = char(flipped[bit / 8] ^ (1 << bit % 8));
         const ReadMesh mesh = test::readAll(openObj(ByteSource::fromMemory(flipped, "mesh", 16)));
         EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << mesh.line();
     }

@@ -78,7 +78,7 @@ TEST(Off, WhatIsWrongIsNamed) {
 std::string binaryOff(bool big, bool colours) {
     std::string bytes = colours ? "COFF BINARY\n" : "OFF BINARY\n";
     const auto put = [&](uint32_t value) {
-        for (int i = 0; i < 4; ++i) bytes += static_cast<char>(value >> (big ? 24 - 8 * i : 8 * i));
+        for (int i = 0; i < 4; ++i) bytes += char(value >> (big ? 24 - 8 * i : 8 * i));
     };
     const auto real = [&](float value) { put(std::bit_cast<uint32_t>(value)); };
     for (const uint32_t count : {4, 2, 0}) put(count);

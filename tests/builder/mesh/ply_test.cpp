@@ -19,14 +19,14 @@ constexpr const char* kTypeNames[] = {"char", "uint8", "int16", "ushort", "int",
 constexpr PlyType kTypes[] = {PlyType::Int8,  PlyType::Uint8,  PlyType::Int16,   PlyType::Uint16,
                               PlyType::Int32, PlyType::Uint32, PlyType::Float32, PlyType::Float64};
 
-const char* nameOf(PlyType type) { return kTypeNames[static_cast<size_t>(type)]; }
+const char* nameOf(PlyType type) { return kTypeNames[size_t(type)]; }
 
 // Writes a PLY body value by value, the slow and obvious way.
 class PlyWriter {
 public:
     explicit PlyWriter(PlyEncoding encoding) : encoding_(encoding) {
         constexpr const char* kNames[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-        text = std::string("ply\nformat ") + kNames[static_cast<size_t>(encoding)] + " 1.0\n";
+        text = std::string("ply\nformat ") + kNames[size_t(encoding)] + " 1.0\n";
     }
     PlyWriter& header(const std::string& line) {
         text += line + "\n";
@@ -63,7 +63,7 @@ public:
         return *this;
     }
     PlyWriter& list(PlyType count, PlyType type, std::initializer_list<double> all) {
-        value(count, static_cast<double>(all.size()));
+        value(count, double(all.size()));
         return values(type, all);
     }
 
@@ -476,7 +476,7 @@ TEST(Ply, EverySingleBitFlipIsReadOrRefused) {
         const std::string text = square(encoding, {0, 1, 2, 3});
         for (size_t bit = 0; bit < 8 * text.size(); ++bit) {
             std::string flipped = text;
-            flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << bit % 8));
+            flipped[bit / 8] = char(flipped[bit / 8] ^ (1 << bit % 8));
             const ReadMesh mesh = test::readAll(openPly(ByteSource::fromMemory(flipped, "mesh", 32)));
             EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << mesh.line();
             EXPECT_LE(mesh.triangles.size(), flipped.size());

@@ -20,7 +20,7 @@ std::string binary(uint32_t count, uint32_t declared, std::string_view title = "
     for (uint32_t i = 0; i < count; ++i) {
         // A normal that is not a number must not matter.
         float facet[12] = {std::numeric_limits<float>::quiet_NaN(), 0, 0};
-        for (int k = 3; k < 12; ++k) facet[k] = static_cast<float>(i * 16) + static_cast<float>(k);
+        for (int k = 3; k < 12; ++k) facet[k] = float(i * 16) + float(k);
         bytes.append(reinterpret_cast<const char*>(facet), sizeof facet);
         bytes.append(2, '\x7F');
     }
@@ -64,8 +64,7 @@ TEST(Stl, ReadsText) {
 
 TEST(Stl, ReadsTextInAnyCaseWithAnyLineEndAndManySolids) {
     std::string upper;
-    for (const char c : kText)
-        upper += c == '\n' ? std::string("\r\n") : std::string(1, static_cast<char>(std::toupper(c)));
+    for (const char c : kText) upper += c == '\n' ? std::string("\r\n") : std::string(1, char(std::toupper(c)));
     for (size_t at; (at = upper.find("NAN")) != std::string::npos;) upper.replace(at, 3, "nan");
     const ReadMesh mesh = read("\n  " + upper + "solid empty\nendsolid\n" + kText);
     ASSERT_FALSE(mesh.error) << mesh.line();
@@ -159,7 +158,7 @@ TEST(Stl, EverySingleBitFlipIsReadOrRefused) {
     for (const std::string& text : {kText, binary(2, 2)})
         for (size_t bit = 0; bit < 8 * text.size(); ++bit) {
             std::string flipped = text;
-            flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << bit % 8));
+            flipped[bit / 8] = char(flipped[bit / 8] ^ (1 << bit % 8));
             const ReadMesh mesh = test::readAll(openStl(ByteSource::fromMemory(flipped, "mesh", 16)));
             EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << mesh.line();
         }

@@ -77,7 +77,7 @@ Answer readInAProcess(const std::filesystem::path& path) {
     Answer answer;
     char buffer[4096];
     ssize_t got = 0;
-    while ((got = ::read(ends[0], buffer, sizeof buffer)) > 0) answer.text.append(buffer, static_cast<size_t>(got));
+    while ((got = ::read(ends[0], buffer, sizeof buffer)) > 0) answer.text.append(buffer, size_t(got));
     ::close(ends[0]);
     ::waitpid(child, &answer.status, 0);
     return answer;

@@ -92,8 +92,8 @@ TEST(BinTriangles, ARunOfPages) {
         ASSERT_EQ(run.pages, expected);
         for (size_t i = 0; i < run.pages.size(); ++i) {
             const auto of = run.of(i),
-                       want = all.of(static_cast<size_t>(std::find(all.pages.begin(), all.pages.end(), run.pages[i]) -
-                                                         all.pages.begin()));
+                       want = all.of(
+                           size_t(std::find(all.pages.begin(), all.pages.end(), run.pages[i]) - all.pages.begin()));
             ASSERT_TRUE(std::equal(of.begin(), of.end(), want.begin(), want.end()));
         }
     }

@@ -14,7 +14,7 @@ constexpr double kMargin = 0.125;
 Triangle3 randomTriangle(uint64_t seed) {
     std::mt19937_64 random(seed);
     const double steps = seed % 2 ? 2048 : 2;
-    const int reach = static_cast<int>((seed % 3 == 0 ? 6 : 1.5) * steps);
+    const int reach = int((seed % 3 == 0 ? 6 : 1.5) * steps);
     std::uniform_int_distribution<int> step(-reach, reach);
     Triangle3 t;
     for (glm::dvec3& corner : t) corner = glm::dvec3(step(random), step(random), step(random)) / steps;
@@ -77,8 +77,7 @@ TEST(CellOverlap, PartOfTheRange) {
             for (int y = low.y; y <= overlap.upper().y; ++y)
                 for (int x = low.x; x <= overlap.upper().x; ++x, ++i) {
                     const glm::ivec3 at = glm::ivec3(x, y, z) - overlap.lower();
-                    ASSERT_EQ(part[i], all[static_cast<size_t>(at.x + size.x * (at.y + size.y * at.z))])
-                        << "seed " << seed;
+                    ASSERT_EQ(part[i], all[size_t(at.x + size.x * (at.y + size.y * at.z))]) << "seed " << seed;
                 }
     }
 }

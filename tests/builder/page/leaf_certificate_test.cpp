@@ -19,7 +19,7 @@ namespace {
 std::array<uint32_t, 8> randomCodes(uint64_t seed) {
     std::mt19937_64 random(seed);
     std::array<uint32_t, 8> codes;
-    for (uint32_t& code : codes) code = static_cast<uint32_t>(random());
+    for (uint32_t& code : codes) code = uint32_t(random());
     return codes;
 }
 
@@ -85,9 +85,9 @@ TEST(LeafSurface, BatchIsWithinItsRounding) {
         for (int i = 0; i < 16; ++i) {
             // The extremes of the range, too.
             const glm::dvec3 p = i < 8 ? glm::dvec3(i & 1 ? 2 : -2, i & 2 ? 2 : -2, i & 4 ? 2 : -2) : s.point(-2, 2);
-            batch.x[i] = static_cast<float>(p.x);
-            batch.y[i] = static_cast<float>(p.y);
-            batch.z[i] = static_cast<float>(p.z);
+            batch.x[i] = float(p.x);
+            batch.y[i] = float(p.y);
+            batch.z[i] = float(p.z);
         }
         surface.evaluate(batch);
         for (int i = 8; i < 16; ++i)
@@ -106,9 +106,9 @@ TEST(LeafSurface, BatchIsWithinItsRoundingOnRealLeaves) {
         std::array<glm::dvec3, 16> exact;
         for (int i = 0; i < 16; ++i) {
             exact[i] = s.point(-0.125, 1.125);
-            batch.x[i] = static_cast<float>(exact[i].x);
-            batch.y[i] = static_cast<float>(exact[i].y);
-            batch.z[i] = static_cast<float>(exact[i].z);
+            batch.x[i] = float(exact[i].x);
+            batch.y[i] = float(exact[i].y);
+            batch.z[i] = float(exact[i].z);
         }
         surface.evaluate(batch);
         // The rounding of the points to float is part of it: the builder gives them in double.
@@ -352,14 +352,14 @@ TEST(Certificate, HoldsBothWays) {
     }
     EXPECT_GT(soft, 2000u);
     EXPECT_GT(worstPart, 0.2) << "the bound is far from the truth";
-    RecordProperty("cells", static_cast<int>(cells));
-    RecordProperty("soft", static_cast<int>(soft));
+    RecordProperty("cells", int(cells));
+    RecordProperty("soft", int(soft));
 }
 
 TEST(Certificate, FlatSheetIsSoft) {
     OnePage page(heightField(20, [](double x, double y) { return 0.2 * x - 0.1 * y; }));
     for (int x = 2; x < 30; x += 3) {
-        const Certificate c = page.certify({x, 16, static_cast<int>(std::floor(16 + 0.2 * (x + 0.5) - 1.65))}, 1, 0.05);
+        const Certificate c = page.certify({x, 16, int(std::floor(16 + 0.2 * (x + 0.5) - 1.65))}, 1, 0.05);
         EXPECT_TRUE(c.soft) << x;
         EXPECT_LT(c.maxValue, 0.01);
         EXPECT_GT(c.minSlope, 0.9);
@@ -438,7 +438,7 @@ TEST(Certificate, TwoSheetsAreRefused) {
             const double z = 16.2 + 0.01 * (x + y);
             if (std::floor(z) != std::floor(z + 0.42)) continue;
             ++two;
-            EXPECT_FALSE(page.certify({x, y, static_cast<int>(z)}, 1, 0.08).soft) << x << ' ' << y;
+            EXPECT_FALSE(page.certify({x, y, int(z)}, 1, 0.08).soft) << x << ' ' << y;
         }
     EXPECT_GT(two, 100);
 }

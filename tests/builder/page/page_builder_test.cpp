@@ -35,8 +35,8 @@ struct Page {
     Page(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1)
         : mesh(std::move(m)), bins(binTriangles(mesh, {kLog2Cells, level})), at(position) {
         const auto page = std::find(bins.pages.begin(), bins.pages.end(), mortonEncode(at));
-        const auto triangles = page == bins.pages.end() ? std::span<const uint32_t>()
-                                                        : bins.of(static_cast<size_t>(page - bins.pages.begin()));
+        const auto triangles =
+            page == bins.pages.end() ? std::span<const uint32_t>() : bins.of(size_t(page - bins.pages.begin()));
         geometry.emplace(mesh, triangles, at, kLog2Cells);
     }
     [[nodiscard]] Triangle3 triangle(size_t k) const {
@@ -55,8 +55,7 @@ LatticeMesh mixedMesh(uint64_t seed) {
     const auto point = [&](double low, double high) {
         return low + (high - low) * glm::dvec3(unit(random), unit(random), unit(random));
     };
-    IndexedMesh mesh =
-        test::sphereMesh(point(20, 44), 6 + 10 * unit(random), 20 + static_cast<uint32_t>(random() % 30));
+    IndexedMesh mesh = test::sphereMesh(point(20, 44), 6 + 10 * unit(random), 20 + uint32_t(random() % 30));
     IndexedMesh torus = test::torusMesh(glm::dvec3(32), 12 + 8 * unit(random), 2 + 3 * unit(random), 80, 30);
     test::rotate(torus, glm::dvec3(32), point(-1, 1), 6 * unit(random));
     test::append(mesh, torus);
@@ -74,7 +73,7 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
         const LatticeMesh mesh = mixedMesh(seed);
         for (const glm::u32vec3 at : {glm::u32vec3(0, 0, 0), glm::u32vec3(1, 0, 1)}) {
             Page page(mesh, at);
-            std::mt19937 random(static_cast<uint32_t>(seed));
+            std::mt19937 random{uint32_t(seed)};
             for (int z = 0; z < kCells; ++z)
                 for (int y = 0; y < kCells; ++y)
                     for (int x = 0; x < kCells; ++x) {
@@ -147,7 +146,7 @@ TEST(PageGeometry, OccupancyIsTouch) {
         for (int y = 0; y < kCells; ++y)
             for (int x = 0; x < kCells; ++x) {
                 const bool is = page.geometry->occupied({x, y, z});
-                const size_t i = static_cast<size_t>(x + kCells * (y + kCells * z));
+                const size_t i = size_t(x + kCells * (y + kCells * z));
                 occupied += is;
                 ASSERT_TRUE(is || !touched[i]) << x << ' ' << y << ' ' << z;
                 ASSERT_TRUE(!is || near[i]) << x << ' ' << y << ' ' << z;
@@ -230,7 +229,7 @@ void expectSound(Page& page, const PageTree& tree) {
         const glm::ivec3 low = n.box.lower / kSubcells, high = (n.box.lower + n.box.edge - 1) / kSubcells;
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y)
-                for (int x = low.x; x <= high.x; ++x) covered[static_cast<size_t>(x + kCells * (y + kCells * z))] = 1;
+                for (int x = low.x; x <= high.x; ++x) covered[size_t(x + kCells * (y + kCells * z))] = 1;
     }
     ASSERT_EQ(soft, tree.soft.size());
     ASSERT_EQ(hard, tree.hard.size());
@@ -240,7 +239,7 @@ void expectSound(Page& page, const PageTree& tree) {
         for (int y = 0; y < kCells; ++y)
             for (int x = 0; x < kCells; ++x) {
                 if (!page.geometry->occupied({x, y, z})) continue;
-                ASSERT_TRUE(covered[static_cast<size_t>(x + kCells * (y + kCells * z))])
+                ASSERT_TRUE(covered[size_t(x + kCells * (y + kCells * z))])
                     << "occupied cell without a leaf " << x << ' ' << y << ' ' << z;
             }
     for (const HardLeaf& leaf : tree.hard) {
@@ -303,8 +302,8 @@ TEST(PageBuilder, MixedMeshes) {
             ASSERT_NO_FATAL_FAILURE(expectSound(page, tree));
             const auto number = std::find(page.bins.pages.begin(), page.bins.pages.end(), mortonEncode(at));
             if (number == page.bins.pages.end()) continue;
-            ASSERT_NO_FATAL_FAILURE(expectHardLeavesComplete(
-                page, tree, page.bins.of(static_cast<size_t>(number - page.bins.pages.begin()))));
+            ASSERT_NO_FATAL_FAILURE(
+                expectHardLeavesComplete(page, tree, page.bins.of(size_t(number - page.bins.pages.begin()))));
             soft += tree.soft.size();
             hard += tree.hard.size();
 
@@ -333,7 +332,7 @@ uint32_t nodeAt(const PageView& view, const NodeBox& box) {
     for (int edge = kCells * kSubcells; edge > box.edge; edge /= 2) {
         EXPECT_EQ(nodeType(node), kNodeInternal);
         const glm::ivec3 o = (box.lower - lower) / (edge / 2);
-        node = view.nodes[8 * uint64_t{node & kNodePayloadMask} + static_cast<uint64_t>(o.x + 2 * o.y + 4 * o.z)];
+        node = view.nodes[8 * uint64_t{node & kNodePayloadMask} + uint64_t(o.x + 2 * o.y + 4 * o.z)];
         lower += o * (edge / 2);
     }
     return node;
@@ -343,8 +342,7 @@ TEST(PageEncoder, LeavesComeBack) {
     for (uint64_t seed = 0; seed < 3; ++seed) {
         Page page(mixedMesh(seed), {0, 0, 0});
         page.mesh.colours.resize(page.mesh.positions.size());
-        for (size_t v = 0; v < page.mesh.colours.size(); ++v)
-            page.mesh.colours[v] = static_cast<uint32_t>(v * 2654435761u);
+        for (size_t v = 0; v < page.mesh.colours.size(); ++v) page.mesh.colours[v] = uint32_t(v * 2654435761u);
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
         const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
         std::vector<uint4> block(encoded.geometry.size() / 16), colour(encoded.colour.size() / 16);

@@ -16,9 +16,9 @@ struct Points {
     std::vector<float> x, y, z;
 
     void add(glm::dvec3 p) {
-        x.push_back(static_cast<float>(p.x));
-        y.push_back(static_cast<float>(p.y));
-        z.push_back(static_cast<float>(p.z));
+        x.push_back(float(p.x));
+        y.push_back(float(p.y));
+        z.push_back(float(p.z));
     }
     [[nodiscard]] double residual(glm::dvec3 n) const {
         return quadricResidual(x.data(), y.data(), z.data(), x.size(), n);
@@ -86,8 +86,7 @@ TEST(QuadricFit, AgreesWithAFitInDouble) {
         std::mt19937_64 random(seed);
         std::uniform_real_distribution<double> half(-0.5, 0.5);
         const Axes axes = axesAcross(unitVector(random));
-        const double noise = std::pow(10.0, -4 + static_cast<double>(seed % 4)), wave = 3 * half(random),
-                     bend = half(random);
+        const double noise = std::pow(10.0, -4 + double(seed % 4)), wave = 3 * half(random), bend = half(random);
         Points points;
         for (size_t count = 8 * (2 + random() % 30); count > 0; --count)
             points.add(pointOver(axes, half(random), half(random), [&](double a, double b) {

@@ -90,7 +90,7 @@ TEST_F(JournalFile, DamagedLinesAreAbsent) {
     for (size_t at = first; at + 1 < whole.size(); ++at)
         for (int bit = 0; bit < 8; ++bit) {
             std::string damaged = whole;
-            damaged[at] = static_cast<char>(damaged[at] ^ 1 << bit);
+            damaged[at] = char(damaged[at] ^ 1 << bit);
             if (at == first) continue;  // the line break in front
             write(damaged);
             ASSERT_EQ(read().at("step"), 1) << "byte " << at << " bit " << bit;

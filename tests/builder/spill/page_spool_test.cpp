@@ -25,7 +25,7 @@ std::vector<std::byte> bytesOf(uint64_t seed, size_t count) {
 
 StoredPage pageOf(uint64_t number) {
     return {bytesOf(number, 50 + number * 3), bytesOf(~number, number % 3 == 0 ? 0 : 20 + number),
-            static_cast<uint32_t>(1000 + number), static_cast<uint32_t>(number % 3 == 0 ? 0 : 500 + number)};
+            uint32_t(1000 + number), uint32_t(number % 3 == 0 ? 0 : 500 + number)};
 }
 
 class Pages : public ::testing::Test {
@@ -35,7 +35,7 @@ protected:
             PageEntry entry;
             entry.morton = i * 7;
             entry.level = 2;
-            entry.leaves = static_cast<uint32_t>(i + 1);
+            entry.leaves = uint32_t(i + 1);
             ASSERT_TRUE(spool.append(entry, pageOf(i)).ok());
         }
     }
@@ -61,10 +61,10 @@ protected:
 
     void flip(const std::string& name, uint64_t bit) const {
         std::fstream file(temp() / name, std::ios::in | std::ios::out | std::ios::binary);
-        file.seekg(static_cast<std::streamoff>(bit / 8));
+        file.seekg(std::streamoff(bit / 8));
         const int byte = file.get();
-        file.seekp(static_cast<std::streamoff>(bit / 8));
-        file.put(static_cast<char>(byte ^ 1 << bit % 8));
+        file.seekp(std::streamoff(bit / 8));
+        file.put(char(byte ^ 1 << bit % 8));
     }
 
     fs::path temp() const { return folder_ / "out.vcp.build"; }

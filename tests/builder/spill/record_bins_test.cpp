@@ -31,9 +31,7 @@ Record randomRecord(std::mt19937_64& random, uint64_t i) {
         const uint64_t words[3] = {random(), random(), random()};
         std::memcpy(&r, words, sizeof r);
     } else {
-        r = {{static_cast<int32_t>(i), -static_cast<int32_t>(i * 3), static_cast<int32_t>(random() % 100)},
-             0.5f,
-             static_cast<uint32_t>(i)};
+        r = {{int32_t(i), -int32_t(i * 3), int32_t(random() % 100)}, 0.5f, uint32_t(i)};
     }
     return r;
 }
@@ -154,8 +152,7 @@ TEST_F(Bins, SmoothRecordsAreSmall) {
     RecordBins<Record> bins(space, "bins", 1, 1 << 20);
     std::vector<Record> records(50000);
     for (size_t i = 0; i < records.size(); ++i)
-        records[i] = {
-            {static_cast<int32_t>(i * 5), 1000000 - static_cast<int32_t>(i), 7}, 1, static_cast<uint32_t>(i / 3)};
+        records[i] = {{int32_t(i * 5), 1000000 - int32_t(i), 7}, 1, uint32_t(i / 3)};
     ASSERT_TRUE(bins.append(0, records).ok());
     ASSERT_TRUE(bins.raw().flush().ok());
     EXPECT_LT(bins.raw().bytes(), records.size() * sizeof(Record) / 4);
@@ -174,9 +171,9 @@ TEST_F(Bins, EveryDamageIsNoticed) {
     ASSERT_GT(intact.size(), 1000u);
     std::mt19937_64 random(5);
     for (int i = 0; i < 400; ++i) {
-        const size_t at = i < 60 ? static_cast<size_t>(i) : random() % intact.size();
+        const size_t at = i < 60 ? size_t(i) : random() % intact.size();
         std::string damaged = intact;
-        damaged[at] = static_cast<char>(damaged[at] ^ 1 << random() % 8);
+        damaged[at] = char(damaged[at] ^ 1 << random() % 8);
         std::ofstream(file, std::ios::binary) << damaged;
         TempSpace space(folder_ / "temp", 0);
         ASSERT_TRUE(space.folder().take().ok());
@@ -204,7 +201,7 @@ TEST_F(Bins, TheIndexIsOfIntactHeadersOnly) {
     const std::string intact = contentOf(file);
     for (size_t bit = 0; bit < 32 * 8; ++bit) {
         std::string damaged = intact;
-        damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ 1 << bit % 8);
+        damaged[bit / 8] = char(damaged[bit / 8] ^ 1 << bit % 8);
         std::ofstream(file, std::ios::binary) << damaged;
         TempSpace space(folder_ / "temp", 0);
         ASSERT_TRUE(space.folder().take().ok());

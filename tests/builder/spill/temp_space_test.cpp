@@ -96,7 +96,7 @@ TEST_F(Temp, ReadersBesideTheWriter) {
     std::vector<std::thread> readers;
     for (int i = 0; i < 3; ++i)
         readers.emplace_back([&, i] {
-            std::mt19937_64 random(static_cast<uint64_t>(i));
+            std::mt19937_64 random{uint64_t(i)};
             while (file.size() < bytes.size() && !wrong) {
                 const uint64_t size = file.size();
                 if (size == 0) continue;
@@ -130,7 +130,7 @@ TEST_F(Temp, TakenOverAndCut) {
         ASSERT_TRUE(space.folder().take().ok());
         TempFile file(space, "pages1.spill");
         ASSERT_TRUE(file.reopen(kept).ok());
-        Bytes want(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(kept));
+        Bytes want(bytes.begin(), bytes.begin() + ptrdiff_t(kept));
         expectHolds(file, want);
         EXPECT_EQ(space.diskBytes(), kept);
         ASSERT_TRUE(file.append(bytes).ok());

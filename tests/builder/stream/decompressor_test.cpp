@@ -28,7 +28,7 @@ std::string drained(Result<ByteSource> source) {
 std::string noise(size_t count) {
     std::mt19937 random(7);
     std::string bytes(count, '\0');
-    for (char& c : bytes) c = static_cast<char>(random() % 23);
+    for (char& c : bytes) c = char(random() % 23);
     return bytes;
 }
 
@@ -68,7 +68,7 @@ TEST(Decompressor, DamageIsAnErrorThatSaysSo) {
     std::string packed = gzipped(bytes);
     for (size_t at = packed.size() / 4; at < packed.size(); at += 101) {
         std::string broken = packed;
-        broken[at] = static_cast<char>(broken[at] ^ 0x10);
+        broken[at] = char(broken[at] ^ 0x10);
         EXPECT_TRUE(failed(drained(piped(broken, 1000, 64)))) << at;
     }
     EXPECT_NE(drained(piped(gzipped("a") + "garbage", 1000, 64)).find("gzip data are damaged"), std::string::npos);

@@ -20,7 +20,7 @@ TEST(Spool, ReadsBackInMemoryAndFromItsFile) {
         Spool spool(folder.path(), memory);
         std::string all;
         for (int i = 0; i < 200; ++i) {
-            const std::string piece(random() % 100, static_cast<char>(i));
+            const std::string piece(random() % 100, char(i));
             ASSERT_TRUE(spool.append(piece).ok());
             all += piece;
             const size_t offset = random() % (all.size() + 1), count = random() % (all.size() - offset + 1);
@@ -42,7 +42,7 @@ TEST(Spool, DamageIsNoticed) {
     TestFolder folder("vcp_spool");
     std::mt19937 random(2);
     std::string all(200'000, '\0');
-    for (char& c : all) c = static_cast<char>(random());
+    for (char& c : all) c = char(random());
     for (const size_t damaged : {size_t{0}, size_t{65'535}, size_t{65'536}, size_t{131'071}}) {
         Spool spool(folder.path(), 1000);
         for (size_t at = 0; at < all.size(); at += 777)
@@ -53,8 +53,8 @@ TEST(Spool, DamageIsNoticed) {
             const auto target = std::filesystem::read_symlink(entry.path(), ignored).string();
             if (target.find((folder / "vcp_spool_").string()) == std::string::npos) continue;
             std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
-            file.seekp(static_cast<std::streamoff>(damaged));
-            file.put(static_cast<char>(all[damaged] ^ 16));
+            file.seekp(std::streamoff(damaged));
+            file.put(char(all[damaged] ^ 16));
         }
         size_t refused = 0;
         std::string part(1000, '\0');
@@ -111,7 +111,7 @@ TEST(RandomBytes, OpensRegularFilesOnly) {
 TEST(DataUri, DecodesBase64OfAnyLength) {
     for (size_t count = 0; count < 10; ++count) {
         std::string bytes;
-        for (size_t i = 0; i < count; ++i) bytes += static_cast<char>(250 + 3 * i);
+        for (size_t i = 0; i < count; ++i) bytes += char(250 + 3 * i);
         EXPECT_EQ(decodeDataUri("data:x/y;base64," + test::base64(bytes)), bytes);
     }
     EXPECT_EQ(decodeDataUri("data:;base64,-_-_"), std::string("\xFB\xFF\xBF", 3));

@@ -58,7 +58,7 @@ std::string jpegOf(const Image& image, bool progressive, const std::vector<jpeg_
     if (progressive) jpeg_simple_progression(&jpeg);
     if (!scans.empty()) {
         jpeg.scan_info = scans.data();
-        jpeg.num_scans = static_cast<int>(scans.size());
+        jpeg.num_scans = int(scans.size());
     }
     jpeg_start_compress(&jpeg, TRUE);
     while (jpeg.next_scanline < jpeg.image_height) {
@@ -103,7 +103,7 @@ TEST(Image, FlippedBytesAreReadOrRefused) {
     for (const std::string& file : {pngOf(image), jpegOf(image, false), jpegOf(image, true)})
         for (int i = 0; i < 300; ++i) {
             std::string broken = file;
-            broken[random() % broken.size()] ^= static_cast<char>(1 + random() % 255);
+            broken[random() % broken.size()] ^= char(1 + random() % 255);
             const auto decoded = decodeImage(broken, {.edge = 4096, .bytes = 1 << 24, .fileBytes = 1 << 24});
             refused += !decoded.ok();
             if (!decoded.ok()) {

@@ -110,7 +110,7 @@ TEST_F(BenchBuild, TheFormsOfTheReportAgree) {
     std::string header, line;
     ASSERT_TRUE(std::getline(csv, header));
     const auto columns = [](const std::string& text) { return std::count(text.begin(), text.end(), ',') + 1; };
-    EXPECT_EQ(columns(header), static_cast<long>(said["rows"][0].size()));
+    EXPECT_EQ(columns(header), long(said["rows"][0].size()));
     size_t lines = 0;
     for (; std::getline(csv, line); ++lines) EXPECT_EQ(columns(line), columns(header));
     EXPECT_EQ(lines, said["rows"].size());

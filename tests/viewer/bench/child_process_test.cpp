@@ -15,7 +15,7 @@ namespace {
 
 TEST(ChildProcess, TheValueArrivesAsItIs) {
     std::string large;
-    for (int i = 0; i < 1'000'000; ++i) large += static_cast<char>(i * 7);
+    for (int i = 0; i < 1'000'000; ++i) large += char(i * 7);
     const pid_t parent = ::getpid();
     pid_t child = 0;
     const auto outcome = runInChild([&](const ChildProgress&) -> Result<std::string> {

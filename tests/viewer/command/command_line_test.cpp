@@ -129,7 +129,7 @@ TEST_F(CommandLine, BadInputsEndWith1AndNameTheFile) {
     write(empty, "");
     write(emptyDataset, "");
     std::string noise;
-    for (unsigned i = 0; i < 9000; ++i) noise += static_cast<char>(i * 2654435761u >> 13);
+    for (unsigned i = 0; i < 9000; ++i) noise += char(i * 2654435761u >> 13);
     write(garbage, noise);
     write(garbageDataset, noise);
     const std::string truncated = contentOf(ball()).substr(0, 2000);
@@ -386,8 +386,7 @@ TEST_F(CommandLine, RenderRefusesBrokenPagesWithoutAPicture) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const Json info = Json::parse(run({"info", dataset().string(), "--json"}).out);
     std::string bytes = contentOf(dataset());
-    for (size_t at = bytes.size() / 3; at + 200 < bytes.size(); at += 97)
-        bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
+    for (size_t at = bytes.size() / 3; at + 200 < bytes.size(); at += 97) bytes[at] = char(bytes[at] ^ 0x55);
     const fs::path file = *folder_ / "broken_pages.vcp", png = *folder_ / "broken_pages.png";
     write(file, bytes);
     expectFailure(run({"render", file.string(), "-o", png.string(), "--size", "64x64"}), 1, file.string());

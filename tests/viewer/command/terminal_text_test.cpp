@@ -60,9 +60,9 @@ TEST(TerminalText, AnyBytes) {
     for (uint32_t seed = 0; seed < 2000; ++seed) {
         std::mt19937 random(seed);
         std::string bytes(random() % 40, '\0');
-        for (char& byte : bytes) byte = static_cast<char>(random());
+        for (char& byte : bytes) byte = char(random());
         const std::string shown = terminalText(bytes);
-        for (const char byte : shown) ASSERT_FALSE(static_cast<uint8_t>(byte) < 0x20 || byte == 0x7f) << seed;
+        for (const char byte : shown) ASSERT_FALSE(uint8_t(byte) < 0x20 || byte == 0x7f) << seed;
         ASSERT_NO_THROW((void)nlohmann::json(shown).dump()) << seed;
         ASSERT_EQ(terminalText(shown), shown) << seed;
     }

@@ -54,8 +54,8 @@ protected:
         png_bytepp rows = png_get_rows(png, info);
         for (uint32_t y = 0; y < image.height; ++y)
             for (uint32_t i = 0; i < image.width * image.channels; ++i)
-                image.values.push_back(
-                    image.bits == 16 ? static_cast<uint16_t>(rows[y][2 * i] << 8 | rows[y][2 * i + 1]) : rows[y][i]);
+                image.values.push_back(image.bits == 16 ? uint16_t(rows[y][2 * i] << 8 | rows[y][2 * i + 1])
+                                                        : rows[y][i]);
         png_destroy_read_struct(&png, &info, nullptr);
         std::fclose(file);
         return image;

@@ -14,7 +14,7 @@ namespace {
 Picture noise(uint32_t width, uint32_t height) {
     Picture picture{width, height, std::vector<uint8_t>(size_t{4} * width * height)};
     std::mt19937 random(width * 31 + height);
-    for (uint8_t& byte : picture.rgba) byte = static_cast<uint8_t>(random());
+    for (uint8_t& byte : picture.rgba) byte = uint8_t(random());
     return picture;
 }
 

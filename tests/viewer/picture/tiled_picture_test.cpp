@@ -78,7 +78,7 @@ protected:
                     ++count;
                     break;
                 }
-        return 4.0 * static_cast<double>(count) / static_cast<double>(a.rgba.size());
+        return 4.0 * double(count) / double(a.rgba.size());
     }
 
     std::unique_ptr<Renderer> renderer_;

@@ -138,7 +138,7 @@ protected:
         change();
         EXPECT_NE(content(build()), before);
         EXPECT_EQ(builds_, builds + 1);
-        (void)build();
+        static_cast<void>(build());
         EXPECT_EQ(builds_, builds + 1);
     }
 };
@@ -154,7 +154,7 @@ TEST_F(MeshCacheSideFilesTest, MaterialsOfAnObj) {
     expectStale([&] { write(mtl, "newmtl a\nKd 0 0 1\nnewmtl b\nKd 0 1 0\n"); });
     const int builds = builds_;
     fs::remove(mtl);
-    (void)build();
+    static_cast<void>(build());
     EXPECT_EQ(builds_, builds) << "what it was at first is still there";
 }
 

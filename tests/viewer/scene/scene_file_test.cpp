@@ -137,7 +137,7 @@ TEST(SceneFile, EveryPrefixAndFlippedByteIsAnAnswer) {
     size_t refused = 0;
     for (size_t i = 0; i < text.size(); ++i) {
         std::string flipped = text;
-        flipped[i] = static_cast<char>(flipped[i] ^ 1 << i % 7);
+        flipped[i] = char(flipped[i] ^ 1 << i % 7);
         refused += sceneFromJson(flipped, "flipped.json", {}) ? 0 : 1;
     }
     EXPECT_GT(refused, text.size() / 4);

@@ -73,7 +73,7 @@ TEST(Measurement, JsonGivesBackEveryBit) {
     measurement.add({odd, 0.1, 3});
     const auto json = nlohmann::json::parse(measurementJson(measurement));
     const auto& position = json["lines"][0]["points"][0]["position"];
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(position[static_cast<size_t>(i)].get<double>(), odd[i]);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(position[size_t(i)].get<double>(), odd[i]);
     const auto angled = nlohmann::json::parse(measurementJson(rightAngle()));
     EXPECT_EQ(angled["lines"][0]["angles_degrees"], nlohmann::json::array({90.0}));
     EXPECT_EQ(angled["lines"][0]["length"], 7.0);

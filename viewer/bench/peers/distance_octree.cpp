@@ -103,9 +103,8 @@ float firstRoot(const Cubic& f, float end) {
 
 Result<DistanceCaster> DistanceCaster::create(const MeshBvh& mesh, const MeshSides& sides,
                                               const DistanceOptions& options, const CornerOctreeOptions& build) {
-    auto tree = buildCornerOctree(mesh, &sides, BandField(options), build);
-    if (!tree) return tree.error();
-    return DistanceCaster(std::move(*tree));
+    VCP_TRY_ASSIGN(auto tree, buildCornerOctree(mesh, &sides, BandField(options), build));
+    return DistanceCaster(std::move(tree));
 }
 
 Result<AnalyticCaster> AnalyticCaster::create(const MeshBvh& mesh, const MeshSides& sides,
@@ -113,9 +112,8 @@ Result<AnalyticCaster> AnalyticCaster::create(const MeshBvh& mesh, const MeshSid
     // Empty nodes are left at their exit, and beyond it by the distance that may be stepped from there.
     CornerOctreeOptions safe = build;
     safe.safeEmpty = true;
-    auto tree = buildCornerOctree(mesh, &sides, CrossingField(), safe);
-    if (!tree) return tree.error();
-    return AnalyticCaster(std::move(*tree));
+    VCP_TRY_ASSIGN(auto tree, buildCornerOctree(mesh, &sides, CrossingField(), safe));
+    return AnalyticCaster(std::move(tree));
 }
 
 }  // namespace vcp

@@ -122,7 +122,7 @@ GridHit DistanceCaster::cast(const GridRay& ray, Work& work) const {
             work.cell();
             work.fetch(2);
         }
-        const auto size = static_cast<float>(1 << finder.level());
+        const auto size = float(1 << finder.level());
         const glm::vec3 at = (p - glm::vec3(finder.low())) / size;
         const float value = f.at(at);
         // 0 stands for an empty node, whose side is not stored.

@@ -22,7 +22,7 @@ namespace vcp {
 class GridRays {
 public:
     GridRays(const Camera& camera, glm::ivec2 size, const RootGrid& frame) : high_(frame.cells()) {
-        const CameraBasis b = cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
+        const CameraBasis b = cameraBasis(camera, uint32_t(size.x), uint32_t(size.y));
         eye_ = frame.gridFromWorld(camera.eye);
         perX_ = b.right * (2 * b.halfWidth / size.x);
         perY_ = b.up * (-2 * b.halfHeight / size.y);
@@ -49,7 +49,7 @@ public:
         ray.origin = glm::vec3(glm::clamp(eye + first * d, glm::dvec3(0), high));
         ray.direction = glm::vec3(d);
         ray.inverse = glm::vec3(inverse);
-        ray.tMax = static_cast<float>(last - first);
+        ray.tMax = float(last - first);
         return ray;
     }
 

@@ -21,12 +21,11 @@ private:
 }  // namespace
 
 Result<PaperDataset> paperDataset(const PaperCaster& octree, const IndexedMesh& mesh) {
-    auto file = paperFile(octree, mesh);
-    if (!file) return file.error();
+    VCP_TRY_ASSIGN(auto file, paperFile(octree, mesh));
     auto dataset = std::make_shared<Dataset>();
-    dataset->header = file->header;
-    dataset->pages.push_back(file->entry);
-    return PaperDataset{std::move(dataset), std::make_shared<const OnePage>(std::move(file->page))};
+    dataset->header = file.header;
+    dataset->pages.push_back(file.entry);
+    return PaperDataset{std::move(dataset), std::make_shared<const OnePage>(std::move(file.page))};
 }
 
 }  // namespace vcp

@@ -51,7 +51,7 @@ public:
         for (int level = tree_.frame.rootLevel; level > 0; --level) {
             if (open.nodes.size() > 1u << 24)
                 return limit("a level of the voxel octree would have more than 2^24 nodes");
-            tree_.levelStart[level] = static_cast<uint32_t>(tree_.nodes.size());
+            tree_.levelStart[level] = uint32_t(tree_.nodes.size());
             open = split(open, level);
         }
         tree_.voxels = open.nodes.size();
@@ -69,7 +69,7 @@ private:
     OpenLevel rootLevel() {
         const RootGrid& frame = tree_.frame;
         const int size = 1 << frame.rootLevel;
-        std::vector<std::vector<uint32_t>> bins(static_cast<size_t>(frame.roots.x) * frame.roots.y * frame.roots.z);
+        std::vector<std::vector<uint32_t>> bins(size_t(frame.roots.x) * frame.roots.y * frame.roots.z);
         for (uint32_t i = 0; i < mesh_.triangles.size(); ++i) {
             const BoxOverlap overlap(inGrid(i));
             const glm::ivec3 low = glm::clamp(glm::ivec3(glm::floor((overlap.lower() - kTouch) / double(size))),
@@ -80,15 +80,14 @@ private:
                 for (int y = low.y; y <= high.y; ++y)
                     for (int x = low.x; x <= high.x; ++x)
                         if (overlap.test((glm::dvec3(x, y, z) + 0.5) * double(size), 0.5 * size))
-                            bins[(static_cast<size_t>(z) * frame.roots.y + y) * frame.roots.x + x].push_back(i);
+                            bins[(size_t(z) * frame.roots.y + y) * frame.roots.x + x].push_back(i);
         }
         OpenLevel level;
         for (size_t i = 0; i < bins.size(); ++i) {
-            tree_.roots.push_back(bins[i].empty() ? VoxelOctree::kEmptyWord : static_cast<int32_t>(level.nodes.size()));
+            tree_.roots.push_back(bins[i].empty() ? VoxelOctree::kEmptyWord : int32_t(level.nodes.size()));
             if (bins[i].empty()) continue;
-            const glm::ivec3 at(static_cast<int>(i) % frame.roots.x,
-                                static_cast<int>(i) / frame.roots.x % frame.roots.y,
-                                static_cast<int>(i) / (frame.roots.x * frame.roots.y));
+            const glm::ivec3 at(int(i) % frame.roots.x, int(i) / frame.roots.x % frame.roots.y,
+                                int(i) / (frame.roots.x * frame.roots.y));
             const uint64_t first = level.triangles.size();
             level.triangles.insert(level.triangles.end(), bins[i].begin(), bins[i].end());
             level.nodes.push_back({at * size, first, level.triangles.size()});
@@ -105,17 +104,17 @@ private:
     OpenLevel split(const OpenLevel& open, int level) {
         constexpr size_t kRow = 256;
         std::vector<SplitRow> rows((open.nodes.size() + kRow - 1) / kRow);
-        forEachRow(static_cast<int>(rows.size()), threads_, [&](int row) {
-            const size_t first = static_cast<size_t>(row) * kRow;
+        forEachRow(int(rows.size()), threads_, [&](int row) {
+            const size_t first = size_t(row) * kRow;
             for (size_t i = first; i < open.nodes.size() && i < first + kRow; ++i)
                 splitNode(open, open.nodes[i], level, rows[row]);
         });
         OpenLevel children;
         for (SplitRow& row : rows) {
-            const auto firstChild = static_cast<uint32_t>(children.nodes.size());
+            const auto firstChild = uint32_t(children.nodes.size());
             for (const uint32_t descriptor : row.descriptors) {
                 if (level == 1) {
-                    tree_.masks.push_back(static_cast<uint8_t>(descriptor >> 24));
+                    tree_.masks.push_back(uint8_t(descriptor >> 24));
                     if (tree_.hasContours) tree_.firstContour.push_back((descriptor & 0xFFFFFFu) + firstChild);
                 } else {
                     tree_.nodes.push_back((descriptor & 0xFF000000u) | ((descriptor & 0xFFFFFFu) + firstChild));
@@ -143,7 +142,7 @@ private:
                 if (overlap.test(glm::dvec3(node.low + half * octantOffset(k)) + 0.5 * half, 0.5 * half))
                     inside[k].push_back(open.triangles[i]);
         }
-        auto descriptor = static_cast<uint32_t>(row.children.nodes.size());
+        auto descriptor = uint32_t(row.children.nodes.size());
         for (int k = 0; k < 8; ++k) {
             if (inside[k].empty()) continue;
             descriptor |= 1u << (24 + k);
@@ -203,13 +202,12 @@ uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<gl
         }
         const auto quantized = [&](double at) { return std::clamp((at / extent + 1) * 0.5, 0.0, 1.0) * 127; };
         // The planes are moved a little apart, so that single precision rounds nothing out of the slab.
-        const auto lowCode = static_cast<uint32_t>(std::max(std::floor(quantized(low) - 1e-3), 0.0));
-        const auto highCode = static_cast<uint32_t>(std::min(std::ceil(quantized(high) + 1e-3), 127.0));
+        const auto lowCode = uint32_t(std::max(std::floor(quantized(low) - 1e-3), 0.0));
+        const auto highCode = uint32_t(std::min(std::ceil(quantized(high) + 1e-3), 127.0));
         const double width = (highCode - lowCode) * extent / glm::length(glm::dvec3(n));
         if (width >= bestWidth) continue;
         bestWidth = width;
-        best = lowCode | highCode << 7 | static_cast<uint32_t>(n.x + 31) << 14 | static_cast<uint32_t>(n.y + 31) << 20 |
-               static_cast<uint32_t>(n.z + 31) << 26;
+        best = lowCode | highCode << 7 | uint32_t(n.x + 31) << 14 | uint32_t(n.y + 31) << 20 | uint32_t(n.z + 31) << 26;
     }
     return best;
 }

@@ -28,8 +28,8 @@ struct Contour {
     float low = 0, high = 0;
 };
 inline Contour unpackContour(uint32_t code) {
-    const auto component = [&](int shift) { return static_cast<float>(static_cast<int>(code >> shift & 63u) - 31); };
-    const auto plane = [&](int shift) { return static_cast<float>(code >> shift & 127u) * (2.0f / 127) - 1; };
+    const auto component = [&](int shift) { return float(int(code >> shift & 63u) - 31); };
+    const auto plane = [&](int shift) { return float(code >> shift & 127u) * (2.0f / 127) - 1; };
     const glm::vec3 normal(component(14), component(20), component(26));
     // The voxel reaches so far along the normal.
     const float extent = 0.5f * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z));
@@ -43,7 +43,7 @@ uint32_t packContour(const std::vector<glm::dvec3>& points, const std::vector<gl
 inline uint32_t childrenBefore(uint32_t mask, int octant) {
     static constexpr std::array<uint8_t, 128> kBits = [] {
         std::array<uint8_t, 128> bits{};
-        for (uint32_t i = 0; i < 128; ++i) bits[i] = static_cast<uint8_t>(std::popcount(i));
+        for (uint32_t i = 0; i < 128; ++i) bits[i] = uint8_t(std::popcount(i));
         return bits;
     }();
     return kBits[mask & ((1u << octant) - 1)];
@@ -67,19 +67,18 @@ public:
     [[nodiscard]] static bool isInner(int32_t word) { return word >= 0; }
     [[nodiscard]] static bool isLeaf(int32_t word) { return word < kEmptyWord; }
     [[nodiscard]] int32_t childWord(int32_t inner, int levelOfChild, int octant) const {
-        const auto node = static_cast<uint32_t>(inner);
+        const auto node = uint32_t(inner);
         if (levelOfChild == 0) {
             const uint32_t last = node - levelStart[1];
-            return masks[last] >> octant & 1 ? -2 - static_cast<int32_t>(8 * last + octant) : kEmptyWord;
+            return masks[last] >> octant & 1 ? -2 - int32_t(8 * last + octant) : kEmptyWord;
         }
         const uint32_t descriptor = nodes[node], mask = descriptor >> 24;
         if (!(mask >> octant & 1)) return kEmptyWord;
-        return static_cast<int32_t>(levelStart[levelOfChild] + (descriptor & 0xFFFFFFu) + childrenBefore(mask, octant));
+        return int32_t(levelStart[levelOfChild] + (descriptor & 0xFFFFFFu) + childrenBefore(mask, octant));
     }
     [[nodiscard]] Contour contourOf(int32_t leaf) const {
-        const auto number = static_cast<uint32_t>(-2 - leaf);
-        return unpackContour(
-            contours[firstContour[number >> 3] + childrenBefore(masks[number >> 3], static_cast<int>(number & 7))]);
+        const auto number = uint32_t(-2 - leaf);
+        return unpackContour(contours[firstContour[number >> 3] + childrenBefore(masks[number >> 3], int(number & 7))]);
     }
     [[nodiscard]] uint64_t bytes() const {
         return roots.size() * 4 + nodes.size() * 4 + masks.size() + firstContour.size() * 4 + contours.size() * 4;

@@ -31,7 +31,7 @@ glm::dvec3 latticeDirection(int view) {
             }
         return all;
     }();
-    return directions[static_cast<size_t>(view) % directions.size()];
+    return directions[size_t(view) % directions.size()];
 }
 
 /// Returns the corner of the grid nearest to p.
@@ -52,7 +52,7 @@ Camera latticeCamera(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
     camera.up = glm::cross(side, d);
     const double pixel = grid.cell * glm::length(side) / 4;
     camera.orthographicHeight = pixel * size.y;
-    const CameraBasis basis = cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y));
+    const CameraBasis basis = cameraBasis(camera, uint32_t(size.x), uint32_t(size.y));
     const glm::dvec3 corner = nearestCorner(grid, 0.5 * (mesh.low() + mesh.high()));
     const auto steps = std::ceil(1.5 * radius / (grid.cell * glm::length(d)));
     // The ray through the middle of a pixel goes through the corner.
@@ -86,7 +86,7 @@ std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, co
     if (name == "lattice") return latticeCamera(mesh, grid, size, view);
     const glm::dvec3 back = viewDirection(view, views);
     const glm::dvec3 up = std::abs(back.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
-    Camera camera = fitCamera(mesh.low(), mesh.high(), -back, up, kVerticalFov, static_cast<double>(size.x) / size.y);
+    Camera camera = fitCamera(mesh.low(), mesh.high(), -back, up, kVerticalFov, double(size.x) / size.y);
     if (name == "whole") return camera;
     const glm::dvec3 centre = 0.5 * (mesh.low() + mesh.high());
     if (name == "half") {

@@ -48,7 +48,7 @@ public:
         auto* positions = static_cast<float*>(
             rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
         for (const glm::dvec3& p : mesh.positions)
-            for (int axis = 0; axis < 3; ++axis) *positions++ = static_cast<float>(p[axis] - middle_[axis]);
+            for (int axis = 0; axis < 3; ++axis) *positions++ = float(p[axis] - middle_[axis]);
         auto* indices = static_cast<uint32_t*>(
             rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
         for (const auto& triangle : mesh.triangles)
@@ -70,7 +70,7 @@ public:
     [[nodiscard]] RTCScene scene() const { return scene_; }
     [[nodiscard]] glm::dvec3 middle() const { return middle_; }
     [[nodiscard]] double buildSeconds() const { return buildSeconds_; }
-    [[nodiscard]] uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load()); }
+    [[nodiscard]] uint64_t bytes() const { return uint64_t(bytes_.load()); }
 
 private:
     std::atomic<int64_t> bytes_{0};
@@ -85,7 +85,7 @@ struct FloatCamera {
     glm::vec3 eye, corner, perX, perY;
 
     FloatCamera(const Camera& camera, glm::ivec2 size, glm::dvec3 middle) {
-        const auto width = static_cast<uint32_t>(size.x), height = static_cast<uint32_t>(size.y);
+        const auto width = uint32_t(size.x), height = uint32_t(size.y);
         const CameraBasis b = cameraBasis(camera, width, height);
         eye = glm::vec3(camera.eye - middle);
         perX = glm::vec3(b.right * (2 * b.halfWidth / size.x));
@@ -93,7 +93,7 @@ struct FloatCamera {
         corner = glm::vec3(b.forward - b.right * b.halfWidth + b.up * b.halfHeight);
     }
     [[nodiscard]] glm::vec3 direction(int x, int y) const {
-        return glm::normalize(corner + (static_cast<float>(x) + 0.5f) * perX + (static_cast<float>(y) + 0.5f) * perY);
+        return glm::normalize(corner + (float(x) + 0.5f) * perX + (float(y) + 0.5f) * perY);
     }
 };
 
@@ -125,7 +125,7 @@ void traceTile(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x
     rtcIntersect8(valid, scene, &context, &r);
     for (int k = 0; k < 8; ++k) {
         if (!valid[k]) continue;
-        FloatHit& hit = out[static_cast<size_t>(y + k / kTileWidth) * size.x + x + k % kTileWidth];
+        FloatHit& hit = out[size_t(y + k / kTileWidth) * size.x + x + k % kTileWidth];
         hit = {};
         if (r.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
             hit = {r.ray.tfar[k], {r.hit.Ng_x[k], r.hit.Ng_y[k], r.hit.Ng_z[k]}};
@@ -143,7 +143,7 @@ void traceOne(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x,
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcIntersect1(scene, &context, &r);
-    FloatHit& hit = out[static_cast<size_t>(y) * size.x + x];
+    FloatHit& hit = out[size_t(y) * size.x + x];
     hit = {};
     if (r.hit.geomID != RTC_INVALID_GEOMETRY_ID) hit = {r.ray.tfar, {r.hit.Ng_x, r.hit.Ng_y, r.hit.Ng_z}};
 }
@@ -158,7 +158,7 @@ public:
 
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
         const FloatCamera rays(camera, size, scene_.middle());
-        std::vector<FloatHit> hits(static_cast<size_t>(size.x) * size.y);
+        std::vector<FloatHit> hits(size_t(size.x) * size.y);
         std::vector<double> seconds;
         for (int repetition = 0; repetition <= repetitions; ++repetition) {
             const auto start = Clock::now();

@@ -78,7 +78,7 @@ std::vector<double> rayMethodKnobs(const std::string& method, bool sweep) {
     if (method != "paper-rules")
         return sweep && !found->swept.empty() ? found->swept : std::vector<double>{found->knob};
     std::vector<double> rules;
-    for (size_t i = 0; i < std::size(kPaperRules); ++i) rules.push_back(static_cast<double>(i));
+    for (size_t i = 0; i < std::size(kPaperRules); ++i) rules.push_back(double(i));
     return rules;
 }
 
@@ -92,11 +92,11 @@ Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, d
     if (method == "reference") return makeReferenceTracer(in_.cache, in_.threads);
     PaperOptions paper = in_.paper;
     if (method == "paper-rules") {
-        const PaperRule& rule = kPaperRules[static_cast<size_t>(knob)];
+        const PaperRule& rule = kPaperRules[size_t(knob)];
         rule.change(paper);
         return makePaper(paper, rule.name);
     }
-    paper.march.epsilon = static_cast<float>(knob);
+    paper.march.epsilon = float(knob);
     if (method == "paper") return makePaper(paper, fmt::format("eps {:g}", knob));
     if (method == "paper-gpu") return makePaperGpu(paper);
     if (method == "sdf" || method == "sdf-analytic") return makeDistances(method == "sdf-analytic", knob);
@@ -110,45 +110,37 @@ Result<const PaperCaster*> RayMethods::paperOf(const PaperOptions& options) {
     if (paper_) structure.march = paper_->options().march;
     if (!paper_ || structure != paper_->options()) {
         paper_.reset();
-        auto made = PaperCaster::create(in_.bvh, options, {.cell = in_.cell, .threads = in_.threads});
-        if (!made) return made.error();
-        paper_ = std::move(*made);
+        VCP_TRY_ASSIGN(paper_, PaperCaster::create(in_.bvh, options, {.cell = in_.cell, .threads = in_.threads}));
     }
     return &*paper_;
 }
 
 Result<std::unique_ptr<RayTracer>> RayMethods::makePaper(const PaperOptions& options, std::string knob) {
-    const auto made = paperOf(options);
-    if (!made) return made.error();
-    PaperCaster caster = **made;
+    VCP_TRY_ASSIGN(const auto made, paperOf(options));
+    PaperCaster caster = *made;
     caster.setMarch(options.march);
     return tracerOf(std::move(caster), std::move(knob), in_.threads);
 }
 
 Result<std::unique_ptr<RayTracer>> RayMethods::makePaperGpu(const PaperOptions& options) {
-    const auto made = paperOf(options);
-    if (!made) return made.error();
-    const auto dataset = paperDataset(**made, in_.mesh);
-    if (!dataset) return dataset.error();
-    return makePaperGpuTracer(dataset->dataset, dataset->source, in_.device, options.march);
+    VCP_TRY_ASSIGN(const auto made, paperOf(options));
+    VCP_TRY_ASSIGN(const auto dataset, paperDataset(*made, in_.mesh));
+    return makePaperGpuTracer(dataset.dataset, dataset.source, in_.device, options.march);
 }
 
 Result<std::unique_ptr<RayTracer>> RayMethods::makeDistances(bool analytic, double cells) {
     const CornerOctreeOptions build{.cell = in_.cell * cells, .threads = in_.threads};
     if (analytic) {
-        auto made = AnalyticCaster::create(in_.bvh, sides(), build);
-        if (!made) return made.error();
-        return tracerOf(std::move(*made), cellKnob(cells), in_.threads);
+        VCP_TRY_ASSIGN(auto made, AnalyticCaster::create(in_.bvh, sides(), build));
+        return tracerOf(std::move(made), cellKnob(cells), in_.threads);
     }
-    auto made = DistanceCaster::create(in_.bvh, sides(), {}, build);
-    if (!made) return made.error();
-    return tracerOf(std::move(*made), cellKnob(cells), in_.threads);
+    VCP_TRY_ASSIGN(auto made, DistanceCaster::create(in_.bvh, sides(), {}, build));
+    return tracerOf(std::move(made), cellKnob(cells), in_.threads);
 }
 
 Result<std::unique_ptr<RayTracer>> RayMethods::makeVoxels(bool contours, double cells) const {
-    auto made = buildVoxelOctree(in_.mesh, in_.cell * cells, contours, in_.threads);
-    if (!made) return made.error();
-    return tracerOf(VoxelCaster(std::move(*made)), cellKnob(cells), in_.threads);
+    VCP_TRY_ASSIGN(auto made, buildVoxelOctree(in_.mesh, in_.cell * cells, contours, in_.threads));
+    return tracerOf(VoxelCaster(std::move(made)), cellKnob(cells), in_.threads);
 }
 
 }  // namespace vcp

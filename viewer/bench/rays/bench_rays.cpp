@@ -61,8 +61,8 @@ public:
         VCP_TRY(folder_.make());
         if (options_.models.empty()) VCP_TRY(writeAnalyticModels());
         for (size_t i = 0; i < options_.models.size(); ++i) {
-            modelFrom_ = static_cast<double>(i) / static_cast<double>(options_.models.size());
-            modelShare_ = 1.0 / static_cast<double>(options_.models.size());
+            modelFrom_ = double(i) / double(options_.models.size());
+            modelShare_ = 1.0 / double(options_.models.size());
             VCP_TRY(runModel(options_.models[i]));
         }
         if (options_.stability) VCP_TRY(runStability());
@@ -101,9 +101,7 @@ private:
         options.threads = options_.threads;
         options.folder = folder_.path();
         options.progress = options_.progress;
-        auto rows = benchStability(options);
-        if (!rows) return rows.error();
-        report_.stability = std::move(*rows);
+        VCP_TRY_ASSIGN(report_.stability, benchStability(options));
         return {};
     }
 
@@ -113,57 +111,49 @@ private:
     }
 
     Result<BenchModel> loadModel(const std::filesystem::path& path) const {
-        auto files = filesOf(path, folder_.path(), options_.cell);
-        if (!files) return files.error();
+        VCP_TRY_ASSIGN(auto files, filesOf(path, folder_.path(), options_.cell));
         BenchModel model;
-        model.files = *files;
-        VCP_TRY(report(fmt::format("{}: reading the mesh", files->name), 0));
-        auto mesh = loadMesh(files->mesh);
-        if (!mesh) return mesh.error();
-        model.mesh = std::move(*mesh);
-        if (!std::filesystem::exists(files->vcp)) {
-            VCP_TRY(report(fmt::format("{}: building", files->name), 0.02));
+        model.files = files;
+        VCP_TRY(report(fmt::format("{}: reading the mesh", files.name), 0));
+        VCP_TRY_ASSIGN(auto mesh, loadMesh(files.mesh));
+        model.mesh = std::move(mesh);
+        if (!std::filesystem::exists(files.vcp)) {
+            VCP_TRY(report(fmt::format("{}: building", files.name), 0.02));
             BuildOptions build;
-            build.inputs = {files->mesh};
-            build.output = files->vcp;
+            build.inputs = {files.mesh};
+            build.output = files.vcp;
             build.cell = options_.cell;
             build.threads = options_.threads;
-            const auto built = buildOctree(build);
-            if (!built) return built.error();
+            VCP_TRY(buildOctree(build));
         }
-        auto cache = PageCache::open(files->vcp);
-        if (!cache) return cache.error();
-        model.cache = std::make_unique<PageCache>(std::move(*cache));
+        VCP_TRY_ASSIGN(auto cache, PageCache::open(files.vcp));
+        model.cache = std::make_unique<PageCache>(std::move(cache));
         return model;
     }
 
     Result<void> runModel(const std::filesystem::path& path) {
-        auto model = loadModel(path);
-        if (!model) return model.error();
+        VCP_TRY_ASSIGN(auto model, loadModel(path));
         // The dataset was moved into its place: the tree points at it.
-        BenchModel& m = *model;
+        BenchModel& m = model;
         m.bvh = std::make_unique<MeshBvh>(m.mesh);
         VCP_TRY(m.cache->loadLevel(m.cache->dataset().header.levels - 1));
         std::unique_ptr<RayTracer> peer;
         if (benchHasEmbree()) {
-            auto made = makeEmbreeTracer(m.mesh, true, options_.threads);
-            if (!made) return made.error();
-            peer = std::move(*made);
+            VCP_TRY_ASSIGN(peer, makeEmbreeTracer(m.mesh, true, options_.threads));
         }
         RayMethods methods({m.mesh, *m.bvh, *m.cache, m.files.vcp, options_.device, options_.threads,
                             m.cache->dataset().header.cell, options_.paper});
         size_t runs = 0, done = 0;
         for (const std::string& method : options_.methods) runs += knobsOf(method).size() * options_.cameras.size();
-        const auto fraction = [&] { return 0.1 + 0.9 * static_cast<double>(done) / static_cast<double>(runs); };
+        const auto fraction = [&] { return 0.1 + 0.9 * double(done) / double(runs); };
         for (const std::string& method : options_.methods)
             for (const double knob : knobsOf(method)) {
                 VCP_TRY(report(fmt::format("{}: making {}", m.files.name, method), fraction()));
-                auto tracer = methods.make(method, knob);
-                if (!tracer) return tracer.error();
+                VCP_TRY_ASSIGN(auto tracer, methods.make(method, knob));
                 for (const std::string& camera : options_.cameras) {
-                    VCP_TRY(report(fmt::format("{}: {} {}, {}", m.files.name, method, (*tracer)->knob(), camera),
-                                   fraction()));
-                    VCP_TRY(runCamera(m, method, camera, **tracer, peer.get()));
+                    VCP_TRY(
+                        report(fmt::format("{}: {} {}, {}", m.files.name, method, tracer->knob(), camera), fraction()));
+                    VCP_TRY(runCamera(m, method, camera, *tracer, peer.get()));
                     ++done;
                 }
             }
@@ -191,19 +181,17 @@ private:
             const Camera camera = *benchCamera(
                 name, *model.bvh, {glm::dvec3(header.origin[0], header.origin[1], header.origin[2]), header.cell},
                 options_.size, view, options_.views);
-            const auto traced = tracer.trace(camera, options_.size, options_.repetitions);
-            if (!traced) return traced.error();
-            seconds += traced->seconds;
-            row.rays += traced->hits.size();
-            row.work.merge(traced->work);
+            VCP_TRY_ASSIGN(const auto traced, tracer.trace(camera, options_.size, options_.repetitions));
+            seconds += traced.seconds;
+            row.rays += traced.hits.size();
+            row.work.merge(traced.work);
             if (peer) {
-                const auto ofPeer = peer->trace(camera, options_.size, options_.repetitions);
-                if (!ofPeer) return ofPeer.error();
-                peerSeconds += ofPeer->seconds;
+                VCP_TRY_ASSIGN(const auto ofPeer, peer->trace(camera, options_.size, options_.repetitions));
+                peerSeconds += ofPeer.seconds;
             }
-            judge(model, camera, *traced, classes);
+            judge(model, camera, traced, classes);
         }
-        row.nsPerRay = 1e9 * seconds / static_cast<double>(row.rays);
+        row.nsPerRay = 1e9 * seconds / double(row.rays);
         row.ratioToEmbree = peer ? peerSeconds / seconds : 0;
         row.bytes = tracer.bytes();
         row.classes = RaySummary(classes, row.cell);
@@ -225,10 +213,9 @@ private:
             RayClassTable mine;
             const int y = row * every;
             for (int x = 0; x < options_.size.x; x += every) {
-                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(options_.size.x),
-                                                static_cast<uint32_t>(options_.size.y), x + 0.5, y + 0.5);
-                mine.add(
-                    judge.judge(ray.origin, ray.direction, traced.hits[static_cast<size_t>(y) * options_.size.x + x]));
+                const CameraRay ray =
+                    cameraRay(camera, uint32_t(options_.size.x), uint32_t(options_.size.y), x + 0.5, y + 0.5);
+                mine.add(judge.judge(ray.origin, ray.direction, traced.hits[size_t(y) * options_.size.x + x]));
             }
             const std::lock_guard lock(mutex);
             classes.merge(mine);

@@ -53,7 +53,7 @@ struct RaySummary {
 
     RaySummary() = default;
     RaySummary(const RayClassTable& table, double cell);
-    [[nodiscard]] double fraction(RayClass rayClass) const { return fractions[static_cast<size_t>(rayClass)]; }
+    [[nodiscard]] double fraction(RayClass rayClass) const { return fractions[size_t(rayClass)]; }
 };
 
 /// One row of the table: field names are those of the JSON (docs/measuring.md).

@@ -96,7 +96,7 @@ const std::array<PlottedValue, 4> kPlotted = {
      {"p99", "Hit error, p99", "cells", [](const BenchRaysRow& row) { return row.classes.distanceCells.p99; }},
      {"wrong", "Rays missed, false, on the wrong sheet or unresolved", "fraction of all rays; none: half a ray",
       [](const BenchRaysRow& row) {
-          return std::max(wrongRays(row.classes), 0.5 / static_cast<double>(std::max<uint64_t>(row.classes.judged, 1)));
+          return std::max(wrongRays(row.classes), 0.5 / double(std::max<uint64_t>(row.classes.judged, 1)));
       }}}};
 
 /// Makes a plot: one series a method, one point a value of its knob: means over the rows, which differ by camera.
@@ -115,7 +115,7 @@ std::string plotOf(const std::vector<const BenchRaysRow*>& rows, const PlottedVa
         int count = 0;
         for (const BenchRaysRow* row : rows) {
             if (std::pair(row->method, row->knob) != key) continue;
-            point.x += againstTime ? row->nsPerRay : static_cast<double>(row->bytes);
+            point.x += againstTime ? row->nsPerRay : double(row->bytes);
             point.y += value.of(*row);
             ++count;
         }
@@ -160,7 +160,7 @@ std::string benchRaysMarkdown(const BenchRaysReport& report) {
             "| {:.5f} | {:.5f} | {:.5f} | {:.4f} | {:.1f}\u00b0 | {:.1f} | {} | {:.1f} | {} | {:.1f} | {} | {:.1f} |\n",
             distance.p50, distance.p95, distance.p99, distance.max, classes.normalDegrees.p50, row.work.steps.mean(),
             tail(row.work.steps), row.work.cells.mean(), tail(row.work.cells), row.work.fetches.mean(),
-            tail(row.work.fetches), static_cast<double>(row.bytes) * 1e-6);
+            tail(row.work.fetches), double(row.bytes) * 1e-6);
     }
     return text + besidePaperMarkdown(report) + stabilityMarkdown(report.stability);
 }

@@ -40,7 +40,7 @@ IndexedMesh shape() {
             mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
             mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
         }
-    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    const auto first = uint32_t(mesh.positions.size());
     for (int corner = 0; corner < 8; ++corner)
         mesh.positions.push_back(kHalf * (2.0 * glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) - 1.0));
     for (const std::array<uint32_t, 4> face :
@@ -85,65 +85,57 @@ public:
 
 private:
     Result<void> measure(const std::filesystem::path& vcp, Renderer& renderer) {
-        auto cache = PageCache::open(vcp);
-        if (!cache) return cache.error();
-        const FileHeader& header = cache->dataset().header;
-        VCP_TRY(cache->loadLevel(header.levels - 1));
+        VCP_TRY_ASSIGN(auto cache, PageCache::open(vcp));
+        const FileHeader& header = cache.dataset().header;
+        VCP_TRY(cache.loadLevel(header.levels - 1));
         row_.certifiedCells = header.certifiedErrorMax / header.cell;
-        const auto exact = castReference(*cache, {}),
-                   floats = castReference(*cache, {.singlePrecision = true, .steps = 8});
-        if (!exact) return exact.error();
-        if (!floats) return floats.error();
-        const auto device = castDevice(vcp, renderer);
-        if (!device) return device.error();
-        row_.doubles = compare(*exact, *exact);
-        row_.floats = compare(*floats, *exact);
-        row_.device = compare(*device, *exact);
+        VCP_TRY_ASSIGN(const auto exact, castReference(cache, {}));
+        VCP_TRY_ASSIGN(const auto floats, castReference(cache, {.singlePrecision = true, .steps = 8}));
+        VCP_TRY_ASSIGN(const auto device, castDevice(vcp, renderer));
+        row_.doubles = compare(exact, exact);
+        row_.floats = compare(floats, exact);
+        row_.device = compare(device, exact);
         return {};
     }
 
     [[nodiscard]] CameraRay rayOf(int x, int y) const {
-        return cameraRay(camera_, static_cast<uint32_t>(options_.width), static_cast<uint32_t>(options_.height),
-                         x + 0.5, y + 0.5);
+        return cameraRay(camera_, uint32_t(options_.width), uint32_t(options_.height), x + 0.5, y + 0.5);
     }
     template <class Work>
     void forRays(const Work& work) const {
         forEachRow(options_.height, options_.threads, [&](int y) {
-            for (int x = 0; x < options_.width; ++x) work(static_cast<size_t>(y) * options_.width + x, rayOf(x, y));
+            for (int x = 0; x < options_.width; ++x) work(size_t(y) * options_.width + x, rayOf(x, y));
         });
     }
 
     Result<Hits> castReference(const PageCache& cache, const CastOptions& precision) const {
-        const auto caster =
-            ReferenceCaster::create(cache, cutAtLevel(cache.dataset(), cache.dataset().header.levels), precision);
-        if (!caster) return caster.error();
+        VCP_TRY_ASSIGN(
+            const auto caster,
+            ReferenceCaster::create(cache, cutAtLevel(cache.dataset(), cache.dataset().header.levels), precision));
         Hits hits(row_.rays);
         forRays([&](size_t i, const CameraRay& ray) {
-            if (const auto hit = caster->cast({ray.origin, ray.direction}))
+            if (const auto hit = caster.cast({ray.origin, ray.direction}))
                 hits[i] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
         });
         return hits;
     }
 
     Result<Hits> castDevice(const std::filesystem::path& vcp, Renderer& renderer) const {
-        const auto reader = openFile(vcp);
-        if (!reader) return reader.error();
-        auto dataset = readDataset(**reader);
-        if (!dataset) return dataset.error();
-        const auto shared = std::make_shared<const Dataset>(std::move(*dataset));
-        VCP_TRY(renderer.open(shared, std::make_shared<FilePageSource>(*reader, shared)));
+        VCP_TRY_ASSIGN(const auto reader, openFile(vcp));
+        VCP_TRY_ASSIGN(auto dataset, readDataset(*reader));
+        const auto shared = std::make_shared<const Dataset>(std::move(dataset));
+        VCP_TRY(renderer.open(shared, std::make_shared<FilePageSource>(reader, shared)));
         FrameRequest request;
         request.camera = camera_;
-        request.width = static_cast<uint32_t>(options_.width);
-        request.height = static_cast<uint32_t>(options_.height);
+        request.width = uint32_t(options_.width);
+        request.height = uint32_t(options_.height);
         request.errorPixels = kFinestPixels;
         if (const auto settled = renderer.settle(request); !settled) return settled.error();
         if (const auto frame = renderer.render(request); !frame) return frame.error();
-        const auto depth = renderer.readDepth();
-        if (!depth) return depth.error();
+        VCP_TRY_ASSIGN(const auto depth, renderer.readDepth());
         Hits hits(row_.rays);
         for (size_t i = 0; i < hits.size(); ++i)
-            if (std::isfinite((*depth)[i])) hits[i] = SurfaceHit{(*depth)[i], {}, shared->header.certifiedErrorMax};
+            if (std::isfinite(depth[i])) hits[i] = SurfaceHit{depth[i], {}, shared->header.certifiedErrorMax};
         return hits;
     }
 
@@ -156,13 +148,13 @@ private:
             if (hits[i].has_value() != exact[i].has_value() || apart > kWrongSheetCells)
                 ++row.otherOutcome;
             else if (hits[i])
-                differences.push_back(static_cast<float>(apart));
+                differences.push_back(float(apart));
         }
         row.depthCells = quantilesOf(std::move(differences));
-        std::vector<RayClassTable> tables(static_cast<size_t>(options_.height));
+        std::vector<RayClassTable> tables(size_t(options_.height));
         const RayJudge judge(*bvh_, cell_, row_.certifiedCells * cell_);
         forRays([&](size_t i, const CameraRay& ray) {
-            tables[i / static_cast<size_t>(options_.width)].add(judge.judge(ray.origin, ray.direction, hits[i]));
+            tables[i / size_t(options_.width)].add(judge.judge(ray.origin, ray.direction, hits[i]));
         });
         RayClassTable all;
         for (const RayClassTable& table : tables) all.merge(table);
@@ -184,19 +176,16 @@ private:
 Result<std::vector<StabilityRow>> benchStability(const StabilityOptions& options) {
     RendererOptions device;
     device.device = options.device;
-    auto renderer = Renderer::create(device);
-    if (!renderer) return renderer.error();
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(device));
     std::vector<StabilityRow> rows;
     const size_t cases = options.cells.size() * options.originCells.size();
     for (const double cell : options.cells)
         for (const double origin : options.originCells) {
             const auto what = fmt::format("stability: cell {:g}, origin {:g} cells", cell, origin);
-            if (options.progress &&
-                !options.progress(what, static_cast<double>(rows.size()) / static_cast<double>(cases)))
+            if (options.progress && !options.progress(what, double(rows.size()) / double(cases)))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
-            auto row = StabilityCase(options, cell, origin).run(**renderer);
-            if (!row) return row.error();
-            rows.push_back(*row);
+            VCP_TRY_ASSIGN(auto row, StabilityCase(options, cell, origin).run(*renderer));
+            rows.push_back(row);
         }
     return rows;
 }

@@ -27,22 +27,18 @@ public:
 
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int) override {
         TracedPicture picture;
-        picture.hits.resize(static_cast<size_t>(size.x) * size.y);
+        picture.hits.resize(size_t(size.x) * size.y);
         std::mutex mutex;
         const auto start = std::chrono::steady_clock::now();
         forEachRow(size.y, threads_, [&](int y) {
             RaysWork work;
             for (int x = 0; x < size.x; ++x) {
                 CastCounters counters;
-                const CameraRay ray =
-                    cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y), x + 0.5, y + 0.5);
+                const CameraRay ray = cameraRay(camera, uint32_t(size.x), uint32_t(size.y), x + 0.5, y + 0.5);
                 const auto hit = caster_.cast({ray.origin, ray.direction}, &counters);
-                if (hit)
-                    picture.hits[static_cast<size_t>(y) * size.x + x] =
-                        SurfaceHit{hit->t, hit->normal, hit->certifiedError};
-                work.add(static_cast<uint32_t>(counters.nodes),
-                         static_cast<uint32_t>(counters.softLeaves + counters.hardLeaves),
-                         static_cast<uint32_t>(counters.softLeaves + counters.triangles));
+                if (hit) picture.hits[size_t(y) * size.x + x] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
+                work.add(uint32_t(counters.nodes), uint32_t(counters.softLeaves + counters.hardLeaves),
+                         uint32_t(counters.softLeaves + counters.triangles));
             }
             const std::lock_guard lock(mutex);
             picture.work.merge(work);
@@ -76,46 +72,41 @@ public:
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
         FrameRequest request;
         request.camera = camera;
-        request.width = static_cast<uint32_t>(size.x);
-        request.height = static_cast<uint32_t>(size.y);
+        request.width = uint32_t(size.x);
+        request.height = uint32_t(size.y);
         request.errorPixels = knob_.errorPixels;
         request.march = knob_.march;
-        const auto settled = renderer_->settle(request);
-        if (!settled) return settled.error();
-        residentBytes_ = settled->residentBytes;
+        VCP_TRY_ASSIGN(const auto settled, renderer_->settle(request));
+        residentBytes_ = settled.residentBytes;
         TracedPicture picture;
         std::vector<double> seconds;
         for (int repetition = 0; repetition <= repetitions; ++repetition) {
-            const auto frame = renderer_->render(request);
-            if (!frame) return frame.error();
-            if (repetition > 0) seconds.push_back(frame->msFrame * 1e-3);
+            VCP_TRY_ASSIGN(const auto frame, renderer_->render(request));
+            if (repetition > 0) seconds.push_back(frame.msFrame * 1e-3);
         }
         picture.seconds = upperQuantile(seconds, 0.5);
-        VCP_TRY(readHits(camera, size, settled->errorPixels, picture));
+        VCP_TRY(readHits(camera, size, settled.errorPixels, picture));
         VCP_TRY(countWork(request, picture));
         return picture;
     }
 
 private:
     Result<void> readHits(const Camera& camera, glm::ivec2 size, double errorPixels, TracedPicture& picture) {
-        const auto depth = renderer_->readDepth();
-        if (!depth) return depth.error();
-        const auto normals = renderer_->readNormals();
-        if (!normals) return normals.error();
+        VCP_TRY_ASSIGN(const auto depth, renderer_->readDepth());
+        VCP_TRY_ASSIGN(const auto normals, renderer_->readNormals());
         // A coarser page's error projects to at most errorPixels where the page is nearest: no more than this
         // many world units at the hit.
         const bool parallel = camera.projection == Projection::Orthographic;
-        const double perPixel =
-            2 * cameraBasis(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y)).halfHeight / size.y;
-        picture.hits.resize(depth->size());
-        for (size_t i = 0; i < depth->size(); ++i) {
-            const double t = (*depth)[i];
+        const double perPixel = 2 * cameraBasis(camera, uint32_t(size.x), uint32_t(size.y)).halfHeight / size.y;
+        picture.hits.resize(depth.size());
+        for (size_t i = 0; i < depth.size(); ++i) {
+            const double t = depth[i];
             if (std::isinf(t)) continue;
             // t is not a number where a ray gave up: the judge calls that unresolved.
             const double allowed = std::isinf(knob_.certifiedError) || std::isnan(t)
                                        ? knob_.certifiedError
                                        : std::max(knob_.certifiedError, errorPixels * perPixel * (parallel ? 1 : t));
-            picture.hits[i] = SurfaceHit{t, glm::dvec3((*normals)[i]), allowed};
+            picture.hits[i] = SurfaceHit{t, glm::dvec3(normals[i]), allowed};
         }
         return {};
     }
@@ -127,11 +118,9 @@ private:
                                                                 {ShadingMode::Fetches, &picture.work.fetches}};
         for (const auto& [mode, histogram] : modes) {
             request.shading.mode = mode;
-            const auto frame = renderer_->render(request);
-            if (!frame) return frame.error();
-            const auto work = renderer_->readWork();
-            if (!work) return work.error();
-            for (const uint32_t count : *work) histogram->add(count);
+            VCP_TRY(renderer_->render(request));
+            VCP_TRY_ASSIGN(const auto work, renderer_->readWork());
+            for (const uint32_t count : work) histogram->add(count);
         }
         return {};
     }
@@ -147,29 +136,25 @@ Result<std::unique_ptr<RayTracer>> makeRendererTracer(std::shared_ptr<const Data
     RendererOptions options;
     options.device = device;
     options.budgetBytes = uint64_t{2} << 30;
-    auto renderer = Renderer::create(options);
-    if (!renderer) return renderer.error();
-    VCP_TRY((*renderer)->open(std::move(dataset), std::move(source)));
-    return std::unique_ptr<RayTracer>(std::make_unique<RendererTracer>(std::move(*renderer), std::move(knob)));
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
+    VCP_TRY(renderer->open(std::move(dataset), std::move(source)));
+    return std::unique_ptr<RayTracer>(std::make_unique<RendererTracer>(std::move(renderer), std::move(knob)));
 }
 
 }  // namespace
 
 Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, unsigned threads) {
     const auto cut = cutAtLevel(cache.dataset(), cache.dataset().header.levels);
-    auto caster = ReferenceCaster::create(cache, cut);
-    if (!caster) return caster.error();
-    return std::unique_ptr<RayTracer>(std::make_unique<ReferenceTracer>(std::move(*caster), threads));
+    VCP_TRY_ASSIGN(auto caster, ReferenceCaster::create(cache, cut));
+    return std::unique_ptr<RayTracer>(std::make_unique<ReferenceTracer>(std::move(caster), threads));
 }
 
 Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device,
                                                        double errorPixels) {
-    const auto reader = openFile(file);
-    if (!reader) return reader.error();
-    auto dataset = readDataset(**reader);
-    if (!dataset) return dataset.error();
-    const auto shared = std::make_shared<const Dataset>(std::move(*dataset));
-    return makeRendererTracer(shared, std::make_shared<FilePageSource>(*reader, shared), device,
+    VCP_TRY_ASSIGN(const auto reader, openFile(file));
+    VCP_TRY_ASSIGN(auto dataset, readDataset(*reader));
+    const auto shared = std::make_shared<const Dataset>(std::move(dataset));
+    return makeRendererTracer(shared, std::make_shared<FilePageSource>(reader, shared), device,
                               {.name = fmt::format("error-pixels {:g}", errorPixels),
                                .errorPixels = errorPixels,
                                .certifiedError = shared->header.certifiedErrorMax});

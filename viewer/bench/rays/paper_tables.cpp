@@ -53,7 +53,7 @@ std::optional<OurModel> modelOf(const BenchRaysReport& report, const std::string
         double rows = 0;
         for (const BenchRaysRow& row : report.rows) {
             if (row.model != name || row.method != kOurs[i].method || row.knob != kOurs[i].knob) continue;
-            model.bytes[i] += static_cast<double>(row.bytes);
+            model.bytes[i] += double(row.bytes);
             model.nanoseconds[i] += row.nsPerRay;
             model.p50[i] += row.classes.distanceCells.p50;
             model.p99[i] += row.classes.distanceCells.p99;

@@ -24,14 +24,13 @@ public:
 
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
         const GridRays rays(camera, size, caster_->frame());
-        std::vector<GridHit> hits(static_cast<size_t>(size.x) * size.y);
+        std::vector<GridHit> hits(size_t(size.x) * size.y);
         std::vector<double> seconds;
         for (int repetition = 0; repetition <= repetitions; ++repetition) {
             const auto start = std::chrono::steady_clock::now();
             forEachRow(size.y, threads_, [&](int y) {
                 NoWork work;
-                for (int x = 0; x < size.x; ++x)
-                    hits[static_cast<size_t>(y) * size.x + x] = caster_->cast(rays.ray(x, y), work);
+                for (int x = 0; x < size.x; ++x) hits[size_t(y) * size.x + x] = caster_->cast(rays.ray(x, y), work);
             });
             if (repetition > 0)
                 seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -44,9 +43,9 @@ public:
             for (int x = 0; x < size.x; ++x) {
                 const GridRay ray = rays.ray(x, y);
                 RayWork work;
-                (void)caster_->cast(ray, work);
+                static_cast<void>(caster_->cast(ray, work));
                 works[y].add(work.steps, work.cells, work.fetches);
-                const size_t pixel = static_cast<size_t>(y) * size.x + x;
+                const size_t pixel = size_t(y) * size.x + x;
                 picture.hits[pixel] = worldHit(ray, hits[pixel]);
             }
         });

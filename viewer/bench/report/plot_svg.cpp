@@ -153,7 +153,7 @@ std::vector<double> plotMarks(double low, double high, bool isLog) {
     if (!(high > low) || (isLog && !(low > 0))) return marks;
     if (isLog) {
         const bool isWide = std::log10(high / low) > 3;
-        for (int decade = static_cast<int>(std::floor(std::log10(low))); std::pow(10.0, decade) <= high; ++decade)
+        for (int decade = int(std::floor(std::log10(low))); std::pow(10.0, decade) <= high; ++decade)
             for (const double step : {1.0, 2.0, 5.0})
                 if (const double mark = step * std::pow(10.0, decade);
                     mark >= low && mark <= high && (step == 1 || !isWide))
@@ -163,8 +163,7 @@ std::vector<double> plotMarks(double low, double high, bool isLog) {
     const double rough = (high - low) / 6, power = std::pow(10.0, std::floor(std::log10(rough)));
     const double step = power * (rough <= power ? 1 : rough <= 2 * power ? 2 : rough <= 5 * power ? 5 : 10);
     // The marks are counted, not added up, so that 0 is exact.
-    for (auto i = static_cast<int64_t>(std::ceil(low / step)); static_cast<double>(i) * step <= high; ++i)
-        marks.push_back(static_cast<double>(i) * step);
+    for (auto i = int64_t(std::ceil(low / step)); double(i) * step <= high; ++i) marks.push_back(double(i) * step);
     return marks;
 }
 

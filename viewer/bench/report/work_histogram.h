@@ -30,16 +30,16 @@ public:
     }
     [[nodiscard]] double mean() const {
         double sum = 0;
-        for (size_t work = 0; work < rays_.size(); ++work) sum += static_cast<double>(work * rays_[work]);
-        return empty() ? 0 : sum / static_cast<double>(rays());
+        for (size_t work = 0; work < rays_.size(); ++work) sum += double(work * rays_[work]);
+        return empty() ? 0 : sum / double(rays());
     }
     /// Returns the least work that this part of the rays does not exceed.
     [[nodiscard]] uint32_t quantile(double part) const {
-        const auto wanted = static_cast<uint64_t>(std::ceil(part * static_cast<double>(rays())));
+        const auto wanted = uint64_t(std::ceil(part * double(rays())));
         uint64_t sum = 0;
         for (size_t work = 0; work < rays_.size(); ++work) {
             sum += rays_[work];
-            if (sum >= wanted) return static_cast<uint32_t>(work);
+            if (sum >= wanted) return uint32_t(work);
         }
         return 0;
     }

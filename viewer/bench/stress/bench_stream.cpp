@@ -33,22 +33,18 @@ public:
     Result<std::vector<StressReport>> run() {
         std::vector<std::string> models = o_.models;
         if (models.empty()) {
-            auto made = buildAnalyticModels();
-            if (!made) return made.error();
-            models = *std::move(made);
+            VCP_TRY_ASSIGN(models, buildAnalyticModels());
         }
         const size_t runs = models.size() * o_.paths.size() * o_.budgets.size();
         std::vector<StressReport> rows;
         for (const std::string& model : models) {
-            auto file = datasetOf(model);
-            if (!file) return file.error();
+            VCP_TRY_ASSIGN(auto file, datasetOf(model));
             for (const std::string& path : o_.paths)
                 for (const uint64_t budget : o_.budgets) {
                     done_ = double(rows.size()) / double(runs);
                     share_ = 1.0 / double(runs);
-                    auto row = runOne(*file, path, budget);
-                    if (!row) return row.error();
-                    rows.push_back(*std::move(row));
+                    VCP_TRY_ASSIGN(auto row, runOne(file, path, budget));
+                    rows.push_back(std::move(row));
                 }
         }
         return rows;
@@ -77,27 +73,26 @@ private:
     }
 
     Result<std::string> datasetOf(const std::string& model) const {
-        auto file = datasetFor({model}, {},
-                               [&](const BuildProgress&) { return progress(fmt::format("{}: building", model), 0); });
-        if (!file) return file.error();
-        return file->string();
+        VCP_TRY_ASSIGN(auto file, datasetFor({model}, {}, [&](const BuildProgress&) {
+                           return progress(fmt::format("{}: building", model), 0);
+                       }));
+        return file.string();
     }
 
     Result<StressReport> runOne(const std::string& file, const std::string& path, uint64_t budget) const {
         leaveSystemCache(file);
         const auto start = Clock::now();
-        const auto open = openDataset(file, o_.access);
-        if (!open) return open.error();
+        VCP_TRY_ASSIGN(const auto open, openDataset(file, o_.access));
         StressOptions run = o_.run;
         run.openSeconds = std::chrono::duration<double>(Clock::now() - start).count();
-        run.name = open->isRemote ? shownAddress(file) : std::filesystem::path(file).filename().string();
+        run.name = open.isRemote ? shownAddress(file) : std::filesystem::path(file).filename().string();
         run.path = path;
         run.renderer.budgetBytes = budget;
-        run.renderer.loaderThreads = open->loaderThreads();
+        run.renderer.loaderThreads = open.loaderThreads();
         run.progress = [&](const std::string& what, double fraction) {
             return progress(fmt::format("{}, {}, {}: {}", run.name, path, formatBytes(budget), what), fraction);
         };
-        return runStress(*open, run);
+        return runStress(open, run);
     }
 
     const BenchStreamOptions& o_;

@@ -100,9 +100,7 @@ public:
 
 private:
     Result<void> openRenderer(std::unique_ptr<Renderer>& renderer, std::shared_ptr<const ByteReader> reader) const {
-        auto made = Renderer::create(o_.renderer);
-        if (!made) return made.error();
-        renderer = std::move(*made);
+        VCP_TRY_ASSIGN(renderer, Renderer::create(o_.renderer));
         return renderer->open(open_.dataset,
                               std::make_shared<FilePageSource>(std::move(reader), open_.dataset, open_.runBytes()));
     }
@@ -120,8 +118,8 @@ private:
     [[nodiscard]] FrameRequest requestFor(const Camera& camera) const {
         FrameRequest request;
         request.camera = camera;
-        request.width = static_cast<uint32_t>(o_.size.x);
-        request.height = static_cast<uint32_t>(o_.size.y);
+        request.width = uint32_t(o_.size.x);
+        request.height = uint32_t(o_.size.y);
         request.errorPixels = o_.errorPixels;
         return request;
     }
@@ -131,11 +129,10 @@ private:
         const auto began = Clock::now();
         auto update = renderer_->update(request);
         if (!update) return update;
-        auto stats = renderer_->render(request);
-        if (!stats) return stats.error();
+        VCP_TRY_ASSIGN(auto stats, renderer_->render(request));
         frameMs = 1e3 * secondsSince(began);
         note(*update);
-        invariants_.check(*stats);
+        invariants_.check(stats);
         return update;
     }
 
@@ -181,16 +178,14 @@ private:
         const Camera whole = fitCamera(open_.bounds().low, open_.bounds().high, {0, -0.35, -1}, {0, 1, 0}, 0.6,
                                        double(o_.size.x) / o_.size.y);
         const FrameRequest request = requestFor(whole);
-        const auto settled = settle(request, [&](const UpdateResult& update) {
+        VCP_TRY(settle(request, [&](const UpdateResult& update) {
             const auto now = [&] { return o_.openSeconds + secondsSince(start_); };
             if (update.drawable && report_.firstPictureSeconds == 0 && renderer_->render(request))
                 report_.firstPictureSeconds = now();
             if (update.drawable && report_.detail90Seconds == 0 && update.pagesMissing * 10 <= update.pagesWanted)
                 report_.detail90Seconds = now();
-        });
-        if (!settled) return settled.error();
-        auto drawn = renderer_->render(request);
-        if (!drawn) return drawn.error();
+        }));
+        VCP_TRY(renderer_->render(request));
         report_.settledSeconds = o_.openSeconds + secondsSince(start_);
         const auto hit = renderer_->pick(request.width / 2, request.height / 2);
         target_ = hit && *hit ? (*hit)->position : open_.bounds().centre();
@@ -218,30 +213,25 @@ private:
         for (size_t i = 0; i < cameras_.size(); ++i) {
             VCP_TRY(ask("flying", double(i) / double(cameras_.size())));
             StressSample sample;
-            const auto update = frame(requestFor(cameras_[i]), sample.frameMs);
-            if (!update) return update.error();
+            VCP_TRY_ASSIGN(const auto update, frame(requestFor(cameras_[i]), sample.frameMs));
             sample.seconds = secondsSince(start_);
-            sample.errorPixels = update->errorPixels;
-            sample.residentBytes = update->residentBytes;
-            sample.pending = update->pagesPending;
-            sample.loads = update->loads - loads;
-            sample.evictions = update->evictions - evictions;
-            sample.missing = update->pagesWanted > 0 ? double(update->pagesMissing) / update->pagesWanted : 0;
-            loads = update->loads, evictions = update->evictions;
-            times.push_back(static_cast<float>(sample.frameMs));
+            sample.errorPixels = update.errorPixels;
+            sample.residentBytes = update.residentBytes;
+            sample.pending = update.pagesPending;
+            sample.loads = update.loads - loads;
+            sample.evictions = update.evictions - evictions;
+            sample.missing = update.pagesWanted > 0 ? double(update.pagesMissing) / update.pagesWanted : 0;
+            loads = update.loads, evictions = update.evictions;
+            times.push_back(float(sample.frameMs));
             report_.samples.push_back(sample);
         }
         report_.frameMs = quantilesOf(std::move(times));
         const auto began = Clock::now();
-        const auto settled = settle(requestFor(cameras_.back()));
-        if (!settled) return settled.error();
+        VCP_TRY_ASSIGN(const auto settled, settle(requestFor(cameras_.back())));
         report_.pathSettledSeconds = secondsSince(began);
-        report_.errorPixels = settled->errorPixels;
-        auto drawn = renderer_->render(requestFor(cameras_.back()));
-        if (!drawn) return drawn.error();
-        auto picture = renderer_->readPicture();
-        if (!picture) return picture.error();
-        picture_ = *std::move(picture);
+        report_.errorPixels = settled.errorPixels;
+        VCP_TRY(renderer_->render(requestFor(cameras_.back())));
+        VCP_TRY_ASSIGN(picture_, renderer_->readPicture());
         return {};
     }
 
@@ -258,7 +248,7 @@ private:
             if (const auto settled = settle(request); !settled) return settled.error();
             double ms = 0;
             if (const auto update = frame(request, ms); !update) return update.error();
-            times.push_back(static_cast<float>(ms));
+            times.push_back(float(ms));
             // It looks twice, since a still view looks at nothing ahead. No page is ever placed, so all it wants is
             // wished for.
             for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
@@ -280,13 +270,11 @@ private:
         VCP_TRY(ask("comparing", 1));
         VCP_TRY(openRenderer(renderer_, open_.reader));
         const FrameRequest request = requestFor(cameras_.back());
-        auto settled = renderer_->settle(request, [&] { return !ask("comparing", 1); });
-        if (!settled) return settled.error();
+        VCP_TRY_ASSIGN(auto settled, renderer_->settle(request, [&] { return !ask("comparing", 1); }));
         if (auto drawn = renderer_->render(request); !drawn) return drawn.error();
-        const auto picture = renderer_->readPicture();
-        if (!picture) return picture.error();
+        VCP_TRY_ASSIGN(const auto picture, renderer_->readPicture());
         // A page that was given up by bad luck is drawn from its parent, and reported.
-        invariants_.require(*picture == picture_ || report_.pagesGivenUp > 0,
+        invariants_.require(picture == picture_ || report_.pagesGivenUp > 0,
                             "the settled picture is not that of a run without faults");
         return {};
     }
@@ -294,10 +282,8 @@ private:
     Result<void> compareOrdersOfArrival() {
         if (o_.orders.size() < 2) return {};
         renderer_.reset();
-        auto curves =
-            compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders, kOrderDraws, o_.progress);
-        if (!curves) return curves.error();
-        report_.orders = *std::move(curves);
+        VCP_TRY_ASSIGN(report_.orders, compareOrders(open_, o_.renderer, requestFor(cameras_.back()), o_.orders,
+                                                     kOrderDraws, o_.progress));
         for (const OrderCurve& curve : report_.orders)
             invariants_.require(curve.settled == report_.orders[0].settled,
                                 "the settled picture depends on the order of arrival");
@@ -309,10 +295,9 @@ private:
         renderer_.reset();
         std::vector<FrameRequest> path;
         for (const Camera& camera : cameras_) path.push_back(requestFor(camera));
-        auto together = flyTogether(open_, o_.renderer, path, o_.views, o_.progress);
-        if (!together) return together.error();
-        for (const std::string& violation : together->violations) invariants_.require(false, violation);
-        report_.views = *std::move(together);
+        VCP_TRY_ASSIGN(auto together, flyTogether(open_, o_.renderer, path, o_.views, o_.progress));
+        for (const std::string& violation : together.violations) invariants_.require(false, violation);
+        report_.views = std::move(together);
         return {};
     }
 

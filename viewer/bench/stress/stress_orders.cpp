@@ -33,15 +33,14 @@ public:
         VCP_TRY(start());
         uint64_t drawnAt = 0, step = 1;
         for (;;) {
-            const auto update = renderer_->update(request_);
-            if (!update) return update.error();
-            step = std::max<uint64_t>(1, update->pagesWanted / static_cast<uint64_t>(draws_));
-            if (update->drawable && (pictures_.empty() || update->settled || update->loads >= drawnAt + step)) {
-                drawnAt = update->loads;
-                VCP_TRY(draw(*update));
+            VCP_TRY_ASSIGN(const auto update, renderer_->update(request_));
+            step = std::max<uint64_t>(1, update.pagesWanted / uint64_t(draws_));
+            if (update.drawable && (pictures_.empty() || update.settled || update.loads >= drawnAt + step)) {
+                drawnAt = update.loads;
+                VCP_TRY(draw(update));
             }
-            if (update->settled) break;
-            if (!progress(1 - double(update->pagesMissing) / std::max(1u, update->pagesWanted)))
+            if (update.settled) break;
+            if (!progress(1 - double(update.pagesMissing) / std::max(1u, update.pagesWanted)))
                 return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
             renderer_->waitForPage(std::chrono::milliseconds(20));
         }
@@ -57,18 +56,15 @@ private:
         options_.ramBytes = options_.uploadBytes = 1;
         for (uint64_t page = 0; page < open_.dataset->pages.size(); ++page)
             options_.ramBytes = std::max(options_.ramBytes, source->bytesToRead(page, colour));
-        auto made = Renderer::create(options_);
-        if (!made) return made.error();
-        renderer_ = std::move(*made);
+        VCP_TRY_ASSIGN(renderer_, Renderer::create(options_));
         start_ = Clock::now();
         return renderer_->open(open_.dataset, source);
     }
 
     Result<void> draw(const UpdateResult& update) {
         if (auto drawn = renderer_->render(request_); !drawn) return drawn.error();
-        auto picture = renderer_->readPicture();
-        if (!picture) return picture.error();
-        pictures_.push_back(*std::move(picture));
+        VCP_TRY_ASSIGN(auto picture, renderer_->readPicture());
+        pictures_.push_back(std::move(picture));
         curve_.samples.push_back({std::chrono::duration<double>(Clock::now() - start_).count(), update.bytesRead, 0});
         return {};
     }
@@ -106,18 +102,16 @@ Result<std::vector<OrderCurve>> compareOrders(
     const std::vector<LoadOrder>& orders, int draws,
     const std::function<bool(const std::string& what, double fraction)>& progress) {
     // All entries are read: the largest page says how much memory one takes.
-    auto dataset = readDataset(*open.reader);
-    if (!dataset) return dataset.error();
+    VCP_TRY_ASSIGN(auto dataset, readDataset(*open.reader));
     OpenDataset whole = open;
-    whole.dataset = std::make_shared<const Dataset>(*std::move(dataset));
+    whole.dataset = std::make_shared<const Dataset>(std::move(dataset));
     std::vector<OrderCurve> curves;
     for (const LoadOrder order : orders) {
         const std::string what = fmt::format("order {}", nameOf(order));
-        auto curve = OrderRun(whole, options, request, order, draws).run([&](double fraction) {
+        VCP_TRY_ASSIGN(auto curve, OrderRun(whole, options, request, order, draws).run([&](double fraction) {
             return !progress || progress(what, fraction);
-        });
-        if (!curve) return curve.error();
-        curves.push_back(*std::move(curve));
+        }));
+        curves.push_back(std::move(curve));
     }
     return curves;
 }

@@ -23,7 +23,7 @@ constexpr double kDefaultStallRate = 0.02;
 class Random {
 public:
     explicit Random(uint64_t seed) : engine_(seed) {}
-    double unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+    double unit() { return double(engine_() >> 11) * 0x1p-53; }
     double between(double low, double high) { return low + (high - low) * unit(); }
     glm::dvec3 direction() {
         const double z = between(-1, 1), angle = 2 * std::numbers::pi * unit(), r = std::sqrt(1 - z * z);
@@ -83,7 +83,7 @@ public:
 private:
     [[nodiscard]] Camera looking(glm::dvec3 forward) const {
         return fitCamera(o_.bounds.low, o_.bounds.high, forward, upFor(forward), kVerticalFov,
-                         static_cast<double>(o_.size.x) / o_.size.y);
+                         double(o_.size.x) / o_.size.y);
     }
     static Camera turned(Camera camera, glm::dvec3 forward) {
         camera.forward = forward;
@@ -128,7 +128,7 @@ std::optional<std::vector<Camera>> stressPath(const StressPathOptions& options) 
     Path path(options);
     std::vector<Camera> cameras;
     for (int frame = 0; frame < options.frames; ++frame) {
-        const double t = options.frames > 1 ? static_cast<double>(frame) / (options.frames - 1) : 0;
+        const double t = options.frames > 1 ? double(frame) / (options.frames - 1) : 0;
         cameras.push_back(options.name == "orbit"      ? path.orbit(t)
                           : options.name == "dive"     ? path.dive(t)
                           : options.name == "fly"      ? path.fly(t)
@@ -151,7 +151,7 @@ std::optional<Faults> parseFaults(std::string_view text) {
         std::optional<double> number = isTime ? parseTime(value) : parseRate(value);
         if (name == "bandwidth") {
             const auto bytes = parseBytes(value);
-            number = bytes ? std::optional(static_cast<double>(*bytes)) : std::nullopt;
+            number = bytes ? std::optional(double(*bytes)) : std::nullopt;
         }
         if (!number) return std::nullopt;
         if (name == "error")

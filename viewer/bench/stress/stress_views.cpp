@@ -38,35 +38,32 @@ public:
 
 private:
     [[nodiscard]] const FrameRequest& requestOf(size_t view, size_t frame) const {
-        return path_[(frame + view * path_.size() / static_cast<size_t>(result_.views)) % path_.size()];
+        return path_[(frame + view * path_.size() / size_t(result_.views)) % path_.size()];
     }
 
     Result<void> start() {
-        auto first = Renderer::create(options_);
-        if (!first) return first.error();
-        views_.push_back(std::move(*first));
+        VCP_TRY_ASSIGN(auto first, Renderer::create(options_));
+        views_.push_back(std::move(first));
         VCP_TRY(views_[0]->open(open_.dataset, open_.source));
-        while (views_.size() < static_cast<size_t>(result_.views)) {
-            auto more = views_[0]->addView();
-            if (!more) return more.error();
-            views_.push_back(std::move(*more));
+        while (views_.size() < size_t(result_.views)) {
+            VCP_TRY_ASSIGN(auto more, views_[0]->addView());
+            views_.push_back(std::move(more));
         }
         last_.resize(views_.size());
         return {};
     }
 
     Result<void> update(size_t view, size_t frame) {
-        auto update = views_[view]->update(requestOf(view, frame));
-        if (!update) return update.error();
-        require(update->residentBytes <= options_.budgetBytes,
+        VCP_TRY_ASSIGN(auto update, views_[view]->update(requestOf(view, frame)));
+        require(update.residentBytes <= options_.budgetBytes,
                 "several views: more bytes are resident than the budget allows");
-        require(update->heldBytesMax <= options_.ramBytes,
+        require(update.heldBytesMax <= options_.ramBytes,
                 "several views: pages on their way and kept take more memory than --ram allows");
-        require(update->reloads == 0, "several views: a page was loaded twice in still views");
-        result_.residentBytesMax = std::max(result_.residentBytesMax, update->residentBytes);
-        result_.loads = update->loads;
-        result_.pagesResident = update->pagesResident;
-        last_[view] = std::move(*update);
+        require(update.reloads == 0, "several views: a page was loaded twice in still views");
+        result_.residentBytesMax = std::max(result_.residentBytesMax, update.residentBytes);
+        result_.loads = update.loads;
+        result_.pagesResident = update.pagesResident;
+        last_[view] = std::move(update);
         return {};
     }
 
@@ -96,16 +93,14 @@ private:
     Result<void> compareWithOneAlone() {
         std::vector<Picture> together;
         for (size_t view = 0; view < views_.size(); ++view) {
-            auto picture = draw(*views_[view], view);
-            if (!picture) return picture.error();
-            together.push_back(*std::move(picture));
+            VCP_TRY_ASSIGN(auto picture, draw(*views_[view], view));
+            together.push_back(std::move(picture));
         }
         views_.resize(1);
         for (size_t view = 0; view < together.size(); ++view) {
             if (auto settled = views_[0]->settle(requestOf(view, path_.size() - 1)); !settled) return settled.error();
-            const auto alone = draw(*views_[0], view);
-            if (!alone) return alone.error();
-            const bool same = *alone == together[view];
+            VCP_TRY_ASSIGN(const auto alone, draw(*views_[0], view));
+            const bool same = alone == together[view];
             result_.identical += same ? 1 : 0;
             require(same || last_[view].relaxed, "several views: one does not show what it shows alone");
         }

@@ -36,7 +36,7 @@ struct Encoded {
 
 Encoded encodedGrid(uint32_t n) {
     draco::TriangleSoupMeshBuilder builder;
-    builder.Start(static_cast<int>(2 * n * n));
+    builder.Start(int(2 * n * n));
     const int positions = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
     const int colours = builder.AddAttribute(draco::GeometryAttribute::COLOR, 3, draco::DT_UINT8, true);
     uint32_t face = 0;
@@ -128,7 +128,7 @@ TEST(Draco, EveryTruncationAndFlippedBytesAreReadOrRefused) {
     std::mt19937 random(3);
     for (int i = 0; i < 60; ++i) {
         std::string broken = bytes;
-        broken[random() % broken.size()] = static_cast<char>(random());
+        broken[random() % broken.size()] = char(random());
         const ReadMesh mesh = read(broken, 64 * kMiB);
         EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << mesh.line();
     }

@@ -87,7 +87,7 @@ struct CompressedFile {
         std::string text = json(""), binary = stored;
         while (text.size() % 4) text += ' ';
         while (binary.size() % 4) binary += '\0';
-        const auto word = [](size_t value) { return test::bytesOf({static_cast<uint32_t>(value)}); };
+        const auto word = [](size_t value) { return test::bytesOf({uint32_t(value)}); };
         return "glTF" + word(2) + word(28 + text.size() + binary.size()) + word(text.size()) + "JSON" + text +
                word(binary.size()) + std::string("BIN\0", 4) + binary;
     }
@@ -115,7 +115,7 @@ struct Sheet {
     [[nodiscard]] std::vector<uint16_t> quantized() const {
         std::vector<uint16_t> values;
         for (size_t i = 0; i < positions.size(); ++i) {
-            values.push_back(static_cast<uint16_t>(std::lround((positions[i] + 1) * 32767.5f)));
+            values.push_back(uint16_t(std::lround((positions[i] + 1) * 32767.5f)));
             if (i % 3 == 2) values.push_back(0);
         }
         return values;
@@ -219,8 +219,8 @@ TEST(GltfMeshopt, QuantizedAttributes) {
         const std::string extra = isNormalized ? R"(,"normalized":true)" : "";
         std::string uvs, colours;
         for (uint32_t i = 0; i < Sheet::kVertices; ++i) {
-            uvs += test::bytesOf<uint16_t>({static_cast<uint16_t>(i * 100), static_cast<uint16_t>(i)});
-            colours += test::bytesOf<uint8_t>({static_cast<uint8_t>(i), 128, 255, 255});
+            uvs += test::bytesOf<uint16_t>({uint16_t(i * 100), uint16_t(i)});
+            colours += test::bytesOf<uint8_t>({uint8_t(i), 128, 255, 255});
         }
         const std::string normalized = R"(,"normalized":true)";
         file.accessor(file.view(ofVertices(values, 8), Sheet::kVertices, 8, "ATTRIBUTES", "NONE"), 5123, "VEC3",
@@ -250,7 +250,7 @@ TEST(GltfMeshopt, QuantizedAttributes) {
         EXPECT_EQ(mesh.colours, expected.colours);
         EXPECT_EQ(soupOf(mesh), soupOf(expected));
         for (size_t i = 0; i < sheet.positions.size(); ++i)
-            EXPECT_NEAR(mesh.positions[i / 3][static_cast<int>(i % 3)], sheet.positions[i], 1e-4) << i;
+            EXPECT_NEAR(mesh.positions[i / 3][int(i % 3)], sheet.positions[i], 1e-4) << i;
     }
 }
 
@@ -338,7 +338,7 @@ TEST(GltfMeshopt, FlippedBitsAreReadOrRefusedInOneLine) {
     size_t refused = 0, readWrong = 0;
     for (size_t bit = 0; bit < 8 * whole.stored.size(); bit += 3) {
         CompressedFile file = whole;
-        file.stored[bit / 8] = static_cast<char>(file.stored[bit / 8] ^ 1 << bit % 8);
+        file.stored[bit / 8] = char(file.stored[bit / 8] ^ 1 << bit % 8);
         const std::string bytes = file.embedded();
         const ReadMesh mesh = readAll(open(ByteSource::fromMemory(bytes, "mesh")));
         EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << bit;

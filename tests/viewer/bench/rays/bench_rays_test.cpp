@@ -312,8 +312,7 @@ TEST(BenchCameras, RaysOfTheLatticeCameraRunThroughCorners) {
             const Camera camera = *benchCamera("lattice", bvh, grid, size, view, 26);
             int throughCorners = 0;
             for (int x = 0; x < size.x; ++x) {
-                const CameraRay ray = cameraRay(camera, static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y),
-                                                x + 0.5, size.y / 2 + 0.5);
+                const CameraRay ray = cameraRay(camera, uint32_t(size.x), uint32_t(size.y), x + 0.5, size.y / 2 + 0.5);
                 // The corner nearest to the mesh's middle, moved sideways by whole cells, lies on every fourth ray.
                 const double t = glm::dot(glm::dvec3(3, 4, 5) - ray.origin, ray.direction);
                 double nearest = 1;

@@ -26,7 +26,7 @@ TEST(StressPath, EveryPathHasAUsableCameraForEachFrame) {
             SCOPED_TRACE(fmt::format("{} {}", name, frames));
             const auto path = stressPath(optionsFor(name, frames));
             ASSERT_TRUE(path);
-            ASSERT_EQ(path->size(), static_cast<size_t>(frames));
+            ASSERT_EQ(path->size(), size_t(frames));
             for (const Camera& camera : *path) {
                 EXPECT_TRUE(std::isfinite(glm::length(camera.eye)));
                 EXPECT_GT(glm::length(glm::cross(camera.forward, camera.up)), 1e-3);
