@@ -65,7 +65,7 @@ CameraBasis basisOf(const FrameRequest& request) {
 /// Splits the eye, in finest cells from the root's corner, into a lattice point and a small rest where it is
 /// near enough for the lattice; from farther away single precision is finer than any pixel.
 void setOrigin(frame::FrameConstants& c, glm::dvec3 eye, double rootCells) {
-    const double latticePerCell = double(c.lattice.x);
+    const double latticePerCell = double(c.latticePerCell);
     c.originLattice = glm::ivec4(0);
     if (glm::all(glm::greaterThan(eye, glm::dvec3(-0.5 * rootCells))) &&
         glm::all(glm::lessThan(eye, glm::dvec3(1.5 * rootCells)))) {
@@ -78,11 +78,11 @@ void setOrigin(frame::FrameConstants& c, glm::dvec3 eye, double rootCells) {
 
 void setSections(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header) {
     const glm::dvec3 corner(header.origin[0], header.origin[1], header.origin[2]);
-    const glm::dvec3 origin = corner + header.cell / double(c.lattice.x) * glm::dvec3(c.originLattice);
+    const glm::dvec3 origin = corner + header.cell / double(c.latticePerCell) * glm::dvec3(c.originLattice);
     for (const SectionPlane& plane : request.sections) {
         const double length = glm::length(plane.normal);
         const double off = (glm::dot(plane.normal, origin) - plane.offset) / (length * header.cell);
-        c.sections[c.extra.y++] = glm::vec4(glm::vec3(plane.normal / length), float(off));
+        c.sections[c.sectionCount++] = glm::vec4(glm::vec3(plane.normal / length), float(off));
     }
 }
 
@@ -98,10 +98,12 @@ void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileH
     const Shading& s = request.shading;
     const double radius = s.occlusionRadius > 0 ? s.occlusionRadius : 0.1 * diagonal;
     const double lift = kLiftPixels + (std::isfinite(errorPixels) ? errorPixels : 0);
-    c.pixel = glm::dvec4(perspective ? 0 : pixel / header.cell, perspective ? pixel : 0, radius / header.cell, lift);
+    (perspective ? c.pixelEdgePerDepth : c.pixelEdge) = float(perspective ? pixel : pixel / header.cell);
+    c.occlusionReach = float(radius / header.cell);
+    c.lightLift = float(lift);
     if (!hasLight(s)) return;
-    c.extra.z = s.occlusionRays;
-    c.extra.w = s.shadows ? 1 : 0;
+    c.occlusionRays = s.occlusionRays;
+    c.hasShadows = s.shadows ? 1 : 0;
 }
 
 }  // namespace
@@ -140,22 +142,28 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
         c.originY = toVec4(plane.stepY / header.cell);
     }
     const int latticeBits = int(frame::kLatticeBits) - int(header.log2Cells) - int(header.levels - 1);
-    c.lattice = {std::ldexp(1.0f, latticeBits), std::ldexp(1.0f, -latticeBits), 0, 0};
+    c.latticePerCell = std::ldexp(1.0f, latticeBits);
+    c.cellPerLattice = std::ldexp(1.0f, -latticeBits);
     const glm::dvec3 corner(header.origin[0], header.origin[1], header.origin[2]);
     setOrigin(c, (request.camera.eye - corner) / header.cell,
               std::ldexp(1.0, int(header.log2Cells + header.levels) - 1));
 
-    c.picture = {request.width, request.height, (request.width + frame::kTileSize - 1) / frame::kTileSize,
-                 (request.height + frame::kTileSize - 1) / frame::kTileSize};
-    c.mode = {header.log2Cells, header.levels - 1, stripes, shadingMode(request.shading.mode)};
+    c.width = request.width;
+    c.height = request.height;
+    c.tilesX = (request.width + frame::kTileSize - 1) / frame::kTileSize;
+    c.tilesY = (request.height + frame::kTileSize - 1) / frame::kTileSize;
+    c.log2Cells = header.log2Cells;
+    c.finestLevel = header.levels - 1;
+    c.stripes = stripes;
+    c.shadingMode = shadingMode(request.shading.mode);
     const LightDirections directions = lightDirections(request, basis);
     c.lightDirection = toVec4(directions.light);
     c.upDirection = toVec4(directions.sky);
     c.clay = encoded(request.shading.clay);
     c.cap = encoded(request.shading.cap);
-    c.extra.x = hitPlanes(request, colour) - 1;
-    c.march.x = request.march.epsilon;
-    c.march.y = float(header.cell * placement.scale);
+    c.lightPlane = hitPlanes(request, colour) - 1;
+    c.paperEpsilon = request.march.epsilon;
+    c.worldPerCell = float(header.cell * placement.scale);
     const glm::dquat& q = placement.rotation;
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     setSections(c, request, header);

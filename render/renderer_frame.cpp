@@ -126,8 +126,8 @@ void Renderer::State::recordFrame(VkCommandBuffer commands, const Layer& layer, 
     frame::FrameConstants c =
         frameConstants(request, layer.residency != nullptr ? &layer.residency->dataset() : nullptr, stripes,
                        layer.constants.colour, layer.errorPixels, layer.placement);
-    c.lattice.z = feedback.jitter().x;
-    c.lattice.w = feedback.jitter().y;
+    c.feedbackX = feedback.jitter().x;
+    c.feedbackY = feedback.jitter().y;
     resources->begin(commands, c);
     if (composes() && &layer == &layers.front()) target.clear(commands);
     timer.mark(commands, 0);

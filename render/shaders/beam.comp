@@ -24,7 +24,7 @@ struct Bundle {
 
 Bundle tileBundle(uvec2 tile) {
     vec2 lo = vec2(tile * kTileSize) + 0.5;
-    vec2 hi = min(lo + float(kTileSize - 1u), vec2(frame.picture.xy) - 0.5);
+    vec2 hi = min(lo + float(kTileSize - 1u), vec2(pictureSize()) - 0.5);
     Ray a = rayAt(lo), b = rayAt(vec2(hi.x, lo.y)), c = rayAt(vec2(lo.x, hi.y)), d = rayAt(hi);
     Bundle bundle;
     // Rounding of the rays' own points is relative to their distance (rays.glsl, latticePoint).
@@ -48,11 +48,11 @@ Bundle tileBundle(uvec2 tile) {
 // Planes of a box, relative to the lattice origin in finest cells, moved apart a little more than the trace
 // pass rounds.
 vec3 planeBelow(ivec3 plane, float margin) {
-    vec3 x = vec3(plane - frame.originLattice.xyz) * frame.lattice.y;
+    vec3 x = vec3(plane - frame.originLattice.xyz) * frame.cellPerLattice;
     return x - margin - 1e-6 * abs(x);
 }
 vec3 planeAbove(ivec3 plane, float margin) {
-    vec3 x = vec3(plane - frame.originLattice.xyz) * frame.lattice.y;
+    vec3 x = vec3(plane - frame.originLattice.xyz) * frame.cellPerLattice;
     return x + margin + 1e-6 * abs(x);
 }
 
@@ -78,7 +78,7 @@ struct OctantTimes {
 };
 
 OctantTimes octantTimes(Bundle bundle, ivec3 corner, int bits) {
-    float margin = 1e-3 * max(frame.lattice.y * float(1 << bits) * 0.03125, 1.0);
+    float margin = 1e-3 * max(frame.cellPerLattice * float(1 << bits) * 0.03125, 1.0);
     ivec3 half3 = ivec3(1 << (bits - 1));
     OctantTimes o;
     o.lower = slabTimes(bundle, planeBelow(corner, margin), planeAbove(corner + half3, margin));
@@ -121,7 +121,7 @@ float tileStart(Bundle bundle) {
         if (isPage) {
             nodesTexel = record.w + kPageHeaderBytes / 16u;
             node = record.z;
-            cellBits = bits - int(frame.mode.x);
+            cellBits = bits - int(frame.log2Cells);
         }
         OctantTimes times = octantTimes(bundle, corner, bits);
         bool inPage = isPage || !inTable;
@@ -175,13 +175,13 @@ float tileStart(Bundle bundle) {
 
 void main() {
     uvec2 tile = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(tile, frame.picture.zw))) return;
+    if (any(greaterThanEqual(tile, uvec2(frame.tilesX, frame.tilesY)))) return;
     float start = 0.0;
     if (kBeam != 0u) {
         start = tileStart(tileBundle(tile));
         if (start < kTileEmpty) start = max(0.0, start * (1.0 - 2e-6) - 2e-3);
     }
-    uint number = tile.y * frame.picture.z + tile.x;
+    uint number = tile.y * frame.tilesX + tile.x;
     tileStarts[number] = floatBitsToUint(start);
     if (start < kTileEmpty) {
         uint at = atomicAdd(tileList[3], 1u);

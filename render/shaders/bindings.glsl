@@ -32,13 +32,18 @@ layout(set = 0, binding = 7, std430) buffer TileStartBlock { uint tileStarts[]; 
 layout(set = 0, binding = 8) uniform utextureBuffer tileStartTexels;
 layout(set = 0, binding = 9, std430) buffer TileListBlock { uint tileList[]; };
 layout(set = 0, binding = 10) uniform utextureBuffer tileListTexels;
-// A pixel's record: depth (float bits; negative on the cap of a section), normal (octahedral, 16 + 16 bits), colour (RGBA8), and at
-// frame.extra.x light (8 bits sun, 8 bits sky) or the value of a false colour (float bits, 0 to 1); planes
-// of width * height words.
+// A pixel's record: depth (float bits; negative on the cap of a section), normal (octahedral, 16 + 16 bits),
+// colour (RGBA8), and at frame.lightPlane light (8 bits sun, 8 bits sky) or the value of a false colour (float bits,
+// 0 to 1); planes of width * height words.
 layout(set = 0, binding = 11, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
 layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint picturePixels[]; };
 layout(set = 0, binding = 14, std430) buffer CounterBlock { FrameCounters counters; };
+
+uvec2 pictureSize() { return uvec2(frame.width, frame.height); }
+
+// Returns a pixel's edge at a depth, in finest cells.
+float pixelEdgeAt(float depth) { return frame.pixelEdge + frame.pixelEdgePerDepth * depth; }
 
 // Chunks are few and their number is known to the compiler: with one there is no choice to make.
 #define FETCH_CHUNK(texelsName, blockName, i)                                                            \

@@ -78,7 +78,7 @@ void usePage(uint node, uvec4 record, inout Page page) {
     page.nodesTexel = record.w + kPageHeaderBytes / 16u;
     page.sections = fetchTable(node * kRecordTexels + 1u);
     page.record = node;
-    page.cell = powerOfTwo(int(frame.mode.y) + page.bits - int(kLatticeBits));
+    page.cell = powerOfTwo(int(frame.finestLevel) + page.bits - int(kLatticeBits));
 }
 
 // Goes down the frame's page tree to the page that the ray has reached. Steps over octants without a page, except where
@@ -139,7 +139,7 @@ Seam seamBetween(Region before, Region after, float wall) {
     seam.behind = after.isPage && after.bits > before.bits;
     seam.bits = max(before.bits, after.bits);
     // It reaches no farther than a page's edge, whatever a file says.
-    float edge = powerOfTwo(int(frame.mode.y + frame.mode.x) + seam.bits - int(kLatticeBits));
+    float edge = powerOfTwo(int(frame.finestLevel + frame.log2Cells) + seam.bits - int(kLatticeBits));
     float reach = min(kSeamErrors * max(before.error, after.error), edge);
     seam.corner = (seam.behind ? before.corner : after.corner) >> seam.bits << seam.bits;
     seam.first = seam.behind ? max(wall - reach, 0.0) : wall;
@@ -191,9 +191,9 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
     sStart = max(first, 0.0);
     ivec3 from = clamp(latticePoint(ray, sStart), page.corner, page.corner + edge);
     ivec3 to = clamp(latticePoint(ray, last), page.corner, page.corner + edge);
-    float toCells = powerOfTwo(int(frame.mode.x) - page.bits);
+    float toCells = powerOfTwo(int(frame.log2Cells) - page.bits);
     PageRay local;
-    local.cells = float(1u << frame.mode.x);
+    local.cells = float(1u << frame.log2Cells);
     local.farWalls = mix(vec3(0.0), vec3(local.cells), ahead);
     float inward = kLastBelowOne * local.cells;
     vec3 low = mix(vec3(local.cells - inward), vec3(0.0), ahead), high = mix(vec3(local.cells), vec3(inward), ahead);
@@ -322,7 +322,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     at.inPage = true;
     float tauUntil = (until - sStart) / page.cell;
 
-    int rootBits = int(frame.mode.x + kMaxSubcellDepth);
+    int rootBits = int(frame.log2Cells + kMaxSubcellDepth);
     uint rootOnly = page.root >> kNodeTypeShift == kNodeInternal ? 0u : 1u;
     uint rootGroup = page.nodesTexel + (rootOnly != 0u ? 0u : 2u * (page.root & kNodePayloadMask));
     if (rootOnly != 0u) rootBits++;

@@ -17,13 +17,13 @@ void main() {
     uvec2 pixel;
     uint tile;
     if (!listedPixel(tile, pixel)) return;
-    uint at = pixel.y * frame.picture.x + pixel.x;
+    uint at = pixel.y * frame.width + pixel.x;
     float depth = fetchPixelHit(at).depth;
     if (depth >= kNoHit) return;
-    float distance = depth * frame.march.y;
+    float distance = depth * frame.worldPerCell;
     float before = uintBitsToFloat(targetDepths[at]);
     if (distance >= before) return;
-    if (before >= kNoHit) atomicAdd(targetDepths[frame.picture.x * frame.picture.y], 1u);
+    if (before >= kNoHit) atomicAdd(targetDepths[frame.width * frame.height], 1u);
     targetDepths[at] = floatBitsToUint(distance);
     targetPixels[at] = ownPixels[at];
 }

@@ -15,8 +15,9 @@ const uint kMostBoxes = 512u;
 
 uvec2 feedbackPixel(uint ray) {
     uvec2 part = uvec2(ray % kFeedbackWidth, ray / kFeedbackWidth);
-    vec2 point = (vec2(part) + frame.lattice.zw) * vec2(frame.picture.xy) / vec2(kFeedbackWidth, kFeedbackHeight);
-    return min(uvec2(point), frame.picture.xy - 1u);
+    vec2 place = vec2(part) + vec2(frame.feedbackX, frame.feedbackY);
+    vec2 point = place * vec2(pictureSize()) / vec2(kFeedbackWidth, kFeedbackHeight);
+    return min(uvec2(point), pictureSize() - 1u);
 }
 
 // Finds the box of the page tree at `place`: a page of the cut, or an octant without one. Returns the record's flags.
@@ -41,16 +42,16 @@ uint boxAt(ivec3 place, out uint node, out int bits) {
 void main() {
     uint number = gl_GlobalInvocationID.x;
     uvec2 pixel = feedbackPixel(number);
-    float start = fetchTileStart(pixel.y / kTileSize * frame.picture.z + pixel.x / kTileSize);
+    float start = fetchTileStart(pixel.y / kTileSize * frame.tilesX + pixel.x / kTileSize);
     if (start >= kTileEmpty) return;
-    float depth = fetchPixelHit(pixel.y * frame.picture.x + pixel.x).depth;
+    float depth = fetchPixelHit(pixel.y * frame.width + pixel.x).depth;
 
     Ray ray = rayAt(vec2(pixel) + 0.5);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     ivec3 root = ivec3(1 << kLatticeBits);
     float s = max(max(maxOf(planeDistances(ray, mix(root, ivec3(0), ahead))), 0.0), start);
     float last = minOf(planeDistances(ray, mix(ivec3(0), root, ahead)));
-    float rootEdge = float(1 << kLatticeBits) * frame.lattice.y;
+    float rootEdge = float(1 << kLatticeBits) * frame.cellPerLattice;
     ivec3 place = clamp(latticePoint(ray, s), ivec3(0), root - 1);
     bool inside = s <= last;
     for (uint i = 0u; i < kMostBoxes && inside; i++) {

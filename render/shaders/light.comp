@@ -32,23 +32,23 @@ void main() {
     uvec2 pixel;
     uint tile;
     if (!listedPixel(tile, pixel)) return;
-    uint at = pixel.y * frame.picture.x + pixel.x;
-    uint plane = frame.picture.x * frame.picture.y;
+    uint at = pixel.y * frame.width + pixel.x;
+    uint plane = frame.width * frame.height;
     float depth = fetchPixelHit(at).depth;
     vec3 n = unpackHitNormal(fetchHit(plane + at));
     Ray eye = rayAt(vec2(pixel) + 0.5);
     bool found = depth < kNoHit;
     // The picture's own error and the roundings stay below the lift.
-    float lift = 0.15 + frame.pixel.w * (frame.pixel.x + frame.pixel.y * depth);
+    float lift = 0.15 + frame.lightLift * pixelEdgeAt(depth);
     Ray ray;
     ray.origin = eye.origin + depth * eye.direction + lift * n;
 
-    uint sky = frame.extra.z;
-    float radius = frame.pixel.z;
+    uint sky = frame.occlusionRays;
+    float radius = frame.occlusionReach;
     bool lit = dot(n, frame.lightDirection.xyz) > 0.0;
     float sun = lit ? 1.0 : 0.0, open = 0.0;
     Work work = Work(0u, 0u, 0u);
-    for (uint i = 1u - frame.extra.w; i <= sky; i++) {
+    for (uint i = 1u - frame.hasShadows; i <= sky; i++) {
         vec3 direction = i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel);
         ray.direction = withoutZeros(direction);
         ray.inverse = 1.0 / ray.direction;
@@ -61,5 +61,5 @@ void main() {
         if (i > 0u) open += blocked ? 1.0 - near * near : 1.0;
     }
     float skyLight = sky == 0u ? 1.0 : open / float(sky);
-    if (found) hits[frame.extra.x * plane + at] = packUnorm4x8(vec4(sun, skyLight, 0.0, 0.0));
+    if (found) hits[frame.lightPlane * plane + at] = packUnorm4x8(vec4(sun, skyLight, 0.0, 0.0));
 }

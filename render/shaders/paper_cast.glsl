@@ -104,15 +104,15 @@ LeafVectors fetchLeafVectors(PaperPage page, int word) {
 // Returns the first hit between two distances along the ray.
 PaperHit castPaper(Ray ray, PaperPage page, float from, float until, inout Work work) {
     PaperHit hit = PaperHit(kNoHit, -ray.direction, 0);
-    int perCell = int(frame.lattice.x);
+    int perCell = int(frame.latticePerCell);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     ivec3 high = page.cells * perCell;
     float first = max(maxOf(planeDistances(ray, mix(high, ivec3(0), ahead))), from);
     float last = min(minOf(planeDistances(ray, mix(ivec3(0), high, ahead))), until);
-    vec3 eye = vec3(frame.originLattice.xyz) * frame.lattice.y + ray.origin;
+    vec3 eye = vec3(frame.originLattice.xyz) * frame.cellPerLattice + ray.origin;
     vec3 start = clamp(eye + first * ray.direction, vec3(0.0), vec3(page.cells));
     float tMax = page.isThere ? last - first : -1.0;
-    float epsilon = frame.march.x;
+    float epsilon = frame.paperEpsilon;
 
     PaperPlace at = PaperPlace(ivec3(0), -1, -1, 0, 0);
     LeafVectors corners;

@@ -20,10 +20,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 // Returns what a false colour shows, 0 to 1 (ShadingMode). Nothing is certified; levels are those of the leaves.
 float falseColour(PaperHit hit, Work work, PaperPage page) {
-    return frame.mode.w == kShadeSteps     ? float(work.steps) / kMostShownSteps
-           : frame.mode.w == kShadeCells   ? float(work.cells) / kMostShownCells
-           : frame.mode.w == kShadeFetches ? float(work.fetches) / kMostShownFetches
-           : frame.mode.w == kShadeLevel   ? float(page.rootLevel - hit.level) / float(page.rootLevel)
+    return frame.shadingMode == kShadeSteps     ? float(work.steps) / kMostShownSteps
+           : frame.shadingMode == kShadeCells   ? float(work.cells) / kMostShownCells
+           : frame.shadingMode == kShadeFetches ? float(work.fetches) / kMostShownFetches
+           : frame.shadingMode == kShadeLevel   ? float(page.rootLevel - hit.level) / float(page.rootLevel)
                                            : 0.0;
 }
 
@@ -42,11 +42,11 @@ void main() {
     bool found = hit.depth < kNoHit;
     hit.normal *= inversesqrt(max(dot(hit.normal, hit.normal), 1e-30));
     hit.normal -= max(dot(hit.normal, ray.direction), 0.0) * ray.direction;
-    uint at = pixel.y * frame.picture.x + pixel.x;
-    uint plane = frame.picture.x * frame.picture.y;
+    uint at = pixel.y * frame.width + pixel.x;
+    uint plane = frame.width * frame.height;
     hits[at] = floatBitsToUint(hit.depth);
     hits[plane + at] = packHitNormal(hit.normal);
-    if (kFalseColour != 0u) hits[frame.extra.x * plane + at] = floatBitsToUint(falseColour(hit, work, page));
+    if (kFalseColour != 0u) hits[frame.lightPlane * plane + at] = floatBitsToUint(falseColour(hit, work, page));
 
     uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
     if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);

@@ -23,7 +23,7 @@ Ray rayAt(vec2 point) {
 
 // Returns a lattice plane minus the ray's origin, in finest cells: one rounding of an exact difference.
 vec3 fromOrigin(Ray ray, ivec3 planes) {
-    precise vec3 difference = vec3(planes - frame.originLattice.xyz) * frame.lattice.y - ray.origin;
+    precise vec3 difference = vec3(planes - frame.originLattice.xyz) * frame.cellPerLattice - ray.origin;
     return difference;
 }
 
@@ -36,7 +36,7 @@ vec3 planeDistances(Ray ray, ivec3 planes) {
 
 // Returns the lattice point next to the ray's point at distance s.
 ivec3 latticePoint(Ray ray, float s) {
-    return frame.originLattice.xyz + ivec3(round((ray.origin + s * ray.direction) * frame.lattice.x));
+    return frame.originLattice.xyz + ivec3(round((ray.origin + s * ray.direction) * frame.latticePerCell));
 }
 
 float minOf(vec3 v) { return min(v.x, min(v.y, v.z)); }

@@ -7,7 +7,7 @@ struct Interval {
 
 Interval keptInterval(Ray ray) {
     Interval kept = Interval(0.0, kNoHit, vec3(0.0));
-    for (uint i = 0u; i < frame.extra.y; i++) {
+    for (uint i = 0u; i < frame.sectionCount; i++) {
         vec4 plane = frame.sections[i];
         float along = dot(plane.xyz, ray.direction);
         float off = dot(plane.xyz, ray.origin) + plane.w;

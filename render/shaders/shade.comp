@@ -24,15 +24,15 @@ float encodedLight(vec3 n, float sunSeen, float skySeen) {
 // Returns how much sky is seen, averaged over the pixels around that show the same surface: light.comp gives each pixel
 // of a square of 4 x 4 its own directions.
 float skyAbout(uvec2 pixel, float depth, uint plane) {
-    float reach = 8.0 * (frame.pixel.x + frame.pixel.y * depth);
+    float reach = 8.0 * pixelEdgeAt(depth);
     float sum = 0.0, count = 0.0;
     for (int i = 0; i < 16; i++) {
-        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), ivec2(frame.picture.xy) - 1);
-        uint at = uint(p.y) * frame.picture.x + uint(p.x);
+        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), ivec2(pictureSize()) - 1);
+        uint at = uint(p.y) * frame.width + uint(p.x);
         // Tiles that were not traced have no depths.
-        bool traced = fetchTileStart(uint(p.y) / kTileSize * frame.picture.z + uint(p.x) / kTileSize) < kTileEmpty;
+        bool traced = fetchTileStart(uint(p.y) / kTileSize * frame.tilesX + uint(p.x) / kTileSize) < kTileEmpty;
         bool same = traced && abs(fetchPixelHit(at).depth - depth) <= reach;
-        sum += same ? unpackUnorm4x8(fetchHit(frame.extra.x * plane + at)).y : 0.0;
+        sum += same ? unpackUnorm4x8(fetchHit(frame.lightPlane * plane + at)).y : 0.0;
         count += same ? 1.0 : 0.0;
     }
     return sum / max(count, 1.0);
@@ -48,29 +48,29 @@ void main() {
     uvec2 pixel;
     uint tile;
     if (!listedPixel(tile, pixel)) return;
-    uint at = pixel.y * frame.picture.x + pixel.x;
-    uint plane = frame.picture.x * frame.picture.y;
+    uint at = pixel.y * frame.width + pixel.x;
+    uint plane = frame.width * frame.height;
     PixelHit hit = fetchPixelHit(at);
     float depth = hit.depth;
-    bool ofWork = kFalseColour != 0u && (frame.mode.w >= kShadeSteps && frame.mode.w <= kShadeFetches);
+    bool ofWork = kFalseColour != 0u && (frame.shadingMode >= kShadeSteps && frame.shadingMode <= kShadeFetches);
     if (depth >= kNoHit && !ofWork) return;
     if (kFalseColour != 0u) {
-        float value = uintBitsToFloat(fetchHit(frame.extra.x * plane + at));
+        float value = uintBitsToFloat(fetchHit(frame.lightPlane * plane + at));
         picturePixels[at] = packUnorm4x8(vec4(heat(value), 1.0));
         return;
     }
     vec3 n = unpackHitNormal(fetchHit(plane + at));
-    bool coloured = frame.mode.w == kShadeLit || frame.mode.w == kShadeUnlit;
+    bool coloured = frame.shadingMode == kShadeLit || frame.shadingMode == kShadeUnlit;
     vec3 albedo = frame.clay.xyz;
     if (kColour != 0u && coloured) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
     if (hit.onCap) albedo = frame.cap.xyz;
     float sunSeen = 1.0, skySeen = 1.0;
     if (kLight != 0u) {
-        sunSeen = unpackUnorm4x8(fetchHit(frame.extra.x * plane + at)).x;
-        if (frame.extra.z > 0u) skySeen = skyAbout(pixel, depth, plane);
+        sunSeen = unpackUnorm4x8(fetchHit(frame.lightPlane * plane + at)).x;
+        if (frame.occlusionRays > 0u) skySeen = skyAbout(pixel, depth, plane);
     }
-    vec3 colour = frame.mode.w == kShadeNormals ? worldNormal(n) * 0.5 + 0.5
-                : frame.mode.w == kShadeUnlit   ? albedo
+    vec3 colour = frame.shadingMode == kShadeNormals ? worldNormal(n) * 0.5 + 0.5
+                : frame.shadingMode == kShadeUnlit   ? albedo
                                                 : albedo * encodedLight(n, sunSeen, skySeen);
     picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

@@ -12,7 +12,7 @@ uvec2 pixelInTile() {
 uint quotient(uint a, uint b) { return uint((float(a) + 0.5) / float(b)); }
 
 uint stripedIndex(uint i, uint count) {
-    uint stripes = frame.mode.z;
+    uint stripes = frame.stripes;
     uint run = quotient(count, stripes);
     uint stripe = quotient(i, max(run, 1u));
     return i < run * stripes ? (i - stripe * run) * stripes + stripe : i;
@@ -27,7 +27,7 @@ bool listedPixel(out uint tile, out uvec2 pixel) {
     if (index >= count) return false;
     uint packed = fetchTileList(kTileListHeader + stripedIndex(index, count));
     uvec2 place = uvec2(packed & 0xffffu, packed >> 16);
-    tile = place.y * frame.picture.z + place.x;
+    tile = place.y * frame.tilesX + place.x;
     pixel = place * kTileSize + pixelInTile();
-    return all(lessThan(pixel, frame.picture.xy));
+    return all(lessThan(pixel, pictureSize()));
 }

@@ -33,7 +33,7 @@ bool isInside(Ray ray, inout Work work) {
             Hit wall = castRay(onward, 0.0, kNoHit, work);
             open = wall.depth < kNoHit;
             crossings += open ? 1u : 0u;
-            float cell = powerOfTwo(int(frame.mode.y) + wall.pageBits - int(kLatticeBits));
+            float cell = powerOfTwo(int(frame.finestLevel) + wall.pageBits - int(kLatticeBits));
             onward = movedAlong(onward, open ? wall.depth + kPastHit * cell : 0.0);
         }
         inside += crossings & 1u;
@@ -65,11 +65,11 @@ Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work wor
 float falseColour(Hit hit, Work work) {
     int level = int(kLatticeBits) - hit.pageBits;
     float error = uintBitsToFloat(fetchTable(hit.record * kRecordTexels).x & kRecordErrorMask);
-    float pixels = error / max(frame.pixel.x + frame.pixel.y * hit.depth, 1e-30);
-    return frame.mode.w == kShadeSteps     ? float(work.steps) / kMostShownSteps
-           : frame.mode.w == kShadeCells   ? float(work.cells) / kMostShownCells
-           : frame.mode.w == kShadeFetches ? float(work.steps + work.fetches) / kMostShownFetches
-           : frame.mode.w == kShadeLevel   ? float(level) / max(float(frame.mode.y), 1.0)
+    float pixels = error / max(pixelEdgeAt(hit.depth), 1e-30);
+    return frame.shadingMode == kShadeSteps     ? float(work.steps) / kMostShownSteps
+           : frame.shadingMode == kShadeCells   ? float(work.cells) / kMostShownCells
+           : frame.shadingMode == kShadeFetches ? float(work.steps + work.fetches) / kMostShownFetches
+           : frame.shadingMode == kShadeLevel   ? float(level) / max(float(frame.finestLevel), 1.0)
                                            : pixels;
 }
 
@@ -98,12 +98,12 @@ void main() {
     // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
     vec3 normal = surface.normal * inversesqrt(max(dot(surface.normal, surface.normal), 1e-30));
     normal -= max(dot(normal, ray.direction), 0.0) * ray.direction;
-    uint at = pixel.y * frame.picture.x + pixel.x;
-    uint plane = frame.picture.x * frame.picture.y;
+    uint at = pixel.y * frame.width + pixel.x;
+    uint plane = frame.width * frame.height;
     hits[at] = floatBitsToUint(onCap ? -hit.depth : hit.depth);
     hits[plane + at] = packHitNormal(normal);
     if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(surface.colour);
-    if (kFalseColour != 0u) hits[frame.extra.x * plane + at] = floatBitsToUint(falseColour(hit, work));
+    if (kFalseColour != 0u) hits[frame.lightPlane * plane + at] = floatBitsToUint(falseColour(hit, work));
 
     uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
     if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);

@@ -1,6 +1,6 @@
 // What the CPU hands to the shaders for a frame. Compiles as C++ (render/frame.h) and as GLSL; every
-// struct is made of 16-byte vectors, so that both agree on the layout, and a test reads the offsets back
-// out of the SPIR-V.
+// struct is made of 16-byte vectors and of scalars in fours, so that both agree on the layout, and a test reads the
+// offsets back out of the SPIR-V.
 //
 // Lattice: the root page's edge is 2^30 lattice units, so every page's box has integer corners; points
 // where rays cross page walls are rounded to it, and both pages at a wall see the same point.
@@ -38,22 +38,27 @@ struct FrameConstants {
     vec4 origin, originX, originY;
     vec4 direction, directionX, directionY;
     ivec4 originLattice;
-    // Lattice units a finest cell; its reciprocal; where in its part of the picture a feedback ray goes, 0 to 1.
-    vec4 lattice;
-    // width, height, tiles in x, tiles in y
-    uvec4 picture;
-    // log2 of cells an edge of a page; levels - 1; stripes of the tile list; shading mode
-    uvec4 mode;
-    vec4 lightDirection;  // unit, world axes, towards the light
-    vec4 upDirection;     // unit: where the hemisphere's light comes from
-    vec4 clay;            // encoded for the screen
-    vec4 cap;             // colour of cut solids, encoded for the screen
-    // A pixel's edge in finest cells: x + y depth. z: how far occlusion reaches, finest cells. w: how far above
-    // the surface rays of light begin, in pixels.
-    vec4 pixel;
-    // The hits' plane of light or false colours (0: none), section planes, occlusion rays a pixel, shadows.
-    uvec4 extra;
-    vec4 march;     // x: of the method `paper`: epsilon, finest cells. y: world units a finest cell
+    float latticePerCell, cellPerLattice;  // lattice units a finest cell, and its reciprocal
+    float feedbackX, feedbackY;            // where in its part of the picture a feedback ray goes, 0 to 1
+    uint width, height, tilesX, tilesY;    // size of the picture, in pixels and in tiles
+    uint log2Cells;                        // log2 of cells an edge of a page
+    uint finestLevel;
+    uint stripes;  // of the tile list: see stripedIndex in tiles.glsl
+    uint shadingMode;
+    vec4 lightDirection;                 // unit, world axes, towards the light
+    vec4 upDirection;                    // unit: where the hemisphere's light comes from
+    vec4 clay;                           // encoded for the screen
+    vec4 cap;                            // colour of cut solids, encoded for the screen
+    float pixelEdge, pixelEdgePerDepth;  // a pixel's edge at a depth, finest cells: first + second * depth
+    float occlusionReach;                // how far occlusion reaches, finest cells
+    float lightLift;                     // how far above the surface rays of light begin, in pixels
+    uint lightPlane;                     // the hits' plane of light or false colours; below 2: there is none
+    uint sectionCount;
+    uint occlusionRays;  // a pixel
+    uint hasShadows;     // 0 or 1
+    float paperEpsilon;  // of the method `paper`, finest cells
+    float worldPerCell;  // world units a finest cell
+    float unused0, unused1;
     vec4 rotation;  // quaternion: world from the dataset's axes
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];

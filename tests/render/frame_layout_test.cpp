@@ -45,12 +45,43 @@ Offsets offsetsIn(std::span<const uint32_t> spirv) {
 void expectSameLayout(std::span<const uint32_t> spirv) {
     const Offsets offsets = offsetsIn(spirv);
     ASSERT_TRUE(offsets.contains("FrameConstants"));
-    EXPECT_EQ(
-        offsets.at("FrameConstants"),
-        (std::vector<uint32_t>{OFFSET(origin), OFFSET(originX), OFFSET(originY), OFFSET(direction), OFFSET(directionX),
-                               OFFSET(directionY), OFFSET(originLattice), OFFSET(lattice), OFFSET(picture),
-                               OFFSET(mode), OFFSET(lightDirection), OFFSET(upDirection), OFFSET(clay), OFFSET(cap),
-                               OFFSET(pixel), OFFSET(extra), OFFSET(march), OFFSET(rotation), OFFSET(sections)}));
+    EXPECT_EQ(offsets.at("FrameConstants"), (std::vector<uint32_t>{OFFSET(origin),
+                                                                   OFFSET(originX),
+                                                                   OFFSET(originY),
+                                                                   OFFSET(direction),
+                                                                   OFFSET(directionX),
+                                                                   OFFSET(directionY),
+                                                                   OFFSET(originLattice),
+                                                                   OFFSET(latticePerCell),
+                                                                   OFFSET(cellPerLattice),
+                                                                   OFFSET(feedbackX),
+                                                                   OFFSET(feedbackY),
+                                                                   OFFSET(width),
+                                                                   OFFSET(height),
+                                                                   OFFSET(tilesX),
+                                                                   OFFSET(tilesY),
+                                                                   OFFSET(log2Cells),
+                                                                   OFFSET(finestLevel),
+                                                                   OFFSET(stripes),
+                                                                   OFFSET(shadingMode),
+                                                                   OFFSET(lightDirection),
+                                                                   OFFSET(upDirection),
+                                                                   OFFSET(clay),
+                                                                   OFFSET(cap),
+                                                                   OFFSET(pixelEdge),
+                                                                   OFFSET(pixelEdgePerDepth),
+                                                                   OFFSET(occlusionReach),
+                                                                   OFFSET(lightLift),
+                                                                   OFFSET(lightPlane),
+                                                                   OFFSET(sectionCount),
+                                                                   OFFSET(occlusionRays),
+                                                                   OFFSET(hasShadows),
+                                                                   OFFSET(paperEpsilon),
+                                                                   OFFSET(worldPerCell),
+                                                                   OFFSET(unused0),
+                                                                   OFFSET(unused1),
+                                                                   OFFSET(rotation),
+                                                                   OFFSET(sections)}));
 }
 
 TEST(FrameLayout, Mesostructure) {
