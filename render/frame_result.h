@@ -4,11 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
 #include "octree/result.h"
+#include "render/frame_request.h"
 
 namespace vcp {
 
@@ -22,10 +24,11 @@ struct UpdateResult {
     bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels is what it reaches
     uint64_t heldBytesMax =
         0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
-    uint64_t loads = 0, evictions = 0;  ///< pages into and out of the pool since open()
-    uint64_t reloads = 0;               ///< pages loaded twice in one still view: always 0
-    uint32_t deviceLosses = 0;          ///< losses since create(): all was made anew and pages are read again
-    uint64_t failures = 0;              ///< reads that failed and were, or will be, tried again
+    uint64_t loads = 0, evictions = 0;        ///< pages into and out of the pool since open()
+    uint64_t reloads = 0;                     ///< pages loaded twice in one still view: always 0
+    uint32_t deviceLosses = 0;                ///< losses since create(): all was made anew and pages are read again
+    uint64_t submissions = 0, hostWaits = 0;  ///< this update's submissions, and how often it waited for one
+    uint64_t failures = 0;                    ///< reads that failed and were, or will be, tried again
     uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
     uint32_t pagesMissing = 0;                    ///< pages wanted, but not resident
     uint32_t pagesPending = 0;                    ///< pages wished for, being read, or waiting for an update
@@ -38,8 +41,10 @@ struct FrameStats {
     uint64_t tracedRays = 0;  ///< pixels of tiles that the beam pass could not prove empty
     uint64_t hitPixels = 0;   ///< pixels where any dataset or surface is hit
     double msBeam = 0, msTrace = 0, msLight = 0, msShade = 0,
-           msFeedback = 0;            ///< GPU timestamps; 0 where the device has none
-    double msFrame = 0;               ///< from submission to completion, wall clock
+           msFeedback = 0;  ///< GPU timestamps; 0 where the device has none
+    /// From submission to completion, wall clock. Of renderAhead(): GPU time of all passes, where the device has a
+    /// clock.
+    double msFrame = 0;
     uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
     uint64_t poolBytes = 0;           ///< bytes allocated for the pool
     uint64_t colourBytes = 0;         ///< bytes of colour in the pool
@@ -50,8 +55,14 @@ struct FrameStats {
         0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
     uint64_t farHits = 0;       ///< hits of pixels in surfaces, shown as seen from far and not marched
     uint64_t surfaceBytes = 0;  ///< bytes of mesostructure on the device, beside the pool: assets and shells
-    uint64_t submissions = 0, hostWaits = 0;  ///< this frame's submissions, and how often the CPU waited for one
+    /// Submissions of the call that drew this frame, and how often that call waited for one.
+    uint64_t submissions = 0, hostWaits = 0;
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
+};
+
+struct PicturePixel {
+    uint32_t x = 0, y = 0;
+    bool operator==(const PicturePixel&) const = default;
 };
 
 /// A page in the pool, for a picture of what is there.
@@ -78,6 +89,15 @@ struct PixelHit {
     size_t dataset = 0;      ///< number of the dataset, in the order of open()
     bool onCap = false;      ///< the hit is on what a section plane cut open
     bool onSurface = false;  ///< the hit is on mesostructure; then `dataset` means nothing
+};
+
+/// A frame that has ended.
+struct DoneFrame {
+    uint64_t number = 0;  ///< number of the frame among those of its view, from 1
+    FrameRequest request;
+    FrameStats stats;
+    std::optional<PicturePixel> cursor;  ///< the pixel that renderAhead() was given
+    std::optional<PixelHit> hit;         ///< what is there; nothing without a cursor
 };
 
 }  // namespace vcp

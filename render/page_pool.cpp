@@ -15,8 +15,10 @@ namespace vcp {
 
 namespace {
 
-// Size of the staging buffer: what an update brings, in one submission; more where a page is larger.
+// Size of a staging buffer: what an update brings, in one submission; more where a page is larger.
 constexpr uint64_t kStagingBytes = 16ull << 20;
+// Larger than most pages, so that the buffer for moves is seldom made anew.
+constexpr uint64_t kLeastScratch = 1ull << 20;
 
 /// Copies before it are done before copies after it begin; it works on queues for copies only, too.
 void keepOrder(VkCommandBuffer commands) {
@@ -64,11 +66,13 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
 PagePool::~PagePool() { static_cast<void>(device_.waitForCopies()); }
 
 Result<void> PagePool::reserveStaging(uint64_t bytes) {
-    if (staging_.bytes() >= bytes) return {};
-    VCP_TRY(device_.waitForCopies());
-    VCP_TRY_ASSIGN(staging_, device_.createBuffer(std::bit_ceil(bytes),
-                                                  VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-                                                  MemoryUse::Upload));
+    Staging& filling = stagings_[filling_];
+    VCP_TRY(device_.waitForCopies(filling.copies));
+    if (filling.buffer.bytes() >= bytes) return {};
+    VCP_TRY_ASSIGN(
+        filling.buffer,
+        device_.createBuffer(std::bit_ceil(bytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                             MemoryUse::Upload));
     return {};
 }
 
@@ -84,16 +88,15 @@ Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::by
     const uint64_t place = slot.firstUnit * kPoolUnitBytes + at;
     const uint64_t chunk = place / chunkBytes(), to = place % chunkBytes();
     if (std::byte* mapped = chunks_[chunk].buffer.mapped()) {
+        VCP_TRY(device_.waitForAll());
         std::memcpy(mapped + to, bytes.data(), bytes.size());
         return {};
     }
     // Copies of one submission have no order among each other.
-    if (stagedBytes_ + bytes.size() > staging_.bytes() || overlapsWaiting(chunk, to, bytes.size())) {
+    if (stagedBytes_ + bytes.size() > stagings_[filling_].buffer.bytes() || overlapsWaiting(chunk, to, bytes.size()))
         VCP_TRY(flush());
-        VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));
-    }
-    if (stagedBytes_ == 0) VCP_TRY(device_.waitForCopies());
-    std::memcpy(staging_.mapped() + stagedBytes_, bytes.data(), bytes.size());
+    if (stagedBytes_ == 0) VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));
+    std::memcpy(stagings_[filling_].buffer.mapped() + stagedBytes_, bytes.data(), bytes.size());
     waiting_.push_back({chunk, {stagedBytes_, to, bytes.size()}});
     stagedBytes_ += bytes.size();
     return {};
@@ -103,13 +106,15 @@ Result<void> PagePool::flush() {
     if (waiting_.empty()) return {};
     stagedBytes_ = 0;
     const std::vector<StagedCopy> copies = std::exchange(waiting_, {});
-    return device_.submitCopies([&](VkCommandBuffer commands) {
+    Staging& filled = stagings_[std::exchange(filling_, 1 - filling_)];
+    VCP_TRY_ASSIGN(filled.copies, device_.submitCopies([&](VkCommandBuffer commands) {
         for (const StagedCopy& copy : copies)
             if (copy.isMove)
                 recordMove(commands, copy);
             else
-                vkCmdCopyBuffer(commands, staging_.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
-    });
+                vkCmdCopyBuffer(commands, filled.buffer.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
+    }));
+    return {};
 }
 
 void PagePool::recordMove(VkCommandBuffer commands, const StagedCopy& move) const {
@@ -134,10 +139,10 @@ Result<void> PagePool::read(PoolSlot slot, uint64_t at, std::span<std::byte> byt
     VCP_TRY(reserveStaging(bytes.size()));
     VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
         const VkBufferCopy region{from % chunkBytes(), 0, bytes.size()};
-        vkCmdCopyBuffer(commands, chunk.buffer.handle(), staging_.handle(), 1, &region);
+        vkCmdCopyBuffer(commands, chunk.buffer.handle(), stagings_[filling_].buffer.handle(), 1, &region);
         barrierTransferToHost(commands);
     }));
-    std::memcpy(bytes.data(), staging_.mapped(), bytes.size());
+    std::memcpy(bytes.data(), stagings_[filling_].buffer.mapped(), bytes.size());
     return {};
 }
 
@@ -147,14 +152,18 @@ Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
     assert(from.units == to.units && source / chunkBytes() == target / chunkBytes());
     const Chunk& chunk = chunks_[source / chunkBytes()];
     if (std::byte* mapped = chunk.buffer.mapped()) {
+        VCP_TRY(device_.waitForAll());
         std::memmove(mapped + target % chunkBytes(), mapped + source % chunkBytes(), bytes);
         return {};
     }
     if (scratch_.bytes() < bytes) {
-        VCP_TRY(flush());
-        VCP_TRY(device_.waitForCopies());
+        // Moves that use the smaller one end first.
+        if (scratch_.bytes() > 0) {
+            VCP_TRY(flush());
+            VCP_TRY(device_.waitForCopies());
+        }
         VCP_TRY_ASSIGN(scratch_,
-                       device_.createBuffer(std::bit_ceil(bytes),
+                       device_.createBuffer(std::bit_ceil(std::max(bytes, kLeastScratch)),
                                             VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                             MemoryUse::Local));
     }

@@ -1,8 +1,8 @@
 // Pages in the device's memory: a fixed number of bytes, taken once, in chunks of at most 1 GiB that shaders see as
-// texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into their slots; elsewhere they
-// go through a staging buffer, many with one submission, on the queue for copies where there is one. A slot is written
-// only while no frame that could read it is in flight: the renderer waits for each frame. Which page has which slot is
-// decided elsewhere (streaming/residency_policy.h).
+// texels of 16 bytes. Where the CPU can write the device's memory, pages go straight into their slots, once the frames
+// in flight, which could read them, have ended. Elsewhere pages go through staging buffers, many with one submission,
+// on the queue for copies where there is one; the copies run after the frames that were submitted before them, and
+// before those after. Which page has which slot is decided elsewhere (streaming/residency_policy.h).
 #pragma once
 
 #include <memory>
@@ -53,6 +53,11 @@ private:
         VkBufferCopy region{};
         bool isMove = false;
     };
+    /// What an update brings lies here until its copies have ended, while the next update fills the other one.
+    struct Staging {
+        Buffer buffer;
+        uint64_t copies = 0;  // the last that read it
+    };
     void recordMove(VkCommandBuffer commands, const StagedCopy& move) const;
     Result<void> reserveStaging(uint64_t bytes);
     [[nodiscard]] bool overlapsWaiting(uint64_t chunk, uint64_t at, uint64_t bytes) const;
@@ -61,7 +66,8 @@ private:
     uint64_t bytes_;
     std::vector<Chunk> chunks_;
     uint32_t chunkShift_ = 0;
-    Buffer staging_;
+    Staging stagings_[2];
+    size_t filling_ = 0;  // number of the staging buffer that takes pages now
     uint64_t stagedBytes_ = 0;
     Buffer scratch_;                   // as large as the largest move: regions of one copy must not overlap
     std::vector<StagedCopy> waiting_;  // in order; not submitted yet

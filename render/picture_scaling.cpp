@@ -27,17 +27,18 @@ void changeLayout(VkCommandBuffer commands, VkImage image, VkImageLayout from, V
     vkCmdPipelineBarrier(commands, before, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, nullptr, 0, nullptr, 1, &barrier);
 }
 
-void PictureScaling::destroy() {
-    if (image_ != VK_NULL_HANDLE) vkDestroyImage(device_.handle(), image_, nullptr);
-    if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_.handle(), memory_, nullptr);
-    image_ = VK_NULL_HANDLE;
-    memory_ = VK_NULL_HANDLE;
-    size_ = {};
+void PictureScaling::destroy(SizedImage& image) {
+    if (image.image != VK_NULL_HANDLE) vkDestroyImage(device_.handle(), image.image, nullptr);
+    if (image.memory != VK_NULL_HANDLE) vkFreeMemory(device_.handle(), image.memory, nullptr);
+    image = {};
 }
 
 Result<void> PictureScaling::prepare(PictureSize size) {
-    if (size == size_) return {};
-    destroy();
+    if (size != images_[current_].size) current_ = 1 - current_;
+    SizedImage& made = images_[current_];
+    if (size == made.size) return {};
+    VCP_TRY(device_.waitForAll());
+    destroy(made);
     VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO};
     info.imageType = VK_IMAGE_TYPE_2D;
     info.format = VK_FORMAT_R8G8B8A8_UNORM;
@@ -45,32 +46,33 @@ Result<void> PictureScaling::prepare(PictureSize size) {
     info.mipLevels = info.arrayLayers = 1;
     info.samples = VK_SAMPLE_COUNT_1_BIT;
     info.usage = VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
-    VCP_VK(vkCreateImage, device_.handle(), &info, nullptr, &image_);
+    VCP_VK(vkCreateImage, device_.handle(), &info, nullptr, &made.image);
     VkMemoryRequirements needs;
-    vkGetImageMemoryRequirements(device_.handle(), image_, &needs);
+    vkGetImageMemoryRequirements(device_.handle(), made.image, &needs);
     VCP_TRY_ASSIGN(auto type, device_.memoryType(needs.memoryTypeBits, MemoryUse::Local));
     VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocation.allocationSize = needs.size;
     allocation.memoryTypeIndex = type;
-    VCP_VK(vkAllocateMemory, device_.handle(), &allocation, nullptr, &memory_);
-    VCP_VK(vkBindImageMemory, device_.handle(), image_, memory_, 0);
-    size_ = size;
+    VCP_VK(vkAllocateMemory, device_.handle(), &allocation, nullptr, &made.memory);
+    VCP_VK(vkBindImageMemory, device_.handle(), made.image, made.memory, 0);
+    made.size = size;
     return {};
 }
 
 void PictureScaling::record(VkCommandBuffer commands, const Buffer& picture, VkImage target, VkExtent2D extent) const {
+    const auto& [image, memory, size] = images_[current_];
     constexpr VkImageLayout kTo = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, kFrom = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
-    changeLayout(commands, image_, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
-    const VkBufferImageCopy copy{0, 0, 0, kLayer, {0, 0, 0}, {size_.width, size_.height, 1}};
-    vkCmdCopyBufferToImage(commands, picture.handle(), image_, kTo, 1, &copy);
-    changeLayout(commands, image_, kTo, kFrom, VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT);
+    changeLayout(commands, image, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
+    const VkBufferImageCopy copy{0, 0, 0, kLayer, {0, 0, 0}, {size.width, size.height, 1}};
+    vkCmdCopyBufferToImage(commands, picture.handle(), image, kTo, 1, &copy);
+    changeLayout(commands, image, kTo, kFrom, VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT);
     changeLayout(commands, target, VK_IMAGE_LAYOUT_UNDEFINED, kTo, 0, VK_ACCESS_TRANSFER_WRITE_BIT);
     const VkImageBlit blit{kLayer,
-                           {{0, 0, 0}, farCorner(size_.width, size_.height)},
+                           {{0, 0, 0}, farCorner(size.width, size.height)},
                            kLayer,
                            {{0, 0, 0}, farCorner(extent.width, extent.height)}};
-    const bool same = size_.width == extent.width && size_.height == extent.height;
-    vkCmdBlitImage(commands, image_, kFrom, target, kTo, 1, &blit, same ? VK_FILTER_NEAREST : VK_FILTER_LINEAR);
+    const bool same = size.width == extent.width && size.height == extent.height;
+    vkCmdBlitImage(commands, image, kFrom, target, kTo, 1, &blit, same ? VK_FILTER_NEAREST : VK_FILTER_LINEAR);
 }
 
 }  // namespace vcp

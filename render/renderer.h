@@ -12,6 +12,11 @@
 //     renderer->present(width, height);                // window only
 //   renderer->readPicture();                           // what render() drew
 //
+// A window draws with renderAhead() in place of render(): then the CPU goes on while up to kFramesAhead frames are in
+// flight. What such a frame counted, what its rays asked for and what is under the cursor come back with its own
+// commands, and are taken in by the first update() or renderAhead() after its end: lastDone() is a frame or two behind
+// the last picture. All else that reads a picture waits for it.
+//
 // A picture without a window is settle(request), render(request), readPicture(). The same request and the
 // same cut give the same bytes. One thread at a time may call a Renderer; several Renderers may exist.
 //
@@ -30,6 +35,7 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "octree/dataset_reader.h"
@@ -53,6 +59,9 @@ struct PlacedDataset {
 };
 
 struct MesoSurface;  // render/passes/meso_surface.h
+
+/// The most frames of a view that are in flight at once.
+constexpr size_t kFramesAhead = 2;
 
 class Renderer {
 public:
@@ -111,6 +120,21 @@ public:
     /// Draws the cut of the last update and waits for the GPU. Without a dataset it draws the background.
     Result<FrameStats> render(const FrameRequest& request);
 
+    /// Draws as render() does, but returns when the frame is handed to the GPU. Waits only where kFramesAhead frames
+    /// are in flight, for the older one. `cursor`: a pixel of the picture whose hit comes back with the frame. Errors:
+    /// those of render(), also of frames before.
+    Result<void> renderAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor = {});
+    /// Whether another frame should wait: on a software device as long as one is in flight, because it has the
+    /// processors and the next one would only be older when it is shown; elsewhere while kFramesAhead are.
+    [[nodiscard]] bool isBusy();
+    /// Whether a frame of renderAhead() has not been taken in yet.
+    [[nodiscard]] bool isDrawing() const;
+    /// Waits until not isBusy(). A window calls it before it looks for input, so that a frame shows the newest.
+    Result<void> waitForFrame();
+    /// Returns the newest frame of this view that has ended and was taken in; nothing before the first, and after
+    /// open() and close().
+    [[nodiscard]] const std::optional<DoneFrame>& lastDone() const;
+
     /// Returns the picture of the last render(). Errors: Usage, where nothing was drawn yet; Device.
     Result<Picture> readPicture();
     /// Distances in world units along the unit ray; infinity where nothing is hit, not a number where the ray gave up.
@@ -123,6 +147,9 @@ public:
     Result<std::vector<uint32_t>> readIterations();
     /// Returns what one pixel of the last render() shows; nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
+    /// Returns what the picture shows at a pixel of a window of that size. At the cursor of lastDone() that frame is
+    /// meant, and nothing is waited for; elsewhere the last one, which is waited for.
+    Result<std::optional<PixelHit>> pickAt(glm::dvec2 pixel, glm::dvec2 size);
 
     /// Copies the last picture into the host's image, scaled to it, sRGB-encoded; what was in the image is lost. Waits
     /// for the GPU. Errors: Usage, where nothing was drawn yet or the queue has no graphics; Device.
@@ -136,7 +163,8 @@ public:
 
     /// Shows the last picture in the window, scaled to it; makes the swapchain anew where the size of the
     /// window changed. `width` and `height`: of the framebuffer; 0 (minimized) shows nothing.
-    /// `drawOver` (may be empty) draws over it. Precondition: options.surface. Errors: Device.
+    /// `drawOver` (may be empty) draws over it. Does not wait for what renderAhead() drew. Precondition:
+    /// options.surface. Errors: Device.
     Result<void> present(uint32_t width, uint32_t height, const DrawOver& drawOver = {});
     /// Returns the same as long as the renderer lives. Precondition: options.surface. Errors: Device.
     Result<WindowDrawing> windowDrawing();
@@ -146,10 +174,9 @@ public:
 
 private:
     struct Shared;
-    struct State;
-    explicit Renderer(std::unique_ptr<State> state);
-    Result<void> openDatasets(std::vector<PlacedDataset> datasets);
-    std::unique_ptr<State> state_;
+    struct View;
+    explicit Renderer(std::unique_ptr<View> view);
+    std::unique_ptr<View> view_;
 };
 
 }  // namespace vcp

@@ -7,29 +7,12 @@
 #include <glm/geometric.hpp>
 
 #include "render/frame_setup.h"
-#include "render/renderer_state.h"
+#include "render/renderer_view.h"
+#include "render/vulkan/compute_pipeline.h"
 
 namespace vcp {
 
 namespace {
-
-/// Adds the counts of another dataset; pixels that are hit are counted where pictures are composed.
-void add(FrameStats& all, const FrameStats& one) {
-    all.tracedRays += one.tracedRays;
-    all.msBeam += one.msBeam;
-    all.msTrace += one.msTrace;
-    all.msLight += one.msLight;
-    all.msShade += one.msShade;
-    all.msFeedback += one.msFeedback;
-    all.msFrame += one.msFrame;
-    all.steps += one.steps;
-    all.fetches += one.fetches;
-    all.poolBytes += one.poolBytes;
-    all.colourBytes += one.colourBytes;
-    all.pagesInCut += one.pagesInCut;
-    all.pipelines += one.pipelines;
-    all.feedbackPasses = one.feedbackPasses;
-}
 
 MesoShading mesoShading(ShadingMode mode) {
     switch (mode) {
@@ -56,9 +39,9 @@ MesoLook mesoLook(const FrameRequest& request) {
 
 }  // namespace
 
-PassConstants Renderer::State::constantsFor(const Layer& layer, const FrameRequest& request) const {
+PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameRequest& request) const {
     PassConstants c;
-    c.access = access;
+    c.access = shared->access;
     if (const Residency* residency = layer.residency) {
         c.poolChunks = residency->pages().chunks();
         c.chunkShift = residency->pages().chunkShift();
@@ -69,87 +52,116 @@ PassConstants Renderer::State::constantsFor(const Layer& layer, const FrameReque
     return c;
 }
 
-Result<void> Renderer::State::checkLimits(const Layer& layer, const FrameRequest& request) const {
+Result<void> Renderer::View::checkLimits(const Layer& layer, const FrameRequest& request) const {
     const uint64_t words = uint64_t{request.width} * request.height *
                            hitPlanes(request, layer.residency != nullptr && layer.residency->hasColour());
-    const VkPhysicalDeviceLimits& limits = device->limits();
+    const Device& device = *shared->device;
+    const VkPhysicalDeviceLimits& limits = device.limits();
     if (words * 4 <= limits.maxStorageBufferRange && words <= limits.maxTexelBufferElements) return {};
     return Error{
         .code = ErrorCode::Limit,
         .message = fmt::format("{} x {} pixels are more than '{}' can address at once; at most {} pixels",
-                               request.width, request.height, device->info().name,
+                               request.width, request.height, device.info().name,
                                std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) /
                                    (words / (uint64_t{request.width} * request.height)))};
 }
 
-Result<void> Renderer::State::prepareTable(Layer& layer) {
+Result<void> Renderer::View::prepareTable(Layer& layer, LayerFrame& frame) {
     const uint64_t version = layer.residency != nullptr ? layer.residency->version() : 0;
-    if (!layer.tableStale && version == layer.tableVersion) return {};
-    auto next = layer.residency != nullptr ? layer.residency->table(number)
-                                           : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
-    if (layer.tableStale || next != layer.table) VCP_TRY(layer.resources->setTable(next));
-    layer.table = std::move(next);
-    layer.tableVersion = version;
-    layer.tableStale = false;
+    if (layer.tableStale || version != layer.tableVersion) {
+        auto next = layer.residency != nullptr ? layer.residency->table(number)
+                                               : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+        if (layer.tableStale || next != layer.table) ++layer.tableNumber;
+        layer.table = std::move(next);
+        layer.tableVersion = version;
+        layer.tableStale = false;
+    }
+    if (frame.tableNumber == layer.tableNumber) return {};
+    VCP_TRY(frame.resources->setTable(layer.table));
+    frame.tableNumber = layer.tableNumber;
     return {};
 }
 
-Result<void> Renderer::State::prepare(Layer& layer, const FrameRequest& request) {
+Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
+    Layer& layer = layers[i];
+    LayerFrame& drawing = frame.layers[i];
+    drawing.request = layer.drawable(frame.request);
+    drawing.listened = layer.listens();
+    drawing.constants = constantsFor(layer, drawing.request);
+    const FrameRequest& request = drawing.request;
+    const PassConstants& constants = drawing.constants;
+    FrameResources& resources = *drawing.resources;
     VCP_TRY(checkLimits(layer, request));
-    const auto& resources = layer.resources;
-    const PassConstants& constants = layer.constants = constantsFor(layer, request);
-    VCP_TRY(resources->resize({request.width, request.height}, hitPlanes(request, constants.colour)));
-    resources->setBackground(backgroundRows(request));
-    VCP_TRY(prepareTable(layer));
-    if (composes()) {
-        VCP_TRY(target.resize(*device, resources->size()));
-        resources->setTarget(&layers.front().resources->picture(), &target.depths());
-        VCP_TRY(compose.prepare(*resources, constants));
+    VCP_TRY(resources.resize({request.width, request.height}, hitPlanes(request, constants.colour)));
+    resources.setBackground(backgroundRows(request));
+    VCP_TRY(prepareTable(layer, drawing));
+    if (shared->composes()) {
+        VCP_TRY(frame.target.resize(*shared->device, resources.size()));
+        resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths());
+        VCP_TRY(shared->compose.prepare(resources, constants));
     }
-    VCP_TRY(beam.prepare(*resources, constants, request.beam));
+    VCP_TRY(shared->beam.prepare(resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None
                                  : request.sectionCaps    ? SectionKind::Capped
                                                           : SectionKind::Open;
     if (layer.isPaper())
-        VCP_TRY(paperTrace.prepare(*resources, constants, sections != SectionKind::None, request.march));
+        VCP_TRY(shared->paperTrace.prepare(resources, constants, sections != SectionKind::None, request.march));
     else
-        VCP_TRY(trace.prepare(*resources, constants, sections));
+        VCP_TRY(shared->trace.prepare(resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
-    if (traceLight) VCP_TRY(light.prepare(*resources, constants));
-    if (layer.listens()) VCP_TRY(feedback.prepare(*device, *resources, constants, layer.table));
-    return shade.prepare(*resources, constants, traceLight);
+    if (traceLight) VCP_TRY(shared->light.prepare(resources, constants));
+    if (drawing.listened)
+        VCP_TRY(shared->feedback.prepare(*shared->device, drawing.feedback, resources, constants, layer.table));
+    return shared->shade.prepare(resources, constants, traceLight);
 }
 
-void Renderer::State::recordFrame(VkCommandBuffer commands, const Layer& layer, const FrameRequest& request) {
-    const auto& resources = layer.resources;
+void Renderer::View::record(VkCommandBuffer commands, Frame& frame, size_t i) {
+    const Layer& layer = layers[i];
+    LayerFrame& drawing = frame.layers[i];
+    FrameResources& resources = *drawing.resources;
+    const PassTimer& timer = drawing.timer;
     timer.reset(commands);
     frame::FrameConstants c =
-        frameConstants(request, layer.residency != nullptr ? &layer.residency->dataset() : nullptr, stripes,
-                       layer.constants.colour, layer.errorPixels, layer.placement);
-    c.feedbackX = feedback.jitter().x;
-    c.feedbackY = feedback.jitter().y;
-    resources->begin(commands, c);
-    if (composes() && &layer == &layers.front()) target.clear(commands);
+        frameConstants(drawing.request, layer.residency != nullptr ? &layer.residency->dataset() : nullptr,
+                       shared->stripes, drawing.constants.colour, layer.errorPixels, layer.placement);
+    c.feedbackX = shared->feedback.jitter().x;
+    c.feedbackY = shared->feedback.jitter().y;
+    resources.begin(commands, c);
+    if (shared->composes() && i == 0) frame.target.clear(commands);
     timer.mark(commands, 0);
-    beam.record(commands, *resources);
+    shared->beam.record(commands, resources);
     timer.mark(commands, 1);
     if (layer.isPaper())
-        paperTrace.record(commands, *resources);
+        shared->paperTrace.record(commands, resources);
     else
-        trace.record(commands, *resources);
+        shared->trace.record(commands, resources);
     timer.mark(commands, 2);
-    if (hasLight(request.shading)) light.record(commands, *resources);
+    if (hasLight(drawing.request.shading)) shared->light.record(commands, resources);
     timer.mark(commands, 3);
-    shade.record(commands, *resources);
-    if (composes()) compose.record(commands, *resources);
+    shared->shade.record(commands, resources);
+    if (shared->composes()) shared->compose.record(commands, resources);
     timer.mark(commands, 4);
-    if (layer.listens()) feedback.record(commands);
+    if (drawing.listened) shared->feedback.record(commands, drawing.feedback);
     timer.mark(commands, 5);
-    resources->recordReadback(commands);
-    if (composes()) target.recordReadback(commands);
+    resources.recordReadback(commands, frame.cursor);
+    if (shared->composes()) frame.target.recordReadback(commands);
 }
 
-FrameRequest Renderer::State::Layer::drawable(const FrameRequest& wanted) const {
+Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& frame) {
+    const Shared::Meso& meso = *shared->meso;
+    const Buffer& picture = frame.layers.front().resources->picture();
+    const MesoLook look = mesoLook(frame.request);
+    VCP_TRY(meso.pass->prepare(frame.surfaces, {frame.request.width, frame.request.height}, picture, look.shadows));
+    frame.surfacesTimer.reset(commands);
+    frame.surfacesTimer.mark(commands, 0);
+    meso.pass->record(commands, frame.surfaces, look, frame.target.depths(), frame.cursor);
+    frame.surfacesTimer.mark(commands, 1);
+    frame.stats.pipelines += meso.resources->pipelinesMade();
+    frame.stats.surfaceBytes = meso.pass->assetBytes();
+    return {};
+}
+
+FrameRequest Renderer::View::Layer::drawable(const FrameRequest& wanted) const {
     FrameRequest request = requestIn(placement, wanted);
     if (!isPaper()) return request;
     request.beam = request.sectionCaps = request.shading.shadows = false;
@@ -158,77 +170,180 @@ FrameRequest Renderer::State::Layer::drawable(const FrameRequest& wanted) const 
 }
 
 Result<FrameStats> Renderer::render(const FrameRequest& request) {
-    return state_->tryAgain([&] { return state_->draw(request); });
+    return view_->shared->tryAgain(*view_, [&] { return view_->draw(request); });
 }
 
-Result<FrameStats> Renderer::State::draw(const FrameRequest& request) {
+Result<void> Renderer::renderAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor) {
+    return view_->shared->tryAgain(*view_, [&] { return view_->drawAhead(request, cursor); });
+}
+
+Result<FrameStats> Renderer::View::draw(const FrameRequest& request) {
     drawn.reset();
-    if (!device || !isComplete()) return kGone;
+    if (!shared->device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
-    const DeviceWork before = device->work();
-    if (std::any_of(layers.begin(), layers.end(), [](const Layer& layer) { return layer.listens(); }))
-        feedbackPicture.reset();
-    std::optional<FrameStats> all;
-    for (Layer& layer : layers) {
-        layer.drawn = layer.drawable(request);
-        auto stats = drawLayer(layer, layer.drawn);
-        if (!stats) return stats;
-        if (all)
-            add(*all, *stats);
-        else
-            all = *stats;
-    }
-    if (shared->meso) {
-        VCP_TRY(drawSurfaces(request, *all));
-    } else if (composes()) {
-        all->hitPixels = target.hitPixels();
-    }
-    drawn = request;
-    all->submissions = device->work().submissions - before.submissions;
-    all->hostWaits = device->work().waits - before.waits;
-    return *all;
-}
-
-Result<FrameStats> Renderer::State::drawLayer(Layer& layer, const FrameRequest& request) {
-    VCP_TRY(prepare(layer, request));
-    const auto began = std::chrono::steady_clock::now();
-    VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) { recordFrame(commands, layer, request); }));
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    if (layer.listens()) {
-        const RayFeedback heard = feedback.read();
-        const SelectionView view = selectionView(request);
-        if (keepsFeedback) keep(heard, view, layer.residency->dataset());
-        layer.residency->hear(heard, view);
-    }
-    auto stats = collectStats(layer, request);
-    if (stats) stats->msFrame = took.count();
+    const DeviceWork before = shared->device->work();
+    VCP_TRY(takeInAll());
+    VCP_TRY(submit(0, request, {}));
+    VCP_TRY(takeInAll());
+    FrameStats& stats = lastDone->stats;
+    stats.submissions = shared->device->work().submissions - before.submissions;
+    stats.hostWaits = shared->device->work().waits - before.waits;
+    drawn = 0;
     return stats;
 }
 
-Result<void> Renderer::State::drawSurfaces(const FrameRequest& request, FrameStats& stats) {
-    const Shared::Meso& meso = *shared->meso;
-    const Buffer& picture = layers.front().resources->picture();
-    const MesoLook look = mesoLook(request);
-    VCP_TRY(meso.pass->prepare(mesoTarget, {request.width, request.height}, picture, look.shadows));
-    const auto began = std::chrono::steady_clock::now();
-    VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) {
-        meso.timer.reset(commands);
-        meso.timer.mark(commands, 0);
-        meso.pass->record(commands, mesoTarget, look, target.depths());
-        meso.timer.mark(commands, 1);
-    }));
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    const MesoCounts counts = mesoTarget.counts();
-    VCP_TRY_ASSIGN(const auto ms, meso.timer.read());
-    stats.msFrame += took.count();
-    stats.msSurfaces = ms.front();
-    stats.unresolvedRays = counts.unresolvedRays, stats.farHits = counts.farHits, stats.hitPixels = counts.hitPixels;
-    stats.pipelines += meso.resources->pipelinesMade();
-    stats.surfaceBytes = meso.pass->assetBytes();
+Result<void> Renderer::View::drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor) {
+    const size_t next = drawn ? (*drawn + 1) % kFramesAhead : 0;
+    drawn.reset();
+    if (!shared->device || !isComplete()) return kGone;
+    VCP_TRY(checkRequest(request));
+    const DeviceWork before = shared->device->work();
+    Frame& frame = frames[next];
+    VCP_TRY(shared->device->waitFor(frame.lastUse));
+    VCP_TRY(takeInDone());
+    VCP_TRY(makeLayers(frame));
+    const bool isInside = cursor && cursor->x < request.width && cursor->y < request.height;
+    VCP_TRY(submit(next, request, isInside ? cursor : std::nullopt));
+    frame.isAhead = true;
+    frame.stats.submissions = shared->device->work().submissions - before.submissions;
+    frame.stats.hostWaits = shared->device->work().waits - before.waits;
+    drawn = next;
     return {};
 }
 
-void Renderer::State::keep(const RayFeedback& heard, const SelectionView& view, const Dataset& dataset) {
+/// Submits a frame. Precondition: nothing in flight uses it.
+Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
+                                    const std::optional<PicturePixel>& cursor) {
+    Frame& frame = frames[which];
+    frame.request = request;
+    frame.cursor = cursor;
+    frame.stats = {.rays = uint64_t{request.width} * request.height};
+    frame.isAhead = false;
+    VCP_TRY_ASSIGN(auto commands, shared->device->beginCommands());
+    barrierToAll(commands);
+    for (size_t i = 0; i < layers.size(); ++i) {
+        VCP_TRY(prepare(frame, i));
+        record(commands, frame, i);
+        for (const Frame& each : frames)
+            if (i < each.layers.size()) frame.stats.pipelines += each.layers[i].resources->pipelinesMade();
+        Residency* const residency = layers[i].residency;
+        if (residency == nullptr) continue;
+        frame.stats.colourBytes += residency->colourBytes();
+        frame.stats.poolBytes += residency->pages().bytes();
+        frame.stats.pagesInCut += uint32_t(residency->cut(number).size());
+    }
+    if (shared->meso) VCP_TRY(recordSurfaces(commands, frame));
+    frame.stats.feedbackPasses = shared->feedback.passes();
+    frame.began = std::chrono::steady_clock::now();
+    VCP_TRY_ASSIGN(const auto submission, shared->device->endCommands());
+    frame.submission = frame.lastUse = submission;
+    return {};
+}
+
+bool Renderer::isBusy() {
+    Shared& s = *view_->shared;
+    if (!s.device) return false;
+    const auto inFlight = std::count_if(view_->frames.begin(), view_->frames.end(),
+                                        [&](const View::Frame& frame) { return !s.device->isDone(frame.submission); });
+    return size_t(inFlight) >= (s.info.software ? 1 : kFramesAhead);
+}
+
+bool Renderer::isDrawing() const {
+    return std::any_of(view_->frames.begin(), view_->frames.end(),
+                       [](const View::Frame& frame) { return frame.submission != 0; });
+}
+
+Result<void> Renderer::waitForFrame() {
+    while (isBusy()) {
+        uint64_t oldest = UINT64_MAX;
+        for (const View::Frame& frame : view_->frames)
+            if (!view_->shared->device->isDone(frame.submission)) oldest = std::min(oldest, frame.submission);
+        const auto done = view_->shared->device->waitFor(oldest);
+        // A lost device is found by the next update, which makes it anew.
+        if (!done) return view_->shared->device->isLost() ? Result<void>() : done;
+    }
+    return {};
+}
+
+const std::optional<DoneFrame>& Renderer::lastDone() const { return view_->lastDone; }
+
+Result<void> Renderer::View::takeInDone() {
+    std::array<Frame*, kFramesAhead> order;
+    std::transform(frames.begin(), frames.end(), order.begin(), [](Frame& frame) { return &frame; });
+    std::sort(order.begin(), order.end(), [](const Frame* a, const Frame* b) { return a->submission < b->submission; });
+    for (Frame* frame : order)
+        if (frame->submission != 0 && shared->device->isDone(frame->submission)) VCP_TRY(takeIn(*frame));
+    return {};
+}
+
+Result<void> Renderer::View::takeInAll() {
+    uint64_t last = 0;
+    for (const Frame& frame : frames) last = std::max({last, frame.submission, frame.lastUse});
+    VCP_TRY(shared->device->waitFor(last));
+    return takeInDone();
+}
+
+Result<void> Renderer::View::takeIn(Frame& frame) {
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - frame.began;
+    frame.submission = 0;
+    FrameStats stats = frame.stats;
+    for (size_t i = 0; i < frame.layers.size(); ++i) VCP_TRY(addStats(frame, i, stats));
+    if (shared->composes()) stats.hitPixels = frame.target.hitPixels();
+    MesoReport surfaces;
+    if (shared->meso) {
+        surfaces = frame.surfaces.report();
+        VCP_TRY(addSurfaceStats(frame, stats));
+    }
+    const double passes =
+        stats.msBeam + stats.msTrace + stats.msLight + stats.msShade + stats.msFeedback + stats.msSurfaces;
+    stats.msFrame = frame.isAhead && shared->device->timestampNanoseconds() > 0 ? passes : took.count();
+    hear(frame);
+    lastDone = {++framesDone, frame.request, stats, frame.cursor, std::nullopt};
+    if (!frame.cursor) return {};
+    std::vector<HitWords> words;
+    for (const LayerFrame& layer : frame.layers) words.push_back(layer.resources->counts().cursor);
+    lastDone->hit = nearestHit(frame.request, *frame.cursor, words, surfaces);
+    return {};
+}
+
+Result<void> Renderer::View::addStats(const Frame& frame, size_t i, FrameStats& all) const {
+    const LayerFrame& layer = frame.layers[i];
+    const FrameCounts counts = layer.resources->counts();
+    all.hitPixels += counts.counters.hitPixels;
+    all.tracedRays += std::min<uint64_t>(all.rays, uint64_t{counts.listedTiles} * frame::kTileSize * frame::kTileSize);
+    all.steps += counts.counters.steps;
+    all.fetches += counts.counters.fetches;
+    VCP_TRY_ASSIGN(const auto ms, layer.timer.read());
+    all.msBeam += ms[0];
+    all.msTrace += ms[1];
+    all.msLight += ms[2];
+    all.msShade += ms[3];
+    all.msFeedback += ms[4];
+    return {};
+}
+
+Result<void> Renderer::View::addSurfaceStats(const Frame& frame, FrameStats& all) const {
+    VCP_TRY_ASSIGN(const auto ms, frame.surfacesTimer.read());
+    all.msSurfaces = ms.front();
+    const MesoCounts counts = frame.surfaces.report().counts;
+    all.unresolvedRays = counts.unresolvedRays, all.farHits = counts.farHits, all.hitPixels = counts.hitPixels;
+    return {};
+}
+
+/// Hands what the rays asked for to the residencies.
+void Renderer::View::hear(const Frame& frame) {
+    if (std::any_of(frame.layers.begin(), frame.layers.end(), [](const LayerFrame& layer) { return layer.listened; }))
+        feedbackPicture.reset();
+    for (size_t i = 0; i < frame.layers.size(); ++i) {
+        if (!frame.layers[i].listened) continue;
+        const RayFeedback heard = frame.layers[i].feedback.read();
+        const SelectionView view = selectionView(frame.layers[i].request);
+        if (keepsFeedback) keep(heard, view, layers[i].residency->dataset());
+        layers[i].residency->hear(heard, view);
+    }
+}
+
+void Renderer::View::keep(const RayFeedback& heard, const SelectionView& view, const Dataset& dataset) {
     if (!feedbackPicture) feedbackPicture.emplace().errorPixels.fill(-1);
     const glm::dvec3 corner = dataset.originOf(dataset.pages[0]);
     const double unit = std::ldexp(dataset.edgeOf(dataset.pages[0]), -int(frame::kLatticeBits));
@@ -239,32 +354,6 @@ void Renderer::State::keep(const RayFeedback& heard, const SelectionView& view, 
         float& kept = feedbackPicture->errorPixels[hit.ray];
         kept = std::max(kept, float(error));
     }
-}
-
-Result<FrameStats> Renderer::State::collectStats(const Layer& layer, const FrameRequest& request) const {
-    const auto& resources = layer.resources;
-    FrameStats stats;
-    stats.rays = uint64_t{request.width} * request.height;
-    const FrameCounts counts = resources->counts();
-    stats.hitPixels = counts.counters.hitPixels;
-    stats.tracedRays =
-        std::min<uint64_t>(stats.rays, uint64_t{counts.listedTiles} * frame::kTileSize * frame::kTileSize);
-    stats.steps = counts.counters.steps;
-    stats.fetches = counts.counters.fetches;
-    VCP_TRY_ASSIGN(auto ms, timer.read());
-    stats.msBeam = ms[0];
-    stats.msTrace = ms[1];
-    stats.msLight = ms[2];
-    stats.msShade = ms[3];
-    stats.msFeedback = ms[4];
-    stats.feedbackPasses = feedback.passes();
-    stats.pipelines = resources->pipelinesMade();
-    if (Residency* const residency = layer.residency) {
-        stats.colourBytes = residency->colourBytes();
-        stats.poolBytes = residency->pages().bytes();
-        stats.pagesInCut = uint32_t(residency->cut(number).size());
-    }
-    return stats;
 }
 
 }  // namespace vcp

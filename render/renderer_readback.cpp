@@ -9,7 +9,7 @@
 
 #include "render/frame_setup.h"
 #include "render/passes/readback.h"
-#include "render/renderer_state.h"
+#include "render/renderer_view.h"
 
 namespace vcp {
 
@@ -20,13 +20,20 @@ constexpr uint32_t kMesoDepth = 0, kMesoNormal = 1, kMesoIterations = 3;
 
 }  // namespace
 
-Result<std::vector<uint32_t>> Renderer::State::hitPlane(const Layer& layer, uint32_t plane, uint32_t missing) const {
-    const auto& resources = layer.resources;
+Result<const Renderer::View::Frame*> Renderer::View::lastFrame() {
     if (!drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    const PictureSize size = resources->size();
-    auto starts = readWords(*device, resources->tileStarts(), 0, uint64_t{size.tilesX()} * size.tilesY());
+    const Frame* const frame = &frames[*drawn];
+    VCP_TRY(takeInAll());
+    return frame;
+}
+
+Result<std::vector<uint32_t>> Renderer::View::hitPlane(const LayerFrame& layer, uint32_t plane,
+                                                       uint32_t missing) const {
+    const FrameResources& resources = *layer.resources;
+    const PictureSize size = resources.size();
+    auto starts = readWords(*shared->device, resources.tileStarts(), 0, uint64_t{size.tilesX()} * size.tilesY());
     if (!starts) return starts;
-    auto words = readWords(*device, resources->hits(), plane * size.pixels(), size.pixels());
+    auto words = readWords(*shared->device, resources.hits(), plane * size.pixels(), size.pixels());
     if (!words) return words;
     for (uint32_t y = 0; y < size.height; ++y)
         for (uint32_t x = 0; x < size.width; ++x) {
@@ -37,41 +44,41 @@ Result<std::vector<uint32_t>> Renderer::State::hitPlane(const Layer& layer, uint
     return words;
 }
 
-Result<std::vector<uint32_t>> Renderer::State::mesoPlane(uint32_t plane) const {
-    if (mesoTarget.size.width == 0) return std::vector<uint32_t>{};
-    return readWords(*device, mesoTarget.hits, plane * mesoTarget.size.pixels(), mesoTarget.size.pixels());
+Result<std::vector<uint32_t>> Renderer::View::mesoPlane(const Frame& frame, uint32_t plane) const {
+    const PictureSize size = frame.surfaces.size;
+    if (size.width == 0) return std::vector<uint32_t>{};
+    return readWords(*shared->device, frame.surfaces.hits, plane * size.pixels(), size.pixels());
 }
 
 Result<Picture> Renderer::readPicture() {
-    const State& s = *state_;
-    if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    const FrameResources& resources = *s.layers.front().resources;
+    VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    const FrameResources& resources = *frame->layers.front().resources;
     const PictureSize size = resources.size();
-    VCP_TRY_ASSIGN(auto words, readWords(*s.device, resources.picture(), 0, size.pixels()));
+    VCP_TRY_ASSIGN(auto words, readWords(*view_->shared->device, resources.picture(), 0, size.pixels()));
     Picture picture{size.width, size.height, std::vector<uint8_t>(size.pixels() * 4)};
     std::memcpy(picture.rgba.data(), words.data(), picture.rgba.size());
     return picture;
 }
 
 Result<std::vector<float>> Renderer::readDepth() {
-    if (!state_->drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    auto depth = state_->depthOf(state_->layers.front());
-    for (size_t i = 1; depth && i < state_->layers.size(); ++i) {
-        const auto other = state_->depthOf(state_->layers[i]);
+    VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    auto depth = view_->depthOf(*frame, 0);
+    for (size_t i = 1; depth && i < view_->layers.size(); ++i) {
+        const auto other = view_->depthOf(*frame, i);
         if (!other) return other;
         std::transform(depth->begin(), depth->end(), other->begin(), depth->begin(),
                        [](float a, float b) { return b < a || std::isnan(a) ? b : a; });
     }
-    const auto depths = state_->mesoPlane(kMesoDepth), normals = state_->mesoPlane(kMesoNormal);
+    const auto depths = view_->mesoPlane(*frame, kMesoDepth), normals = view_->mesoPlane(*frame, kMesoNormal);
     if (!depths || !normals) return depths ? normals.error() : depths.error();
     for (size_t i = 0; depth && i < normals->size(); ++i)
         if ((*normals)[i] != 0) (*depth)[i] = std::bit_cast<float>((*depths)[i]);
     return depth;
 }
 
-Result<std::vector<float>> Renderer::State::depthOf(const Layer& layer) const {
-    VCP_TRY_ASSIGN(auto words, hitPlane(layer, 0, std::bit_cast<uint32_t>(frame::kNoHit)));
-    const double cell = layer.unit();
+Result<std::vector<float>> Renderer::View::depthOf(const Frame& frame, size_t layer) const {
+    VCP_TRY_ASSIGN(auto words, hitPlane(frame.layers[layer], 0, std::bit_cast<uint32_t>(frame::kNoHit)));
+    const double cell = layers[layer].unit();
     std::vector<float> depth(words.size());
     std::transform(words.begin(), words.end(), depth.begin(), [&](uint32_t word) {
         const float cells = std::abs(std::bit_cast<float>(word));
@@ -82,16 +89,16 @@ Result<std::vector<float>> Renderer::State::depthOf(const Layer& layer) const {
 }
 
 Result<std::vector<uint32_t>> Renderer::readWork() {
-    const State& s = *state_;
-    if (!s.drawn || !showsWork(s.drawn->shading.mode))
+    const auto frame = view_->lastFrame();
+    if (!frame || !showsWork((*frame)->request.shading.mode))
         return Error{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
-    const ShadingMode mode = s.drawn->shading.mode;
+    const ShadingMode mode = (*frame)->request.shading.mode;
     const float most = mode == ShadingMode::Steps   ? frame::kMostShownSteps
                        : mode == ShadingMode::Cells ? frame::kMostShownCells
                                                     : frame::kMostShownFetches;
     std::vector<uint32_t> work;
-    for (const State::Layer& layer : s.layers) {
-        const auto words = s.hitPlane(layer, hitPlanes(layer.drawn, layer.constants.colour) - 1, 0);
+    for (const View::LayerFrame& layer : (*frame)->layers) {
+        const auto words = view_->hitPlane(layer, hitPlanes(layer.request, layer.constants.colour) - 1, 0);
         if (!words) return words;
         work.resize(words->size());
         for (size_t i = 0; i < work.size(); ++i)
@@ -101,116 +108,130 @@ Result<std::vector<uint32_t>> Renderer::readWork() {
 }
 
 Result<std::vector<glm::vec3>> Renderer::readNormals() {
+    VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
     std::vector<float> nearest;
     std::vector<glm::vec3> normals;
-    for (const State::Layer& layer : state_->layers) {
-        VCP_TRY_ASSIGN(const auto depth, state_->depthOf(layer));
-        VCP_TRY_ASSIGN(const auto words, state_->hitPlane(layer, 1, 0));
+    for (size_t layer = 0; layer < view_->layers.size(); ++layer) {
+        VCP_TRY_ASSIGN(const auto depth, view_->depthOf(*frame, layer));
+        VCP_TRY_ASSIGN(const auto words, view_->hitPlane(frame->layers[layer], 1, 0));
         nearest.resize(words.size(), std::numeric_limits<float>::infinity());
         normals.resize(words.size(), glm::vec3(0));
-        const glm::quat turn(layer.placement.rotation);
+        const glm::quat turn(view_->layers[layer].placement.rotation);
         for (size_t i = 0; i < normals.size(); ++i) {
             if (!(depth[i] < nearest[i])) continue;
             nearest[i] = depth[i];
             normals[i] = turn * unpackNormal(words[i]);
         }
     }
-    VCP_TRY_ASSIGN(const auto words, state_->mesoPlane(kMesoNormal));
+    VCP_TRY_ASSIGN(const auto words, view_->mesoPlane(*frame, kMesoNormal));
     for (size_t i = 0; i < words.size(); ++i)
         if (words[i] != 0) normals[i] = unpackNormal(words[i]);
     return normals;
 }
 
 Result<std::vector<uint32_t>> Renderer::readIterations() {
-    if (!state_->drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    auto words = state_->mesoPlane(kMesoIterations);
-    if (words) words->resize(state_->layers.front().resources->size().pixels());
+    VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    auto words = view_->mesoPlane(*frame, kMesoIterations);
+    if (words) words->resize(frame->layers.front().resources->size().pixels());
     return words;
 }
 
-Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) {
-    const State& s = *state_;
-    if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    std::optional<PixelHit> nearest;
-    for (size_t i = 0; i < s.layers.size(); ++i) {
-        const auto hit = s.pick(s.layers[i], x, y);
-        if (!hit) return hit;
-        if (!*hit || (nearest && nearest->depth <= (*hit)->depth)) continue;
-        nearest = **hit;
-        nearest->dataset = i;
+Result<std::optional<PixelHit>> Renderer::pick(uint32_t x, uint32_t y) { return view_->pick({x, y}); }
+
+Result<std::optional<PixelHit>> Renderer::pickAt(glm::dvec2 pixel, glm::dvec2 size) {
+    const auto pixelOf = [&](const FrameRequest& request) {
+        const glm::dvec2 at = pixel * glm::dvec2(request.width, request.height) / size;
+        return PicturePixel{uint32_t(at.x), uint32_t(at.y)};
+    };
+    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y)) return std::optional<PixelHit>{};
+    const std::optional<DoneFrame>& done = view_->lastDone;
+    if (done && done->cursor && *done->cursor == pixelOf(done->request)) return done->hit;
+    VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    return view_->pick(pixelOf(frame->request));
+}
+
+Result<std::optional<PixelHit>> Renderer::View::pick(PicturePixel pixel) {
+    VCP_TRY_ASSIGN(const auto last, lastFrame());
+    const Frame& frame = *last;
+    const PictureSize size = frame.layers.front().resources->size();
+    if (pixel.x >= size.width || pixel.y >= size.height) return std::optional<PixelHit>{};
+    const uint64_t tile = uint64_t{pixel.y / frame::kTileSize} * size.tilesX() + pixel.x / frame::kTileSize;
+    const uint64_t at = uint64_t{pixel.y} * size.width + pixel.x;
+    std::vector<WordPlace> places;
+    for (const LayerFrame& layer : frame.layers) {
+        const FrameResources& resources = *layer.resources;
+        places.push_back({&resources.tileStarts(), tile});
+        places.push_back({&resources.hits(), at});
+        places.push_back({&resources.hits(), size.pixels() + at});
     }
-    const auto onSurface = s.pickSurfaces(x, y);
-    if (!onSurface) return onSurface;
-    return *onSurface ? *onSurface : nearest;
+    const bool hasSurfaces = frame.surfaces.size.width > 0;
+    if (hasSurfaces) {
+        places.push_back({&frame.surfaces.hits, kMesoDepth * size.pixels() + at});
+        places.push_back({&frame.surfaces.hits, kMesoNormal * size.pixels() + at});
+    }
+    VCP_TRY_ASSIGN(const auto read, readEach(*shared->device, places));
+    std::vector<HitWords> words;
+    for (size_t i = 0; i < frame.layers.size(); ++i) words.push_back({read[3 * i], read[3 * i + 1], read[3 * i + 2]});
+    MesoReport surfaces;
+    if (hasSurfaces) surfaces.cursorDepth = read[read.size() - 2], surfaces.cursorNormal = read.back();
+    return nearestHit(frame.request, pixel, words, surfaces);
 }
 
-Result<std::optional<PixelHit>> Renderer::State::pickSurfaces(uint32_t x, uint32_t y) const {
-    const PictureSize size = mesoTarget.size;
-    if (x >= size.width || y >= size.height) return std::optional<PixelHit>{};
-    const uint64_t at = uint64_t{y} * size.width + x;
-    const WordPlace places[] = {{&mesoTarget.hits, kMesoDepth * size.pixels() + at},
-                                {&mesoTarget.hits, kMesoNormal * size.pixels() + at}};
-    VCP_TRY_ASSIGN(const auto words, readEach(*device, places));
-    const auto [depth, normal] = std::pair(words[0], words[1]);
-    if (normal == 0) return std::optional<PixelHit>{};
-    PixelHit hit = hitAt(x, y, double(std::bit_cast<float>(depth)));
-    hit.normal = unpackNormal(normal);
-    hit.onSurface = true;
-    return std::optional<PixelHit>(hit);
-}
-
-PixelHit Renderer::State::hitAt(uint32_t x, uint32_t y, double depth) const {
-    const PictureTile whole = wholePicture(*drawn);
+std::optional<PixelHit> Renderer::View::nearestHit(const FrameRequest& request, PicturePixel pixel,
+                                                   std::span<const HitWords> words, const MesoReport& surfaces) const {
+    const PictureTile whole = wholePicture(request);
     const CameraRay ray =
-        cameraRay(drawn->camera, whole.fullWidth, whole.fullHeight, whole.x + x + 0.5, whole.y + y + 0.5);
-    return {.depth = depth, .position = ray.origin + ray.direction * depth, .normal = glm::vec3(0)};
-}
-
-Result<std::optional<PixelHit>> Renderer::State::pick(const Layer& layer, uint32_t x, uint32_t y) const {
-    const auto& resources = layer.resources;
-    const PictureSize size = resources->size();
-    if (x >= size.width || y >= size.height || layer.residency == nullptr) return std::optional<PixelHit>{};
-    const uint64_t tile = uint64_t{y / frame::kTileSize} * size.tilesX() + x / frame::kTileSize;
-    const uint64_t at = uint64_t{y} * size.width + x;
-    const WordPlace places[] = {
-        {&resources->tileStarts(), tile}, {&resources->hits(), at}, {&resources->hits(), size.pixels() + at}};
-    VCP_TRY_ASSIGN(const auto read, readEach(*device, places));
-    const std::vector<uint32_t>& words = read;
-    const float cells = std::abs(std::bit_cast<float>(words[1]));
-    const bool onCap = std::signbit(std::bit_cast<float>(words[1]));
-    if (std::bit_cast<float>(words[0]) >= frame::kTileEmpty || cells >= frame::kNoHit) return std::optional<PixelHit>{};
-    PixelHit hit = hitAt(x, y, double(cells) * layer.unit());
-    hit.onCap = onCap;
-    hit.normal = glm::quat(layer.placement.rotation) * unpackNormal(words[2]);
-    return std::optional<PixelHit>(hit);
+        cameraRay(request.camera, whole.fullWidth, whole.fullHeight, whole.x + pixel.x + 0.5, whole.y + pixel.y + 0.5);
+    const auto hitAt = [&](double depth, glm::vec3 normal) {
+        return PixelHit{.depth = depth, .position = ray.origin + ray.direction * depth, .normal = normal};
+    };
+    if (surfaces.cursorNormal != 0) {
+        PixelHit hit = hitAt(double(std::bit_cast<float>(surfaces.cursorDepth)), unpackNormal(surfaces.cursorNormal));
+        hit.onSurface = true;
+        return hit;
+    }
+    std::optional<PixelHit> nearest;
+    for (size_t i = 0; i < words.size(); ++i) {
+        const float cells = std::abs(std::bit_cast<float>(words[i].depth));
+        const bool isEmpty = std::bit_cast<float>(words[i].tileStart) >= frame::kTileEmpty;
+        if (layers[i].residency == nullptr || isEmpty || cells >= frame::kNoHit) continue;
+        const double depth = double(cells) * layers[i].unit();
+        if (nearest && nearest->depth <= depth) continue;
+        nearest = hitAt(depth, glm::quat(layers[i].placement.rotation) * unpackNormal(words[i].normal));
+        nearest->dataset = i;
+        nearest->onCap = std::signbit(std::bit_cast<float>(words[i].depth));
+    }
+    return nearest;
 }
 
 Result<void> Renderer::copyPicture(const ImageTarget& target) {
-    State& s = *state_;
-    if (!s.drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
-    if (!s.options.host)
+    View& v = *view_;
+    Device* const device = v.shared->device.get();
+    VCP_TRY_ASSIGN(const auto frame, v.lastFrame());
+    if (!v.shared->options.host)
         return Error{.code = ErrorCode::Usage,
                      .message = "images are those of a device of the host, and there is none"};
     if (target.image == VK_NULL_HANDLE || target.width == 0 || target.height == 0)
         return Error{.code = ErrorCode::Usage, .message = "there is no image, or it has no area"};
-    if (!s.device->hasGraphics())
+    if (!device->hasGraphics())
         return Error{.code = ErrorCode::Usage,
                      .message = "pictures are scaled to images by queues with graphics, which this is not"};
-    if (!s.scaling) s.scaling = std::make_unique<PictureScaling>(*s.device);
-    VCP_TRY(s.scaling->prepare(s.layers.front().resources->size()));
-    VCP_TRY_ASSIGN(auto commands, s.device->beginCommands());
-    s.scaling->record(commands, s.layers.front().resources->picture(), target.image, {target.width, target.height});
+    if (!v.scaling) v.scaling = std::make_unique<PictureScaling>(*device);
+    const FrameResources& resources = *frame->layers.front().resources;
+    VCP_TRY(v.scaling->prepare(resources.size()));
+    VCP_TRY_ASSIGN(auto commands, device->beginCommands());
+    v.scaling->record(commands, resources.picture(), target.image, {target.width, target.height});
     changeLayout(commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter,
                  VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
-    return s.device->endCommandsAndWait(target.wait, target.signal);
+    return device->endCommandsAndWait(target.wait, target.signal);
 }
 
 std::vector<PageBox> Renderer::residentPages() const {
     std::vector<PageBox> boxes;
-    for (const State::Layer& layer : state_->layers) {
+    for (const View::Layer& layer : view_->layers) {
         if (layer.residency == nullptr) continue;
         const Dataset& dataset = layer.residency->dataset();
-        const std::vector<uint64_t>& cut = layer.residency->cut(state_->number);
+        const std::vector<uint64_t>& cut = layer.residency->cut(view_->number);
         layer.residency->forEachResident([&](uint64_t page) {
             const PageEntry& entry = dataset.pages[page];
             const glm::dvec3 low = dataset.originOf(entry);
@@ -229,26 +250,33 @@ std::vector<PageBox> Renderer::residentPages() const {
 }
 
 void Renderer::keepFeedback(bool keep) {
-    state_->keepsFeedback = keep;
-    state_->feedbackPicture.reset();
+    view_->keepsFeedback = keep;
+    view_->feedbackPicture.reset();
 }
 
-const std::optional<FeedbackPicture>& Renderer::feedbackPicture() const { return state_->feedbackPicture; }
+const std::optional<FeedbackPicture>& Renderer::feedbackPicture() const { return view_->feedbackPicture; }
 
 Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& drawOver) {
-    State& s = *state_;
-    if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
-    if (!s.drawn) return {};
-    const FrameResources& resources = *s.layers.front().resources;
-    return s.swapchain->show(resources.picture(), resources.size(), {width, height}, drawOver);
+    View& v = *view_;
+    if (!v.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
+    if (!v.drawn) return {};
+    View::Frame& frame = v.frames[*v.drawn];
+    const FrameResources& resources = *frame.layers.front().resources;
+    const auto submission = v.swapchain->show(resources.picture(), resources.size(), {width, height}, drawOver);
+    // A device that was lost with frames in flight is found by the next update, which makes it anew.
+    if (!submission && frame.isAhead && v.shared->device->isLost()) return {};
+    if (!submission) return submission.error();
+    frame.lastUse = std::max(frame.lastUse, *submission);
+    return frame.isAhead ? Result<void>() : v.shared->device->waitFor(*submission);
 }
 
 Result<WindowDrawing> Renderer::windowDrawing() {
-    const State& s = *state_;
-    if (!s.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
-    VCP_TRY_ASSIGN(const auto renderPass, s.swapchain->renderPass());
-    return WindowDrawing{s.instance->handle(), s.device->physical(),    s.device->handle(),
-                         s.device->queue(),    s.device->queueFamily(), renderPass};
+    const View& v = *view_;
+    if (!v.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
+    VCP_TRY_ASSIGN(const auto renderPass, v.swapchain->renderPass());
+    const Device& device = *v.shared->device;
+    return WindowDrawing{v.shared->instance->handle(), device.physical(), device.handle(), device.queue(),
+                         device.queueFamily(),         renderPass};
 }
 
 }  // namespace vcp

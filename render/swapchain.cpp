@@ -20,8 +20,11 @@ void Swapchain::destroySwapchain() {
     views_.clear();
     for (VkSemaphore semaphore : shown_) vkDestroySemaphore(device_.handle(), semaphore, nullptr);
     shown_.clear();
-    if (acquired_ != VK_NULL_HANDLE) vkDestroySemaphore(device_.handle(), acquired_, nullptr);
-    acquired_ = VK_NULL_HANDLE;
+    for (Acquisition& acquisition : acquisitions_) {
+        if (acquisition.semaphore != VK_NULL_HANDLE)
+            vkDestroySemaphore(device_.handle(), acquisition.semaphore, nullptr);
+        acquisition = {};
+    }
     if (swapchain_ != VK_NULL_HANDLE) vkDestroySwapchainKHR(device_.handle(), swapchain_, nullptr);
     swapchain_ = VK_NULL_HANDLE;
 }
@@ -126,7 +129,8 @@ Result<void> Swapchain::recreate(PictureSize window) {
     images_.resize(count);
     VCP_VK(vkGetSwapchainImagesKHR, device_.handle(), swapchain_, &count, images_.data());
     const VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
-    VCP_VK(vkCreateSemaphore, device_.handle(), &semaphore, nullptr, &acquired_);
+    for (Acquisition& acquisition : acquisitions_)
+        VCP_VK(vkCreateSemaphore, device_.handle(), &semaphore, nullptr, &acquisition.semaphore);
     shown_.assign(images_.size(), VK_NULL_HANDLE);
     for (VkSemaphore& shown : shown_) VCP_VK(vkCreateSemaphore, device_.handle(), &semaphore, nullptr, &shown);
     return {};
@@ -142,30 +146,48 @@ void Swapchain::recordOver(VkCommandBuffer commands, const DrawOver& drawOver, u
     vkCmdEndRenderPass(commands);
 }
 
-Result<void> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window,
-                             const DrawOver& drawOver) {
-    if (window.width == 0 || window.height == 0) return {};
-    if (swapchain_ == VK_NULL_HANDLE || window != window_) VCP_TRY(recreate(window));
+/// Returns the number of the image that may be drawn to next; nothing where the window has none now.
+Result<std::optional<uint32_t>> Swapchain::acquire(PictureSize window) {
     uint32_t image = 0;
     VkResult acquired = VK_ERROR_OUT_OF_DATE_KHR;
     // The window may change between asking for its size and drawing: try with the new one, once.
     for (int attempt = 0; attempt < 2 && acquired == VK_ERROR_OUT_OF_DATE_KHR; ++attempt) {
-        if (attempt > 0) VCP_TRY(recreate(window));
-        if (swapchain_ == VK_NULL_HANDLE) return {};
-        acquired = vkAcquireNextImageKHR(device_.handle(), swapchain_, UINT64_MAX, acquired_, VK_NULL_HANDLE, &image);
+        if (swapchain_ == VK_NULL_HANDLE || window != window_ || attempt > 0) VCP_TRY(recreate(window));
+        if (swapchain_ == VK_NULL_HANDLE) return std::optional<uint32_t>{};
+        const Acquisition& next = acquisitions_[nextAcquisition_];
+        VCP_TRY(device_.waitFor(next.submission));
+        acquired =
+            vkAcquireNextImageKHR(device_.handle(), swapchain_, UINT64_MAX, next.semaphore, VK_NULL_HANDLE, &image);
     }
-    if (acquired == VK_ERROR_OUT_OF_DATE_KHR) return {};
+    if (acquired == VK_ERROR_OUT_OF_DATE_KHR) return std::optional<uint32_t>{};
     if (acquired != VK_SUCCESS && acquired != VK_SUBOPTIMAL_KHR) return vulkanError("vkAcquireNextImageKHR", acquired);
+    return std::optional<uint32_t>(image);
+}
+
+Result<uint64_t> Swapchain::show(const Buffer& picture, PictureSize pictureSize, PictureSize window,
+                                 const DrawOver& drawOver) {
+    if (window.width == 0 || window.height == 0) return uint64_t{0};
     VCP_TRY(scaling_.prepare(pictureSize));
+    VCP_TRY_ASSIGN(const auto image, acquire(window));
+    if (!image) return uint64_t{0};
     if (drawOver) VCP_TRY(makeFramebuffers());
     VCP_TRY_ASSIGN(auto commands, device_.beginCommands());
-    scaling_.record(commands, picture, images_[image], extent_);
+    scaling_.record(commands, picture, images_[*image], extent_);
     if (drawOver)
-        recordOver(commands, drawOver, image);
+        recordOver(commands, drawOver, *image);
     else
-        changeLayout(commands, images_[image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
+        changeLayout(commands, images_[*image], VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
                      VK_ACCESS_TRANSFER_WRITE_BIT, 0);
-    VCP_TRY(device_.endCommandsAndWait(acquired_, shown_[image]));
+    Acquisition& acquisition = acquisitions_[nextAcquisition_];
+    const auto submission = device_.endCommands(acquisition.semaphore, shown_[*image]);
+    if (!submission) return submission;
+    acquisition.submission = *submission;
+    nextAcquisition_ = (nextAcquisition_ + 1) % acquisitions_.size();
+    VCP_TRY(present(*image));
+    return submission;
+}
+
+Result<void> Swapchain::present(uint32_t image) {
     VkPresentInfoKHR present{VK_STRUCTURE_TYPE_PRESENT_INFO_KHR};
     present.waitSemaphoreCount = 1;
     present.pWaitSemaphores = &shown_[image];

@@ -13,7 +13,7 @@ struct WindowDrawing {
     VkInstance instance;
     VkPhysicalDevice physical;
     VkDevice device;
-    VkQueue queue;  ///< idle between calls of the renderer
+    VkQueue queue;  ///< frames of renderAhead() may be in flight between calls of the renderer
     uint32_t queueFamily;
     VkRenderPass renderPass;  ///< one colour attachment, one sample, the picture in it
 };

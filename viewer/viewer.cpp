@@ -163,9 +163,7 @@ void Viewer::resize(glm::ivec2 size) { size_ = glm::clamp(size, glm::ivec2(0), g
 std::optional<PixelHit> Viewer::hitAt(glm::dvec2 pixel) {
     if (!drawn_ || !hasSize()) return std::nullopt;
     // The last picture may be smaller than the window it is shown in.
-    const glm::dvec2 at = pixel * glm::dvec2(drawn_->width, drawn_->height) / glm::dvec2(size_);
-    if (at.x < 0 || at.y < 0 || at.x >= drawn_->width || at.y >= drawn_->height) return std::nullopt;
-    const auto hit = renderer_->pick(uint32_t(at.x), uint32_t(at.y));
+    const auto hit = renderer_->pickAt(pixel, glm::dvec2(size_));
     return hit ? *hit : std::nullopt;
 }
 
@@ -498,6 +496,7 @@ Result<NextStep> Viewer::update(double now) {
     pagesChanged_ = pagesChanged_ || update.changed;
     if (!update.problems.empty()) status_.problem = update.problems.back().line();
     status_.update = std::move(update);
+    if (options_.framesAhead && renderer_->lastDone()) takeStats(*renderer_->lastDone());
     return nextStep(now);
 }
 
@@ -510,25 +509,45 @@ NextStep Viewer::nextStep(double now) const {
     const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
     if (isCheaper) next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
     if (isSentSomewhere()) next.waitSeconds = 0;
+    // What a frame in flight tells is taken in by the next update.
+    if (renderer_->isDrawing()) next.waitSeconds = std::min(next.waitSeconds, kLoadingPollSeconds);
     return next;
 }
 
+Result<bool> Viewer::waitForFrame() {
+    if (!options_.framesAhead || !renderer_->isBusy()) return false;
+    VCP_TRY(renderer_->waitForFrame());
+    return true;
+}
+
 Result<void> Viewer::draw() {
-    VCP_TRY_ASSIGN(auto stats, renderer_->render(request_));
-    status_.frame = stats;
+    if (options_.framesAhead) {
+        const glm::dvec2 cursor = cursor_ * glm::dvec2(request_.width, request_.height) / glm::dvec2(size_);
+        const bool isInside = cursor.x >= 0 && cursor.y >= 0 && cursor.x < request_.width && cursor.y < request_.height;
+        const PicturePixel pixel{uint32_t(std::max(cursor.x, 0.0)), uint32_t(std::max(cursor.y, 0.0))};
+        VCP_TRY(renderer_->renderAhead(request_, isInside ? std::optional(pixel) : std::nullopt));
+    } else {
+        VCP_TRY(renderer_->render(request_));
+    }
+    if (renderer_->lastDone()) takeStats(*renderer_->lastDone());
     status_.reduction = requestReduction_;
     const bool wantsLight =
         request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
     status_.without = isPaper_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
-    // The first frame also compiles: it says nothing about the next. Nor does a moving one, which has no occlusion.
-    if (framesDrawn_ > 0)
-        fullFrameMs_ = requestReduction_ * requestReduction_ *
-                       (stats.msFrame - (request_.shading.occlusionRays > 0 ? stats.msLight : 0));
     ++framesDrawn_;
     drawn_ = request_;
     drawnAt_ = now_;
     pagesChanged_ = false;
     return {};
+}
+
+/// Takes a frame's statistics for the status, and for the size of frames while the camera moves.
+void Viewer::takeStats(const DoneFrame& done) {
+    status_.frame = done.stats;
+    // The first frame also compiles: it says nothing about the next. Nor does a moving one, which has no occlusion.
+    if (done.number == 1) return;
+    const double light = done.request.shading.occlusionRays > 0 ? done.stats.msLight : 0;
+    fullFrameMs_ = double(size_.x) * size_.y / double(done.stats.rays) * (done.stats.msFrame - light);
 }
 
 }  // namespace vcp

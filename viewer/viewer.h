@@ -70,6 +70,9 @@ struct ViewerOptions {
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
     double movingFrameMs = 50;
     double moveSeconds = 0.3;  ///< time that a smooth move takes; 0: at once
+    /// draw() returns when the frame is handed to the GPU (Renderer::renderAhead), for hosts that only show pictures.
+    /// The status then tells of the newest frame that has ended. Such a host calls waitForFrame() before it draws.
+    bool framesAhead = false;
 };
 
 /// What the host should do next.
@@ -85,7 +88,7 @@ struct ViewerStatus {
     uint64_t triangles = 0;
     uint32_t levels = 0;
     UpdateResult update;
-    FrameStats frame;   ///< statistics of the last draw()
+    FrameStats frame;   ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
     int reduction = 1;  ///< the last picture has 1/reduction of the width and height
     std::string device;
     bool software = false;
@@ -150,6 +153,10 @@ public:
     Result<NextStep> update(double now);
     /// Draws what the last update chose.
     Result<void> draw();
+    /// Waits until a frame that is drawn now would not wait itself for those in flight, where it is drawn ahead.
+    /// Returns whether it waited: then the host looks for input and calls update() again, so that the frame shows the
+    /// newest.
+    Result<bool> waitForFrame();
 
     /// Returns what the last picture shows at a pixel.
     std::optional<PixelHit> hitAt(glm::dvec2 pixel);
@@ -216,6 +223,7 @@ private:
     [[nodiscard]] FrameRequest requestWith(int reduction) const;
     [[nodiscard]] bool refinementIsDue(double now) const;
     [[nodiscard]] NextStep nextStep(double now) const;
+    void takeStats(const DoneFrame& done);
     glm::dvec3 pointOfInterest(glm::dvec2 pixel);
     void toggleLight();
     void toggleProjection();

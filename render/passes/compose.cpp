@@ -26,7 +26,7 @@ void ComposeTarget::clear(VkCommandBuffer commands) const {
     const uint64_t bytes = size_.pixels() * 4;
     vkCmdFillBuffer(commands, depths_.handle(), 0, bytes, std::bit_cast<uint32_t>(frame::kNoHit));
     vkCmdFillBuffer(commands, depths_.handle(), bytes, 4, 0);
-    barrierTransferToAll(commands);
+    barrierToAll(commands);
 }
 
 void ComposeTarget::recordReadback(VkCommandBuffer commands) const {

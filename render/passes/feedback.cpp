@@ -19,7 +19,7 @@ static_assert(frame::kFeedbackRays == frame::kFeedbackWidth * frame::kFeedbackHe
 
 FeedbackPass::FeedbackPass() : pipelines_(kFeedbackSpirv) {}
 
-Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
+Result<void> FeedbackTarget::reserve(Device& device, uint64_t words) {
     if (buffer_.bytes() >= words * 4) return {};
     const uint64_t bytes = std::bit_ceil(words) * 4;
     constexpr VkBufferUsageFlags kUsage =
@@ -32,13 +32,13 @@ Result<void> FeedbackPass::reserve(Device& device, uint64_t words) {
     return {};
 }
 
-Result<void> FeedbackPass::prepare(Device& device, FrameResources& resources, const PassConstants& constants,
-                                   std::span<const glm::uvec4> table) {
+Result<void> FeedbackPass::prepare(Device& device, FeedbackTarget& target, FrameResources& resources,
+                                   const PassConstants& constants, std::span<const glm::uvec4> table) {
     const size_t records = table.size() / frame::kRecordTexels;
-    VCP_TRY(reserve(device, kRayWords + records));
-    resources.setFeedback(&buffer_);
-    pages_.resize(records);
-    for (size_t i = 0; i < records; ++i) pages_[i] = table[i * frame::kRecordTexels + 2].z;
+    VCP_TRY(target.reserve(device, kRayWords + records));
+    resources.setFeedback(&target.buffer_);
+    target.pages_.resize(records);
+    for (size_t i = 0; i < records; ++i) target.pages_[i] = table[i * frame::kRecordTexels + 2].z;
     PassConstants plain = constants;
     plain.colour = plain.countSteps = plain.falseColour = false;
     return pipelines_.choose(resources, plain);
@@ -50,20 +50,20 @@ glm::vec2 FeedbackPass::jitter() const {
     return {std::fmod(0.5 + 0.7548776662466927 * n, 1.0), std::fmod(0.5 + 0.5698402909980532 * n, 1.0)};
 }
 
-void FeedbackPass::record(VkCommandBuffer commands) {
-    vkCmdFillBuffer(commands, buffer_.handle(), 0, VK_WHOLE_SIZE, 0);
-    barrierTransferToAll(commands);
+void FeedbackPass::record(VkCommandBuffer commands, const FeedbackTarget& target) {
+    vkCmdFillBuffer(commands, target.buffer_.handle(), 0, VK_WHOLE_SIZE, 0);
+    barrierToAll(commands);
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
     vkCmdDispatch(commands, frame::kFeedbackRays / kGroupSize, 1, 1);
     barrierComputeToReadback(commands);
     ++passes_;
-    if (buffer_.mapped() != nullptr) return;
-    const VkBufferCopy whole{0, 0, (kRayWords + pages_.size()) * 4};
-    vkCmdCopyBuffer(commands, buffer_.handle(), readback_.handle(), 1, &whole);
+    if (target.buffer_.mapped() != nullptr) return;
+    const VkBufferCopy whole{0, 0, (kRayWords + target.pages_.size()) * 4};
+    vkCmdCopyBuffer(commands, target.buffer_.handle(), target.readback_.handle(), 1, &whole);
     barrierTransferToHost(commands);
 }
 
-RayFeedback FeedbackPass::read() const {
+RayFeedback FeedbackTarget::read() const {
     std::vector<uint32_t> words(kRayWords + pages_.size());
     std::memcpy(words.data(), buffer_.mapped() != nullptr ? buffer_.mapped() : readback_.mapped(), words.size() * 4);
     RayFeedback feedback;

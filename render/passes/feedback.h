@@ -16,20 +16,30 @@
 
 namespace vcp {
 
+/// What one frame's pass reports into. It stays as it is until that frame has ended.
+class FeedbackTarget {
+public:
+    /// Returns what the last frame with the pass reported. Precondition: that frame is done.
+    [[nodiscard]] RayFeedback read() const;
+
+private:
+    friend class FeedbackPass;
+    Result<void> reserve(Device& device, uint64_t words);
+
+    Buffer buffer_, readback_;     // readback_ is used where buffer_ is not mapped
+    std::vector<uint64_t> pages_;  // for each record of the table, its page; pages of the cut only
+};
+
 class FeedbackPass {
 public:
     FeedbackPass();
     /// `table`: the frame's page table. Makes pipeline and buffers on first use. Errors: Device.
-    Result<void> prepare(Device& device, FrameResources& resources, const PassConstants& constants,
-                         std::span<const glm::uvec4> table);
+    Result<void> prepare(Device& device, FeedbackTarget& target, FrameResources& resources,
+                         const PassConstants& constants, std::span<const glm::uvec4> table);
     /// Precondition: prepare().
-    void record(VkCommandBuffer commands);
-    /// Returns what the last frame with this pass reported. Precondition: that frame is done.
-    [[nodiscard]] RayFeedback read() const;
+    void record(VkCommandBuffer commands, const FeedbackTarget& target);
     /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
-    /// Forgets all that the device holds.
-    void release() { pipelines_.clear(), buffer_ = {}, readback_ = {}; }
 
     /// The number of passes recorded so far.
     [[nodiscard]] uint64_t passes() const { return passes_; }
@@ -37,11 +47,7 @@ public:
     [[nodiscard]] glm::vec2 jitter() const;
 
 private:
-    Result<void> reserve(Device& device, uint64_t words);
-
     PipelineVariants pipelines_;
-    Buffer buffer_, readback_;     // readback_ is used where buffer_ is not mapped
-    std::vector<uint64_t> pages_;  // for each record of the table, its page; pages of the cut only
     uint64_t passes_ = 0;
 };
 

@@ -246,15 +246,24 @@ void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants
     vkCmdFillBuffer(commands, counters_.handle(), 0, VK_WHOLE_SIZE, 0);
     const uint32_t list[frame::kTileListHeader] = {frame::kTileRow, 0, 1, 0};
     vkCmdUpdateBuffer(commands, tileList_.buffer.handle(), 0, sizeof(list), list);
-    barrierTransferToAll(commands);
+    barrierToAll(commands);
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set_, 0, nullptr);
 }
 
-void FrameResources::recordReadback(VkCommandBuffer commands) const {
+void FrameResources::recordReadback(VkCommandBuffer commands, const std::optional<PicturePixel>& cursor) const {
     const VkBufferCopy counters{0, offsetof(FrameCounts, counters), sizeof(frame::FrameCounters)};
     vkCmdCopyBuffer(commands, counters_.handle(), counted_.handle(), 1, &counters);
     const VkBufferCopy listed{kListedTilesWord * 4, offsetof(FrameCounts, listedTiles), 4};
     vkCmdCopyBuffer(commands, tileList_.buffer.handle(), counted_.handle(), 1, &listed);
+    if (cursor) {
+        const uint64_t tile = uint64_t{cursor->y / frame::kTileSize} * size_.tilesX() + cursor->x / frame::kTileSize;
+        const VkBufferCopy start{tile * 4, offsetof(FrameCounts, cursor.tileStart), 4};
+        vkCmdCopyBuffer(commands, tileStarts_.buffer.handle(), counted_.handle(), 1, &start);
+        const uint64_t at = uint64_t{cursor->y} * size_.width + cursor->x;
+        const VkBufferCopy hit[] = {{at * 4, offsetof(FrameCounts, cursor.depth), 4},
+                                    {(size_.pixels() + at) * 4, offsetof(FrameCounts, cursor.normal), 4}};
+        vkCmdCopyBuffer(commands, hits_.buffer.handle(), counted_.handle(), 2, hit);
+    }
     barrierTransferToHost(commands);
 }
 

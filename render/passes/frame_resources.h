@@ -18,10 +18,12 @@
 #include <initializer_list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "render/frame.h"
+#include "render/frame_result.h"
 #include "render/page_pool.h"
 #include "render/vulkan/compute_pipeline.h"
 #include "render/vulkan/device.h"
@@ -70,12 +72,20 @@ struct WordBuffer {
     TexelView view;
 };
 
-/// What is counted in a frame.
+/// The words of one pixel's hit: the start distance of its tile, its depth and its normal.
+struct HitWords {
+    uint32_t tileStart = 0, depth = 0, normal = 0;
+};
+
+/// What a frame tells the CPU.
 struct FrameCounts {
     frame::FrameCounters counters;
     uint32_t listedTiles = 0;  ///< tiles that the beam pass could not prove empty
+    HitWords cursor;           ///< the hit at the pixel that recordReadback() was given
 };
 
+/// What one frame of one dataset is drawn with. A frame in flight has resources of its own: nothing here is changed
+/// until it has ended.
 class FrameResources {
 public:
     static Result<std::unique_ptr<FrameResources>> create(Device& device);
@@ -98,13 +108,15 @@ public:
     /// Sets what the pictures of several datasets are composed into, or null.
     void setTarget(const Buffer* picture, const Buffer* depths);
 
-    /// Copies the constants, clears counters, tile list and picture, binds the set. Ends with barrierTransferToAll.
+    /// Copies the constants, clears counters, tile list and picture, binds the set. Comes after barrierToAll, and ends
+    /// with it.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
 
-    /// Records the copy of what a frame counted to where counts() reads it. Comes after the last pass's
-    /// barrierComputeToReadback; ends with barrierTransferToHost.
-    void recordReadback(VkCommandBuffer commands) const;
-    /// Returns what a frame counted. Precondition: the frame is done.
+    /// Records the copy of what a frame counted, and of the hit at `cursor`, to where counts() reads it. Comes after
+    /// the last pass's barrierComputeToReadback; ends with barrierTransferToHost. Precondition: `cursor` is in the
+    /// picture.
+    void recordReadback(VkCommandBuffer commands, const std::optional<PicturePixel>& cursor) const;
+    /// Returns what recordReadback() copied. Precondition: the frame is done.
     [[nodiscard]] FrameCounts counts() const;
 
     [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
@@ -133,7 +145,7 @@ private:
     PictureSize size_;
     uint32_t hitPlanes_ = 0;
     Buffer constants_, picture_, counters_;
-    Buffer counted_;            // counters and the number of listed tiles, for the CPU
+    Buffer counted_;            // FrameCounts
     Buffer tableUpload_;        // the next frame's table, where the CPU does not see the device's memory
     uint64_t tableToCopy_ = 0;  // bytes
     Buffer background_;         // as large as the picture, copied over it before each frame

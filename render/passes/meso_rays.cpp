@@ -40,7 +40,7 @@ Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const mes
 
 void MesoRaysPass::record(VkCommandBuffer commands) const {
     vkCmdUpdateBuffer(commands, constants_.handle(), 0, sizeof values_, &values_);
-    barrierTransferToAll(commands);
+    barrierToAll(commands);
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_);
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1, &set_.set, 0, nullptr);
     vkCmdDispatch(commands, (count_ + kGroup - 1) / kGroup, 1, 1);

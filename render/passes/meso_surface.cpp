@@ -106,8 +106,8 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
                                             std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
             VCP_TRY_ASSIGN(*buffer, resources_.storage(bytes));
         }
-        VCP_TRY_ASSIGN(target.counted,
-                       device_.createBuffer(sizeof(MesoCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
+        VCP_TRY_ASSIGN(target.reported,
+                       device_.createBuffer(sizeof(MesoReport), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
         for (const Placed& surface : surfaces_) {
             VCP_TRY_ASSIGN(auto set,
                            resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits,
@@ -165,14 +165,14 @@ void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, co
     barrierComputeToCompute(commands);
 }
 
-MesoCounts MesoTarget::counts() const {
-    MesoCounts counts;
-    std::memcpy(&counts, counted.mapped(), sizeof counts);
-    return counts;
+MesoReport MesoTarget::report() const {
+    MesoReport report;
+    std::memcpy(&report, reported.mapped(), sizeof report);
+    return report;
 }
 
 void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look,
-                             const Buffer& depths) {
+                             const Buffer& depths, const std::optional<PicturePixel>& cursor) {
     const uint64_t plane = target.size.pixels() * 4;
     const VkBufferCopy region{0, 0, plane};
     vkCmdCopyBuffer(commands, depths.handle(), target.hits.handle(), 1, &region);
@@ -182,14 +182,20 @@ void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target,
         const MesoConstants constants = constantsOf(surface, target.size, look);
         vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
     }
-    barrierTransferToAll(commands);
+    barrierToAll(commands);
     for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].cast, target, i);
     if (look.shadows && look.shading == MesoShading::Lit)
         for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].shadow, target, i);
     dispatch(commands, shade_, target, 0);
     barrierComputeToReadback(commands);
-    const VkBufferCopy counts{0, 0, sizeof(MesoCounts)};
-    vkCmdCopyBuffer(commands, target.counters.handle(), target.counted.handle(), 1, &counts);
+    const VkBufferCopy counts{0, offsetof(MesoReport, counts), sizeof(MesoCounts)};
+    vkCmdCopyBuffer(commands, target.counters.handle(), target.reported.handle(), 1, &counts);
+    if (cursor) {
+        const uint64_t at = (uint64_t{cursor->y} * target.size.width + cursor->x) * 4;
+        const VkBufferCopy hit[] = {{at, offsetof(MesoReport, cursorDepth), 4},
+                                    {plane + at, offsetof(MesoReport, cursorNormal), 4}};
+        vkCmdCopyBuffer(commands, target.hits.handle(), target.reported.handle(), 2, hit);
+    }
     barrierTransferToHost(commands);
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,17 +63,23 @@ struct MesoCounts {
     uint32_t unresolvedRays = 0, farHits = 0, hitPixels = 0, unused = 0;
 };
 
+/// What a frame tells the CPU: the counts, and the depth and normal at the pixel that record() was given.
+struct MesoReport {
+    MesoCounts counts;
+    uint32_t cursorDepth = 0, cursorNormal = 0;
+};
+
 /// What one view's pictures of the surfaces are drawn into.
 struct MesoTarget {
     PictureSize size;       ///< 0: nothing is made
     uint64_t surfaces = 0;  ///< MesoSurfacePass::version() for which the sets were made
     Buffer hits, counters;
-    Buffer counted;                     ///< the counters, for the CPU
+    Buffer reported;                    ///< MesoReport
     VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
     std::vector<MesoSet> sets;          ///< one for each surface
 
-    /// Returns what a frame counted. Precondition: the frame is done.
-    [[nodiscard]] MesoCounts counts() const;
+    /// Returns what a frame told. Precondition: the frame is done.
+    [[nodiscard]] MesoReport report() const;
 };
 
 class MesoSurfacePass {
@@ -86,7 +93,8 @@ public:
     Result<void> prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows);
     /// Records the surfaces' passes. Precondition: prepare(); the picture shows what is seen without mesostructure.
     /// `depths`: a float a pixel, world units along the unit ray, of what the picture shows.
-    void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths);
+    void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths,
+                const std::optional<PicturePixel>& cursor);
 
     [[nodiscard]] uint64_t version() const { return version_; }
     /// Bytes of assets, shells and textures.

@@ -29,8 +29,8 @@ private:
     VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
 
-/// Makes what was copied or filled visible to shaders and copies.
-void barrierTransferToAll(VkCommandBuffer commands);
+/// Lets shaders and copies after it begin when those before it have ended, and see what they wrote.
+void barrierToAll(VkCommandBuffer commands);
 /// Makes what compute shaders wrote visible to compute shaders and indirect dispatches.
 void barrierComputeToCompute(VkCommandBuffer commands);
 /// Makes what compute shaders wrote visible to copies and the CPU.

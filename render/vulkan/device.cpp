@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "render/vulkan/check.h"
+#include "render/vulkan/compute_pipeline.h"
 
 namespace vcp {
 
@@ -84,7 +85,7 @@ Result<std::unique_ptr<Device>> Device::borrow(const HostDevice& host, const Dev
                                 "' does not compute"};
     made->useFamily(host.queueFamily, families[host.queueFamily]);
     made->device_ = host.device;
-    made->queue_ = host.queue;
+    made->hostQueue_ = host.queue;
     made->hasSwapchain_ = vkGetDeviceProcAddr(host.device, "vkCreateSwapchainKHR") != nullptr;
     VCP_TRY(made->createObjects());
     return made;
@@ -158,54 +159,32 @@ Result<void> Device::createDevice() {
     info.enabledExtensionCount = hasSwapchain_ ? 1 : 0;
     info.ppEnabledExtensionNames = &swapchain;
     VCP_VK(vkCreateDevice, physical_, &info, nullptr, &device_);
-    vkGetDeviceQueue(device_, family_, 0, &queue_);
-    if (copyFamily_) vkGetDeviceQueue(device_, *copyFamily_, 0, &copyQueue_);
     return {};
 }
 
 Result<void> Device::createObjects() {
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = family_;
-    VCP_VK(vkCreateCommandPool, device_, &pool, nullptr, &commandPool_);
-    VkCommandBufferAllocateInfo commands{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    commands.commandPool = commandPool_;
-    commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    commands.commandBufferCount = 1;
-    VCP_VK(vkAllocateCommandBuffers, device_, &commands, &commands_);
-    const VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    VCP_VK(vkCreateFence, device_, &fence, nullptr, &fence_);
+    work_.lostAtSubmission = faults_.lostAtSubmission;
+    VkQueue queue = hostQueue_;
+    if (queue == VK_NULL_HANDLE) vkGetDeviceQueue(device_, family_, 0, &queue);
+    VCP_TRY(frames_.create(device_, queue, family_, work_));
     const VkPipelineCacheCreateInfo cache{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
     VCP_VK(vkCreatePipelineCache, device_, &cache, nullptr, &pipelineCache_);
-    return copyQueue_ != VK_NULL_HANDLE ? createCopyObjects() : Result<void>();
-}
-
-Result<void> Device::createCopyObjects() {
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = *copyFamily_;
-    VCP_VK(vkCreateCommandPool, device_, &pool, nullptr, &copyPool_);
-    VkCommandBufferAllocateInfo commands{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    commands.commandPool = copyPool_;
-    commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    commands.commandBufferCount = 1;
-    VCP_VK(vkAllocateCommandBuffers, device_, &commands, &copyCommands_);
-    const VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    VCP_VK(vkCreateFence, device_, &fence, nullptr, &copyFence_);
+    if (!copyFamily_) return {};
+    vkGetDeviceQueue(device_, *copyFamily_, 0, &queue);
+    VCP_TRY(copies_.create(device_, queue, *copyFamily_, work_));
     const VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
     VCP_VK(vkCreateSemaphore, device_, &semaphore, nullptr, &copiesDone_);
+    VCP_VK(vkCreateSemaphore, device_, &semaphore, nullptr, &framesDone_);
     return {};
 }
 
 Device::~Device() {
     if (device_ == VK_NULL_HANDLE) return;
-    static_cast<void>(waitForCopies());
+    copies_.destroy();
+    frames_.destroy();
+    vkDestroySemaphore(device_, framesDone_, nullptr);
     vkDestroySemaphore(device_, copiesDone_, nullptr);
-    vkDestroyFence(device_, copyFence_, nullptr);
-    vkDestroyCommandPool(device_, copyPool_, nullptr);
     vkDestroyPipelineCache(device_, pipelineCache_, nullptr);
-    vkDestroyFence(device_, fence_, nullptr);
-    vkDestroyCommandPool(device_, commandPool_, nullptr);
     if (!borrowed_) vkDestroyDevice(device_, nullptr);
 }
 
@@ -284,78 +263,43 @@ Result<TexelView> Device::createTexelView(const Buffer& buffer, VkFormat format,
     return made;
 }
 
-Result<VkCommandBuffer> Device::beginCommands() {
-    VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    VCP_VK(vkBeginCommandBuffer, commands_, &begin);
-    return commands_;
+Result<uint64_t> Device::endCommands(VkSemaphore wait, VkSemaphore signal) {
+    const auto done = frames_.submit({{wait, copiesAwaited_ ? copiesDone_ : VK_NULL_HANDLE},
+                                      {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT},
+                                      signal});
+    if (done) copiesAwaited_ = false;
+    return done;
 }
 
 Result<void> Device::endCommandsAndWait(VkSemaphore wait, VkSemaphore signal) {
-    VCP_VK(vkEndCommandBuffer, commands_);
-    std::vector<VkSemaphore> waits;
-    std::vector<VkPipelineStageFlags> stages;
-    const auto waitFirst = [&](VkSemaphore semaphore, VkPipelineStageFlags stage) {
-        waits.push_back(semaphore);
-        stages.push_back(stage);
-    };
-    if (wait != VK_NULL_HANDLE) waitFirst(wait, VK_PIPELINE_STAGE_TRANSFER_BIT);
-    if (copiesAwaited_) waitFirst(copiesDone_, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT);
-    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-    submit.waitSemaphoreCount = uint32_t(waits.size());
-    submit.pWaitSemaphores = waits.data();
-    submit.pWaitDstStageMask = stages.data();
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &commands_;
-    submit.signalSemaphoreCount = signal != VK_NULL_HANDLE ? 1 : 0;
-    submit.pSignalSemaphores = &signal;
-    VCP_TRY(submitTo(queue_, submit, fence_));
-    copiesAwaited_ = false;
-    return waitFor(fence_);
+    const auto submission = endCommands(wait, signal);
+    return submission ? waitFor(*submission) : submission.error();
 }
 
-Result<void> Device::submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence fence) {
-    // A device that is lost stays lost, also one that is only said to be.
-    const bool isLost = lost_ || ++submissions_ == faults_.lostAtSubmission;
-    const VkResult done = isLost ? VK_ERROR_DEVICE_LOST : vkQueueSubmit(queue, 1, &submit, fence);
-    lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
-    return done == VK_SUCCESS ? Result<void>() : vulkanError("vkQueueSubmit", done);
+Result<VkCommandBuffer> Device::beginCopies() {
+    auto commands = copyQueue().begin();
+    // On one queue the order of submission alone lets copies overtake the shaders that still read.
+    if (commands && !copies_.exists()) barrierToAll(*commands);
+    return commands;
 }
 
-Result<void> Device::waitFor(VkFence fence) {
-    ++waits_;
-    const VkResult done = vkWaitForFences(device_, 1, &fence, VK_TRUE, UINT64_MAX);
-    lost_ = lost_ || done == VK_ERROR_DEVICE_LOST;
-    if (done != VK_SUCCESS) return vulkanError("vkWaitForFences", done);
-    VCP_VK(vkResetFences, device_, 1, &fence);
-    return {};
-}
-
-Result<void> Device::waitForCopies() { return std::exchange(copiesRun_, false) ? waitFor(copyFence_) : Result<void>(); }
-
-Result<void> Device::beginCopies() {
-    VCP_TRY(waitForCopies());
-    VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    VCP_VK(vkBeginCommandBuffer, copyCommands_, &begin);
-    return {};
-}
-
-Result<void> Device::endCopies() {
-    VCP_VK(vkEndCommandBuffer, copyCommands_);
-    // Earlier copies that nothing has waited for yet: this signal covers them too.
-    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_TRANSFER_BIT;
-    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-    submit.waitSemaphoreCount = copiesAwaited_ ? 1 : 0;
-    submit.pWaitSemaphores = &copiesDone_;
-    submit.pWaitDstStageMask = &stage;
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &copyCommands_;
-    submit.signalSemaphoreCount = 1;
-    submit.pSignalSemaphores = &copiesDone_;
-    VCP_TRY(submitTo(copyQueue_, submit, copyFence_));
-    copiesRun_ = copiesAwaited_ = true;
-    return {};
+Result<uint64_t> Device::endCopies(VkCommandBuffer commands) {
+    if (!copies_.exists()) {
+        barrierToAll(commands);
+        return endCommands();
+    }
+    QueueSemaphores semaphores;
+    // Earlier copies that nothing waits for yet: this submission's signal covers them too.
+    if (copiesAwaited_) semaphores.waits[0] = copiesDone_, semaphores.stages[0] = VK_PIPELINE_STAGE_TRANSFER_BIT;
+    if (frames_.last() > framesBeforeCopies_ && !frames_.isDone(frames_.last())) {
+        VCP_TRY(frames_.submitSignal(framesDone_));
+        semaphores.waits[1] = framesDone_, semaphores.stages[1] = VK_PIPELINE_STAGE_TRANSFER_BIT;
+    }
+    framesBeforeCopies_ = frames_.last();
+    semaphores.signal = copiesDone_;
+    const auto done = copies_.submit(semaphores);
+    if (done) copiesAwaited_ = true;
+    return done;
 }
 
 }  // namespace vcp

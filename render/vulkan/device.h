@@ -1,4 +1,8 @@
 // A logical device with one queue, and one only for copies where it has such; its buffers and commands.
+//
+// What is submitted runs in the order of submission, beside the CPU; submitAndWait() waits for its end. A submission
+// that overwrites what an earlier one reads begins with barrierToAll (compute_pipeline.h). Copies on a queue of their
+// own wait for all frames submitted before them, and what is submitted next waits for the copies; the CPU does not.
 #pragma once
 
 #include <array>
@@ -12,6 +16,7 @@
 #include <vulkan/vulkan_core.h>
 
 #include "octree/result.h"
+#include "render/vulkan/command_queue.h"
 #include "render/vulkan/device_info.h"
 #include "render/vulkan/instance.h"
 
@@ -66,10 +71,6 @@ private:
 /// device, read by the CPU.
 enum class MemoryUse { Local, Upload, Readback };
 
-struct DeviceWork {
-    uint64_t submissions = 0, waits = 0;
-};
-
 class Device {
 public:
     /// `choice` as in RendererOptions::device. `forWindows` asks for the swapchain extension and a queue with graphics,
@@ -85,7 +86,7 @@ public:
 
     [[nodiscard]] VkDevice handle() const { return device_; }
     [[nodiscard]] VkPhysicalDevice physical() const { return physical_; }
-    [[nodiscard]] VkQueue queue() const { return queue_; }
+    [[nodiscard]] VkQueue queue() const { return frames_.handle(); }
     [[nodiscard]] uint32_t queueFamily() const { return family_; }
     [[nodiscard]] VkPipelineCache pipelineCache() const { return pipelineCache_; }
     /// Whether the queue can scale pictures.
@@ -96,12 +97,12 @@ public:
     [[nodiscard]] double timestampNanoseconds() const { return timestampNanoseconds_; }
 
     /// Counts submissions, and how often the CPU waited for one, since create().
-    [[nodiscard]] DeviceWork work() const { return {submissions_, waits_}; }
+    [[nodiscard]] const DeviceWork& work() const { return work_; }
 
     /// Whether the queue can show pictures in this window.
     [[nodiscard]] bool shows(VkSurfaceKHR surface) const;
     /// Whether the device was lost: then nothing works any more but destroying it.
-    [[nodiscard]] bool isLost() const { return lost_; }
+    [[nodiscard]] bool isLost() const { return work_.isLost; }
     /// Whether memory for a buffer was lacking since the last call.
     [[nodiscard]] bool takeOutOfMemory() const { return std::exchange(outOfMemory_, false); }
 
@@ -118,21 +119,28 @@ public:
         record(commands);
         return endCommandsAndWait();
     }
-    Result<VkCommandBuffer> beginCommands();
-    /// With semaphores, transfers wait for `wait`, and `signal` is signalled.
+    Result<VkCommandBuffer> beginCommands() { return frames_.begin(); }
+    /// Submits what was recorded and returns the submission's number. With semaphores, transfers wait for `wait`, and
+    /// `signal` is signalled. Errors: Device.
+    Result<uint64_t> endCommands(VkSemaphore wait = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
     Result<void> endCommandsAndWait(VkSemaphore wait = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
+    /// Whether a submission has ended. Never waits.
+    [[nodiscard]] bool isDone(uint64_t submission) { return frames_.isDone(submission); }
+    Result<void> waitFor(uint64_t submission) { return frames_.waitFor(submission); }
+    /// Waits for all submissions, not for copies on a queue of their own.
+    Result<void> waitForAll() { return frames_.waitFor(frames_.last()); }
 
-    /// Copies between buffers; the copies are done before anything that is submitted after them. On a queue of their
-    /// own they run beside what the CPU does next, and waitForCopies() waits for them; elsewhere they are done on
-    /// return.
+    /// Copies between buffers; the copies begin when all that was submitted before them has ended, and are done before
+    /// anything that is submitted after them. Returns a number for waitForCopies().
     template <class Record>
-    Result<void> submitCopies(Record record) {
-        if (copyQueue_ == VK_NULL_HANDLE) return submitAndWait(record);
-        VCP_TRY(beginCopies());
-        record(copyCommands_);
-        return endCopies();
+    Result<uint64_t> submitCopies(Record record) {
+        VCP_TRY_ASSIGN(auto commands, beginCopies());
+        record(commands);
+        return endCopies(commands);
     }
-    Result<void> waitForCopies();
+    /// Waits for copies. Errors: Device.
+    Result<void> waitForCopies(uint64_t copies) { return copyQueue().waitFor(copies); }
+    Result<void> waitForCopies() { return waitForCopies(copyQueue().last()); }
 
 private:
     Device() = default;
@@ -144,36 +152,29 @@ private:
     Result<void> createDevice();
     Result<void> createObjects();
     void chooseCopyFamily();
-    Result<void> createCopyObjects();
-    Result<void> beginCopies();
-    Result<void> endCopies();
-    Result<void> submitTo(VkQueue queue, const VkSubmitInfo& submit, VkFence fence);
-    Result<void> waitFor(VkFence fence);
+    [[nodiscard]] CommandQueue& copyQueue() { return copies_.exists() ? copies_ : frames_; }
+    Result<VkCommandBuffer> beginCopies();
+    Result<uint64_t> endCopies(VkCommandBuffer commands);
 
     VkPhysicalDevice physical_ = VK_NULL_HANDLE;
     VkDevice device_ = VK_NULL_HANDLE;
-    VkQueue queue_ = VK_NULL_HANDLE;
-    VkCommandPool commandPool_ = VK_NULL_HANDLE;
-    VkCommandBuffer commands_ = VK_NULL_HANDLE;
-    VkFence fence_ = VK_NULL_HANDLE;
+    VkQueue hostQueue_ = VK_NULL_HANDLE;  // the queue of a device that is not ours
+    DeviceWork work_;
+    CommandQueue frames_, copies_;  // copies_ exists where there is a queue for copies only
     VkPipelineCache pipelineCache_ = VK_NULL_HANDLE;
     uint32_t family_ = 0;
-    VkQueue copyQueue_ = VK_NULL_HANDLE;  // null: copies go to queue_
-    VkCommandPool copyPool_ = VK_NULL_HANDLE;
-    VkCommandBuffer copyCommands_ = VK_NULL_HANDLE;
-    VkFence copyFence_ = VK_NULL_HANDLE;              // signalled when the running copies are done
-    VkSemaphore copiesDone_ = VK_NULL_HANDLE;         // signalled by copies, waited for by what is submitted next
-    bool copiesRun_ = false, copiesAwaited_ = false;  // the fence, the semaphore: nothing has waited for it since
+    VkSemaphore copiesDone_ = VK_NULL_HANDLE;  // signalled by copies, waited for by what is submitted next
+    VkSemaphore framesDone_ = VK_NULL_HANDLE;  // signalled after frames, waited for by copies
+    bool copiesAwaited_ = false;               // nothing waits for copiesDone_ yet
+    uint64_t framesBeforeCopies_ = 0;          // the last submission that copies have waited for
     std::optional<uint32_t> copyFamily_;
     double timestampNanoseconds_ = 0;
     DeviceInfo info_;
     VkPhysicalDeviceLimits limits_{};
     VkPhysicalDeviceMemoryProperties memory_{};
     DeviceFaults faults_;
-    uint64_t submissions_ = 0, waits_ = 0;
     mutable uint64_t allocated_ = 0;
     mutable bool outOfMemory_ = false;
-    bool lost_ = false;
     bool hasSwapchain_ = false, hasGraphics_ = false, borrowed_ = false;
 };
 

@@ -66,7 +66,9 @@ double MotionReport::quantileMs(double part) const { return quantile(frameMs, pa
 
 Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
                                    const MotionOptions& options) {
-    VCP_TRY_ASSIGN(auto viewer, Viewer::create(options.viewer));
+    ViewerOptions viewerOptions = options.viewer;
+    viewerOptions.framesAhead = true;
+    VCP_TRY_ASSIGN(auto viewer, Viewer::create(viewerOptions));
     OrbitCamera start;
     start.look(View::Front, bounds, options.size);
     viewer->resize(options.size);
@@ -80,6 +82,7 @@ Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Bo
     const double began = seconds();
     double last = began;
     while (last - began < options.seconds) {
+        if (const auto waited = viewer->waitForFrame(); !waited) return waited.error();
         viewer->setCamera(cameraAt(start, bounds.centre(), (seconds() - began) / options.seconds));
         VCP_TRY_ASSIGN(const auto drew, motion.turn());
         const double now = seconds();

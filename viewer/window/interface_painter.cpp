@@ -15,7 +15,7 @@ namespace vcp {
 namespace {
 
 constexpr float kFontPixels = 13;
-// The backend cycles through so many vertex buffers. Frames wait for the queue, so its least number is enough.
+// The backend cycles through so many vertex buffers. Of the pictures that are presented, two are in flight at most.
 constexpr uint32_t kBuffers = 2;
 constexpr uint32_t kMostDescriptors = 8;
 

@@ -64,6 +64,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
     viewerOptions.shading.backgroundBottom = options.user.backgroundBottom;
     viewerOptions.sectionCaps = options.render.caps;
     viewerOptions.march = options.render.march;
+    viewerOptions.framesAhead = true;
     VCP_TRY_ASSIGN(auto viewer, Viewer::create(viewerOptions));
     return std::unique_ptr<ViewSession>(new ViewSession(options, std::move(viewer)));
 }

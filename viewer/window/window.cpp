@@ -129,8 +129,14 @@ public:
                 catching_.reset();
             else if (!catching_ && options_->catchInterrupts)
                 catching_ = options_->catchInterrupts();
-            VCP_TRY_ASSIGN(const auto next, session_->update(seconds()));
             Viewer& viewer = session_->viewer();
+            VCP_TRY_ASSIGN(auto next, session_->update(seconds()));
+            if (next.draw) {
+                VCP_TRY_ASSIGN(const auto waited, viewer.waitForFrame());
+                // The frame is to show what was done up to now.
+                if (waited) glfwPollEvents(), next = session_->update(seconds());
+                if (!next) return next.error();
+            }
             if (next.draw) VCP_TRY(viewer.draw());
             if (!painter_) VCP_TRY(makePainter());
             VCP_TRY(present(next.draw));

@@ -1,0 +1,89 @@
+// What the views of a renderer share: device, passes, and the datasets with their pages.
+#pragma once
+
+#include "render/renderer.h"
+
+#include <utility>
+
+#include "render/passes/beam.h"
+#include "render/passes/compose.h"
+#include "render/passes/feedback.h"
+#include "render/passes/light.h"
+#include "render/passes/meso_surface.h"
+#include "render/passes/paper_trace.h"
+#include "render/passes/shade.h"
+#include "render/passes/trace.h"
+#include "render/residency.h"
+
+namespace vcp {
+
+struct Renderer::Shared {
+    struct Placed {
+        std::unique_ptr<Residency> residency;
+        Similarity placement;
+    };
+    RendererOptions options;
+    std::unique_ptr<Instance> instance;
+    std::unique_ptr<Device> device;  // null after a loss that could not be repaired
+    DeviceInfo info;
+    PageAccess access = PageAccess::TexelBuffer;
+    uint32_t stripes = 1;
+    std::vector<Placed> datasets;
+    std::vector<std::pair<uint32_t, uint32_t>> poolLayouts;  // layouts of the datasets that the pipelines were made for
+    uint32_t losses = 0;
+    // Views record their frames one after the other, so one set of pipelines is enough for all.
+    BeamPass beam;
+    TracePass trace;
+    PaperTracePass paperTrace;
+    LightPass light;
+    ShadePass shade;
+    FeedbackPass feedback;
+    ComposePass compose;
+    /// The surfaces with mesostructure, and what draws them.
+    struct Meso {
+        std::vector<MesoSurface> surfaces;  // kept to be uploaded again
+        std::unique_ptr<MesoResources> resources;
+        std::unique_ptr<MesoSurfacePass> pass;
+    };
+    std::unique_ptr<Meso> meso;  // null: there are none
+    uint64_t mesoVersion = 0;    // counts setSurfaces
+    std::vector<View*> views;
+    ViewNumber nextNumber = 0;
+
+    /// Whether pictures are composed of more than one dataset, or have surfaces.
+    [[nodiscard]] bool composes() const { return datasets.size() > 1 || meso; }
+    /// Takes a device that was just made.
+    void take(std::unique_ptr<Device> made);
+    /// Uploads the copies of the surfaces to the device. After an error there are none.
+    Result<void> uploadSurfaces();
+    /// Opens datasets beside those that are open, and shows all. After an error some may be open. Errors: as of
+    /// Renderer::open.
+    Result<void> addDatasets(std::vector<PlacedDataset> placed);
+    /// hidePool: ends what is in flight; no shader of any view sees a pool then. showPool: shaders see the residencies'
+    /// pools; where one has none, datasets are closed.
+    void hidePool();
+    Result<void> showPool();
+    void clearPipelines();
+    /// Shares the budgets out among the datasets.
+    Result<void> setShares(uint64_t budgetBytes, uint64_t ramBytes);
+    /// Makes anew all that the device held. `asked`: the view that found the device lost.
+    Result<void> rebuild(View& asked);
+    /// Whether what failed is worth another try now.
+    bool recover(View& asked, bool mayRebuild);
+    /// Calls `doIt` for a view; after an error that can be recovered from, once more.
+    template <class Do>
+    auto tryAgain(View& asked, Do doIt) -> decltype(doIt());
+};
+
+template <class Do>
+auto Renderer::Shared::tryAgain(View& asked, Do doIt) -> decltype(doIt()) {
+    const uint32_t before = losses;
+    auto done = doIt();
+    // A device that is lost each time is given up; the pool can be halved only a few times.
+    while (!done && recover(asked, losses == before)) done = doIt();
+    return done;
+}
+
+inline const Error kGone{.code = ErrorCode::Device, .message = "the device was lost and could not be made anew"};
+
+}  // namespace vcp

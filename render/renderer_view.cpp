@@ -1,0 +1,188 @@
+// Renderer: the life of a view.
+#include "render/renderer_view.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "render/frame_setup.h"
+#include "render/vulkan/check.h"
+
+namespace vcp {
+
+namespace {
+
+/// Adds the result of another dataset in the same picture.
+void add(UpdateResult& all, const UpdateResult& one) {
+    all.changed = all.changed || one.changed;
+    all.settled = all.settled && one.settled;
+    all.relaxed = all.relaxed || one.relaxed;
+    all.errorPixels = std::max(all.errorPixels, one.errorPixels);
+    all.residentBytes += one.residentBytes;
+    all.bytesRead += one.bytesRead;
+    all.heldBytesMax += one.heldBytesMax;
+    all.loads += one.loads;
+    all.evictions += one.evictions;
+    all.reloads += one.reloads;
+    all.failures += one.failures;
+    all.pagesResident += one.pagesResident;
+    all.pagesInCut += one.pagesInCut;
+    all.pagesWanted += one.pagesWanted;
+    all.pagesMissing += one.pagesMissing;
+    all.pagesPending += one.pagesPending;
+    all.problems.insert(all.problems.end(), one.problems.begin(), one.problems.end());
+    if (!one.drawable) return;
+    all.coarsestLevel = all.drawable ? std::min(all.coarsestLevel, one.coarsestLevel) : one.coarsestLevel;
+    all.finestLevel = std::max(all.finestLevel, one.finestLevel);
+    all.drawable = true;
+}
+
+}  // namespace
+
+Renderer::View::View(std::shared_ptr<Shared> with, std::optional<SurfaceSource> window)
+    : shared(std::move(with)), surface(std::move(window)), number(shared->nextNumber++) {
+    shared->views.push_back(this);
+}
+
+Renderer::View::~View() {
+    if (shared->device) static_cast<void>(shared->device->waitForAll());
+    std::erase(shared->views, this);
+    for (const Shared::Placed& placed : shared->datasets) placed.residency->forgetView(number);
+}
+
+Result<VkSurfaceKHR> Renderer::View::createSurface() const {
+    VkSurfaceKHR made = VK_NULL_HANDLE;
+    if (surface) VCP_VK(surface->createSurface, shared->instance->handle(), &made);
+    return made;
+}
+
+Result<void> Renderer::View::createDevice(const DeviceFaults& faults) {
+    const RendererOptions& options = shared->options;
+    const Instance& instance = *shared->instance;
+    if (options.host && shared->losses > 0)
+        return Error{.code = ErrorCode::Device, .message = "the host's device was lost"};
+    VCP_TRY_ASSIGN(const auto window, createSurface());
+    const bool forWindows = window != VK_NULL_HANDLE || !options.windowExtensions.empty();
+    auto made = options.host ? Device::borrow(*options.host, faults)
+                             : Device::create(instance, options.device, window, forWindows, faults);
+    if (!made) {
+        if (window != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance.handle(), window, nullptr);
+        return made.error();
+    }
+    shared->take(std::move(*made));
+    return attach(window);
+}
+
+Result<void> Renderer::View::attachToDevice() {
+    VCP_TRY_ASSIGN(const auto window, createSurface());
+    if (window == VK_NULL_HANDLE || shared->device->shows(window)) return attach(window);
+    vkDestroySurfaceKHR(shared->instance->handle(), window, nullptr);
+    return Error{.code = ErrorCode::Device,
+                 .message = "device '" + shared->info.name +
+                            "', as it was chosen for the first view, cannot show pictures in this window"};
+}
+
+Result<void> Renderer::View::attach(VkSurfaceKHR window) {
+    if (window != VK_NULL_HANDLE)
+        swapchain = std::make_unique<Swapchain>(shared->instance->handle(), *shared->device, window);
+    return makeLayers();
+}
+
+Result<void> Renderer::View::makeLayers() {
+    layers.resize(std::max<size_t>(shared->datasets.size(), 1));
+    for (Frame& frame : frames)
+        if (&frame != &frames.front() && frame.layers.size() != layers.size()) frame = {};
+    return makeLayers(frames.front());
+}
+
+Result<void> Renderer::View::makeLayers(Frame& frame) {
+    Device& device = *shared->device;
+    if (frame.layers.size() > layers.size()) frame.layers.resize(layers.size());
+    while (frame.layers.size() < layers.size()) {
+        VCP_TRY_ASSIGN(auto resources, FrameResources::create(device));
+        VCP_TRY_ASSIGN(auto clock, PassTimer::create(device, kPassMarks));
+        LayerFrame& made = frame.layers.emplace_back();
+        made.resources = std::move(resources);
+        made.timer = std::move(clock);
+        bindPools(frame);
+    }
+    if (shared->meso && !frame.surfacesTimer.hasClock()) {
+        VCP_TRY_ASSIGN(frame.surfacesTimer, PassTimer::create(device, 2));
+    }
+    if (shared->composes()) return {};
+    frame.layers.front().resources->setTarget(nullptr, nullptr);
+    frame.target = {};
+    frame.surfaces = {};
+    return {};
+}
+
+void Renderer::View::bindPools(Frame& frame) {
+    for (size_t i = 0; i < frame.layers.size(); ++i) {
+        const Residency* residency = i < layers.size() ? layers[i].residency : nullptr;
+        const PagePool* pool = residency != nullptr ? &residency->pages() : nullptr;
+        frame.layers[i].resources->setPools(pool, pool != nullptr && residency->hasColour() ? pool : nullptr);
+    }
+}
+
+Result<void> Renderer::View::showDatasets() {
+    VCP_TRY(makeLayers());
+    const std::vector<Shared::Placed>& datasets = shared->datasets;
+    for (size_t i = 0; i < layers.size(); ++i) {
+        layers[i].residency = i < datasets.size() ? datasets[i].residency.get() : nullptr;
+        layers[i].placement = i < datasets.size() ? datasets[i].placement : Similarity{};
+        layers[i].tableStale = true;
+    }
+    for (Frame& frame : frames) bindPools(frame);
+    return {};
+}
+
+bool Renderer::View::isComplete() const {
+    const bool isBound = std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) {
+        return shared->datasets.empty() || layer.residency != nullptr;
+    });
+    return isBound && layers.size() == std::max<size_t>(shared->datasets.size(), 1) &&
+           frames.front().layers.size() == layers.size();
+}
+
+void Renderer::View::forgetFrames() {
+    drawn.reset();
+    lastDone.reset();
+    for (Frame& frame : frames) {
+        frame.submission = 0;
+        frame.surfaces = {};
+    }
+}
+
+void Renderer::View::release() {
+    if (gone) gone();
+    if (shared->device) static_cast<void>(shared->device->waitForAll());
+    drawn.reset();
+    lastDone.reset();
+    swapchain.reset();
+    scaling.reset();
+    layers.clear();
+    frames = {};
+}
+
+Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {
+    if (!isComplete()) return kGone;
+    const DeviceWork before = shared->device->work();
+    if (shared->device->isLost()) return Error{.code = ErrorCode::Device, .message = "the device was lost"};
+    VCP_TRY(takeInDone());
+    std::optional<UpdateResult> all;
+    for (Layer& layer : layers) {
+        if (layer.residency == nullptr) continue;
+        auto one = layer.residency->update(selectionView(requestIn(layer.placement, request)), number);
+        if (!one) return one;
+        layer.errorPixels = one->errorPixels;
+        if (all)
+            add(*all, *one);
+        else
+            all = *std::move(one);
+    }
+    if (!all) all = UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
+    all->submissions = shared->device->work().submissions - before.submissions;
+    all->hostWaits = shared->device->work().waits - before.waits;
+    return *std::move(all);
+}
+
+}  // namespace vcp

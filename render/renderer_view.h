@@ -1,0 +1,150 @@
+// A view of a renderer: camera, pictures and window of its own. Included by renderer.cpp (its life), renderer_frame.cpp
+// (drawing) and renderer_readback.cpp (what was drawn).
+//
+// The life of a frame: it is recorded with resources that no frame in flight has, submitted as one submission, and,
+// when the device has ended it, taken in: its counts, what its rays asked for, and the hit under the cursor. Everything
+// that the CPU writes for a frame, or reads of it, is in Frame, so that there is one for each that may be in flight;
+// what only the device touches is ordered by the barrier at the start of each frame.
+#pragma once
+
+#include <array>
+#include <chrono>
+
+#include "render/picture_scaling.h"
+#include "render/renderer_shared.h"
+#include "render/swapchain.h"
+#include "render/vulkan/pass_timer.h"
+
+namespace vcp {
+
+/// Number of time marks of a dataset in a frame: one before the beam pass, and one after each pass.
+constexpr uint32_t kPassMarks = 6;
+
+struct Renderer::View {
+    View(std::shared_ptr<Shared> with, std::optional<SurfaceSource> window);
+    ~View();
+    View(const View&) = delete;
+    View& operator=(const View&) = delete;
+
+    /// What this view draws of one dataset.
+    struct Layer {
+        Residency* residency = nullptr;  // null: nothing but the background is drawn
+        Similarity placement;
+        bool tableStale = true;
+        uint64_t tableVersion = 0;
+        std::vector<glm::uvec4> table;
+        uint64_t tableNumber = 0;  // counts changes of the table
+        double errorPixels = 0;    // largest error in the cut
+
+        [[nodiscard]] bool isPaper() const {
+            return residency != nullptr && residency->dataset().header.method == Method::Paper;
+        }
+        /// Whether the next frame has a feedback pass.
+        [[nodiscard]] bool listens() const { return residency != nullptr && residency->listens() && !isPaper(); }
+        /// World units per unit of the hits' depths.
+        [[nodiscard]] double unit() const {
+            return (residency != nullptr ? residency->dataset().header.cell : 1) * placement.scale;
+        }
+        /// The request as seen from the dataset's own space, without what its method cannot draw.
+        [[nodiscard]] FrameRequest drawable(const FrameRequest& request) const;
+    };
+    /// One dataset in one frame.
+    struct LayerFrame {
+        std::unique_ptr<FrameResources> resources;
+        FeedbackTarget feedback;
+        PassTimer timer;
+        PassConstants constants;
+        FrameRequest request;      // as seen from the dataset
+        uint64_t tableNumber = 0;  // of the table that the resources have
+        bool listened = false;     // the frame has a feedback pass
+    };
+    struct Frame {
+        std::vector<LayerFrame> layers;  // one for each of the view's; the first one's picture is the frame's
+        ComposeTarget target;            // pictures are composed into it
+        MesoTarget surfaces;
+        PassTimer surfacesTimer;
+        FrameRequest request;
+        std::optional<PicturePixel> cursor;
+        FrameStats stats;  // what is known when it is submitted
+        std::chrono::steady_clock::time_point began;
+        uint64_t submission = 0;  // of the frame; 0: none that is to be taken in
+        uint64_t lastUse = 0;     // the last submission that uses any of this
+        bool isAhead = false;     // drawn with renderAhead()
+    };
+
+    const std::shared_ptr<Shared> shared;
+    const std::optional<SurfaceSource> surface;
+    const ViewNumber number;
+    std::function<void()> gone;
+    std::unique_ptr<Swapchain> swapchain;
+    std::unique_ptr<PictureScaling> scaling;  // scales to the host's images; made on first use
+    std::vector<Layer> layers;                // one for each dataset, and at least one
+    std::array<Frame, kFramesAhead> frames;   // render() draws with the first one only
+    std::optional<size_t> drawn;              // number of the frame with the last picture
+    std::optional<DoneFrame> lastDone;
+    uint64_t framesDone = 0;  // counts those that were taken in
+    uint64_t mesoSeen = 0;    // Shared::mesoVersion of the last update
+    bool keepsFeedback = false;
+    std::optional<FeedbackPicture> feedbackPicture;
+
+    /// Makes the device, and this view's part of it.
+    Result<void> createDevice(const DeviceFaults& faults);
+    Result<VkSurfaceKHR> createSurface() const;
+    Result<void> attach(VkSurfaceKHR window);
+    Result<void> attachToDevice();
+    void release();
+    /// Makes as many layers as there are datasets, in the view and in its first frame.
+    Result<void> makeLayers();
+    Result<void> makeLayers(Frame& frame);
+    /// Lets the layers draw the datasets that are open.
+    Result<void> showDatasets();
+    /// Lets the frame's shaders see the layers' pools.
+    void bindPools(Frame& frame);
+    /// Whether each dataset has its layer; false where the device failed half-way.
+    [[nodiscard]] bool isComplete() const;
+    /// Forgets the pictures, and what the frames would tell. Precondition: no frame is in flight.
+    void forgetFrames();
+
+    Result<UpdateResult> updateAll(const FrameRequest& request);
+    /// Draws a frame and waits for it.
+    Result<FrameStats> draw(const FrameRequest& request);
+    Result<void> drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor);
+    Result<void> submit(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor);
+    Result<void> checkLimits(const Layer& layer, const FrameRequest& request) const;
+    [[nodiscard]] PassConstants constantsFor(const Layer& layer, const FrameRequest& request) const;
+    Result<void> prepareTable(Layer& layer, LayerFrame& frame);
+    Result<void> prepare(Frame& frame, size_t layer);
+    void record(VkCommandBuffer commands, Frame& frame, size_t layer);
+    /// Records the surfaces, over the datasets' picture.
+    Result<void> recordSurfaces(VkCommandBuffer commands, Frame& frame);
+
+    /// Takes in frames that have ended, in their order. Never waits. Errors: Device.
+    Result<void> takeInDone();
+    /// Waits for this view's frames, and takes them in.
+    Result<void> takeInAll();
+    Result<void> takeIn(Frame& frame);
+    Result<void> addStats(const Frame& frame, size_t layer, FrameStats& all) const;
+    Result<void> addSurfaceStats(const Frame& frame, FrameStats& all) const;
+    void hear(const Frame& frame);
+    void keep(const RayFeedback& heard, const SelectionView& view, const Dataset& dataset);
+
+    /// The frame with the last picture, of which nothing is in flight any more. Errors: Usage, without one; Device.
+    Result<const Frame*> lastFrame();
+    /// Returns the words of a plane of a frame; pixels of empty tiles, which were not written, get `missing`.
+    Result<std::vector<uint32_t>> hitPlane(const LayerFrame& layer, uint32_t plane, uint32_t missing) const;
+    /// Returns the distances in one layer, as readDepth() gives them.
+    Result<std::vector<float>> depthOf(const Frame& frame, size_t layer) const;
+    /// Returns the words of a plane of the surfaces' hits; empty where there are none.
+    [[nodiscard]] Result<std::vector<uint32_t>> mesoPlane(const Frame& frame, uint32_t plane) const;
+    Result<std::optional<PixelHit>> pick(PicturePixel pixel);
+    /// Returns the nearest of the layers' hits and the surfaces', from their words at a pixel.
+    [[nodiscard]] std::optional<PixelHit> nearestHit(const FrameRequest& request, PicturePixel pixel,
+                                                     std::span<const HitWords> words, const MesoReport& surfaces) const;
+};
+
+/// Whether pixels show the work of their rays.
+constexpr bool showsWork(ShadingMode mode) {
+    return mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches;
+}
+
+}  // namespace vcp
