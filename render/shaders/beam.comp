@@ -13,8 +13,8 @@
 layout(constant_id = 6) const uint kBeam = 1u;  // 0: every tile is listed, from distance 0
 layout(local_size_x = 8, local_size_y = 8) in;
 
-const int kMaxDepth = 34;       // page levels and levels of an octree in a page
-const uint kInTable = 1u << 31; // marks a stack entry of the page tree
+const int kMaxDepth = 34;        // page levels and levels of an octree in a page
+const uint kInTable = 1u << 31;  // marks a stack entry of the page tree
 
 struct Bundle {
     vec3 originMin, originMax;

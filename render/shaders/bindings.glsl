@@ -20,6 +20,7 @@ layout(constant_id = 3) const uint kColour = 0u;
 layout(constant_id = 4) const uint kCountSteps = 0u;
 layout(constant_id = 5) const uint kFalseColour = 0u;
 
+// clang-format off
 layout(set = 0, binding = 0, std140) uniform FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1) uniform utextureBuffer poolTexels[kMaxPoolChunks];
 layout(set = 0, binding = 2, std430) readonly buffer PoolBlock { uvec4 texels[]; } poolBlock[kMaxPoolChunks];
@@ -39,6 +40,7 @@ layout(set = 0, binding = 11, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
 layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint picturePixels[]; };
 layout(set = 0, binding = 14, std430) buffer CounterBlock { FrameCounters counters; };
+// clang-format on
 
 uvec2 pictureSize() { return uvec2(frame.width, frame.height); }
 
@@ -46,7 +48,7 @@ uvec2 pictureSize() { return uvec2(frame.width, frame.height); }
 float pixelEdgeAt(float depth) { return frame.pixelEdge + frame.pixelEdgePerDepth * depth; }
 
 // Chunks are few and their number is known to the compiler: with one there is no choice to make.
-#define FETCH_CHUNK(texelsName, blockName, i)                                                            \
+#define FETCH_CHUNK(texelsName, blockName, i) \
     (kTexelAccess == 1u ? texelFetch(texelsName[i], int(offset)) : blockName[i].texels[offset])
 
 uvec4 fetchTexel(uint texel) {

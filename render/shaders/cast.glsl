@@ -12,12 +12,13 @@ const float kLastBelowOne = 0.99999994;
 const float kSeamErrors = 8.0;  // a coarser surface reaches so many certified errors of the two pages beyond its page
 
 struct Hit {
-    float depth;  // finest cells; kNoHit
-    uint record;  // record of the hit page in the table
-    int pageBits; // log2 of the page's edge on the lattice
-    uint leaf;    // its node
-    vec4 at;      // soft: the point in leaf space, and f where the ray entered; hard: weights of the second and third vertex
-    uint triangle; // hard: its record
+    float depth;   // finest cells; kNoHit
+    uint record;   // record of the hit page in the table
+    int pageBits;  // log2 of the page's edge on the lattice
+    uint leaf;     // its node
+    // Soft: the point in leaf space, and f where the ray entered. Hard: weights of the second and third vertex.
+    vec4 at;
+    uint triangle;  // hard: its record
 };
 
 // What is seen of a hit.
@@ -70,7 +71,8 @@ const int kNoRegion = 64;  // bits before the first one
 
 // Whether the surface steps from one level to another between two regions, one after the other on a ray.
 bool levelChanges(Region before, Region after) {
-    return before.bits != kNoRegion && ((before.isPage && after.bits < before.bits) || (after.isPage && after.bits > before.bits));
+    return before.bits != kNoRegion &&
+           ((before.isPage && after.bits < before.bits) || (after.isPage && after.bits > before.bits));
 }
 
 void usePage(uint node, uvec4 record, inout Page page) {
@@ -85,7 +87,8 @@ void usePage(uint node, uvec4 record, inout Page page) {
 // such an octant follows on a coarser page. Returns false where nothing comes before `last`. The distance to a plane,
 // never a rounded place, tells the ray's side of the plane: a ray in a wall, or nearly parallel to it, would be sent to
 // a page that it enters much later.
-bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out Region region, out Page page, inout uint steps) {
+bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out Region region, out Page page,
+              inout uint steps) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     uint node = 0u;
     uvec4 record = uvec4(0u);
@@ -102,7 +105,8 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
             if (kCountSteps != 0u) steps++;
             if ((record.x & kRecordInCut) == 0u) {
                 region.bits--;
-                ivec3 upper = ivec3(equal(ahead, lessThanEqual(planeDistances(ray, region.corner + (1 << region.bits)), reached)));
+                ivec3 upper = ivec3(
+                    equal(ahead, lessThanEqual(planeDistances(ray, region.corner + (1 << region.bits)), reached)));
                 region.corner += upper << region.bits;
                 uint octant = uint(upper.x | upper.y << 1 | upper.z << 2);
                 exists = (record.x >> octant & 1u) != 0u;
@@ -128,7 +132,7 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
 struct Seam {
     ivec3 corner;  // lowest corner of a box of the coarser level's pages that the part runs through
     int bits;
-    bool behind;   // the coarser region lies ahead: boxes are looked at from its wall backwards
+    bool behind;  // the coarser region lies ahead: boxes are looked at from its wall backwards
     float first, last;
 };
 
@@ -154,7 +158,8 @@ bool nextBox(Ray ray, inout Seam seam) {
     vec3 t = planeDistances(ray, mix(seam.corner, far, upward));
     float wall = seam.behind ? maxOf(t) : minOf(t);
     seam.corner += mix(ivec3(0), mix(-edge, edge, upward), oneOf(equal(t, vec3(wall))));
-    bool inLattice = all(greaterThanEqual(seam.corner, ivec3(0))) && all(lessThan(seam.corner, ivec3(1 << kLatticeBits)));
+    bool inLattice =
+        all(greaterThanEqual(seam.corner, ivec3(0))) && all(lessThan(seam.corner, ivec3(1 << kLatticeBits)));
     return inLattice && (seam.behind ? wall > seam.first : wall < seam.last);
 }
 
@@ -185,7 +190,8 @@ bool coarserPage(Seam seam, inout Page page, inout uint steps) {
 PageRay enterPage(Ray ray, Page page, out float sStart) {
     ivec3 edge = ivec3(1 << page.bits);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
-    ivec3 nearWalls = mix(page.corner + edge, page.corner, ahead), farWalls = mix(page.corner, page.corner + edge, ahead);
+    ivec3 nearWalls = mix(page.corner + edge, page.corner, ahead),
+          farWalls = mix(page.corner, page.corner + edge, ahead);
     vec3 t0 = planeDistances(ray, nearWalls), t1 = planeDistances(ray, farWalls);
     float first = maxOf(t0), last = max(minOf(t1), first);
     sStart = max(first, 0.0);
@@ -241,9 +247,11 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
     for (uint i = 0u; i < count; i++) {
         uvec2 record = fetchPair(page.sections.y, first + i);
         uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
-        uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y), c = fetchPair(page.sections.z, v.z);
+        uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y),
+              c = fetchPair(page.sections.z, v.z);
         if (kCountSteps != 0u) work.fetches += 4u;
-        vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y), decodeVertex(c.x, c.y), kTriangleSlack);
+        vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y),
+                                   decodeVertex(c.x, c.y), kTriangleSlack);
         if (t.x >= lowest && t.x <= best) {
             best = t.x;
             hit.at.xy = t.yz;
@@ -256,8 +264,10 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
 
 vec4 blendColours(uvec4 face0, uvec4 face1, vec3 x) {
     vec4 w = faceWeights(x.y, x.z);
-    vec4 c0 = w.x * unpackUnorm4x8(face0.x) + w.y * unpackUnorm4x8(face0.y) + w.z * unpackUnorm4x8(face0.z) + w.w * unpackUnorm4x8(face0.w);
-    vec4 c1 = w.x * unpackUnorm4x8(face1.x) + w.y * unpackUnorm4x8(face1.y) + w.z * unpackUnorm4x8(face1.z) + w.w * unpackUnorm4x8(face1.w);
+    vec4 c0 = w.x * unpackUnorm4x8(face0.x) + w.y * unpackUnorm4x8(face0.y) + w.z * unpackUnorm4x8(face0.z) +
+              w.w * unpackUnorm4x8(face0.w);
+    vec4 c1 = w.x * unpackUnorm4x8(face1.x) + w.y * unpackUnorm4x8(face1.y) + w.z * unpackUnorm4x8(face1.z) +
+              w.w * unpackUnorm4x8(face1.w);
     return mix(c0, c1, x.x);
 }
 
@@ -269,14 +279,16 @@ Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
     surface.normal = facingNormal(leafNormal(leaf, hit.at.xyz), direction, hit.at.w);
     surface.colour = vec4(0.0);
     if (kColour != 0u)
-        surface.colour = blendColours(fetchColour(colourFaces + face), fetchColour(colourFaces + face + 1u), rotateToAxis(hit.at.xyz, axis));
+        surface.colour = blendColours(fetchColour(colourFaces + face), fetchColour(colourFaces + face + 1u),
+                                      rotateToAxis(hit.at.xyz, axis));
     return surface;
 }
 
 Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction) {
     uvec2 record = fetchPair(sections.y, hit.triangle);
     uvec3 corners = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
-    uvec2 a = fetchPair(sections.z, corners.x), b = fetchPair(sections.z, corners.y), c = fetchPair(sections.z, corners.z);
+    uvec2 a = fetchPair(sections.z, corners.x), b = fetchPair(sections.z, corners.y),
+          c = fetchPair(sections.z, corners.z);
     vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
     vec3 flatNormal = cross(pb - pa, pc - pa);
     flatNormal *= inversesqrt(max(dot(flatNormal, flatNormal), 1e-30));
@@ -285,9 +297,11 @@ Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction
     Surface surface = Surface(vec3(0.0), vec4(0.0));
     for (int i = 0; i < 3; i++) {
         uint code = fetchWord(sections.w, corners[i]);
-        surface.normal += w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
+        surface.normal +=
+            w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
         if (kColour != 0u)
-            surface.colour += w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (corners[i] >> 2)), corners[i] & 3u));
+            surface.colour +=
+                w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (corners[i] >> 2)), corners[i] & 3u));
     }
     return surface;
 }
@@ -318,7 +332,8 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     PageRay local = enterPage(ray, page, sStart);
     Place at;
     at.tau = max(0.0, (s - sStart) / page.cell);
-    at.subcell = clamp(ivec3((local.start + at.tau * local.direction) * kSubcells), ivec3(0), ivec3(int(local.cells * kSubcells) - 1));
+    at.subcell = clamp(ivec3((local.start + at.tau * local.direction) * kSubcells), ivec3(0),
+                       ivec3(int(local.cells * kSubcells) - 1));
     at.inPage = true;
     float tauUntil = (until - sStart) / page.cell;
 
@@ -386,7 +401,8 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
         if (!findPage(ray, reached, last, before, region, page, work.steps)) break;
         if (fromNew) seam = seamBetween(before, region, reached.x);
         onSeam = fromNew ? levelChanges(before, region) : onSeam;
-        float first = onSeam ? seam.first : 0.0, start = onSeam ? seam.first : reached.x, stop = onSeam ? seam.last : kNoHit;
+        float first = onSeam ? seam.first : 0.0, start = onSeam ? seam.first : reached.x,
+              stop = onSeam ? seam.last : kNoHit;
         bool look = onSeam ? coarserPage(seam, page, work.steps) : region.isPage;
         if (look) {
             Hit found = hit;

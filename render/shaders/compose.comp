@@ -11,7 +11,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 13, std430) readonly buffer OwnPictureBlock { uint ownPixels[]; };
 layout(set = 0, binding = 16, std430) buffer TargetPictureBlock { uint targetPixels[]; };
-layout(set = 0, binding = 17, std430) buffer TargetDepthBlock { uint targetDepths[]; };  // float bits; behind them the count
+// The bits of floats; behind them the count.
+layout(set = 0, binding = 17, std430) buffer TargetDepthBlock { uint targetDepths[]; };
 
 void main() {
     uvec2 pixel;

@@ -3,13 +3,13 @@
 // node comes next across a face.
 
 struct PageRay {
-    vec3 start;      // where the ray enters the page or begins
+    vec3 start;  // where the ray enters the page or begins
     vec3 direction, inverse;
-    vec3 exit;       // where it leaves the page
-    vec3 farWalls;   // 0 or cells an edge: the page's walls it may leave by
-    float cells;     // an edge
-    float tauExit;   // distance from start to exit
-    bool beginsHere; // the ray begins inside the page
+    vec3 exit;        // where it leaves the page
+    vec3 farWalls;    // 0 or cells an edge: the page's walls it may leave by
+    float cells;      // an edge
+    float tauExit;    // distance from start to exit
+    bool beginsHere;  // the ray begins inside the page
 };
 
 const float kSubcells = 8.0;  // 2^kMaxSubcellDepth

@@ -63,7 +63,8 @@ void findNode(PaperPage page, ivec3 cell, inout PaperPlace at, inout Work work) 
     int level = fromParent ? at.parentLevel - 1 : page.rootLevel;
     ivec3 bits = (cell >> max(level, 0)) & 1;
     uint octant = uint(bits.x | bits.y << 1 | bits.z << 2);
-    uint index = fromParent ? uint(at.parent) + octant : (uint(root.z) * page.roots.y + uint(root.y)) * page.roots.x + uint(root.x);
+    uint index = fromParent ? uint(at.parent) + octant
+                            : (uint(root.z) * page.roots.y + uint(root.y)) * page.roots.x + uint(root.x);
     if (!known && !fromParent) at.parentLevel = -1;
     bool inner = !known;
     while (inner) {

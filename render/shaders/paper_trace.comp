@@ -24,7 +24,7 @@ float falseColour(PaperHit hit, Work work, PaperPage page) {
            : frame.shadingMode == kShadeCells   ? float(work.cells) / kMostShownCells
            : frame.shadingMode == kShadeFetches ? float(work.fetches) / kMostShownFetches
            : frame.shadingMode == kShadeLevel   ? float(page.rootLevel - hit.level) / float(page.rootLevel)
-                                           : 0.0;
+                                                : 0.0;
 }
 
 void main() {

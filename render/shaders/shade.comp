@@ -70,7 +70,7 @@ void main() {
         if (frame.occlusionRays > 0u) skySeen = skyAbout(pixel, depth, plane);
     }
     vec3 colour = frame.shadingMode == kShadeNormals ? worldNormal(n) * 0.5 + 0.5
-                : frame.shadingMode == kShadeUnlit   ? albedo
-                                                : albedo * encodedLight(n, sunSeen, skySeen);
+                  : frame.shadingMode == kShadeUnlit ? albedo
+                                                     : albedo * encodedLight(n, sunSeen, skySeen);
     picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

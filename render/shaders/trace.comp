@@ -21,7 +21,8 @@ const float kPastHit = 0.15;
 // Whether a point in a section plane, the ray's origin, is inside of the solid: an odd number of walls lies
 // behind. Two of three rays decide, for one may graze a wall.
 bool isInside(Ray ray, inout Work work) {
-    vec3 side = normalize(abs(ray.direction.z) < 0.7 ? vec3(ray.direction.y, -ray.direction.x, 0.0) : vec3(0.0, ray.direction.z, -ray.direction.y));
+    vec3 side = normalize(abs(ray.direction.z) < 0.7 ? vec3(ray.direction.y, -ray.direction.x, 0.0)
+                                                     : vec3(0.0, ray.direction.z, -ray.direction.y));
     uint inside = 0u, outside = 0u;
     for (int k = 0; inside < 2u && outside < 2u; k++) {
         Ray onward = ray;
@@ -70,7 +71,7 @@ float falseColour(Hit hit, Work work) {
            : frame.shadingMode == kShadeCells   ? float(work.cells) / kMostShownCells
            : frame.shadingMode == kShadeFetches ? float(work.steps + work.fetches) / kMostShownFetches
            : frame.shadingMode == kShadeLevel   ? float(level) / max(float(frame.finestLevel), 1.0)
-                                           : pixels;
+                                                : pixels;
 }
 
 void main() {
