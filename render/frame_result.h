@@ -55,7 +55,7 @@ struct FrameStats {
         0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
     uint64_t farHits = 0;       ///< hits of pixels in surfaces, shown as seen from far and not marched
     uint64_t surfaceBytes = 0;  ///< bytes of mesostructure on the device, beside the pool: assets and shells
-    /// Submissions of the call that drew this frame, and how often that call waited for one.
+    /// This frame's submissions, with those that present it before it has ended, and how often the CPU waited for one.
     uint64_t submissions = 0, hostWaits = 0;
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };

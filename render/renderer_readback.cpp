@@ -262,7 +262,10 @@ Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& 
     if (!v.drawn) return {};
     View::Frame& frame = v.frames[*v.drawn];
     const FrameResources& resources = *frame.layers.front().resources;
+    const DeviceWork before = v.shared->device->work();
     const auto submission = v.swapchain->show(resources.picture(), resources.size(), {width, height}, drawOver);
+    frame.stats.submissions += v.shared->device->work().submissions - before.submissions;
+    frame.stats.hostWaits += v.shared->device->work().waits - before.waits;
     // A device that was lost with frames in flight is found by the next update, which makes it anew.
     if (!submission && frame.isAhead && v.shared->device->isLost()) return {};
     if (!submission) return submission.error();

@@ -117,7 +117,7 @@ TEST_F(FramesInWindow, AMovingFrameWaitsOnceAtMost) {
         ASSERT_TRUE(renderer_->present(200, 150));
         const FrameStats& stats = renderer_->lastDone()->stats;
         EXPECT_LE(stats.hostWaits, 1u);
-        EXPECT_EQ(stats.submissions, 1u);
+        EXPECT_LE(stats.submissions, 2u) << "one that draws and one that presents";
         glfwPollEvents();
     }
     for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
