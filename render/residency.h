@@ -46,7 +46,7 @@ public:
     void releasePool();
     Result<void> rebuild(Device& device, PageAccess access);
 
-    /// Takes in pages; never waits for the loader. Precondition: no frame is in flight. Errors: Device.
+    /// Takes in pages; never waits for the loader. Copies wait for the frames in flight (page_pool.h). Errors: Device.
     Result<UpdateResult> update(const SelectionView& view, ViewNumber number = 0);
     void forgetView(ViewNumber number);
 

@@ -291,7 +291,7 @@ TEST_F(MesoSurfaces, SurviveALostDevice) {
         start(options);
         show(over.scene);
         ASSERT_TRUE(renderer_->setSurfaces(surfaces).ok());
-        for (int i = 0; i < 6; ++i) RendererFixture::draw(over.request);
+        for (int i = 0; i < 10; ++i) RendererFixture::draw(over.request);  // a submission each
         EXPECT_EQ(renderer_->update(over.request)->deviceLosses, 1u) << submission;
         RendererFixture::draw(over.request);
         EXPECT_EQ(*renderer_->readPicture(), expected) << submission;

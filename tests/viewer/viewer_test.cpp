@@ -23,11 +23,12 @@ protected:
     }
 
     void openViewer(double movingFrameMs = 0, const std::filesystem::path& file = *folder_ / "ball.vcp",
-                    double moveSeconds = 0) {
+                    double moveSeconds = 0, bool framesAhead = false) {
         ViewerOptions options;
         options.renderer.budgetBytes = 64 << 20;
         options.movingFrameMs = movingFrameMs;
         options.moveSeconds = moveSeconds;
+        options.framesAhead = framesAhead;
         auto viewer = Viewer::create(options);
         ASSERT_TRUE(viewer) << viewer.error().line();
         viewer_ = *std::move(viewer);
@@ -76,6 +77,33 @@ protected:
     NextStep next_;
     double now_ = 0;
 };
+
+// A window draws ahead: what it shows and says at rest is what a host sees that waits for each frame.
+TEST_F(ViewerTest, FramesAheadComeToTheSame) {
+    openViewer();
+    settle();
+    const Picture expected = *viewer_->renderer().readPicture();
+    const uint64_t hits = viewer_->status().frame.hitPixels;
+    const auto point = viewer_->pointAt(glm::dvec2(kSize) / 2.0);
+    ASSERT_TRUE(point);
+    openViewer(0, *folder_ / "ball.vcp", 0, true);
+    viewer_->move(glm::dvec2(kSize) / 2.0);
+    settle();
+    for (int i = 0; i < 10000 && viewer_->renderer().isDrawing(); ++i) {
+        EXPECT_FALSE(turn(0.1));
+        EXPECT_TRUE(!viewer_->renderer().isDrawing() || next_.waitSeconds < 1) << "the frame is yet to be taken in";
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_FALSE(turn(0.1));
+    EXPECT_TRUE(std::isinf(next_.waitSeconds)) << "at rest it waits for events alone";
+    EXPECT_EQ(viewer_->status().frame.hitPixels, hits);
+    EXPECT_EQ(viewer_->status().frame.hostWaits, 0u) << "a still frame waits for nothing";
+    EXPECT_EQ(*viewer_->pointAt(glm::dvec2(kSize) / 2.0), *point) << "the hit under the cursor came with the frame";
+    EXPECT_EQ(*viewer_->renderer().readPicture(), expected);
+    const auto waited = viewer_->waitForFrame();
+    ASSERT_TRUE(waited);
+    EXPECT_FALSE(*waited) << "nothing is in flight";
+}
 
 TEST_F(ViewerTest, DrawsOnlyWhenSomethingChanged) {
     openViewer();

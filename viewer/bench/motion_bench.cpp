@@ -98,7 +98,8 @@ Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Bo
     const double stopped = seconds();
     while (!report.fullSizeAfterMs && seconds() - stopped <= kLongestRest) {
         VCP_TRY(motion.turn());
-        if (viewer->status().reduction == 1) report.fullSizeAfterMs = 1e3 * (seconds() - stopped);
+        const bool isDone = !viewer->renderer().isDrawing();
+        if (isDone && viewer->status().reduction == 1) report.fullSizeAfterMs = 1e3 * (seconds() - stopped);
     }
     return report;
 }
