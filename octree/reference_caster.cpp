@@ -101,9 +101,9 @@ glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dv
     const glm::u32vec2 a = view.vertices[v[0]], b = view.vertices[v[1]], c = view.vertices[v[2]];
     if (single)
         return f32::intersectTriangle(glm::vec3(q), glm::vec3(d), f32::decodeVertex(a.x, a.y),
-                                      f32::decodeVertex(b.x, b.y), f32::decodeVertex(c.x, c.y), float(kTriangleSlack));
+                                      f32::decodeVertex(b.x, b.y), f32::decodeVertex(c.x, c.y), f32::kTriangleSlack);
     return f64::intersectTriangle(q, d, f64::decodeVertex(a.x, a.y), f64::decodeVertex(b.x, b.y),
-                                  f64::decodeVertex(c.x, c.y), kTriangleSlack);
+                                  f64::decodeVertex(c.x, c.y), f64::kTriangleSlack);
 }
 
 /// Returns the blend of the vertex normals, each on the side of the triangle that the ray comes from; at a crease the
@@ -198,7 +198,7 @@ private:
     [[nodiscard]] bool touches(const PageRay& in, Interval t) const {
         const double last = best_ && !all_ ? std::min(best_->t, ray_.tMax) : ray_.tMax;
         // A triangle's hit may lie outside of its leaf by kIntervalSlack.
-        const double ahead = in.slack + (best_ ? kIntervalSlack : 0);
+        const double ahead = in.slack + (best_ ? f64::kIntervalSlack : 0);
         return t.first <= t.last + in.slack && t.last >= ray_.tMin / in.cell - in.slack &&
                t.first <= last / in.cell + ahead;
     }
@@ -223,14 +223,14 @@ private:
         if (counters_) ++counters_->hardLeaves;
         const TriangleRange range = hardLeafTriangles(*in.view, node);
         const glm::dvec3 q = in.origin + segment.first * in.direction;
-        const double length = segment.last - segment.first + kIntervalSlack;
+        const double length = segment.last - segment.first + f64::kIntervalSlack;
         std::optional<LeafHit> nearest;
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             if (counters_) ++counters_->triangles;
             const auto vertices = triangleVertices(*in.view, t);
             const glm::dvec3 hit = castTriangle(*in.view, vertices, q, in.direction, caster_.options_.singlePrecision);
             const double at = segment.first + hit.x;
-            if (!(hit.x >= -kIntervalSlack && hit.x <= length) || (nearest && nearest->t <= at)) continue;
+            if (!(hit.x >= -f64::kIntervalSlack && hit.x <= length) || (nearest && nearest->t <= at)) continue;
             if (at * in.cell < ray_.tMin || at * in.cell > ray_.tMax) continue;
             nearest = LeafHit{at, triangleNormal(*in.view, vertices, hit.y, hit.z, in.direction), t, false};
         }

@@ -7,7 +7,7 @@
 //
 // A hit is the first crossing of f = 0 in a soft leaf, a wall of a soft leaf where |f| is within the leaf's
 // wall tolerance (not where the ray starts or ends inside the leaf), or a triangle of a hard leaf within
-// the leaf's box, widened by kIntervalSlack.
+// the leaf's box, widened by kIntervalSlack (shared/leaf_math.h).
 #pragma once
 
 #include <array>
@@ -23,11 +23,6 @@
 #include "octree/page_reader.h"
 
 namespace vcp {
-
-/// The triangles of hard leaves are widened by so many cells of the page's level.
-inline constexpr double kTriangleSlack = 1e-4;
-/// How far outside of its leaf a hit with a triangle may lie along the ray, in cells of the page's level.
-inline constexpr double kIntervalSlack = 1e-4;
 
 /// Pages of one dataset in memory. Loading is for one thread at a time; reading for any once it is done.
 class PageCache {

@@ -35,6 +35,8 @@ struct SectionPlane {
 };
 /// A request has at most so many planes (kMaxSections in frame_layout.h).
 constexpr size_t kMostSections = 6;
+/// Rays of ambient occlusion a pixel: at most, and where it is only switched on.
+constexpr uint32_t kMostOcclusionRays = 64, kUsualOcclusionRays = 8;
 
 struct Shading {
     ShadingMode mode = ShadingMode::Lit;
@@ -44,8 +46,9 @@ struct Shading {
     glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
     glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; colour of cut solids
     bool shadows = false;                            ///< hard shadows: a further ray a pixel
-    uint32_t occlusionRays = 0;  ///< ambient occlusion: so many further rays a pixel, at most 64; 0: off
-    double occlusionRadius = 0;  ///< how far they look, world units; 0: a tenth of the box's diagonal
+    uint32_t occlusionRays =
+        0;  ///< ambient occlusion: so many further rays a pixel, at most kMostOcclusionRays; 0: off
+    double occlusionRadius = 0;                    ///< how far they look, world units; 0: a tenth of the box's diagonal
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
     bool transparent = false;  ///< background is black with alpha 0

@@ -13,8 +13,6 @@ static_assert(kMostSections == frame::kMaxSections);
 
 namespace {
 
-constexpr uint32_t kMostOcclusionRays = 64;
-
 glm::vec4 toVec4(glm::dvec3 v) { return glm::vec4(glm::vec3(v), 0); }
 
 /// Encodes a colour for the screen with a plain power, as in shade.comp.

@@ -31,7 +31,6 @@ constexpr double kFarthestSection = 4;     // the most that a drag moves a plane
 constexpr double kFlySeconds = 4;          // time that flying over the dataset's diagonal takes, at speed 1
 constexpr double kLongestFlyStep = 0.1;    // in seconds: a delay must not become a leap
 constexpr double kFlySpeedPerNotch = 1.25;
-constexpr uint32_t kOcclusionRays = 8;
 // A dataset smaller than this part of the picture's height is far enough away.
 constexpr double kSmallestInView = 1e-3;
 
@@ -408,7 +407,7 @@ void Viewer::act(ViewerAction action) {
             shading_.shadows = !shading_.shadows;
             break;
         case ViewerAction::ToggleOcclusion:
-            shading_.occlusionRays = shading_.occlusionRays > 0 ? 0 : kOcclusionRays;
+            shading_.occlusionRays = shading_.occlusionRays > 0 ? 0 : kUsualOcclusionRays;
             break;
         case ViewerAction::ToggleSection:
             toggleSection();

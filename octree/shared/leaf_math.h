@@ -6,6 +6,11 @@
 // docs/surface.md: f(x) = sum w_i(x) [ D_i + 1/2 N_i . (x - p_i) ] with signed distances D_i, oriented
 // directions N_i and trilinear weights w_i; exact where the surface is a quadric's level set.
 
+// The triangles of hard leaves are widened by so many cells of the page's level.
+const Real kTriangleSlack = Real(1e-4);
+// How far outside of its leaf a hit with a triangle may lie along the ray, in cells of the page's level.
+const Real kIntervalSlack = Real(1e-4);
+
 // Returns the unit vector at a point of [-1, 1]^2, the unfolded octahedron.
 INLINE Real3 unfoldOctahedron(Real x, Real y) {
     Real z = Real(1.0) - abs(x) - abs(y);

@@ -6,8 +6,6 @@
 #include "render/shaders/page_walk.glsl"
 
 const int kIllinoisSteps = 8;
-const float kTriangleSlack = 1e-4;  // cells; as in the reference caster
-const float kIntervalSlack = 1e-4;
 const float kLastBelowOne = 0.99999994;
 const float kSeamErrors = 8.0;  // a coarser surface reaches so many certified errors of the two pages beyond its page
 

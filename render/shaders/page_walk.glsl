@@ -12,7 +12,7 @@ struct PageRay {
     bool beginsHere;  // the ray begins inside the page
 };
 
-const float kSubcells = 8.0;  // 2^kMaxSubcellDepth
+const float kSubcells = float(1u << kMaxSubcellDepth);
 // Walls are whole numbers of clearances, and not below 0: with this added, cutting rounds up subcells.
 const float kRoundUp = 1.0 - kSubcells / kClearancePerCell;
 

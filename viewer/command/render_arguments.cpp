@@ -8,8 +8,6 @@ namespace vcp {
 
 namespace {
 
-constexpr const char* kDefaultOcclusionRays = "8";
-
 std::string checkPlane(const std::string& text) {
     return parsePlane(text) ? std::string() : "must be like \"x<0.2\", \"z>50%\" or \"a,b,c,d\", not \"" + text + "\"";
 }
@@ -39,7 +37,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
                    "error (certified, up to a pixel)")
         ->type_name("MODE")
         ->capture_default_str()
-        ->check(CLI::IsMember(shadingNames()));
+        ->check(CLI::IsMember(std::vector<std::string>(kShadingNames.begin(), kShadingNames.end())));
     app.add_option("--light-direction", settings.lightDirection,
                    "Towards the light: right, up, back of the camera; with --light fixed x, y, z of the world")
         ->type_name("X,Y,Z")
@@ -48,8 +46,8 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     app.add_option("--occlusion", settings.occlusionRays, "Ambient occlusion, by so many further rays a pixel [0]")
         ->type_name("N")
         ->expected(0, 1)
-        ->default_str(kDefaultOcclusionRays)
-        ->check(CLI::Range(0, 64));
+        ->default_str(std::to_string(kUsualOcclusionRays))
+        ->check(CLI::Range(0, int(kMostOcclusionRays)));
     app.add_option("--section", settings.sections,
                    "Keep one side of a plane: x<0.2, z>50% (of the bounding box), or a,b,c,d for ax + by + cz >= d; up "
                    "to 6 times")

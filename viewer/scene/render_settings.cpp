@@ -11,26 +11,10 @@ namespace vcp {
 
 namespace {
 
-struct NamedShading {
-    const char* name;
-    ShadingMode mode;
-};
-constexpr NamedShading kShadings[] = {
-    {"lit", ShadingMode::Lit},         {"unlit", ShadingMode::Unlit}, {"clay", ShadingMode::Clay},
-    {"normals", ShadingMode::Normals}, {"steps", ShadingMode::Steps}, {"cells", ShadingMode::Cells},
-    {"fetches", ShadingMode::Fetches}, {"level", ShadingMode::Level}, {"error", ShadingMode::Error},
-};
-
 // This light comes from the left, almost along a surface that faces the camera: relief of a millimetre casts shade.
 constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
 
 }  // namespace
-
-std::vector<std::string> shadingNames() {
-    std::vector<std::string> names;
-    for (const NamedShading& each : kShadings) names.emplace_back(each.name);
-    return names;
-}
 
 RendererOptions RenderSettings::rendererOptions() const {
     RendererOptions options;
@@ -54,9 +38,7 @@ Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
 
 Shading RenderSettings::shadingChosen() const {
     Shading chosen;
-    chosen.mode = std::find_if(std::begin(kShadings), std::end(kShadings), [&](const auto& each) {
-                      return shading == each.name;
-                  })->mode;
+    chosen.mode = static_cast<ShadingMode>(std::ranges::find(kShadingNames, shading) - kShadingNames.begin());
     chosen.lightFollowsCamera = light != "fixed";
     if (light == "raking") chosen.lightDirection = kRakingLight;
     if (!lightDirection.empty()) chosen.lightDirection = parseDirection(lightDirection).value();

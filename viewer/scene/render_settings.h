@@ -1,6 +1,7 @@
 // How a dataset is shown: the settings of `vcp render` and `vcp view`.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -43,7 +44,9 @@ struct RenderSettings {
                                                 const PictureMargins& covered = {}) const;
 };
 
-/// Returns the names that RenderSettings::shading may have.
-std::vector<std::string> shadingNames();
+/// The names that RenderSettings::shading may have, in the order of ShadingMode.
+inline constexpr std::array<const char*, 9> kShadingNames = {"lit",   "clay",    "unlit", "normals", "steps",
+                                                             "cells", "fetches", "level", "error"};
+static_assert(kShadingNames.size() == size_t(ShadingMode::Error) + 1);
 
 }  // namespace vcp

@@ -15,7 +15,6 @@ namespace vcp::widget {
 namespace {
 
 constexpr uint32_t kLargestSide = 16384;
-constexpr uint32_t kMostOcclusionRays = 64;
 // A view without a size yet is fitted to a picture of this one.
 constexpr glm::ivec2 kUsualSize(1280, 720);
 constexpr double kPollSeconds = 0.1;

@@ -10,6 +10,7 @@
 
 #include "viewer/key_map.h"
 #include "viewer/scene/option_values.h"
+#include "viewer/scene/render_settings.h"
 
 namespace vcp {
 
@@ -30,9 +31,6 @@ constexpr double kUrgentDoublings = 5;  // doublings of the tolerated error, unt
 constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160),
                 kMeasured = IM_COL32(255, 210, 60, 255);
 constexpr ImU32 kHandle = IM_COL32(90, 190, 255, 255), kGripped = IM_COL32(255, 210, 60, 255);
-constexpr uint32_t kOcclusionRays = 8;
-
-constexpr const char* kModes[] = {"lit", "clay", "unlit", "normals", "steps", "cells", "fetches", "level", "error"};
 
 constexpr int kMostPictures = 3600;
 constexpr double kPicturesPerSecond = 30;
@@ -232,13 +230,14 @@ void Interface::layOutLooks() {
     Viewer& viewer = session_->viewer();
     Shading shading = viewer.shading();
     int mode = int(shading.mode);
-    if (ImGui::Combo("shading", &mode, kModes, int(std::size(kModes)))) shading.mode = static_cast<ShadingMode>(mode);
+    if (ImGui::Combo("shading", &mode, kShadingNames.data(), int(kShadingNames.size())))
+        shading.mode = static_cast<ShadingMode>(mode);
     // On files that are drawn without shadows, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
     ImGui::Checkbox("shadows", &shading.shadows);
     ImGui::SameLine();
     bool occlusion = shading.occlusionRays > 0;
-    if (ImGui::Checkbox("occlusion", &occlusion)) shading.occlusionRays = occlusion ? kOcclusionRays : 0;
+    if (ImGui::Checkbox("occlusion", &occlusion)) shading.occlusionRays = occlusion ? kUsualOcclusionRays : 0;
     ImGui::EndDisabled();
     colourEdit("above", shading.backgroundTop);
     ImGui::SameLine();

@@ -19,7 +19,6 @@ constexpr double kOpeningPollSeconds = 0.1;
 constexpr double kPickPollSeconds = 0.01;
 
 constexpr int kMostExports = 10000;
-constexpr uint32_t kRememberedOcclusionRays = 8;
 constexpr uint32_t kSavedTile = 512;  // small, so that the window stays live between tiles
 
 /// Returns the first number from 1 on that is free; where there are too many, the last.
@@ -47,7 +46,7 @@ void applyRemembered(RenderSettings& render, const UserSettings& user,
     if (!isGiven("--error-pixels")) render.errorPixels = user.errorPixels;
     if (!isGiven("--budget")) render.budget = std::to_string(user.budgetBytes);
     if (!isGiven("--shadows")) render.shadows = user.shadows;
-    if (!isGiven("--occlusion") && user.occlusion) render.occlusionRays = kRememberedOcclusionRays;
+    if (!isGiven("--occlusion") && user.occlusion) render.occlusionRays = kUsualOcclusionRays;
     if (!isGiven("--up")) render.up = user.up == UpAxis::Z ? "z" : "y";
 }
 
