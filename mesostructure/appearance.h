@@ -13,6 +13,7 @@
 
 #include <glm/vec4.hpp>
 
+#include "mesostructure/march_math.h"
 #include "mesostructure/shape.h"
 
 namespace vcp::meso {
@@ -21,9 +22,9 @@ struct Appearance {
     /// Views along an edge of the grid: view (i, j) is along (a, b, 1 - |a| - |b|) where a = (u + v) / 2, b = (u - v) /
     /// 2 and u, v run from -1 to 1 (the upper half of an octahedron, turned to fill the square), but never lower than 3
     /// degrees.
-    static constexpr uint32_t kViews = 8;
+    static constexpr uint32_t kViews = f32::kAppearanceViews;
     /// A view has two times three texels: nine coefficients and the mean normal, without and with shadows.
-    static constexpr uint32_t kTexels = 6;
+    static constexpr uint32_t kTexels = f32::kAppearanceTexels;
 
     double height = 0;              ///< mean height of what is seen from above, tile units
     bool isOpaque = false;          ///< no ray came through to the slab's bottom: there need be no base

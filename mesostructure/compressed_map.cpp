@@ -49,30 +49,6 @@ void fill(CompressedMap::Level& level, const DistanceMap& map, const std::vector
 
 }  // namespace
 
-CompressedMap::Found CompressedMap::lookUp(int cone, glm::ivec3 cell) const {
-    const glm::ivec3 at(wrapped(cell.x, grid.cells.x), wrapped(cell.y, grid.cells.y), cell.z);
-    const glm::ivec3 block = at / levels[0].edge;
-    uint32_t entry = uint32_t(block.x + top.x * (block.y + top.y * block.z));
-    Found found;
-    for (size_t i = 0; i < levels.size(); ++i) {
-        const Level& level = levels[i];
-        const uint8_t step = level.steps[size_t(cone) * level.entries + entry];
-        ++found.fetches;
-        if (step != kOccupied) {
-            found.length = float(step) * unit;
-            return found;
-        }
-        if (i + 1 == levels.size()) break;
-        const Level& below = levels[i + 1];
-        const glm::ivec3 local = at % level.edge / below.edge;
-        entry = level.brick[entry] * uint32_t(below.factor * below.factor * below.factor) +
-                uint32_t(local.x + below.factor * (local.y + below.factor * local.z));
-        ++found.fetches;
-    }
-    found.occupied = true;
-    return found;
-}
-
 uint64_t CompressedMap::bytes() const {
     uint64_t sum = 0;
     for (const Level& level : levels) sum += level.steps.size() + level.brick.size() * 4;

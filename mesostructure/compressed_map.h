@@ -32,13 +32,6 @@ struct CompressedMap {
     glm::ivec3 top{0};  ///< entries of level 0
     std::vector<Level> levels;
 
-    struct Found {
-        bool occupied = false;
-        float length = 0;
-        int fetches = 0;  ///< bytes and words read
-    };
-    [[nodiscard]] Found lookUp(int cone, glm::ivec3 cell) const;
-
     [[nodiscard]] uint64_t bytes() const;
     /// The ratio of the paper's Table 3: texels of the map over texels of lookup and atlases, whatever their bytes.
     [[nodiscard]] double texelRatio() const;

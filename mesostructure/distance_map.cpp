@@ -108,29 +108,16 @@ glm::dvec2 onCircle(int part, int parts) {
 
 }  // namespace
 
-ConeBorders::ConeBorders(Cones of) : cones(of) {
-    for (int k = 0; k < std::min(cones.azimuth, kMostAzimuths); ++k) azimuths[k] = onCircle(k, cones.azimuth);
-    for (int k = 0; k < std::min(cones.elevation, kMostElevations); ++k) {
+ConeBorders::ConeBorders(Cones cones) : azimuths(cones.azimuth), elevations(cones.elevation) {
+    for (int k = 0; k < std::min(azimuths, kMostAzimuths); ++k) borders[k].azimuth = onCircle(k, azimuths);
+    for (int k = 0; k < std::min(elevations, kMostElevations); ++k) {
         // An elevation of -90 degrees is three quarters of a turn.
-        const glm::dvec2 p = onCircle(3 * cones.elevation + 2 * k, 4 * cones.elevation);
-        elevations[k] = glm::vec2(p.x * p.x, p.y * std::abs(p.y));
+        const glm::dvec2 p = onCircle(3 * elevations + 2 * k, 4 * elevations);
+        borders[k].elevation = glm::vec2(p.x * p.x, p.y * std::abs(p.y));
     }
 }
 
-int coneOf(const ConeBorders& borders, glm::vec3 d) {
-    const int azimuths = borders.cones.azimuth;
-    int azimuth = 0, elevation = 0;
-    // A direction in the lower half turn is past all borders of the upper one.
-    const bool isLower = d.y < 0;
-    for (int k = 1; k < azimuths; ++k) {
-        const float along = borders.azimuths[k].x * d.y, across = borders.azimuths[k].y * d.x;
-        azimuth += 2 * k < azimuths ? isLower || along > across : isLower && along >= across;
-    }
-    const float flat = d.x * d.x + d.y * d.y, height = d.z * std::abs(d.z);
-    for (int k = 1; k < borders.cones.elevation; ++k)
-        elevation += height * borders.elevations[k].x >= borders.elevations[k].y * flat;
-    return elevation * azimuths + azimuth;
-}
+int coneOf(const ConeBorders& borders, glm::vec3 d) { return f32::ConeLookup<ConeBorders>{borders}.coneAlong(d); }
 
 std::vector<float> signedConeDistances(const Occupancy& occupancy, glm::ivec3 sign, bool betweenCentres) {
     const TileGrid& grid = occupancy.grid;

@@ -24,6 +24,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "mesostructure/march_math.h"
 #include "mesostructure/shape.h"
 
 namespace vcp::meso {
@@ -42,7 +43,7 @@ struct Occupancy {
 /// Errors: Limit (more than kMaxGridCells or kMaxGridEdge), Usage (no cells); InvalidInput where no cell is occupied.
 Result<Occupancy> occupy(const Shape& shape, glm::ivec3 cells);
 
-inline constexpr int kMostAzimuths = 32, kMostElevations = 16;
+inline constexpr int kMostAzimuths = f32::kMesoMostBorders, kMostElevations = 16;
 
 struct Cones {
     int azimuth = 1;    ///< 1 to kMostAzimuths
@@ -57,12 +58,12 @@ struct Cones {
 struct ConeBorders {
     explicit ConeBorders(Cones cones);
 
-    Cones cones;
-    std::array<glm::vec2, kMostAzimuths> azimuths{};
-    std::array<glm::vec2, kMostElevations> elevations{};
+    int azimuths, elevations;
+    std::array<f32::MesoBorder, kMostAzimuths> borders{};
 };
 
-/// Returns a direction's cone: elevation * azimuths + azimuth. 0 counts as positive. Single precision, as in shaders.
+/// Returns a direction's cone: elevation * azimuths + azimuth. 0 counts as positive. Single precision
+/// (mesostructure/shared/cone_lookup.h).
 ///
 /// It uses only signs and products, which every device rounds correctly; an atan may be off by 4096 units of the last
 /// place there. Let u be 2^-23, the most that a product or a sum is off, whichever way it is rounded. The comparison
@@ -78,8 +79,8 @@ enum class DistanceRule {
     PaperSafe  ///< as Paper, less the diagonal of a fine cell: conservative, at the paper's price
 };
 
-inline constexpr uint8_t kOccupied = 255;  ///< in place of a length
-inline constexpr int kMostSteps = 254;
+inline constexpr uint8_t kOccupied = f32::kMesoOccupied;  ///< in place of a length
+inline constexpr int kMostSteps = f32::kMesoMostSteps;
 
 struct DistanceMap {
     TileGrid grid;

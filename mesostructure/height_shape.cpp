@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "mesostructure/cell_solve.h"
+#include "mesostructure/march_math.h"
 #include "mesostructure/shape.h"
 
 namespace vcp::meso {
@@ -74,9 +74,10 @@ public:
         for (double t = 0; t <= tMax;) {
             const double tx = wall(o.x, d.x, cell.x), ty = wall(o.y, d.y, cell.y);
             const double end = std::max(t, std::min({tx, ty, tMax}));
-            const BilinearCell<double> heights{map_.height(cell.x, cell.y), map_.height(cell.x + 1, cell.y),
-                                               map_.height(cell.x, cell.y + 1), map_.height(cell.x + 1, cell.y + 1)};
-            const CellHit<double> found = heights.firstEntry(o - glm::dvec3(cell.x, cell.y, 0), d, t, end, outside);
+            const glm::dvec4 heights{map_.height(cell.x, cell.y), map_.height(cell.x + 1, cell.y),
+                                     map_.height(cell.x, cell.y + 1), map_.height(cell.x + 1, cell.y + 1)};
+            const f64::CellHit found =
+                f64::firstEntryBilinear(heights, o - glm::dvec3(cell.x, cell.y, 0), d, t, end, outside);
             if (found.hit) return {true, true, found.t, normalAt(cell, o + found.t * d)};
             outside = found.outside;
             if (end >= tMax) return {};

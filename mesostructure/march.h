@@ -1,6 +1,6 @@
-// Marchers: the methods that find where a ray meets a mesostructure, on the CPU, each as its shader does it: flat
-// arrays, single precision, integer cells, every fetch counted. They are the reference that a port is compared with,
-// ray by ray, and what `vcp bench meso` measures.
+// Marchers: the methods that find where a ray meets a mesostructure, on the CPU, by the code that the shaders compile
+// (mesostructure/shared/): flat arrays, single precision, integer cells, every fetch counted. They are compared with
+// truths in double precision, devices are compared with them, ray by ray, and `vcp bench meso` measures them.
 //
 // A ray starts in the slab of a tile (mesostructure/tile_grid.h) and travels 0 <= t <= tMax, in tile units. It hits
 // where it enters the solid from outside. A ray that starts inside sees nothing before it has left. Rays leave by the
@@ -56,9 +56,7 @@ public:
     [[nodiscard]] virtual bool isConservative() const = 0;
 };
 
-inline constexpr uint32_t kMostIterations = 8192;
-
-/// How a walk skips empty cells. What the pointers refer to must outlive the marcher.
+/// How a walk skips empty cells.
 struct Skipping {
     const Occupancy* occupancy = nullptr;  ///< cell by cell
     const DistanceMap* distances = nullptr;
@@ -73,8 +71,8 @@ struct Surface {
     const SampledField* field = nullptr;  ///< trilinear samples; the grid's cells must divide the field's
 };
 
-/// Makes a walk over a grid: with one of Skipping, and at most one of Surface. Errors: Usage (none or several, grids
-/// that do not match).
+/// Makes a walk over a grid: with one of Skipping, and at most one of Surface, of which it keeps a copy. Errors: Usage
+/// (none or several, grids that do not match), Limit (8 GiB).
 Result<std::unique_ptr<Marcher>> gridMarcher(const Skipping& skipping, const Surface& surface);
 
 enum class Refinement { None, Binary, Secant, SecantAsPrinted, Illinois };
@@ -120,7 +118,7 @@ struct SphereMap {
 };
 /// Builds the map. Errors: Usage (no cells, too many).
 Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options);
-std::unique_ptr<Marcher> sphereMarcher(SphereMap map);
+std::unique_ptr<Marcher> sphereMarcher(const SphereMap& map);
 
 /// Traces in double precision, with no skipping and every cell solved: the truth about a method's own stored data.
 TruthHit traceField(const SampledField& field, const MarchRay& ray);

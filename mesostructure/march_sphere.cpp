@@ -1,70 +1,13 @@
-// Sphere tracing on a plain distance map, and the exact walk over sampled distances.
+// The map of sphere tracing, and the truth about sampled distances.
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
-#include "mesostructure/cell_solve.h"
-#include "mesostructure/grid_walk.h"
+#include "mesostructure/march_arrays.h"
 
 namespace vcp::meso {
-
-namespace {
-
-using glm::ivec3, glm::vec3;
-
-class SphereTracing final : public Marcher {
-public:
-    explicit SphereTracing(SphereMap map) : map_(std::move(map)) {}
-
-    MarchResult march(const MarchRay& ray) const override {
-        MarchResult result;
-        const glm::dvec3 extent = map_.grid.extent();
-        const vec3 o(inFirstTile(ray.origin, extent)), d(ray.direction);
-        bool outside = false;
-        for (float t = 0; t <= float(ray.tMax);) {
-            const vec3 p = o + t * d;
-            if (p.z < 0 ? d.z <= 0 : p.z > float(extent.z) && d.z >= 0) return result;
-            if (result.iterations++ == uint32_t(map_.options.steps)) {
-                result.state = MarchState::Unresolved;
-                return result;
-            }
-            const float length = sample(p, result);
-            // Inside, and on the start's own surface, it moves on by a part of a cell until the distance grows.
-            if (length >= map_.threshold)
-                outside = true;
-            else if (outside || t == 0) {
-                if (outside || p.z >= float(extent.z)) {
-                    result.state = MarchState::Hit, result.t = t;
-                    return result;
-                }
-            }
-            t += std::max(length, outside ? 0 : float(map_.grid.cell.x) * 0.25f);
-        }
-        return result;
-    }
-    uint64_t bytes() const override { return map_.steps.size() * sizeof(int16_t); }
-    bool isConservative() const override { return false; }
-
-private:
-    float sample(vec3 p, MarchResult& result) const {
-        ++result.fetches;
-        const vec3 at = p / vec3(map_.grid.cell) - 0.5f, first = glm::floor(at), w = at - first;
-        float sum = 0;
-        for (int corner = 0; corner < 8; ++corner) {
-            const ivec3 bit(corner & 1, corner >> 1 & 1, corner >> 2);
-            ivec3 cell = ivec3(first) + bit;
-            cell.z = std::clamp(cell.z, 0, map_.grid.cells.z - 1);
-            const vec3 part = glm::mix(1.0f - w, w, vec3(bit));
-            sum += part.x * part.y * part.z * float(map_.steps[map_.grid.index(cell)]);
-        }
-        return sum * (map_.cap / 32767);
-    }
-
-    SphereMap map_;
-};
-
-}  // namespace
 
 Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options) {
     SphereMap map{options, TileGrid(options.cells, shape.extent()), 0, 0, {}};
@@ -84,12 +27,14 @@ Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& option
     return map;
 }
 
-std::unique_ptr<Marcher> sphereMarcher(SphereMap map) { return std::make_unique<SphereTracing>(std::move(map)); }
+std::unique_ptr<Marcher> sphereMarcher(const SphereMap& map) {
+    return arrayMarcher(sphereArrays(map), map.steps.size() * sizeof(int16_t), false);
+}
 
 TruthHit traceField(const SampledField& field, const MarchRay& ray) {
     const TileGrid& grid = field.grid;
     const glm::dvec3 o = inFirstTile(ray.origin, grid.extent()) / grid.cell, d = ray.direction / grid.cell;
-    ivec3 cell(glm::floor(o));
+    glm::ivec3 cell(glm::floor(o));
     for (int axis = 0; axis < 3; ++axis)
         if (d[axis] < 0 && o[axis] == std::floor(o[axis])) --cell[axis];
     bool outside = o.z >= grid.cells.z && d.z < 0;
@@ -102,14 +47,17 @@ TruthHit traceField(const SampledField& field, const MarchRay& ray) {
             if (wall < exit) exit = wall, axisOut = axis;
         }
         const double end = std::max(t, std::min(exit, ray.tMax));
-        TrilinearCell<double> corners;
-        for (int corner = 0; corner < 8; ++corner)
-            corners.value[corner] = field.step(cell + ivec3(corner & 1, corner >> 1 & 1, corner >> 2));
-        if (const int side = corners.side(); side == 0 || (side < 0 && outside)) {
-            const CellHit<double> found = corners.firstEntry(o - glm::dvec3(cell), d, t, end, outside);
+        glm::dvec4 below, above;
+        for (int corner = 0; corner < 4; ++corner) {
+            const glm::ivec3 at = cell + glm::ivec3(corner & 1, corner >> 1, 0);
+            below[corner] = field.step(at), above[corner] = field.step(at + glm::ivec3(0, 0, 1));
+        }
+        if (const int side = f64::sideTrilinear(below, above); side == 0 || (side < 0 && outside)) {
+            const glm::dvec3 local = o - glm::dvec3(cell);
+            const f64::CellHit found = f64::firstEntryTrilinear(below, above, local, d, t, end, outside);
             if (found.hit)
                 return {true, true, found.t,
-                        glm::normalize(corners.gradient(o + found.t * d - glm::dvec3(cell)) / grid.cell)};
+                        glm::normalize(f64::gradientTrilinear(below, above, local + found.t * d) / grid.cell)};
             outside = found.outside;
         } else {
             outside = side > 0;

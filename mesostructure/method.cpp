@@ -63,6 +63,23 @@ Skipping Method::skipping() const {
     return {.occupancy = occupancy.get()};
 }
 
+Result<MarchArrays> Method::arrays() const {
+    const bool isComplete = kind == WalkKind::Sphere ? sphere != nullptr
+                            : kind != WalkKind::Grid ? heights != nullptr
+                                                     : boxes || compressed || distances || occupancy;
+    if (!isComplete) return Error{.code = ErrorCode::Usage, .message = "a mesostructure method without its arrays"};
+    switch (kind) {
+        case WalkKind::Relief:
+            return reliefArrays(*heights, relief);
+        case WalkKind::Pyramid:
+            return pyramidArrays(*heights);
+        case WalkKind::Sphere:
+            return sphereArrays(*sphere);
+        default:
+            return gridArrays(skipping(), surface());
+    }
+}
+
 Result<std::unique_ptr<Marcher>> Method::marcher() const {
     switch (kind) {
         case WalkKind::Relief:

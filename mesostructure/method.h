@@ -1,5 +1,5 @@
 // A method by name: which marcher it is, with the arrays that it reads. The reference marchers (march.h) and the
-// shaders (render/meso_arrays.h) are made from the same arrays.
+// shaders are made from the same arrays (march_arrays.h).
 #pragma once
 
 #include <memory>
@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "mesostructure/asset_file.h"
+#include "mesostructure/march_arrays.h"
 
 namespace vcp::meso {
 
@@ -31,7 +32,9 @@ struct Method {
     [[nodiscard]] Surface surface() const {
         return {patches.get(), kind == WalkKind::Grid ? heights : nullptr, field.get()};
     }
-    /// Makes the marcher, which refers to the method. Errors: as gridMarcher's.
+    /// Packs the arrays; the method is not referred to afterwards. Errors: Usage (a method without its arrays), Limit.
+    [[nodiscard]] Result<MarchArrays> arrays() const;
+    /// Makes the marcher. Errors: as gridMarcher's.
     [[nodiscard]] Result<std::unique_ptr<Marcher>> marcher() const;
 };
 

@@ -79,7 +79,7 @@ OctantBoxes buildOctantBoxes(const Occupancy& occupancy) {
         for (size_t i = 0; i < grid.count(); ++i) {
             uint16_t& box = result.boxes[size_t(octant) * grid.count() + i];
             if (occupancy.cells[i] != 0) {
-                box = 0x8000;
+                box = OctantBoxes::kOccupied;
                 continue;
             }
             const glm::ivec3 extent = grow(count, grid.at(i), sign);
@@ -93,8 +93,8 @@ void markSmallCells(const SampledField& field, OctantBoxes& boxes) {
     const TileGrid& grid = boxes.grid;
     const bool fits = field.grid.cells == 2 * grid.cells;
     for (size_t i = 0; i < grid.count(); ++i) {
-        if ((boxes.boxes[i] & 0x8000) == 0) continue;
-        uint16_t box = uint16_t(0x8000 | (fits ? OctantBoxes::kSmallCells : 0));
+        if ((boxes.boxes[i] & OctantBoxes::kOccupied) == 0) continue;
+        uint16_t box = uint16_t(OctantBoxes::kOccupied | (fits ? OctantBoxes::kSmallCells : 0));
         for (int small = 0; fits && small < 8; ++small) {
             const glm::ivec3 at = 2 * grid.at(i) + glm::ivec3(small & 1, small >> 1 & 1, small >> 2);
             int inside = 0;

@@ -10,17 +10,16 @@
 
 namespace vcp::meso {
 
-/// Octant o is towards +x, +y, +z where its bits 0, 1, 2 are 0, and towards - where they are 1.
-inline int octantOf(glm::vec3 d) { return (d.x < 0) | (d.y < 0) << 1 | (d.z < 0) << 2; }
+using f32::octantOf;
 
 struct OctantBoxes {
     static constexpr int kMost = 31;  ///< cells beyond its own by which a box grows along an axis
-    static constexpr uint16_t kSmallCells = 0x4000;
+    static constexpr uint16_t kOccupied = f32::kMesoBoxOccupied, kSmallCells = f32::kMesoSmallCells;
 
     TileGrid grid;
     /// Octant by octant, cells as in the grid. Bits 0-4, 5-9, 10-14: further cells that are empty along x, y, z; a box
-    /// that reaches the slab's top or bottom goes on as if the outside were empty cells. Bit 15: the cell is occupied;
-    /// the others are 0 then, or what markSmallCells put there.
+    /// that reaches the slab's top or bottom goes on as if the outside were empty cells. Bit 15 (kOccupied): the
+    /// cell is occupied; the others are 0 then, or what markSmallCells put there.
     std::vector<uint16_t> boxes;
 
     [[nodiscard]] uint64_t bytes() const { return boxes.size() * sizeof(uint16_t); }

@@ -57,10 +57,6 @@ std::array<CellFace, 6> makeFaces() {
 }
 const std::array<CellFace, 6> kFaces = makeFaces();
 
-void setLinear(float* to, dvec3 gradient, double constant) {
-    to[0] = float(gradient.x), to[1] = float(gradient.y), to[2] = float(gradient.z), to[3] = float(constant);
-}
-
 void normalise(std::array<double, 10>& q, float* to) {
     double most = 0;
     for (const double c : q) most = std::max(most, std::abs(c));
@@ -71,14 +67,14 @@ void appendTriangle(dvec3 a, dvec3 b, dvec3 c, std::vector<Patch>& patches) {
     const dvec3 ab = b - a, ac = c - a, normal = glm::cross(ab, ac);
     const double size = glm::dot(normal, normal);
     if (!(size > 1e-18)) return;
-    Patch patch;
+    Patch patch{};
     patch.isTriangle = 1;
     std::array<double, 10> q{};
     q[6] = normal.x, q[7] = normal.y, q[8] = normal.z, q[9] = -glm::dot(normal, a);
     normalise(q, patch.quadric);
     const dvec3 u = glm::cross(ac, normal) / size, v = glm::cross(normal, ab) / size;
-    setLinear(patch.u, u, -glm::dot(u, a));
-    setLinear(patch.v, v, -glm::dot(v, a));
+    patch.u = glm::dvec4(u, -glm::dot(u, a));
+    patch.v = glm::dvec4(v, -glm::dot(v, a));
     patches.push_back(patch);
 }
 
@@ -95,7 +91,7 @@ void appendBilinear(dvec3 p1, dvec3 p2, dvec3 p3, dvec3 p4, std::vector<Patch>& 
     }
     const dvec3 u = ca / det, v = ab / det, w = bc / det;
     const double u0 = -glm::dot(u, p1), v0 = -glm::dot(v, p1), w0 = -glm::dot(w, p1);
-    Patch patch;
+    Patch patch{};
     // w - u v = 0
     std::array<double, 10> q{-u.x * v.x,
                              -u.y * v.y,
@@ -108,8 +104,8 @@ void appendBilinear(dvec3 p1, dvec3 p2, dvec3 p3, dvec3 p4, std::vector<Patch>& 
                              w.z - u.z * v0 - u0 * v.z,
                              w0 - u0 * v0};
     normalise(q, patch.quadric);
-    setLinear(patch.u, u, u0);
-    setLinear(patch.v, v, v0);
+    patch.u = glm::dvec4(u, u0);
+    patch.v = glm::dvec4(v, v0);
     patches.push_back(patch);
 }
 
@@ -338,40 +334,6 @@ void appendPatches(std::span<const glm::dvec3> loop, std::vector<Patch>& patches
     size_t i = 1;
     for (; i + 2 < n; i += 2) appendBilinear(loop[0], loop[i], loop[i + 1], loop[i + 2], patches);
     if (i + 1 < n) appendTriangle(loop[0], loop[i], loop[i + 1], patches);
-}
-
-float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span) {
-    const float* q = patch.quadric;
-    const float a =
-        q[0] * d.x * d.x + q[1] * d.y * d.y + q[2] * d.z * d.z + q[3] * d.x * d.y + q[4] * d.y * d.z + q[5] * d.z * d.x;
-    const float b = 2 * (q[0] * o.x * d.x + q[1] * o.y * d.y + q[2] * o.z * d.z) + q[3] * (o.x * d.y + o.y * d.x) +
-                    q[4] * (o.y * d.z + o.z * d.y) + q[5] * (o.z * d.x + o.x * d.z) + q[6] * d.x + q[7] * d.y +
-                    q[8] * d.z;
-    const float c = q[0] * o.x * o.x + q[1] * o.y * o.y + q[2] * o.z * o.z + q[3] * o.x * o.y + q[4] * o.y * o.z +
-                    q[5] * o.z * o.x + q[6] * o.x + q[7] * o.y + q[8] * o.z + q[9];
-    const float disc = b * b - 4 * a * c;
-    if (disc < 0) return -1;
-    // Computed without cancellation; for a = 0, the linear branch, the second root is that of the plane.
-    const float r = -0.5f * (b + (b >= 0 ? std::sqrt(disc) : -std::sqrt(disc)));
-    float near = a != 0 ? r / a : -1e30f, far = r != 0 ? c / r : -1e30f;
-    if (near > far) std::swap(near, far);
-    constexpr float kOn = 2e-4f;  // patches meet at their borders: a ray between two finds one of them
-    const float slack = kOn / std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
-    for (const float s : {near, far}) {
-        if (!(s >= -slack && s <= span + slack)) continue;
-        const glm::vec3 p = o + s * d;
-        const float u = patch.u[0] * p.x + patch.u[1] * p.y + patch.u[2] * p.z + patch.u[3],
-                    v = patch.v[0] * p.x + patch.v[1] * p.y + patch.v[2] * p.z + patch.v[3];
-        if (u < -kOn || v < -kOn) continue;
-        if (patch.isTriangle != 0 ? u + v <= 1 + kOn : u <= 1 + kOn && v <= 1 + kOn) return std::clamp(s, 0.0f, span);
-    }
-    return -1;
-}
-
-glm::vec3 patchGradient(const Patch& patch, glm::vec3 p) {
-    const float* q = patch.quadric;
-    return {2 * q[0] * p.x + q[3] * p.y + q[5] * p.z + q[6], 2 * q[1] * p.y + q[3] * p.x + q[4] * p.z + q[7],
-            2 * q[2] * p.z + q[4] * p.y + q[5] * p.x + q[8]};
 }
 
 Result<PatchSet> buildPatches(const Shape& shape, const Occupancy& occupancy, CrossingRule rule) {

@@ -21,22 +21,11 @@
 #include <vector>
 
 #include "mesostructure/distance_map.h"
+#include "mesostructure/march_math.h"
 
 namespace vcp::meso {
 
-/// A point x of the cell lies on the patch when quadric(x) = 0, u(x) >= 0, v(x) >= 0, and u + v <= 1 for a triangle or
-/// u <= 1 and v <= 1 for a bilinear patch.
-///
-///    0   10 floats   A..J: A x^2 + B y^2 + C z^2 + D xy + E yz + F zx + G x + H y + I z + J
-///   40    4 floats   u: of x, y, z and 1
-///   56    4 floats   v
-///   72    1 word     1: a triangle (A..F are 0), 0: bilinear
-struct Patch {
-    float quadric[10] = {};
-    float u[4] = {};
-    float v[4] = {};
-    uint32_t isTriangle = 0;
-};
+using f32::crossPatch, f32::Patch, f32::patchGradient;
 static_assert(sizeof(Patch) == 76 && offsetof(Patch, u) == 40 && offsetof(Patch, v) == 56 &&
               offsetof(Patch, isTriangle) == 72);
 
@@ -67,10 +56,6 @@ Result<PatchSet> buildPatches(const Shape& shape, const Occupancy& occupancy, Cr
 
 /// Appends the patches through a loop of 3 to 12 points in a cell's coordinates; none where they have no area.
 void appendPatches(std::span<const glm::dvec3> loop, std::vector<Patch>& patches);
-
-/// Returns the crossing of a ray with a patch at 0 <= s <= span, `o` and `d` in the cell's coordinates; below 0: none.
-float crossPatch(const Patch& patch, glm::vec3 o, glm::vec3 d, float span);
-glm::vec3 patchGradient(const Patch& patch, glm::vec3 p);
 
 /// Returns the quadric A..J of least Taubin distance to points, or a plane where they lie in one. At least 3 points.
 std::array<double, 10> fitQuadric(std::span<const glm::dvec3> points);

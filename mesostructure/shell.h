@@ -19,11 +19,13 @@
 #include <glm/vec4.hpp>
 
 #include "mesostructure/base_surface.h"
+#include "mesostructure/march_math.h"
 
 namespace vcp::meso {
 
 struct Shell {
-    static constexpr uint32_t kNodeTexels = 2, kPieceTexels = 7, kMostInLeaf = 4, kDepth = 32;
+    static constexpr uint32_t kNodeTexels = f32::kShellNodeTexels, kPieceTexels = f32::kShellPieceTexels,
+                              kMostInLeaf = 4, kDepth = f32::kShellDepth;
 
     glm::dvec3 origin{0};        ///< what all coordinates are relative to: the middle of the base
     glm::dvec3 low{0}, high{0};  ///< box of the shell, world
@@ -38,7 +40,7 @@ struct Shell {
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
     ///           3 x (row of T, 0)                   tile space is q0 + T (p - v0); q0 is in the first tile
     /// A face is cut where it is on a border of the base, or where the map jumps: solid shows its cut there.
-    static constexpr uint32_t kBase = 16;
+    static constexpr uint32_t kBase = f32::kShellBaseFace;
     std::vector<glm::vec4> texels;
 };
 

@@ -27,6 +27,13 @@ inline int wrapped(int i, int n) {
     return rest < 0 ? rest + n : rest;
 }
 
+/// Moves the origin into the tile at 0, exactly: rays of far tiles lose no precision to their place.
+inline glm::dvec3 inFirstTile(glm::dvec3 origin, glm::dvec3 extent) {
+    origin.x -= extent.x * std::floor(origin.x / extent.x);
+    origin.y -= extent.y * std::floor(origin.y / extent.y);
+    return origin;
+}
+
 struct TileGrid {
     glm::ivec3 cells{1};
     glm::dvec3 cell{1};  ///< edges of a cell, tile units

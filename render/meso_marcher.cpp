@@ -63,7 +63,7 @@ Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method
                      .message = fmt::format("{} rays; at most {} at once", rays.size(), kMostRays)};
     std::vector<MesoRaysPass> passes;
     for (const meso::Method* method : methods) {
-        VCP_TRY_ASSIGN(const auto arrays, packMesoArrays(*method));
+        VCP_TRY_ASSIGN(const auto arrays, method->arrays());
         VCP_TRY(passes.emplace_back(*state_->device, *state_->resources).prepare(arrays, rays));
     }
     for (int round = 0; round <= rounds; ++round)

@@ -36,7 +36,7 @@ public:
     [[nodiscard]] const DeviceInfo& device() const;
 
     /// Marches all rays by each method: one round over the methods to warm up and then `rounds` rounds, so that what
-    /// else the machine does falls on all alike. Errors: those of packMesoArrays; Device; Limit.
+    /// else the machine does falls on all alike. Errors: those of Method::arrays(); Device; Limit.
     Result<std::vector<MesoMarched>> march(std::span<const meso::Method* const> methods,
                                            std::span<const meso::MarchRay> rays, int rounds);
 

@@ -13,12 +13,7 @@
 
 namespace vcp {
 
-namespace {
-
-// Planes of the surfaces' hits (shared/meso_layout.h).
-constexpr uint32_t kMesoDepth = 0, kMesoNormal = 1, kMesoIterations = 3;
-
-}  // namespace
+using frame::kMesoPlaneDepth, frame::kMesoPlaneNormal;
 
 Result<const Renderer::View::Frame*> Renderer::View::lastFrame() {
     if (!drawn) return Error{.code = ErrorCode::Usage, .message = "nothing was drawn yet"};
@@ -69,7 +64,7 @@ Result<std::vector<float>> Renderer::readDepth() {
         std::transform(depth->begin(), depth->end(), other->begin(), depth->begin(),
                        [](float a, float b) { return b < a || std::isnan(a) ? b : a; });
     }
-    const auto depths = view_->mesoPlane(*frame, kMesoDepth), normals = view_->mesoPlane(*frame, kMesoNormal);
+    const auto depths = view_->mesoPlane(*frame, kMesoPlaneDepth), normals = view_->mesoPlane(*frame, kMesoPlaneNormal);
     if (!depths || !normals) return depths ? normals.error() : depths.error();
     for (size_t i = 0; depth && i < normals->size(); ++i)
         if ((*normals)[i] != 0) (*depth)[i] = std::bit_cast<float>((*depths)[i]);
@@ -123,7 +118,7 @@ Result<std::vector<glm::vec3>> Renderer::readNormals() {
             normals[i] = turn * unpackNormal(words[i]);
         }
     }
-    VCP_TRY_ASSIGN(const auto words, view_->mesoPlane(*frame, kMesoNormal));
+    VCP_TRY_ASSIGN(const auto words, view_->mesoPlane(*frame, kMesoPlaneNormal));
     for (size_t i = 0; i < words.size(); ++i)
         if (words[i] != 0) normals[i] = unpackNormal(words[i]);
     return normals;
@@ -131,7 +126,7 @@ Result<std::vector<glm::vec3>> Renderer::readNormals() {
 
 Result<std::vector<uint32_t>> Renderer::readIterations() {
     VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
-    auto words = view_->mesoPlane(*frame, kMesoIterations);
+    auto words = view_->mesoPlane(*frame, frame::kMesoPlaneIterations);
     if (words) words->resize(frame->layers.front().resources->size().pixels());
     return words;
 }
@@ -166,8 +161,8 @@ Result<std::optional<PixelHit>> Renderer::View::pick(PicturePixel pixel) {
     }
     const bool hasSurfaces = frame.surfaces.size.width > 0;
     if (hasSurfaces) {
-        places.push_back({&frame.surfaces.hits, kMesoDepth * size.pixels() + at});
-        places.push_back({&frame.surfaces.hits, kMesoNormal * size.pixels() + at});
+        places.push_back({&frame.surfaces.hits, kMesoPlaneDepth * size.pixels() + at});
+        places.push_back({&frame.surfaces.hits, kMesoPlaneNormal * size.pixels() + at});
     }
     VCP_TRY_ASSIGN(const auto read, readEach(*shared->device, places));
     std::vector<HitWords> words;

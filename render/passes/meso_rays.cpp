@@ -2,7 +2,6 @@
 
 #include <bit>
 
-#include "mesostructure/grid_walk.h"
 #include "render/meso_rays_spirv.h"
 #include "render/passes/readback.h"
 
@@ -14,12 +13,12 @@ constexpr uint32_t kResultWords = 8, kGroup = 64;
 
 }  // namespace
 
-Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const meso::MarchRay> rays) {
-    const glm::dvec3 extent(arrays.record.extent);
+Result<void> MesoRaysPass::prepare(const meso::MarchArrays& arrays, std::span<const meso::MarchRay> rays) {
     std::vector<glm::vec4> texels;
-    for (const meso::MarchRay& ray : rays) {
-        texels.push_back(glm::vec4(meso::inFirstTile(ray.origin, extent), std::min(ray.tMax, 1e6)));
-        texels.push_back(glm::vec4(ray.direction, float(ray.origin.z) >= arrays.record.extent.z ? 1 : 0));
+    for (const meso::MarchRay& given : rays) {
+        const meso::f32::MesoRay ray = meso::rayInTile(given, arrays);
+        texels.push_back(glm::vec4(ray.o, ray.tMax));
+        texels.push_back(glm::vec4(ray.d, ray.atTop ? 1 : 0));
     }
     count_ = uint32_t(rays.size());
     VCP_TRY_ASSIGN(words_, resources_.words(arrays.words));
@@ -32,9 +31,9 @@ Result<void> MesoRaysPass::prepare(const MesoArrays& arrays, std::span<const mes
                              MemoryUse::Local));
     constants_ = std::move(constants);
     values_.record = arrays.record;
-    values_.view.picture.x = count_;
+    values_.view.width = count_;
     VCP_TRY_ASSIGN(set_, resources_.makeSet({&constants_, &words_, &rays_, &results_, &none_, &none_}));
-    VCP_TRY_ASSIGN(pipeline_, resources_.pipeline(kMesoRaysSpirv, {arrays.constants.begin(), arrays.constants.end()}));
+    VCP_TRY_ASSIGN(pipeline_, resources_.pipeline(kMesoRaysSpirv, wordsOf(arrays.constants)));
     return {};
 }
 

@@ -12,7 +12,7 @@ public:
     MesoRaysPass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
 
     /// Uploads the arrays and the rays. Errors: Device, Limit.
-    Result<void> prepare(const MesoArrays& arrays, std::span<const meso::MarchRay> rays);
+    Result<void> prepare(const meso::MarchArrays& arrays, std::span<const meso::MarchRay> rays);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands) const;
     Result<std::vector<meso::MarchResult>> read();

@@ -18,14 +18,20 @@
 #include <utility>
 #include <vector>
 
-#include "render/meso_arrays.h"
+#include "mesostructure/march_arrays.h"
+#include "render/meso_view.h"
 #include "render/vulkan/compute_pipeline.h"
 #include "render/vulkan/device.h"
 
 namespace vcp {
 
+/// The specialization constants of a pipeline that marches.
+inline std::vector<uint32_t> wordsOf(const meso::MarchConstants& c) {
+    return {c.walk, c.skip, c.surface, c.refinement};
+}
+
 struct MesoConstants {
-    frame::MesoRecord record;
+    meso::f32::MesoRecord record;
     frame::MesoView view;
 };
 

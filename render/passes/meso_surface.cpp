@@ -18,14 +18,14 @@ namespace {
 
 constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
 
-glm::vec4 toVec4(glm::dvec3 v, double w = 0) { return {glm::vec3(v), float(w)}; }
+glm::vec4 toVec4(glm::dvec3 v) { return {glm::vec3(v), 0}; }
 
 /// Returns the words of what is seen from far, followed by the textures.
 std::vector<uint64_t> lookOf(const MesoSurface& surface, frame::MesoView& view) {
     std::vector<uint64_t> texels;
     if (surface.far)
         for (const glm::vec4& texel : surface.far->texels) texels.push_back(glm::packHalf4x16(texel));
-    const auto add = [&](const MesoTexture* texture, glm::uvec4& where) {
+    const auto add = [&](const MesoTexture* texture, frame::MesoImage& where) {
         if (texture == nullptr) return;
         where = {uint32_t(texels.size()), texture->size.x, texture->size.y, texture->levels};
         texels.insert(texels.end(), texture->texels.begin(), texture->texels.end());
@@ -35,15 +35,14 @@ std::vector<uint64_t> lookOf(const MesoSurface& surface, frame::MesoView& view) 
     return texels;
 }
 
-static_assert(frame::kMesoFarViews == meso::Appearance::kViews && frame::kMesoFarTexels == meso::Appearance::kTexels);
-
 }  // namespace
 
-double shadowLift(const MesoArrays& arrays, double tileEdge) {
-    const frame::MesoRecord& r = arrays.record;
-    const bool isExact = arrays.constants[0] == frame::kMesoPyramid || arrays.constants[2] == frame::kMesoHeights ||
-                         arrays.constants[2] == frame::kMesoField;
-    if (r.fine.x > 0 && (isExact || arrays.constants[0] == frame::kMesoRelief))
+double shadowLift(const meso::MarchArrays& arrays, double tileEdge) {
+    const meso::f32::MesoRecord& r = arrays.record;
+    const meso::MarchConstants& c = arrays.constants;
+    const bool isExact =
+        c.walk == meso::f32::kMesoPyramid || c.surface == meso::f32::kMesoHeights || c.surface == meso::f32::kMesoField;
+    if (r.fine.x > 0 && (isExact || c.walk == meso::f32::kMesoRelief))
         return (isExact ? 0.25 : 1.5) * tileEdge / r.fine.x;
     return 0.5 * tileEdge * double(r.cell.x);
 }
@@ -51,7 +50,7 @@ double shadowLift(const MesoArrays& arrays, double tileEdge) {
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
     surfaces_.clear();
     ++version_;
-    std::map<const MesoArrays*, std::shared_ptr<MesoTexels>> uploaded;
+    std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;
     std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, std::shared_ptr<MesoTexels>>
         looks;
     std::vector<Placed> placed;
@@ -73,14 +72,15 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
         made.look = look;
         // A surface that rays may come through must be marched.
         made.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
-        made.view.far.y = made.isFarDrawn ? float(surface.far->height) : 0.0f;
+        made.view.meanHeight = made.isFarDrawn ? float(surface.far->height) : 0.0f;
         VCP_TRY_ASSIGN(auto shell, resources_.vectors(surface.shell.texels));
         made.shell = std::move(shell);
         VCP_TRY_ASSIGN(made.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
         made.origin = surface.shell.origin;
-        made.view.picture = {0, 0, surface.shell.nodes, surface.withBase ? 1 : 0};
-        made.view.light.w = float(surface.lift);
-        made.view.colour = glm::vec4(surface.colour, 0);
+        made.view.nodes = surface.shell.nodes;
+        made.view.withBase = surface.withBase ? 1 : 0;
+        made.view.shadowLift = float(surface.lift);
+        made.view.colour = surface.colour;
         placed.push_back(std::move(made));
     }
     surfaces_ = std::move(placed);
@@ -117,10 +117,10 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, cons
         target.size = size, target.surfaces = version_, target.picture = picture.handle();
     }
     for (Placed& surface : surfaces_) {
-        std::vector<uint32_t> constants(surface.arrays->constants.begin(), surface.arrays->constants.end());
+        std::vector<uint32_t> constants = wordsOf(surface.arrays->constants);
         constants.push_back(0);
-        constants.push_back((surface.view.colours.w > 0 ? frame::kMesoColours : 0) |
-                            (surface.view.normals.w > 0 ? frame::kMesoNormals : 0));
+        constants.push_back((surface.view.colours.levels > 0 ? frame::kMesoColours : 0) |
+                            (surface.view.normals.levels > 0 ? frame::kMesoNormals : 0));
         constants.push_back(surface.isFarDrawn ? 1 : 0);
         VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kMesoSurfaceSpirv, constants));
         if (!shadows) continue;
@@ -149,10 +149,11 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize si
         c.view.forward = toVec4(basis.forward + corner), c.view.forwardX = toVec4(stepX),
         c.view.forwardY = toVec4(stepY);
     }
-    c.view.picture.x = size.width, c.view.picture.y = size.height;
-    c.view.light = toVec4(look.light, surface.view.light.w);
-    c.view.far = {float(look.errorPixels), surface.view.far.y, look.shadows ? 1.0f : 0.0f, 0.0f};
-    c.view.up = toVec4(look.up, double(look.shading));
+    c.view.width = size.width, c.view.height = size.height;
+    c.view.light = look.light;
+    c.view.strayPixels = float(look.errorPixels), c.view.farShadows = look.shadows ? 1 : 0;
+    c.view.up = look.up;
+    c.view.shows = uint32_t(look.shading);
     return c;
 }
 

@@ -24,7 +24,7 @@ namespace vcp {
 
 /// One asset on one base surface.
 struct MesoSurface {
-    std::shared_ptr<const MesoArrays> arrays;  ///< surfaces may share them
+    std::shared_ptr<const meso::MarchArrays> arrays;  ///< surfaces may share them
     meso::Shell shell;
     glm::vec3 colour{0.8f};  ///< encoded, as the screen has it
     bool withBase = true;    ///< the base is drawn where rays come through to it
@@ -38,7 +38,7 @@ struct MesoSurface {
 };
 
 /// Returns a good lift: some texels or a part of a cell. `tileEdge` in world units.
-double shadowLift(const MesoArrays& arrays, double tileEdge);
+double shadowLift(const meso::MarchArrays& arrays, double tileEdge);
 
 enum class MesoShading : uint32_t {
     Lit = frame::kMesoShowLit,
@@ -102,7 +102,7 @@ public:
 
 private:
     struct Placed {
-        std::shared_ptr<const MesoArrays> arrays;
+        std::shared_ptr<const meso::MarchArrays> arrays;
         std::shared_ptr<MesoTexels> words, look;  ///< look: null without textures
         MesoTexels shell;
         Buffer constants;

@@ -1,4 +1,15 @@
 // The descriptor set of the mesostructure passes (render/passes/meso_bindings.h).
+#define INLINE
+#define CONST_REF(T) T
+#define INOUT(T) inout T
+#define OUT(T) out T
+#define Real float
+#define Real2 vec2
+#define Real3 vec3
+#define Real4 vec4
+#define REAL_EPSILON 1.1920929e-7
+#include "mesostructure/shared/march_layout.h"
+#include "mesostructure/shared/shell_layout.h"
 #include "render/shared/meso_layout.h"
 
 layout(constant_id = 0) const uint kWalk = 0u;
@@ -15,10 +26,9 @@ layout(set = 0, binding = 2) uniform utextureBuffer quadTexels;
 layout(set = 0, binding = 3) uniform textureBuffer inputTexels;  // rays, or the shell
 layout(set = 0, binding = 4, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 5, std430) buffer PictureBlock { uint picturePixels[]; };
-layout(set = 0, binding = 6, std430) buffer CounterBlock { uint counters[]; };  // unresolved rays; hits from far; pixels that anything is hit in
+// Unresolved rays; hits from far; pixels that anything is hit in.
+layout(set = 0, binding = 6, std430) buffer CounterBlock { uint counters[]; };
 layout(set = 0, binding = 7) uniform textureBuffer lookTexels;  // what is seen from far, textures
 
 uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }
-uint fetchByte(uint array, uint i) { return bitfieldExtract(fetchWord(array + (i >> 2)), int(i & 3u) * 8, 8); }
-uint fetchShort(uint array, uint i) { return bitfieldExtract(fetchWord(array + (i >> 1)), int(i & 1u) * 16, 16); }
 uvec4 fetchQuad(uint i) { return texelFetch(quadTexels, int(i)); }

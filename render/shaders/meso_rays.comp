@@ -10,9 +10,10 @@ layout(local_size_x = 64) in;
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
-    if (i >= view.picture.x) return;
+    if (i >= view.width) return;
     vec4 a = texelFetch(inputTexels, int(2u * i)), b = texelFetch(inputTexels, int(2u * i + 1u));
-    MesoResult r = marchMeso(MesoRay(a.xyz, b.xyz, a.w, b.w > 0.0, false));
+    float tMax = a.w, startsAtTop = b.w;
+    MesoResult r = marchMeso(MesoRay(a.xyz, b.xyz, tMax, startsAtTop > 0.0, false));
     uint at = 8u * i;
     hits[at] = r.state;
     hits[at + 1u] = floatBitsToUint(r.t);

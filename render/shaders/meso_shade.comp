@@ -8,27 +8,25 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 
-const float kFarthest = 1e30;  // depth of the farthest hit
-
 // Maps 0 to 1 from blue through green to red.
 vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, view.picture.xy))) return;
-    uint index = pixel.y * view.picture.x + pixel.x, plane = view.picture.x * view.picture.y;
-    if (uintBitsToFloat(hits[index]) < kFarthest) atomicAdd(counters[2], 1u);
-    uint shown = uint(view.up.w);
+    if (pixel.x >= view.width || pixel.y >= view.height) return;
+    uint index = pixel.y * view.width + pixel.x, plane = view.width * view.height;
+    if (uintBitsToFloat(hits[kMesoPlaneDepth * plane + index]) < kMesoNoHit) atomicAdd(counters[2], 1u);
+    uint shown = view.shows;
     if (shown == kMesoShowHeat) {
-        uint iterations = hits[3u * plane + index];
-        if (iterations > 0u) picturePixels[index] = packUnorm4x8(vec4(heat(min(float(iterations) / kMesoMostIterations, 1.0)), 1.0));
+        uint iterations = hits[kMesoPlaneIterations * plane + index];
+        if (iterations > 0u) picturePixels[index] = packUnorm4x8(vec4(heat(min(float(iterations) / kMesoHottest, 1.0)), 1.0));
         return;
     }
-    uint code = hits[plane + index];
+    uint code = hits[kMesoPlaneNormal * plane + index];
     if (code == 0u) return;
     vec3 n = unpackHitNormal(code);
-    vec4 colour = unpackUnorm4x8(hits[2u * plane + index]);
-    float sun = max(dot(n, view.light.xyz), 0.0) * colour.w, sky = 0.5 + 0.5 * dot(n, view.up.xyz);
+    vec4 colour = unpackUnorm4x8(hits[kMesoPlaneLook * plane + index]);
+    float sun = max(dot(n, view.light), 0.0) * colour.w, sky = 0.5 + 0.5 * dot(n, view.up);
     vec3 lit = colour.xyz * pow(kMesoSun * sun + kMesoAmbient + kMesoSky * sky, 1.0 / 2.2);
     vec3 result = shown == kMesoShowNormals ? n * 0.5 + 0.5 : shown == kMesoShowUnlit ? colour.xyz : lit;
     picturePixels[index] = packUnorm4x8(vec4(result, 1.0));

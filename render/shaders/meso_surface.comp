@@ -16,19 +16,17 @@ uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/meso_texture.glsl"
 #include "render/shaders/meso_far.glsl"
 
-const float kNoHit = 1e30;
 // Pieces are met a little wider than they are, in weights of their corners, so that no rounding opens a gap between two; what is
 // met twice is the same surface. By at least kPieceSlack, ten times what single precision loses over a picture of some thousand
 // pieces, and by kRounding of the products that a weight is the sum of: small pieces far from the origin lose more.
 const float kPieceSlack = 2e-5, kRounding = 4e-7;
-const uint kBaseFace = 16u;  // Shell::kBase
 // A ray looks at no more nodes and pieces, and makes no more iterations in all its pieces; then it is unresolved, with
 // what it found. A ray along a base of five million triangles, 1600 quads across, passes a tenth of that.
 const uint kMostVisits = 65536u;
 const float kLeastSlope = 1.0 / 16.0;  // least slope of a ray to the slab: below it, textures are not blurred further
 
 struct ShellHit {
-    float t;        // along the ray; kNoHit
+    float t;        // along the ray; kMesoNoHit
     vec3 normal;    // not unit
     uint iterations;
     bool unresolved;
@@ -42,18 +40,18 @@ vec2 pixelWidth;
 // Gives a normal where the method has none: that of the nearest data, or of the voxel's face.
 vec3 fallbackNormal(vec3 p, vec3 d) {
     if (kWalk == kMesoRelief) {
-        vec2 at = p.xy * float(meso.fine.x), i = floor(at), w = at - i;
-        vec4 h = heightsAt(int(i.x), int(i.y)) * meso.scale.x;
-        return vec3(-vec2(mix(h.y - h.x, h.w - h.z, w.y), mix(h.z - h.x, h.w - h.y, w.x)) * float(meso.fine.x), 1.0);
+        vec3 at = p * float(meso.fine.x), i = floor(at);
+        vec4 h = heightsAt(int(i.x), int(i.y)) * meso.step;
+        return vec3(-slopeBilinear(h, at - i) * float(meso.fine.x), 1.0);
     }
     if (kWalk == kMesoSphere) {
         vec4 v0, v1;
         vec3 w;
-        sphereCorners(p, v0, v1, w);
-        return gradientTrilinear(v0, v1, w) / meso.cell.xyz;
+        distancesAt(p, v0, v1, w);
+        return gradientTrilinear(v0, v1, w) / meso.cell;
     }
     // Takes the wall that the point is nearest to, among those that the ray may enter by.
-    vec3 at = p * vec3(meso.cells.xyz) / meso.extent.xyz, off = abs(at - round(at));
+    vec3 at = p * vec3(meso.cells) / meso.extent, off = abs(at - round(at));
     off = mix(off, vec3(1.0), equal(d, vec3(0.0)));
     float least = min(off.x, min(off.y, off.z));
     return off.x == least ? vec3(-sign(d.x), 0.0, 0.0) : off.y == least ? vec3(0.0, -sign(d.y), 0.0) : vec3(0.0, 0.0, -sign(d.z));
@@ -68,7 +66,7 @@ struct Passage {
 };
 
 bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, out Passage passage) {
-    int at = int(2u * view.picture.z + 7u * piece);
+    int at = int(kShellNodeTexels * view.nodes + kShellPieceTexels * piece);
     vec4 corner = texelFetch(inputTexels, at);
     vec3 r0 = texelFetch(inputTexels, at + 1).xyz, r1 = texelFetch(inputTexels, at + 2).xyz, r2 = texelFetch(inputTexels, at + 3).xyz;
     vec3 p = o - corner.xyz;
@@ -87,7 +85,7 @@ bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, out Passag
             passage.entered = i;
             passage.enter = time;
         } else if (b[i] < 0.0 && time < passage.leave) {
-            passage.toBase = i == 3 && (uint(corner.w) & kBaseFace) != 0u;
+            passage.toBase = i == 3 && (uint(corner.w) & kShellBaseFace) != 0u;
             passage.leave = time;
         } else if (b[i] == 0.0 && a[i] < 0.0) return false;
     }
@@ -99,7 +97,7 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
     vec4 corner = texelFetch(inputTexels, at), r0 = texelFetch(inputTexels, at + 1), r1 = texelFetch(inputTexels, at + 2), r2 = texelFetch(inputTexels, at + 3);
     uint bits = uint(corner.w);
     // The weight of the corner above, whose row of R r2 is, grows away from the base.
-    if (entered == 3 && (bits & kBaseFace) != 0u && view.picture.w != 0u) {
+    if (entered == 3 && (bits & kShellBaseFace) != 0u && view.withBase != 0u) {
         best = ShellHit(start + passage.enter, -r2.xyz, best.iterations, best.unresolved, at, false);
         return;
     }
@@ -118,7 +116,7 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
         ray.isOutside = entered >= 0;
         vec3 cut = entered == 0 ? r0.xyz + r1.xyz + r2.xyz : entered == 1 ? -r0.xyz : entered == 2 ? -r1.xyz : -r2.xyz;
         bool far = kFromFar != 0u && isFar(t0, t1, t2, pixelWidth.x + pixelWidth.y * (start + passage.enter));
-        if (fromCut && (far ? ray.o.z < view.far.y : isSolidAt(ray.o))) {
+        if (fromCut && (far ? ray.o.z < view.meanHeight : isSolidAt(ray.o))) {
             best = ShellHit(start + passage.enter, cut, best.iterations, best.unresolved, at, false);
             return;
         }
@@ -137,17 +135,17 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
             return;
         }
     }
-    if (passage.toBase && view.picture.w != 0u) {
+    if (passage.toBase && view.withBase != 0u) {
         best = ShellHit(start + passage.leave, r2.xyz, best.iterations, best.unresolved, at, false);
     }
 }
 
 float boxEntry(uint node, vec3 o, vec3 inverse, float leave, out vec4 low, out vec4 high) {
-    low = texelFetch(inputTexels, int(2u * node));
-    high = texelFetch(inputTexels, int(2u * node + 1u));
+    low = texelFetch(inputTexels, int(kShellNodeTexels * node));
+    high = texelFetch(inputTexels, int(kShellNodeTexels * node + 1u));
     vec3 a = (low.xyz - o) * inverse, b = (high.xyz - o) * inverse, near = min(a, b), far = max(a, b);
     float first = max(0.0, max(near.x, max(near.y, near.z))), last = min(leave, min(far.x, min(far.y, far.z)));
-    return first <= last ? first : kNoHit;
+    return first <= last ? first : kMesoNoHit;
 }
 
 ShellHit castShell(vec3 eye, vec3 d, float tMax) {
@@ -155,10 +153,10 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     vec3 inverse = 1.0 / mix(d, vec3(1e-18), lessThan(abs(d), vec3(1e-18)));
     vec4 low, high;
     float start = boxEntry(0u, eye, inverse, tMax, low, high);
-    if (start >= kNoHit) return best;
+    if (start >= kMesoNoHit) return best;
     // The ray starts at the shell's box, where numbers are small.
     vec3 o = eye + start * d;
-    uint stack[32];
+    uint stack[kShellDepth];
     stack[0] = 0u;
     int depth = 1;
     uint piece = 0u, left = 0u, visits = 0u;
@@ -176,7 +174,7 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
                 continue;
             }
             uint node = stack[--depth];
-            if (boxEntry(node, o, inverse, best.t - start, low, high) >= kNoHit) continue;
+            if (boxEntry(node, o, inverse, best.t - start, low, high) >= kMesoNoHit) continue;
             if (high.w > 0.0) {
                 piece = uint(low.w);
                 left = uint(high.w);
@@ -187,8 +185,8 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
             float e0 = boxEntry(child, o, inverse, best.t - start, l, h), e1 = boxEntry(child + 1u, o, inverse, best.t - start, l, h);
             // The nearer child goes on top.
             uint swapped = e1 < e0 ? 1u : 0u;
-            if (max(e0, e1) < kNoHit) stack[depth++] = child + 1u - swapped;
-            if (min(e0, e1) < kNoHit) stack[depth++] = child + swapped;
+            if (max(e0, e1) < kMesoNoHit) stack[depth++] = child + 1u - swapped;
+            if (min(e0, e1) < kMesoNoHit) stack[depth++] = child + swapped;
         }
         if (passes) castPiece(passage, o, d, start, best);
         if (kShadow != 0u && best.t < tMax) return best;
@@ -201,7 +199,7 @@ ShellHit castShell(vec3 eye, vec3 d, float tMax) {
 // Returns the encoded colour at a hit, and the part of the light that reaches it; bends its normal. `width`: of a pixel
 // there, world units.
 vec4 lookAt(ShellHit hit, vec3 p, vec3 d, float width, inout vec3 n) {
-    vec4 look = vec4(view.colour.xyz, 1.0);
+    vec4 look = vec4(view.colour, 1.0);
     if (kTextures == 0u && !hit.far) return look;
     vec4 corner = texelFetch(inputTexels, hit.piece), q0 = texelFetch(inputTexels, hit.piece + 1), q1 = texelFetch(inputTexels, hit.piece + 2);
     mat3 gradients = mat3(texelFetch(inputTexels, hit.piece + 4).xyz, texelFetch(inputTexels, hit.piece + 5).xyz, texelFetch(inputTexels, hit.piece + 6).xyz);
@@ -220,36 +218,36 @@ vec4 lookAt(ShellHit hit, vec3 p, vec3 d, float width, inout vec3 n) {
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, view.picture.xy))) return;
+    if (pixel.x >= view.width || pixel.y >= view.height) return;
     vec2 at = vec2(pixel) + 0.5;
-    uint index = pixel.y * view.picture.x + pixel.x, plane = view.picture.x * view.picture.y;
+    uint index = pixel.y * view.width + pixel.x, plane = view.width * view.height;
     vec3 eye = view.eye.xyz + at.x * view.eyeX.xyz + at.y * view.eyeY.xyz;
     vec3 towards = view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz, d = normalize(towards);
-    float depth = uintBitsToFloat(hits[index]);
+    float depth = uintBitsToFloat(hits[kMesoPlaneDepth * plane + index]);
     pixelWidth = vec2(length(view.eyeX.xyz), length(view.forwardX.xyz) / length(towards));
     if (kShadow != 0u) {
-        uint colour = hits[2u * plane + index];
+        uint colour = hits[kMesoPlaneLook * plane + index];
         // Only mesostructure that is not yet in the dark casts a shadow ray.
-        if (hits[plane + index] == 0u || colour >> 24 == 0u) return;
-        vec3 n = unpackHitNormal(hits[plane + index]);
-        if (dot(n, view.light.xyz) <= 0.0) return;
+        if (hits[kMesoPlaneNormal * plane + index] == 0u || colour >> 24 == 0u) return;
+        vec3 n = unpackHitNormal(hits[kMesoPlaneNormal * plane + index]);
+        if (dot(n, view.light) <= 0.0) return;
         pixelWidth = vec2(pixelWidth.x + pixelWidth.y * depth, 0.0);
-        vec3 from = eye + depth * d + view.light.w * n;
-        ShellHit hit = castShell(from, view.light.xyz, kNoHit);
+        vec3 from = eye + depth * d + view.shadowLift * n;
+        ShellHit hit = castShell(from, view.light, kMesoNoHit);
         if (hit.unresolved) atomicAdd(counters[0], 1u);
-        if (hit.t < kNoHit) hits[2u * plane + index] = colour & 0xffffffu;
+        if (hit.t < kMesoNoHit) hits[kMesoPlaneLook * plane + index] = colour & 0xffffffu;
         return;
     }
     ShellHit hit = castShell(eye, d, depth);
-    hits[3u * plane + index] += hit.iterations;
+    hits[kMesoPlaneIterations * plane + index] += hit.iterations;
     if (hit.unresolved) atomicAdd(counters[0], 1u);
     if (!(hit.t < depth)) return;
     if (hit.far) atomicAdd(counters[1], 1u);
     vec3 n = normalize(hit.normal);
     vec4 look = lookAt(hit, eye + hit.t * d, d, pixelWidth.x + pixelWidth.y * hit.t, n);
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;
-    hits[index] = floatBitsToUint(hit.t);
+    hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(hit.t);
     // 0 means that a pixel has no mesostructure.
-    hits[plane + index] = max(packHitNormal(normalize(n)), 1u);
-    hits[2u * plane + index] = packUnorm4x8(look);
+    hits[kMesoPlaneNormal * plane + index] = max(packHitNormal(normalize(n)), 1u);
+    hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);
 }

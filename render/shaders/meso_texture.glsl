@@ -1,5 +1,4 @@
-// Textures over the tile (render/meso_texture.h), trilinear (Williams 1983). A texture is given by its first texel,
-// width, height, levels.
+// Textures over the tile (render/meso_texture.h), trilinear (Williams 1983).
 
 vec4 textureTexel(uint first, ivec2 size, ivec2 at) {
     at = ivec2(at.x < 0 ? at.x + size.x : at.x >= size.x ? at.x - size.x : at.x, at.y < 0 ? at.y + size.y : at.y >= size.y ? at.y - size.y : at.y);
@@ -7,12 +6,12 @@ vec4 textureTexel(uint first, ivec2 size, ivec2 at) {
 }
 
 // `at`: place in the tile, from 0 to 1.
-vec4 textureLevel(uvec4 image, uint level, vec2 at) {
-    uint first = image.x;
-    for (uint i = 0u; i < level; i++) first += max(image.y >> i, 1u) * max(image.z >> i, 1u);
-    ivec2 size = ivec2(max(image.yz >> level, uvec2(1u)));
+vec4 textureLevel(MesoImage image, uint level, vec2 at) {
+    uint first = image.first;
+    for (uint i = 0u; i < level; i++) first += max(image.width >> i, 1u) * max(image.height >> i, 1u);
+    ivec2 size = ivec2(max(uvec2(image.width, image.height) >> level, uvec2(1u)));
     // The finest texels lie on the grid points i / size.
-    vec2 p = (at + 0.5 / vec2(image.yz)) * vec2(size) - 0.5, low = floor(p), w = p - low;
+    vec2 p = (at + 0.5 / vec2(image.width, image.height)) * vec2(size) - 0.5, low = floor(p), w = p - low;
     ivec2 i = ivec2(low);
     vec4 lower = mix(textureTexel(first, size, i), textureTexel(first, size, i + ivec2(1, 0)), w.x);
     vec4 upper = mix(textureTexel(first, size, i + ivec2(0, 1)), textureTexel(first, size, i + 1), w.x);
@@ -20,9 +19,9 @@ vec4 textureLevel(uvec4 image, uint level, vec2 at) {
 }
 
 // Returns the mean over a square of edge `footprint` about `at`, both in tile units.
-vec4 sampleTexture(uvec4 image, vec2 at, float footprint) {
-    vec2 texel = meso.extent.xy / vec2(image.yz), part = at / meso.extent.xy;
-    float level = clamp(log2(max(footprint / min(texel.x, texel.y), 1.0)), 0.0, float(image.w - 1u));
+vec4 sampleTexture(MesoImage image, vec2 at, float footprint) {
+    vec2 texel = meso.extent.xy / vec2(image.width, image.height), part = at / meso.extent.xy;
+    float level = clamp(log2(max(footprint / min(texel.x, texel.y), 1.0)), 0.0, float(image.levels - 1u));
     uint finer = uint(level);
     part -= floor(part);
     vec4 value = textureLevel(image, finer, part);

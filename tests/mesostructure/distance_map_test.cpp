@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "mesostructure/march_arrays.h"
 #include "tests/support/meso_rays.h"
 
 namespace vcp::meso {
@@ -236,12 +237,18 @@ TEST(CompressedMap, IsNeverLongerAndKeepsTheSurface) {
     for (const std::vector<int>& factors : {std::vector<int>{2}, {4}, {8}, {4, 2}, {2, 2, 2}, {5}}) {
         const auto compressed = compressMap(map, factors);
         ASSERT_TRUE(compressed.ok());
+        const MarchArrays arrays = *gridArrays({.compressed = &*compressed}, {});
+        f32::ArrayMarch march{arrays.record, arrays.words.data(), 0, f32::kMesoCompressed, 0, 0};
         for (int cone = 0; cone < 8; ++cone)
             for (size_t i = 0; i < occupancy.cells.size(); ++i) {
                 const glm::ivec3 at = map.grid.at(i);
-                const CompressedMap::Found found = compressed->lookUp(cone, at - glm::ivec3(map.grid.cells.x, 0, 0));
+                uint32_t fetches = 0;
+                const f32::ArrayMarch::Space found =
+                    march.lookUp(uint32_t(cone), at - glm::ivec3(map.grid.cells.x, 0, 0), fetches);
                 ASSERT_EQ(found.occupied, occupancy.cells[i] != 0);
-                ASSERT_LE(found.length, found.occupied ? 0 : map.length(cone, at));
+                ASSERT_LE(found.reach, found.occupied ? 0 : map.length(cone, at));
+                ASSERT_GE(fetches, 1u);
+                ASSERT_LE(fetches, 2 * compressed->levels.size() - 1);
             }
         EXPECT_GT(compressed->texelRatio(), factors[0] == 2 ? 0.5 : 1.0);
     }

@@ -192,6 +192,26 @@ TEST(March, AwkwardRays) {
     }
 }
 
+/// 7 edges of cells add up to less than the slab here: what lies at the top must not be lost to that.
+TEST(March, RaysFromTheTopHitWhatTouchesIt) {
+    HeightMap map{.size = {14, 14}, .range = 0.03, .texels = std::vector<uint16_t>(196, 65535)};
+    const auto shape = test::heights(map);
+    const Occupancy occupancy = test::occupied(*shape, {7, 7, 7});
+    ASSERT_LT(map.range / occupancy.grid.cell.z, 7);
+    const OctantBoxes boxes = buildOctantBoxes(occupancy);
+    const DistanceMap distances = test::distances(occupancy, {.cones = {4, 1}});
+    for (const Skipping& skipping :
+         {Skipping{.occupancy = &occupancy}, Skipping{.distances = &distances}, Skipping{.boxes = &boxes}})
+        for (const Surface& surface : {Surface{}, Surface{.heights = &map}})
+            for (const glm::dvec3 direction : {glm::dvec3(0, 0, -1), glm::dvec3(0.6, 0, -0.8)}) {
+                const MarchRay ray{{0.51, 0.52, map.range}, direction};
+                ASSERT_TRUE(shape->trace(ray.origin, ray.direction, 1).hit);
+                const MarchResult found = test::walk(skipping, surface)->march(ray);
+                EXPECT_EQ(found.state, MarchState::Hit);
+                EXPECT_NEAR(found.t, 0, 1e-6);
+            }
+}
+
 TEST(March, CapsAreUnresolved) {
     const HeightMap map = *makeHeightField("needle", 16, 1);
     const auto shape = test::heights(map);

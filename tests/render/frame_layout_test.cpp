@@ -12,9 +12,9 @@
 #include "render/feedback_spirv.h"
 #include "render/frame.h"
 #include "render/light_spirv.h"
-#include "render/meso_arrays.h"
 #include "render/meso_surface_spirv.h"
 #include "render/paper_trace_spirv.h"
+#include "render/passes/meso_resources.h"
 #include "render/shade_spirv.h"
 #include "render/trace_spirv.h"
 
@@ -84,22 +84,40 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(sections)}));
 }
 
+#define AT(type, member) uint32_t(offsetof(type, member))
+
 TEST(FrameLayout, Mesostructure) {
     const Offsets offsets = offsetsIn(kMesoSurfaceSpirv);
-    ASSERT_TRUE(offsets.contains("MesoRecord") && offsets.contains("MesoView"));
-    using frame::MesoRecord, frame::MesoView;
-    const auto words = [](std::initializer_list<size_t> all) { return std::vector<uint32_t>(all.begin(), all.end()); };
-    EXPECT_EQ(offsets.at("MesoRecord"),
-              words({offsetof(MesoRecord, extent), offsetof(MesoRecord, cell), offsetof(MesoRecord, cells),
-                     offsetof(MesoRecord, fine), offsetof(MesoRecord, ratio), offsetof(MesoRecord, cones),
-                     offsetof(MesoRecord, top), offsetof(MesoRecord, at), offsetof(MesoRecord, scale),
-                     offsetof(MesoRecord, levels), offsetof(MesoRecord, borders)}));
+    for (const char* type : {"MesoRecord", "MesoLevel", "MesoBorder", "MesoView", "MesoImage"})
+        ASSERT_TRUE(offsets.contains(type)) << type;
+    using meso::f32::MesoRecord, meso::f32::MesoLevel, meso::f32::MesoBorder, frame::MesoView, frame::MesoImage;
+    using Words = std::vector<uint32_t>;
+    EXPECT_EQ(offsets.at("MesoRecord"), (Words{AT(MesoRecord, extent),     AT(MesoRecord, unit),
+                                               AT(MesoRecord, cell),       AT(MesoRecord, reach),
+                                               AT(MesoRecord, cells),      AT(MesoRecord, cellCount),
+                                               AT(MesoRecord, fine),       AT(MesoRecord, mostSteps),
+                                               AT(MesoRecord, ratio),      AT(MesoRecord, mostRefinements),
+                                               AT(MesoRecord, azimuths),   AT(MesoRecord, elevations),
+                                               AT(MesoRecord, levelCount), AT(MesoRecord, unused0),
+                                               AT(MesoRecord, top),        AT(MesoRecord, unused1),
+                                               AT(MesoRecord, skipping),   AT(MesoRecord, data),
+                                               AT(MesoRecord, rows),       AT(MesoRecord, patches),
+                                               AT(MesoRecord, step),       AT(MesoRecord, height),
+                                               AT(MesoRecord, tolerance),  AT(MesoRecord, unused2),
+                                               AT(MesoRecord, levels),     AT(MesoRecord, borders)}));
+    EXPECT_EQ(offsets.at("MesoLevel"), (Words{AT(MesoLevel, first), AT(MesoLevel, entries),
+                                              AT(MesoLevel, edgeAndFactor), AT(MesoLevel, bricks)}));
+    EXPECT_EQ(offsets.at("MesoBorder"), (Words{AT(MesoBorder, azimuth), AT(MesoBorder, elevation)}));
     EXPECT_EQ(
         offsets.at("MesoView"),
-        words({offsetof(MesoView, eye), offsetof(MesoView, eyeX), offsetof(MesoView, eyeY), offsetof(MesoView, forward),
-               offsetof(MesoView, forwardX), offsetof(MesoView, forwardY), offsetof(MesoView, picture),
-               offsetof(MesoView, light), offsetof(MesoView, colour), offsetof(MesoView, up),
-               offsetof(MesoView, colours), offsetof(MesoView, normals), offsetof(MesoView, far)}));
+        (Words{AT(MesoView, eye),        AT(MesoView, eyeX),     AT(MesoView, eyeY),        AT(MesoView, forward),
+               AT(MesoView, forwardX),   AT(MesoView, forwardY), AT(MesoView, width),       AT(MesoView, height),
+               AT(MesoView, nodes),      AT(MesoView, withBase), AT(MesoView, light),       AT(MesoView, shadowLift),
+               AT(MesoView, colour),     AT(MesoView, unused0),  AT(MesoView, up),          AT(MesoView, shows),
+               AT(MesoView, colours),    AT(MesoView, normals),  AT(MesoView, strayPixels), AT(MesoView, meanHeight),
+               AT(MesoView, farShadows), AT(MesoView, unused1)}));
+    EXPECT_EQ(offsets.at("MesoImage"),
+              (Words{AT(MesoImage, first), AT(MesoImage, width), AT(MesoImage, height), AT(MesoImage, levels)}));
 }
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }

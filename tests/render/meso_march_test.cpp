@@ -120,6 +120,32 @@ TEST_F(MesoMarch, SolidsAsTheReference) {
         expectSame(asset, *shape, {.name = "ddm", .cells = 13, .cones = cones}, rays);
 }
 
+/// The tile's edge along y is no sum of powers of two: rays of far tiles must not drift by its rounding.
+TEST_F(MesoMarch, RaysOfFarTilesHitWhereTheTruthSays) {
+    Asset asset;
+    asset.heights = *makeHeightField("fbm", 48, 3);
+    asset.heights->size.y = 16;
+    asset.heights->texels.resize(48 * 16);
+    const auto shape = test::heights(*asset.heights);
+    std::mt19937 random(1);
+    std::vector<MarchRay> rays;
+    for (int i = 0; i < 500; ++i) {
+        rays.push_back(test::rayFromTop(random, shape->extent(), 10));
+        rays.back().origin += glm::dvec3(-1e5, 3e5 * shape->extent().y, 0);
+    }
+    const auto method = buildMethod(asset, *shape, {.name = "pyramid"});
+    ASSERT_TRUE(method);
+    const auto marched = renderer_->march(std::array{&*method}, rays, 0);
+    ASSERT_TRUE(marched) << marched.error().line();
+    const auto marcher = *method->marcher();
+    for (size_t i = 0; i < rays.size(); ++i) {
+        const TruthHit truth = shape->trace(rays[i].origin, rays[i].direction, 100);
+        ASSERT_TRUE(truth.hit);
+        EXPECT_NEAR(marched->front().results[i].t, truth.t, 1e-3) << "ray " << i;
+        EXPECT_NEAR(marcher->march(rays[i]).t, truth.t, 1e-3) << "ray " << i;
+    }
+}
+
 TEST_F(MesoMarch, CapsAreUnresolved) {
     Asset asset;
     asset.heights = *makeHeightField("needle", 16, 1);

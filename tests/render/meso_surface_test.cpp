@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mesostructure/method.h"
 #include "render/passes/meso_surface.h"
 #include "tests/support/meso_rays.h"
 #include "tests/support/renderer_fixture.h"
@@ -39,7 +40,7 @@ protected:
         BaseSurface surface = *makeBaseSurface(base, tiles);
         for (glm::dvec3& p : surface.positions) p += place;
         MesoSurface placed;
-        placed.arrays = std::make_shared<const MesoArrays>(*packMesoArrays(*made));
+        placed.arrays = std::make_shared<const MarchArrays>(*made->arrays());
         placed.shell = *buildShell(surface, height, asset.extent);
         placed.lift = shadowLift(*placed.arrays, tileEdge(surface));
         return placed;

@@ -18,11 +18,11 @@ namespace {
 
 constexpr int kTexels = 256;
 
-Result<std::shared_ptr<const MesoArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
+Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     VCP_TRY_ASSIGN(const auto method, buildMethod(asset, *shape, options));
-    VCP_TRY_ASSIGN(auto arrays, packMesoArrays(method));
-    return std::make_shared<const MesoArrays>(std::move(arrays));
+    VCP_TRY_ASSIGN(auto arrays, method.arrays());
+    return std::make_shared<const MarchArrays>(std::move(arrays));
 }
 
 Result<std::shared_ptr<const Appearance>> farOf(const Asset& asset, double heightScale) {

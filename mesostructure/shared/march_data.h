@@ -1,0 +1,137 @@
+// What a marcher reads of its arrays, every fetch counted (march_layout.h says where they lie). Compiles as GLSL and,
+// in a struct with the record `meso`, the constants kSkip and kSurface, fetchWord and fetchQuad, as C++
+// (mesostructure/array_marcher.cpp).
+
+INLINE uint fetchByte(uint array, uint i) { return (fetchWord(array + (i >> 2)) >> ((i & 3u) * 8u)) & 0xffu; }
+INLINE uint fetchShort(uint array, uint i) { return (fetchWord(array + (i >> 1)) >> ((i & 1u) * 16u)) & 0xffffu; }
+INLINE float signedShort(uint bits) { return float(int(bits << 16) >> 16); }
+
+// What is known of a cell: occupied, or what may be skipped.
+struct Space {
+    bool occupied;
+    ivec3 further;  // empty cells towards the ray
+    float reach;    // empty length from where the ray is
+    uint marks;     // which small cells of an occupied cell the surface passes (meso::markSmallCells); 0: not known
+};
+
+INLINE Space occupiedSpace(uint marks) {
+    Space space;
+    space.occupied = true;
+    space.further = ivec3(0);
+    space.reach = 0.0f;
+    space.marks = marks;
+    return space;
+}
+
+INLINE Space emptySpace(ivec3 further, float reach) {
+    Space space;
+    space.occupied = false;
+    space.further = further;
+    space.reach = reach;
+    space.marks = 0u;
+    return space;
+}
+
+// Looks up a cell of a compressed map, level by level.
+INLINE Space lookUp(uint cone, ivec3 cell, INOUT(uint) fetches) {
+    ivec3 at = ivec3(wrappedCells(cell.x, cell.y, ivec2(meso.cells)), cell.z);
+    ivec3 block = at / int(meso.levels[0].edgeAndFactor >> 16);
+    uint entry = uint(block.x + meso.top.x * (block.y + meso.top.y * block.z));
+    for (int i = 0; i < meso.levelCount; ++i) {
+        MesoLevel level = meso.levels[i];
+        uint steps = fetchByte(level.first, cone * level.entries + entry);
+        fetches++;
+        if (steps != kMesoOccupied) return emptySpace(ivec3(0), float(steps) * meso.unit);
+        if (i + 1 == meso.levelCount) break;
+        uint below = meso.levels[i + 1].edgeAndFactor;
+        int edge = int(level.edgeAndFactor >> 16), factor = int(below & 0xffffu);
+        ivec3 local = at % edge / int(below >> 16);
+        entry = fetchWord(level.bricks + entry) * uint(factor * factor * factor) +
+                uint(local.x + factor * (local.y + factor * local.z));
+        fetches++;
+    }
+    return occupiedSpace(0u);
+}
+
+// `direction`: the cone, or the octant.
+INLINE Space spaceAt(int direction, ivec3 cell, INOUT(uint) fetches) {
+    if (kSkip == kMesoCompressed) return lookUp(uint(direction), cell, fetches);
+    fetches++;
+    uint slot = uint(direction) * uint(meso.cellCount) + cellIndex(cell, meso.cells);
+    if (kSkip == kMesoBoxes) {
+        uint box = fetchShort(meso.skipping, slot);
+        if ((box & kMesoBoxOccupied) != 0u) return occupiedSpace(box & (kMesoBoxOccupied - 1u));
+        return emptySpace(ivec3(int(box & 31u), int((box >> 5) & 31u), int((box >> 10) & 31u)), 0.0f);
+    }
+    uint steps = fetchByte(meso.skipping, slot);
+    if (kSkip == kMesoOccupancy) {
+        if (steps != 0u) return occupiedSpace(0u);
+        return emptySpace(ivec3(0), 0.0f);
+    }
+    if (steps == kMesoOccupied) return occupiedSpace(0u);
+    return emptySpace(ivec3(0), float(steps) * meso.unit);
+}
+
+INLINE Patch fetchPatch(uint i) {
+    uint at = meso.patches + 5u * i;
+    vec4 q0 = uintBitsToFloat(fetchQuad(at)), q1 = uintBitsToFloat(fetchQuad(at + 1u));
+    vec4 q2 = uintBitsToFloat(fetchQuad(at + 2u)), q3 = uintBitsToFloat(fetchQuad(at + 3u));
+    uvec4 last = fetchQuad(at + 4u);
+    vec4 q4 = uintBitsToFloat(last);
+    Patch it;
+    it.quadric[0] = q0.x;
+    it.quadric[1] = q0.y;
+    it.quadric[2] = q0.z;
+    it.quadric[3] = q0.w;
+    it.quadric[4] = q1.x;
+    it.quadric[5] = q1.y;
+    it.quadric[6] = q1.z;
+    it.quadric[7] = q1.w;
+    it.quadric[8] = q2.x;
+    it.quadric[9] = q2.y;
+    it.u = vec4(q2.z, q2.w, q3.x, q3.y);
+    it.v = vec4(q3.z, q3.w, q4.x, q4.y);
+    it.isTriangle = last.z;
+    return it;
+}
+
+INLINE vec4 samplesAt(uvec4 at) {
+    return vec4(signedShort(fetchShort(meso.data, at.x)), signedShort(fetchShort(meso.data, at.y)),
+                signedShort(fetchShort(meso.data, at.z)), signedShort(fetchShort(meso.data, at.w)));
+}
+
+// Returns the places of a cell and of its neighbours towards +x, +y and both, in a plane of cells.
+INLINE uvec4 cornersOf(int x, int y, ivec2 cells) {
+    ivec2 a = wrappedCells(x, y, cells), b = nextCells(a, cells);
+    return uvec4(a.x + cells.x * a.y, b.x + cells.x * a.y, a.x + cells.x * b.y, b.x + cells.x * b.y);
+}
+
+// Returns the heights of the bilinear cell at a texel, in 16-bit steps.
+INLINE vec4 heightsAt(int x, int y) {
+    uvec4 at = cornersOf(x, y, ivec2(meso.fine));
+    return vec4(fetchShort(meso.data, at.x), fetchShort(meso.data, at.y), fetchShort(meso.data, at.z),
+                fetchShort(meso.data, at.w));
+}
+
+// Returns the samples at the corners of a field's cell, below and above.
+INLINE void fieldAt(ivec3 cell, OUT(vec4) v0, OUT(vec4) v1) {
+    uint plane = uint(meso.fine.x * meso.fine.y);
+    uvec4 at = cornersOf(cell.x, cell.y, ivec2(meso.fine)) + uint(cell.z) * plane;
+    v0 = samplesAt(at);
+    v1 = samplesAt(at + plane);
+}
+
+// Returns the distances at the cells' centres around a point, and its place between them; z does not repeat.
+INLINE void distancesAt(vec3 p, OUT(vec4) v0, OUT(vec4) v1, OUT(vec3) w) {
+    vec3 at = p / meso.cell - 0.5f, first = floor(at);
+    w = at - first;
+    ivec3 cell = ivec3(first);
+    ivec2 z = clamp(ivec2(cell.z, cell.z + 1), 0, meso.cells.z - 1);
+    uint plane = uint(meso.cells.x * meso.cells.y);
+    uvec4 column = cornersOf(cell.x, cell.y, ivec2(meso.cells));
+    v0 = samplesAt(column + uint(z.x) * plane);
+    v1 = samplesAt(column + uint(z.y) * plane);
+}
+
+// Blends the values at four corners, x fastest.
+INLINE float blendCorners(vec4 v, vec3 w) { return mix(mix(v.x, v.y, w.x), mix(v.z, v.w, w.x), w.y); }

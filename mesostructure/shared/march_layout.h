@@ -1,0 +1,61 @@
+// The arrays that a marcher reads, and the record that says where each begins. Compiles as C++
+// (mesostructure/march_arrays.h) and as GLSL, made of groups of 16 bytes. All arrays are one run of 32-bit words, read
+// as single words and as aligned fours ("quads"); bytes and 16-bit values are packed low end first.
+
+const uint kMesoMaxLevels = 14u;
+const uint kMesoMostBorders = 32u;
+
+// The values of the constants that choose a marcher.
+const uint kMesoGrid = 0u, kMesoRelief = 1u, kMesoPyramid = 2u, kMesoSphere = 3u;            // kWalk
+const uint kMesoOccupancy = 0u, kMesoDistances = 1u, kMesoCompressed = 2u, kMesoBoxes = 3u;  // kSkip
+const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u;            // kSurface
+const uint kMesoUnrefined = 0u, kMesoBinary = 1u, kMesoSecant = 2u, kMesoAsPrinted = 3u,
+           kMesoIllinois = 4u;  // kRefinement
+
+const uint kMesoHit = 0u, kMesoMiss = 1u, kMesoUnresolved = 2u;  // the states of a ray
+
+const uint kMesoMostIterations = 8192u;  // of a walk; then the ray is unresolved
+const uint kMesoMostSteps = 254u;        // the longest length of a distance map
+const uint kMesoOccupied = 255u;         // in place of a length
+
+// The word of an occupied cell of octant boxes, and of one that says which of its small cells the surface passes.
+const uint kMesoBoxOccupied = 0x8000u, kMesoSmallCells = 0x4000u;
+
+// A level of a compressed map or of a pyramid.
+struct MesoLevel {
+    uint first;          // word of the steps, or of the maxima
+    uint entries;        // of a cone, or of a row
+    uint edgeAndFactor;  // (compressed) edge * 65536 + factor
+    uint bricks;         // (compressed) word of the bricks
+};
+
+// Where cones meet (meso::ConeBorders).
+struct MesoBorder {
+    vec2 azimuth, elevation;
+};
+
+struct MesoRecord {
+    vec3 extent;  // of the tile
+    float unit;   // tile units of one step of a length
+    vec3 cell;    // edges, tile units
+    float reach;  // (sphere) the distance that is a hit, tile units
+    ivec3 cells;  // of the grid
+    int cellCount;
+    ivec3 fine;           // texels or samples along the axes
+    int mostSteps;        // (sphere, relief)
+    ivec3 ratio;          // texels or samples a cell
+    int mostRefinements;  // (relief)
+    int azimuths, elevations, levelCount, unused0;
+    ivec3 top;  // (compressed) entries of level 0
+    int unused1;
+    uint skipping;    // word of what skips
+    uint data;        // word of texels, samples or ranks
+    uint rows;        // word of the rows
+    uint patches;     // first quad of the patches
+    float step;       // tile units of a step of a height or (sphere) of a distance
+    float height;     // of the slab, tile units
+    float tolerance;  // (relief)
+    float unused2;
+    MesoLevel levels[kMesoMaxLevels];
+    MesoBorder borders[kMesoMostBorders];
+};

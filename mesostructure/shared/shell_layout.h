@@ -1,0 +1,9 @@
+// The sizes of a shell's texels (mesostructure/shell.h) and of an appearance's (mesostructure/appearance.h). Compiles
+// as C++ (mesostructure/march_math.h) and as GLSL.
+
+const uint kShellNodeTexels = 2u, kShellPieceTexels = 7u;
+const uint kShellDepth = 32u;     // of the tree of nodes
+const uint kShellBaseFace = 16u;  // the bit of a piece's face that is the base
+
+const uint kAppearanceViews = 8u;   // along an edge of the grid
+const uint kAppearanceTexels = 6u;  // of a view
