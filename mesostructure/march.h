@@ -120,7 +120,8 @@ struct SphereMap {
 Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options);
 std::unique_ptr<Marcher> sphereMarcher(const SphereMap& map);
 
-/// Traces in double precision, with no skipping and every cell solved: the truth about a method's own stored data.
+/// Traces in double precision, with no skipping and every cell solved: the truth about a method's own stored data. Its
+/// walk is its own, and shares no code with the marchers'.
 TruthHit traceField(const SampledField& field, const MarchRay& ray);
 
 }  // namespace vcp::meso

@@ -1,6 +1,6 @@
 // Finds where a ray first enters the solid inside one cell: closed forms for the bilinear height field and, one
 // monotone piece after the other, for the trilinear field. The function f along the ray is above 0 outside the solid.
-// Compiles as GLSL (Real = float) and as C++ in float and double (mesostructure/cell_solve.h). Only the common subset
+// Compiles as GLSL (Real = float) and as C++ in float and double (mesostructure/march_math.h). Only the common subset
 // of GLSL and GLM is used: no swizzles, no constructors of structs.
 //
 // The side travels with the ray: `outside` says on which side it came to the cell. A ray that was outside and finds f

@@ -1,5 +1,5 @@
 // A ray among the cells of a grid, in the grid's own units and integer cells; t stays in tile units. Compiles as GLSL
-// and as C++ (mesostructure/march_arrays.h).
+// and as C++ (mesostructure/march_math.h).
 
 const float kFar = 1e30f;       // in place of a wall that a parallel ray never meets
 const float kMostReach = 1e6f;  // tile units that a ray travels at most

@@ -1,6 +1,6 @@
 // What a marcher reads of its arrays, every fetch counted (march_layout.h says where they lie). Compiles as GLSL and,
 // in a struct with the record `meso`, the constants kSkip and kSurface, fetchWord and fetchQuad, as C++
-// (mesostructure/array_marcher.cpp).
+// (mesostructure/march_math.h).
 
 INLINE uint fetchByte(uint array, uint i) { return (fetchWord(array + (i >> 2)) >> ((i & 3u) * 8u)) & 0xffu; }
 INLINE uint fetchShort(uint array, uint i) { return (fetchWord(array + (i >> 1)) >> ((i & 1u) * 16u)) & 0xffffu; }

@@ -1,5 +1,5 @@
 // The arrays that a marcher reads, and the record that says where each begins. Compiles as C++
-// (mesostructure/march_arrays.h) and as GLSL, made of groups of 16 bytes. All arrays are one run of 32-bit words, read
+// (mesostructure/march_math.h) and as GLSL, made of groups of 16 bytes. All arrays are one run of 32-bit words, read
 // as single words and as aligned fours ("quads"); bytes and 16-bit values are packed low end first.
 
 const uint kMesoMaxLevels = 14u;

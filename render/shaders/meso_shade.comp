@@ -19,7 +19,8 @@ void main() {
     uint shown = view.shows;
     if (shown == kMesoShowHeat) {
         uint iterations = hits[kMesoPlaneIterations * plane + index];
-        if (iterations > 0u) picturePixels[index] = packUnorm4x8(vec4(heat(min(float(iterations) / kMesoHottest, 1.0)), 1.0));
+        if (iterations > 0u)
+            picturePixels[index] = packUnorm4x8(vec4(heat(min(float(iterations) / kMesoHottest, 1.0)), 1.0));
         return;
     }
     uint code = hits[kMesoPlaneNormal * plane + index];

@@ -1,7 +1,12 @@
 // Textures over the tile (render/meso_texture.h), trilinear (Williams 1983).
 
 vec4 textureTexel(uint first, ivec2 size, ivec2 at) {
-    at = ivec2(at.x < 0 ? at.x + size.x : at.x >= size.x ? at.x - size.x : at.x, at.y < 0 ? at.y + size.y : at.y >= size.y ? at.y - size.y : at.y);
+    at = ivec2(at.x < 0         ? at.x + size.x
+               : at.x >= size.x ? at.x - size.x
+                                : at.x,
+               at.y < 0         ? at.y + size.y
+               : at.y >= size.y ? at.y - size.y
+                                : at.y);
     return texelFetch(lookTexels, int(first) + at.x + size.x * at.y);
 }
 
@@ -29,7 +34,9 @@ vec4 sampleTexture(MesoImage image, vec2 at, float footprint) {
 }
 
 // Encodes a linear colour as it is shown (sRGB).
-vec3 encodedColour(vec3 light) { return mix(1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, light * 12.92, lessThanEqual(light, vec3(0.0031308))); }
+vec3 encodedColour(vec3 light) {
+    return mix(1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, light * 12.92, lessThanEqual(light, vec3(0.0031308)));
+}
 
 // Returns the tile's axes in the world, made orthonormal: z out of the slab, x and y along it.
 mat3 tileFrame(mat3 gradients) {
