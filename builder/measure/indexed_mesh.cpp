@@ -1,6 +1,6 @@
 #include "builder/measure/indexed_mesh.h"
 
-#include <limits>
+#include <fmt/format.h>
 
 #include "builder/mesh/open_mesh.h"
 
@@ -8,35 +8,74 @@ namespace vcp {
 
 namespace {
 
-Result<void> append(const std::filesystem::path& path, IndexedMesh& mesh) {
-    VCP_TRY_ASSIGN(auto stream, openMesh(path));
+/// Appends a chunk's coordinates, or clears all once triangles have none.
+void addCoordinates(const MeshChunk& chunk, size_t before, IndexedMesh& mesh) {
+    if (mesh.coordinates.size() != before) return;
+    mesh.coordinates.insert(mesh.coordinates.end(), chunk.coordinates.begin(), chunk.coordinates.end());
+    // In the streams' own coordinates v grows downwards.
+    if (chunk.coordinates.empty())
+        for (const auto& uv : chunk.uvs) {
+            auto& map = mesh.coordinates.emplace_back();
+            for (int k = 0; k < 3; ++k) map[k] = glm::dvec2(uv[k].x, 1 - uv[k].y);
+        }
+    if (mesh.coordinates.size() != mesh.triangles.size()) mesh.coordinates = {};
+}
+
+Result<void> append(MeshStream& stream, const std::string& name, const LoadOptions& options, IndexedMesh& mesh) {
     const uint64_t base = mesh.positions.size();
-    MeshChunk chunk;
-    while (true) {
-        VCP_TRY_ASSIGN(auto more, stream->next(chunk));
+    const auto fail = [&](ErrorCode code, std::string message) {
+        return Error{.code = code, .message = std::move(message), .file = name};
+    };
+    for (MeshChunk chunk;;) {
+        VCP_TRY_ASSIGN(const auto more, stream.next(chunk));
         if (!more) return {};
-        if (mesh.positions.size() + chunk.positions.size() > std::numeric_limits<uint32_t>::max())
-            return Error{.code = ErrorCode::Limit,
-                         .message = "more vertices than a mesh in memory can number",
-                         .file = path.string()};
+        if (mesh.positions.size() + chunk.positions.size() > options.mostPositions ||
+            mesh.triangles.size() + chunk.triangles.size() > options.mostTriangles)
+            return fail(ErrorCode::Limit,
+                        fmt::format("has more than {} triangles or {} vertices, the most that are held in memory here",
+                                    options.mostTriangles, options.mostPositions));
         mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
+        const size_t before = mesh.triangles.size();
         for (const auto& t : chunk.triangles)
             mesh.triangles.push_back({uint32_t(base + t[0]), uint32_t(base + t[1]), uint32_t(base + t[2])});
+        if (options.coordinates != Coordinates::OfMaterials) addCoordinates(chunk, before, mesh);
+        if (options.coordinates == Coordinates::Required && mesh.coordinates.size() != mesh.triangles.size())
+            return fail(ErrorCode::InvalidInput,
+                        "has no texture coordinates, which say where things go on the surface; unwrap the mesh first");
+        const double size = double(stream.info().fileBytes);
+        if (options.progress && !options.progress(size > 0 ? double(stream.bytesRead()) / size : 0))
+            return fail(ErrorCode::Cancelled, "cancelled");
     }
 }
 
 }  // namespace
 
+Result<IndexedMesh> loadMesh(MeshStream& stream, const std::string& name, const LoadOptions& options) {
+    IndexedMesh mesh;
+    VCP_TRY(append(stream, name, options, mesh));
+    if (mesh.triangles.empty())
+        return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle", .file = name};
+    return mesh;
+}
+
+Result<IndexedMesh> loadMesh(const std::filesystem::path& path, const LoadOptions& options) {
+    MeshOpenOptions open;
+    open.coordinates = options.coordinates;
+    VCP_TRY_ASSIGN(auto stream, openMesh(path, open));
+    return loadMesh(*stream, path.string(), options);
+}
+
 Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths) {
     IndexedMesh mesh;
-    for (const auto& path : paths) VCP_TRY(append(path, mesh));
+    for (const auto& path : paths) {
+        VCP_TRY_ASSIGN(auto stream, openMesh(path));
+        VCP_TRY(append(*stream, path.string(), {}, mesh));
+    }
     if (mesh.triangles.empty())
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "the mesh has no triangle",
                      .file = paths.empty() ? std::string() : paths.front().string()};
     return mesh;
 }
-
-Result<IndexedMesh> loadMesh(const std::filesystem::path& path) { return loadMesh(std::span(&path, 1)); }
 
 }  // namespace vcp

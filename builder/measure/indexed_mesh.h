@@ -1,15 +1,20 @@
-// A triangle mesh held in memory: what the measurements compare with. The build itself never holds a mesh.
+// A triangle mesh held in memory: what the measurements compare with, and what surfaces and tiles are made from. The
+// build itself never holds a mesh.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "builder/stream/mesh_stream.h"
 #include "octree/result.h"
 
 namespace vcp {
@@ -17,6 +22,8 @@ namespace vcp {
 struct IndexedMesh {
     std::vector<glm::dvec3> positions;               ///< world
     std::vector<std::array<uint32_t, 3>> triangles;  ///< numbers of positions
+    /// Texture coordinates of the triangles' corners, v growing upwards; one for each triangle, or none.
+    std::vector<std::array<glm::dvec2, 3>> coordinates;
 
     [[nodiscard]] std::array<glm::dvec3, 3> corners(uint64_t triangle) const {
         const auto& t = triangles[triangle];
@@ -24,9 +31,21 @@ struct IndexedMesh {
     }
 };
 
-/// Reads meshes through openMesh and joins them. Errors: what the readers say; InvalidInput where there is no
-/// triangle; Limit at 2^32 vertices.
+struct LoadOptions {
+    /// OfMaterials: without coordinates. IfAny: where all triangles have them. Required: else it is an error.
+    Coordinates coordinates = Coordinates::OfMaterials;
+    uint64_t mostTriangles = std::numeric_limits<uint32_t>::max();
+    uint64_t mostPositions = std::numeric_limits<uint32_t>::max();
+    /// Takes the part of the file that is read, from 0 to 1; returning false cancels.
+    std::function<bool(double fraction)> progress = {};
+};
+
+/// Reads a mesh to its end. `name` stands for it in errors. Errors: what the reader says; InvalidInput where there is
+/// no triangle, or one without coordinates that are required; Limit; Cancelled.
+Result<IndexedMesh> loadMesh(MeshStream& stream, const std::string& name, const LoadOptions& options);
+/// Reads a file through openMesh.
+Result<IndexedMesh> loadMesh(const std::filesystem::path& path, const LoadOptions& options = {});
+/// Reads meshes and joins them. Errors: Limit at 2^32 vertices.
 Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths);
-Result<IndexedMesh> loadMesh(const std::filesystem::path& path);
 
 }  // namespace vcp

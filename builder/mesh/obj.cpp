@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -40,10 +41,19 @@ struct VertexNumbers {
     [[nodiscard]] const double* colour() const { return values.data() + (count == 6 ? 3 : 4); }
 };
 
+// Without materials where all coordinates are wanted.
+MeshOpenOptions paintOf(MeshOpenOptions options) {
+    options.materials = options.materials && options.coordinates == Coordinates::OfMaterials;
+    return options;
+}
+
 class ObjStream final : public MeshStream {
 public:
     ObjStream(ByteSource source, const std::filesystem::path& path, const MeshOpenOptions& options)
-        : source_(std::move(source)), materials_(path, options) {
+        : source_(std::move(source)),
+          materials_(path, paintOf(options)),
+          wanted_(options.coordinates),
+          mostCoordinates_(options.mostCoordinates) {
         info_.format = "OBJ";
         info_.fileBytes = source_.fileBytes();
         // The shortest vertex is "v 0 0 0\n".
@@ -154,6 +164,9 @@ private:
             VCP_TRY(readFace(p, chunk));
         } else if (materials_.active()) {
             VCP_TRY(readPaint(p));
+        } else if (const char* const q = wantsAll() ? afterKeyword(p, "vt") : nullptr) {
+            p = q;
+            VCP_TRY(readCoordinates(p));
         }
         p = lineEnd(p);
         if (p != end_) {
@@ -184,6 +197,31 @@ private:
             p = q;
             return materials_.addUv(numbers.values[0], numbers.values[1]);
         }
+        return {};
+    }
+
+    bool wantsAll() const { return wanted_ != Coordinates::OfMaterials; }
+
+    Result<void> readCoordinates(const char*& p) {
+        VertexNumbers numbers;
+        if (!readNumbers(p, numbers)) return wrong(p, shownWord(p, end_) + " is not a number");
+        const glm::dvec2 uv(numbers.values[0], numbers.values[1]);
+        if (numbers.count < 2 || !std::isfinite(uv.x) || !std::isfinite(uv.y))
+            return wrong(p, "texture coordinates are two finite numbers");
+        if (coordinates_.size() == mostCoordinates_)
+            return source_.error(ErrorCode::Limit, fmt::format("line {}", line_), byteAt(p),
+                                 fmt::format("has more than {} texture coordinates", mostCoordinates_));
+        coordinates_.push_back(uv);
+        return {};
+    }
+
+    Result<void> addCoordinates(const std::array<std::optional<uint64_t>, 3>& uvs, MeshChunk& chunk) const {
+        if (uvs[0] && uvs[1] && uvs[2])
+            chunk.coordinates.push_back({coordinates_[*uvs[0]], coordinates_[*uvs[1]], coordinates_[*uvs[2]]});
+        else if (wanted_ == Coordinates::Required)
+            return source_.error(ErrorCode::InvalidInput, fmt::format("line {}", line_), std::nullopt,
+                                 "has no texture coordinates before it, which say where things go on the surface; "
+                                 "unwrap the mesh first");
         return {};
     }
 
@@ -259,6 +297,7 @@ private:
             if (corner == 0) uvs[0] = uvs[2];
             if (corner > 1) chunk.triangles.push_back({first, last, vertex});
             if (corner > 1 && materials_.active()) VCP_TRY(materials_.paint(uvs, chunk));
+            if (corner > 1 && wantsAll()) VCP_TRY(addCoordinates(uvs, chunk));
             last = vertex;
             uvs[1] = uvs[2];
         }
@@ -279,7 +318,8 @@ private:
             promisedLine_ = line_;
             promisedByte_ = byteAt(p);
         }
-        uv = materials_.hasImages() && stop != end_ && *stop == '/' ? uvNumber(stop + 1) : std::nullopt;
+        const bool isOfUse = materials_.hasImages() || wantsAll();
+        uv = isOfUse && stop != end_ && *stop == '/' ? uvNumber(stop + 1) : std::nullopt;
         while (!endsWord(stop)) ++stop;
         p = stop;
         return {};
@@ -289,7 +329,7 @@ private:
     std::optional<uint64_t> uvNumber(const char* p) const {
         int64_t number = 0;
         if (!parseInteger(p, end_, number)) return std::nullopt;
-        const auto seen = int64_t(materials_.uvCount());
+        const auto seen = int64_t(wantsAll() ? coordinates_.size() : materials_.uvCount());
         if (number == 0 || number < -seen || number > seen) return std::nullopt;
         return uint64_t(number > 0 ? number - 1 : seen + number);
     }
@@ -315,8 +355,11 @@ private:
     ByteSource source_;
     MeshInfo info_;
     ObjMaterials materials_;
-    uint64_t lookedAtBytes_ = 0;  // the start of the file, where colours and materials are decided
-    double colourScale_ = 255.0;  // from the file's colours to 0..255
+    Coordinates wanted_;
+    uint64_t mostCoordinates_;
+    std::vector<glm::dvec2> coordinates_;  // when all are wanted
+    uint64_t lookedAtBytes_ = 0;           // the start of the file, where colours and materials are decided
+    double colourScale_ = 255.0;           // from the file's colours to 0..255
     uint64_t mostVertices_ = 0;
 
     const char* begin_ = nullptr;  // start of the window, which starts at the cursor

@@ -6,6 +6,7 @@
 //   one; vertices without one are white then.
 // - `f v v v ...`, each as v, v/t, v//n or v/t/n; numbers count from 1, negative ones back from the latest
 //   vertex. Polygons become fans about their first vertex; those with fewer than three are skipped.
+// - With MeshOpenOptions::coordinates all `vt` before a face count, and materials do not.
 // - Materials count when the MTL file is there (mtl.h), is named in the first 256 KiB, and has an image, or several
 //   different colours. Texture coordinates that a face names before they come are 0.
 // - A statement may continue in the next line after a backslash. A comment may follow on the line.

@@ -40,6 +40,9 @@ struct MeshChunk {
     /// 0) is the upper left corner of the image, v grows downwards; finite, 0 where the file has none.
     std::vector<std::array<glm::vec2, 3>> uvs;
     std::vector<uint32_t> materials;  ///< indices into MeshStream::materials(), or kNoMaterial
+    /// OBJ with MeshOpenOptions::coordinates: texture coordinates of the corners in the order of the triangles, as the
+    /// file has them, v growing upwards. Triangles without are left out, so there may be fewer than triangles.
+    std::vector<std::array<glm::dvec2, 3>> coordinates;
 
     void clear() {
         positions.clear();
@@ -47,6 +50,7 @@ struct MeshChunk {
         triangles.clear();
         uvs.clear();
         materials.clear();
+        coordinates.clear();
     }
 };
 
@@ -84,6 +88,13 @@ public:
     [[nodiscard]] virtual std::span<const SideFile> sideFiles() const { return {}; }
 };
 
+/// Which texture coordinates a reader hands on.
+enum class Coordinates {
+    OfMaterials,  ///< those that an image is looked up with: MeshChunk::uvs
+    IfAny,        ///< of an OBJ all of them, with or without materials, in double precision: MeshChunk::coordinates
+    Required,     ///< as before, and a face of an OBJ without them is an error
+};
+
 struct MeshOpenOptions {
     /// One of meshFormats() (open_mesh.h), without regard to case; empty: recognised by content, then by extension.
     /// Where the content is beyond doubt, it decides; a pipe needs this where the content is not.
@@ -92,6 +103,8 @@ struct MeshOpenOptions {
     /// The folder for data that must be read more than once (texture coordinates of a large OBJ, a piped GLB), in a
     /// file without a name. Empty: the system's folder for such files.
     std::filesystem::path tempFolder = {};
+    Coordinates coordinates = Coordinates::OfMaterials;
+    uint64_t mostCoordinates = 15'000'000;      ///< limit on those that an OBJ reader holds for Coordinates
     uint64_t decoderBytes = uint64_t{1} << 30;  ///< limit on the memory that decodes Draco and meshopt
 };
 

@@ -99,6 +99,36 @@ TEST(Obj, AMeshWithoutFacesIsAnError) {
     EXPECT_NE(read("# nothing\n").line().find("neither vertices nor faces"), std::string::npos);
 }
 
+/// Reads with coordinates; an error becomes its line.
+std::string coordinatesOf(std::string_view text, Coordinates wanted, uint64_t most,
+                          std::vector<std::array<glm::dvec2, 3>>& found) {
+    MeshOpenOptions options;
+    options.coordinates = wanted, options.mostCoordinates = most;
+    auto stream = openObj(ByteSource::fromMemory(text, "a.obj", 37), {}, options);
+    if (!stream) return stream.error().line();
+    for (MeshChunk chunk;;) {
+        const auto more = (*stream)->next(chunk);
+        if (!more) return more.error().line();
+        if (!*more) return "";
+        found.insert(found.end(), chunk.coordinates.begin(), chunk.coordinates.end());
+    }
+}
+
+TEST(Obj, HandsOnAllCoordinatesWhereTheyAreWanted) {
+    const std::string text = kSquare + "vt 0.1 0.2\nvt 3 4 5\nvt -1e-9 .5\nf 1/1 2/2 3/3 4/-1\nf 1 2 3\n";
+    std::vector<std::array<glm::dvec2, 3>> found;
+    EXPECT_EQ(coordinatesOf(text, Coordinates::IfAny, 3, found), "");
+    const glm::dvec2 a(0.1, 0.2), b(3, 4), c(-1e-9, 0.5);
+    EXPECT_EQ(found, (std::vector<std::array<glm::dvec2, 3>>{{a, b, c}, {a, c, c}}));
+    EXPECT_EQ(coordinatesOf(text, Coordinates::Required, 3, found).substr(0, 42),
+              "a.obj: line 9: has no texture coordinates b");
+    EXPECT_EQ(coordinatesOf(text, Coordinates::IfAny, 2, found),
+              "a.obj: line 7: byte 62: has more than 2 texture coordinates");
+    found.clear();
+    EXPECT_EQ(coordinatesOf(text, Coordinates::OfMaterials, 0, found), "");
+    EXPECT_TRUE(found.empty());
+}
+
 TEST(Obj, Utf16IsNamed) {
     const ReadMesh mesh = read(std::string_view("\xFE\xFF\0v", 4));
     ASSERT_TRUE(mesh.error);
