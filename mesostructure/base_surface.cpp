@@ -1,9 +1,11 @@
 #include "mesostructure/base_surface.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <numbers>
+#include <numeric>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -198,14 +200,18 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
 }
 
 void joinPositions(BaseSurface& surface) {
-    std::map<std::array<double, 3>, uint32_t> numbers;
+    const std::vector<dvec3>& all = surface.positions;
+    std::vector<uint32_t> order(all.size()), first(all.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto key = [&](uint32_t i) { return std::tie(all[i].x, all[i].y, all[i].z); };
+    std::ranges::sort(order, [&](uint32_t a, uint32_t b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
+    for (size_t i = 0; i < order.size(); ++i)
+        first[order[i]] = i > 0 && key(order[i - 1]) == key(order[i]) ? first[order[i - 1]] : order[i];
     std::vector<dvec3> kept;
-    std::vector<uint32_t> renumbered;
-    for (const dvec3 p : surface.positions) {
-        // Adding 0 turns -0 into 0.
-        const auto [at, isNew] = numbers.try_emplace({p.x + 0.0, p.y + 0.0, p.z + 0.0}, uint32_t(kept.size()));
-        if (isNew) kept.push_back(p);
-        renumbered.push_back(at->second);
+    std::vector<uint32_t> renumbered(all.size());
+    for (uint32_t i = 0; i < all.size(); ++i) {
+        renumbered[i] = first[i] == i ? uint32_t(kept.size()) : renumbered[first[i]];
+        if (first[i] == i) kept.push_back(all[i]);
     }
     for (auto& triangle : surface.triangles)
         for (uint32_t& corner : triangle) corner = renumbered[corner];

@@ -1,5 +1,5 @@
 // Base surfaces that mesostructure is laid on: triangles with a texture map in tile units. The shapes are made here;
-// mesh files come from viewer/scene/base_mesh.h.
+// mesh files come from viewer/scene/base_mesh.h. What looks at their edges is in mesostructure/base/.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ std::span<const std::string_view> baseSurfaceNames();
 /// not above 0).
 Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles);
 
-/// Gives equal positions one number.
+/// Gives equal positions one number, in the order in which they first come.
 void joinPositions(BaseSurface& surface);
 
 /// Returns the world units of a tile's edge, averaged over the area; 0 where the map has no area.

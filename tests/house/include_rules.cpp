@@ -30,6 +30,7 @@ const std::vector<Outside>& outsideRules() {
         {std::regex("GLFW/.*|.*imgui.*"),
          {"viewer/window", "viewer/examples"},
          "GLFW and ImGui belong to viewer/window/"},
+        {std::regex("OpenMesh/.*"), {"mesostructure/base"}, "OpenMesh belongs to mesostructure/base/"},
         {std::regex("CLI/.*"), {"viewer/command"}, "CLI11 belongs to viewer/command/"},
         {std::regex("thread|mutex|shared_mutex|condition_variable|future|stop_token|semaphore|latch|barrier|execution|"
                     "pthread\\.h|tbb/.*|oneapi/.*"),

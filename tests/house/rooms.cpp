@@ -23,13 +23,14 @@ const std::vector<Room>& rooms() {
         {"builder/paper", {"octree", "builder", "builder/mesh", "builder/measure"}},
 
         {"mesostructure", {"octree"}},
+        {"mesostructure/base", {"octree", "mesostructure"}},
         {"streaming", {"octree"}},
         {"render", {"octree", "mesostructure", "streaming"}},
 
         {"viewer/camera", {"octree", "render"}},
-        {"viewer/scene", {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/camera"}},
+        {"viewer/scene", {"octree", "builder/", "mesostructure/", "streaming", "render", "viewer/camera"}},
         {"viewer/picture", {"octree", "render"}},
-        {"viewer/asset", {"octree", "builder/", "mesostructure"}},
+        {"viewer/asset", {"octree", "builder/", "mesostructure/"}},
         {"viewer", {"octree", "render", "viewer/camera", "viewer/scene"}},
         {"viewer/widget",
          {"octree", "builder/", "render", "streaming", "viewer/camera", "viewer/scene", "viewer/picture", "viewer"}},
@@ -46,7 +47,7 @@ const std::vector<Room>& rooms() {
          {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/scene", "viewer", "viewer/bench/report",
           "viewer/bench/rays"}},
         {"viewer/command",
-         {"octree", "builder/", "mesostructure", "streaming", "render", "viewer/camera", "viewer/scene",
+         {"octree", "builder/", "mesostructure/", "streaming", "render", "viewer/camera", "viewer/scene",
           "viewer/picture", "viewer/asset", "viewer", "viewer/window", "viewer/bench/"}},
         {"viewer/examples", {}},
 
