@@ -2,6 +2,9 @@
 // numbers, or none.
 #include <cmath>
 
+#include "mesostructure/base/decimation.h"
+#include "mesostructure/base/subdivision.h"
+#include "mesostructure/base/surface_edges.h"
 #include "mesostructure/shell.h"
 #include "tests/fuzz/mesh_fuzz.h"
 #include "viewer/scene/base_mesh.h"
@@ -23,6 +26,22 @@ void checkShell(const vcp::meso::BaseSurface& base) {
         require(std::isfinite(texel.x + texel.y + texel.z + texel.w), "a shell is finite");
 }
 
+/// What is read is manifold, and so is what is made of it.
+void checkSurface(const vcp::meso::BaseSurface& base) {
+    const auto edges = vcp::meso::edgesOf(base);
+    require(edges.ok(), "a base is manifold");
+    const auto finer = vcp::meso::subdivided(base, 1);
+    require(finer.ok() == (edges->triangles > 0), "a base can be subdivided");
+    if (!finer) return;
+    require(finer->triangles.size() == 4 * edges->triangles, "four triangles of each");
+    require(vcp::meso::edgesOf(*finer).ok(), "what is finer is manifold");
+    const auto coarser = vcp::meso::decimated(base, {.triangles = base.triangles.size() / 2});
+    if (!coarser) return require(coarser.error().code == vcp::ErrorCode::Limit, "a base can be decimated");
+    const auto left = vcp::meso::edgesOf(*coarser);
+    require(left.ok() && left->parts == edges->parts, "what is coarser is manifold, with as many parts");
+    require((left->border == 0) == (edges->border == 0), "and closed where the base is");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -40,5 +59,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     for (const auto& triangle : base->triangles)
         for (const uint32_t corner : triangle) require(corner < base->positions.size(), "corners are in range");
     checkShell(*base);
+    if (base->triangles.size() <= 4096) checkSurface(*base);
     return 0;
 }

@@ -4,37 +4,56 @@
 #include <array>
 #include <limits>
 
+#include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "builder/mesh/open_mesh.h"
+#include "builder/measure/indexed_mesh.h"
+#include "mesostructure/base/surface_edges.h"
 
 namespace vcp {
+
+namespace {
+
+glm::dvec3 turned(glm::dvec3 p, char up) {
+    return up == 'x' ? glm::dvec3(p.y, p.z, p.x) : up == 'y' ? glm::dvec3(p.z, p.x, p.y) : p;
+}
+
+/// Joins corners at one place and refuses what is no surface, or has a border although it does not go on beyond the
+/// tile. Whether what repeats is closed is for meso::meshShape to say.
+Result<void> checkEdges(meso::BaseSurface& surface, const TileMeshOptions& options, const std::filesystem::path& path) {
+    const auto named = [&](Error error) {
+        error.file = path.string();
+        return error;
+    };
+    meso::joinPositions(surface);
+    const auto edges = meso::edgesOf(surface);
+    if (!edges) return named(edges.error());
+    if (edges->border > 0 && !options.period)
+        return named({.message = fmt::format("the mesh is not closed: {} of its edges have a triangle on one side "
+                                             "only, the first {}; close it, or name the length after which it "
+                                             "repeats (--period)",
+                                             edges->border, edges->firstBorder),
+                      .element = fmt::format("triangle {}", edges->firstBorderTriangle)});
+    return {};
+}
+
+}  // namespace
 
 Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshOptions& options) {
     const auto fail = [&](ErrorCode code, std::string message) {
         return Error{.code = code, .message = std::move(message), .file = path.string()};
     };
-    constexpr size_t kMost = 10'000'000;
-    MeshOpenOptions open;
-    open.materials = false;
-    VCP_TRY_ASSIGN(auto stream, openMesh(path, open));
-    std::vector<glm::dvec3> positions;
-    std::vector<std::array<uint64_t, 3>> triangles;
-    for (MeshChunk chunk;;) {
-        VCP_TRY_ASSIGN(const auto more, stream->next(chunk));
-        if (!more) break;
-        for (const glm::dvec3 p : chunk.positions)
-            positions.push_back(options.up == 'x'   ? glm::dvec3(p.y, p.z, p.x)
-                                : options.up == 'y' ? glm::dvec3(p.z, p.x, p.y)
-                                                    : p);
-        triangles.insert(triangles.end(), chunk.triangles.begin(), chunk.triangles.end());
-        if (triangles.size() > kMost || positions.size() > kMost)
-            return fail(ErrorCode::Limit, "a mesostructure has at most 10^7 triangles");
-    }
-    if (triangles.empty()) return fail(ErrorCode::InvalidInput, "has no triangle");
+    LoadOptions loading;
+    loading.mostTriangles = loading.mostPositions = 10'000'000;
+    VCP_TRY_ASSIGN(auto loaded, loadMesh(path, loading));
+    meso::BaseSurface surface{std::move(loaded.positions), std::move(loaded.triangles), {}};
+    for (glm::dvec3& p : surface.positions) p = turned(p, options.up);
+    VCP_TRY(checkEdges(surface, options, path));
+    const auto& positions = surface.positions;
+    const auto& triangles = surface.triangles;
     glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
     for (const auto& triangle : triangles)
-        for (const uint64_t corner : triangle)
+        for (const uint32_t corner : triangle)
             low = glm::min(low, positions[corner]), high = glm::max(high, positions[corner]);
     const glm::dvec3 size = high - low;
     if (!(std::max(size.x, size.y) > 0))

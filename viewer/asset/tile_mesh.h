@@ -24,7 +24,7 @@ struct TileMesh {
 };
 
 /// Reads a mesh whole and puts it into a tile, with a fiftieth of a tile free below and above. Errors: those of the
-/// mesh readers; InvalidInput (no triangle, no size), Limit (10^7 triangles, a slab above 16 tiles), with the file's
+/// mesh readers; InvalidInput (no triangle, no size, not manifold, a border although it stands alone), Limit (10^7 triangles, a slab above 16 tiles), with the file's
 /// name.
 Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshOptions& options);
 

@@ -10,6 +10,7 @@
 #include "mesostructure/solids.h"
 #include "viewer/asset/height_image.h"
 #include "viewer/asset/tile_mesh.h"
+#include "viewer/command/command_meso_base.h"
 #include "viewer/command/command_meso_render.h"
 #include "viewer/scene/option_values.h"
 
@@ -271,12 +272,18 @@ Command addMeso(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("meso", "Mesostructure assets");
     app->require_subcommand(1);
     const RunCommand build = addMesoBuild(*app), render = addMesoRender(*app);
-    const CLI::App* renderApp = app->get_subcommand("render");
+    const RunCommand base = addMesoBase(*app);
+    const CLI::App *renderApp = app->get_subcommand("render"), *baseApp = app->get_subcommand("base");
     auto info = std::make_shared<InfoMeso>();
     CLI::App* infoApp = app->add_subcommand("info", "Say what is in an asset");
     infoApp->add_option("FILE", info->file, "An asset made by `vcp meso build`")->type_name("")->required();
     addJsonOption(*infoApp, info->report);
-    return {app, [=] { return infoApp->parsed() ? runInfo(*info) : renderApp->parsed() ? render() : build(); }};
+    return {app, [=] {
+                return infoApp->parsed()     ? runInfo(*info)
+                       : renderApp->parsed() ? render()
+                       : baseApp->parsed()   ? base()
+                                             : build();
+            }};
 }
 
 }  // namespace vcp

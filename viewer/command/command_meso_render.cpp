@@ -15,6 +15,7 @@
 #include <glm/common.hpp>
 
 #include "builder/measure/quantile.h"
+#include "mesostructure/base/subdivision.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/scene/dataset_opening.h"
@@ -335,6 +336,10 @@ RunCommand addMesoRender(CLI::App& meso) {
                     "Tile edges along the surface, or a unit of a mesh's coordinates; for all assets, or each [4]")
         ->type_name("N")
         ->allow_extra_args(false);
+    app->add_option("--subdivide", d.subdivide, "Times that all surfaces are smoothed by Loop subdivision")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(0, meso::kMostSubdivisions));
     app->add_option("--height", command->heights, "Times the asset's own height; for all assets, or each [1]")
         ->type_name("X")
         ->allow_extra_args(false);

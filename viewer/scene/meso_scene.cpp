@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "mesostructure/base/subdivision.h"
 #include "mesostructure/solids.h"
 #include "viewer/scene/base_mesh.h"
 #include "viewer/scene/tile_texture.h"
@@ -37,6 +38,14 @@ bool isFile(const MesoSurfaceDescription& d) {
 
 Result<BaseSurface> baseOf(const MesoSurfaceDescription& d) {
     auto base = isFile(d) ? readBaseMesh(d.base, d.tiles) : makeBaseSurface(d.base, d.tiles);
+    if (base && d.subdivide > 0) {
+        base = subdivided(*base, d.subdivide);
+        if (!base && isFile(d)) {
+            Error error = base.error();
+            error.file = d.base;
+            return error;
+        }
+    }
     if (!base) return base;
     for (glm::dvec3& p : base->positions) p = d.place + d.scale * (isFile(d) ? p : turnedUp(p, d.up));
     return base;

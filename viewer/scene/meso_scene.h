@@ -32,6 +32,7 @@ struct MesoSurfaceDescription {
     meso::MethodOptions method;
     std::string base = "quad";  ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
     double tiles = 4;           ///< tile edges along the base (makeBaseSurface, readBaseMesh)
+    int subdivide = 0;          ///< times that Loop's rules are applied to the base (meso::subdivided)
     double heightScale = 1;     ///< height of the slab; 1: in the asset's own proportion to its tile's edge
     glm::dvec3 place{0};        ///< the base's origin, world
     double scale = 1;           ///< scale of the base, of mesh files too

@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "mesostructure/base/subdivision.h"
 #include "mesostructure/solids.h"
 #include "streaming/http_reader.h"
 #include "viewer/camera/json_lines.h"
@@ -154,7 +155,7 @@ private:
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
         onlyKeys(json, at,
-                 {"asset", "surface", "tiles", "height", "translate", "scale", "up", "colour", "texture",
+                 {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
                   "normal_texture", "method", "base"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
@@ -165,6 +166,7 @@ private:
         const auto bases = meso::baseSurfaceNames();
         const auto isMesh = [&](const std::string& name) { return std::ranges::find(bases, name) == bases.end(); };
         if (json.contains("surface")) made.base = named(json["surface"], at + "/surface", isMesh);
+        if (json.contains("subdivide")) made.subdivide = times(json["subdivide"], at + "/subdivide");
         if (json.contains("tiles")) made.tiles = scale(json["tiles"], at + "/tiles");
         if (json.contains("height")) made.heightScale = scale(json["height"], at + "/height");
         if (json.contains("translate")) made.place = triple(json["translate"], at + "/translate");
@@ -196,6 +198,13 @@ private:
             wrong(at, fmt::format("must be an asset (.meso), a height field ({}) or a solid ({})",
                                   fmt::join(meso::heightFieldNames(), ", "), fmt::join(meso::solidNames(), ", ")));
         return name;
+    }
+
+    int times(const Json& json, const std::string& at) {
+        const double count = json.is_number() ? json.get<double>() : -1;
+        if (!(count >= 0 && count <= meso::kMostSubdivisions && count == std::floor(count)))
+            return wrong(at, fmt::format("must be a whole number from 0 to {}", meso::kMostSubdivisions)), 0;
+        return int(count);
     }
 
     UpAxis upAxis(const Json& json, const std::string& at) {

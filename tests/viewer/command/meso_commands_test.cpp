@@ -285,6 +285,69 @@ TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
     EXPECT_NE(smeared.out.find("smeared"), std::string::npos) << smeared.out;
 }
 
+TEST_F(MesoCommands, DecimatesAScanToABase) {
+    const std::filesystem::path makeScan = std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan";
+    ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 10000 -o " + path("dog.obj")).c_str()), 0);
+    const Ran ran =
+        run("meso base " + path("dog.obj") + " --triangles 1500 --progress plain --json -o " + path("base.obj"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json told = Json::parse(ran.out);
+    EXPECT_LE(told["triangles"], 1500);
+    EXPECT_GE(told["triangles"], 1490);
+    EXPECT_EQ(told["texture_coordinates"], true);
+    EXPECT_NE(ran.err.find("collapsing edges"), std::string::npos) << ran.err;
+    // The base carries mesostructure, as it is and smoothed.
+    const std::string render = "meso render ball --tiles 20 --size 32x32 --json --surface " + path("base.obj") + " -o ";
+    const Ran once = run(render + path("a.png")), smooth = run(render + path("b.png") + " --subdivide 1");
+    ASSERT_EQ(once.status, 0) << once.err;
+    ASSERT_EQ(smooth.status, 0) << smooth.err;
+    EXPECT_GT(Json::parse(smooth.out)["panels"][0]["asset_bytes"],
+              2 * Json::parse(once.out)["panels"][0]["asset_bytes"].get<int64_t>());
+    // Written once more it is the same file, and it is not written over what it is made from.
+    const std::string first = contentOf(path("base.obj"));
+    EXPECT_EQ(run("meso base " + path("dog.obj") + " --triangles 1500 -o " + path("base.obj")).status, 0);
+    EXPECT_EQ(contentOf(path("base.obj")), first);
+    const std::string before = contentOf(path("dog.obj"));
+    const Ran over = run("meso base " + path("dog.obj") + " --triangles 1500 --overwrite -o " + path("dog.obj"));
+    EXPECT_EQ(over.status, 1);
+    EXPECT_EQ(over.errLines(), 1u) << over.err;
+    EXPECT_EQ(contentOf(path("dog.obj")), before);
+    EXPECT_EQ(run("meso base " + path("dog.obj") + " --triangles 1500 -o " + path("base.ply")).status, 2);
+}
+
+TEST_F(MesoCommands, AClosedScanBecomesAClosedBase) {
+    writeBall(path("ball.ply"), 40, 80);
+    const Ran ran = run("meso base " + path("ball.ply") + " --triangles 400 --json -o " + path("base.obj"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json told = Json::parse(ran.out);
+    EXPECT_EQ(told["triangles"], 400);
+    EXPECT_EQ(told["closed"], true);
+    EXPECT_EQ(told["parts"], 1);
+    EXPECT_EQ(told["texture_coordinates"], false);
+    EXPECT_EQ(told["vertices"], 202);
+    // It has no map yet.
+    const Ran bare = run("meso render ball --surface " + path("base.obj") + " -o " + path("a.png"));
+    EXPECT_EQ(bare.status, 1);
+    EXPECT_NE(bare.err.find("has no texture coordinates"), std::string::npos) << bare.err;
+}
+
+TEST_F(MesoCommands, WhatIsNotManifoldIsRefusedInOneLine) {
+    std::ofstream(path("fin.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
+                                      "f 1/1 2/2 3/3\nf 2/1 1/2 4/3\nf 1/1 2/2 5/3\n";
+    for (const std::string command : {"render ball --surface ", "base --triangles 4 ", "build --grid 8 "}) {
+        const std::string out = path(command.starts_with("render") ? "x.png"
+                                     : command.starts_with("base") ? "x.obj"
+                                                                   : "x.meso");
+        const Ran ran = run("meso " + command + path("fin.obj") + " -o " + out);
+        EXPECT_EQ(ran.status, 1) << command;
+        EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+        EXPECT_NE(ran.err.find("fin.obj: triangle 2: 3 triangles meet at the edge from (0, 0, 0) to (1, 0, 0)"),
+                  std::string::npos)
+            << ran.err;
+        EXPECT_FALSE(std::filesystem::exists(out));
+    }
+}
+
 TEST_F(MesoCommands, RendersMethodsSideBySide) {
     const Ran ran =
         run("meso render maze ball --method boxes,dm,cells --tiles 1 --at 0,0,0 --at 0.1,0.2,-0.05 --scale 1 --scale "
@@ -334,8 +397,9 @@ TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
         int status;
         std::string says;
     } cases[] = {{"fbm --surface " + path("bare.obj"), 1, "line 4: has no texture coordinates"},
-                 {"fbm --surface " + path("wild.obj"), 1, "names no vertex"},
-                 {"fbm --surface " + path("nan.obj"), 1, "three numbers"},
+                 {"fbm --surface " + path("wild.obj"), 1,
+                  "line 5: byte 45: a face names vertex 9, more than a file of this size can hold"},
+                 {"fbm --surface " + path("nan.obj"), 1, "line 2, vertex 2: byte 8: the position is not finite"},
                  {"fbm --surface " + path("bare.stl"), 1, "has no texture coordinates"},
                  {"fbm --surface " + path("none.obj"), 1, "none.obj"},
                  {"fbm --surface plate", 2, "teapot"},
