@@ -203,13 +203,14 @@ private:
     bool wantsAll() const { return wanted_ != Coordinates::OfMaterials; }
 
     Result<void> readCoordinates(const char*& p) {
+        const char* const start = p;
         VertexNumbers numbers;
         if (!readNumbers(p, numbers)) return wrong(p, shownWord(p, end_) + " is not a number");
         const glm::dvec2 uv(numbers.values[0], numbers.values[1]);
         if (numbers.count < 2 || !std::isfinite(uv.x) || !std::isfinite(uv.y))
-            return wrong(p, "texture coordinates are two finite numbers");
+            return wrong(start, "texture coordinates are two finite numbers");
         if (coordinates_.size() == mostCoordinates_)
-            return source_.error(ErrorCode::Limit, fmt::format("line {}", line_), byteAt(p),
+            return source_.error(ErrorCode::Limit, fmt::format("line {}", line_), byteAt(start),
                                  fmt::format("has more than {} texture coordinates", mostCoordinates_));
         coordinates_.push_back(uv);
         return {};

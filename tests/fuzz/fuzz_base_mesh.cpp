@@ -26,10 +26,13 @@ void checkShell(const vcp::meso::BaseSurface& base) {
         require(std::isfinite(texel.x + texel.y + texel.z + texel.w), "a shell is finite");
 }
 
-/// What is read is manifold, and so is what is made of it.
+/// What is made of a manifold surface is manifold; of others nothing is made.
 void checkSurface(const vcp::meso::BaseSurface& base) {
     const auto edges = vcp::meso::edgesOf(base);
-    require(edges.ok(), "a base is manifold");
+    if (!edges) {
+        require(edges.error().line().find('\n') == std::string::npos, "an error is one line");
+        return require(!vcp::meso::subdivided(base, 1) && !vcp::meso::decimated(base, {}), "and all say it");
+    }
     const auto finer = vcp::meso::subdivided(base, 1);
     require(finer.ok() == (edges->triangles > 0), "a base can be subdivided");
     if (!finer) return;

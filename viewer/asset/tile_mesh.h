@@ -24,8 +24,8 @@ struct TileMesh {
 };
 
 /// Reads a mesh whole and puts it into a tile, with a fiftieth of a tile free below and above. Errors: those of the
-/// mesh readers; InvalidInput (no triangle, no size, not manifold, a border although it stands alone), Limit (10^7 triangles, a slab above 16 tiles), with the file's
-/// name.
+/// mesh readers; InvalidInput (no triangle, no size, edges as meso::edgesOf says, a border although it stands alone),
+/// Limit (10^7 triangles, a slab above 16 tiles), with the file's name.
 Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshOptions& options);
 
 }  // namespace vcp

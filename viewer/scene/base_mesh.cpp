@@ -2,7 +2,6 @@
 
 #include "builder/measure/indexed_mesh.h"
 #include "builder/mesh/obj.h"
-#include "mesostructure/base/surface_edges.h"
 
 namespace vcp {
 
@@ -17,17 +16,12 @@ LoadOptions loading() {
 
 Result<meso::BaseSurface> surfaceOf(Result<IndexedMesh> mesh, const std::string& name, double tiles) {
     if (!mesh) return mesh.error();
-    const auto named = [&](Error error) {
-        error.file = name;
-        return error;
-    };
     meso::BaseSurface made{std::move(mesh->positions), std::move(mesh->triangles), std::move(mesh->coordinates)};
     for (auto& map : made.uvs)
         for (glm::dvec2& uv : map) uv *= tiles;
     if (!(meso::tileEdge(made) > 0))
-        return named({.message = "has no texture coordinates with an area; unwrap the mesh first"});
+        return Error{.message = "has no texture coordinates with an area; unwrap the mesh first", .file = name};
     meso::joinPositions(made);
-    if (const auto edges = meso::edgesOf(made); !edges) return named(edges.error());
     return made;
 }
 

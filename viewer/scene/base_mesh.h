@@ -10,8 +10,8 @@ namespace vcp {
 
 /// Reads a mesh with texture coordinates: OBJ (with or without materials), and the other formats where they have
 /// coordinates and a material. `tiles`: tile edges that one unit of the coordinates takes. The file may be hostile.
-/// Errors: those of openMesh; InvalidInput (a face without texture coordinates, a mesh that is not manifold as
-/// meso::edgesOf says); Limit (above 5 million triangles).
+/// Corners at one place share their number; the edges may be of any kind (meso::edgesOf says). Errors: those of
+/// openMesh; InvalidInput (a face without texture coordinates); Limit (above 5 million triangles).
 Result<meso::BaseSurface> readBaseMesh(const std::filesystem::path& path, double tiles);
 
 /// Does the same with an OBJ that is open, from its start.

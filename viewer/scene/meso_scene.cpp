@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "mesostructure/base/subdivision.h"
+#include "mesostructure/base/surface_edges.h"
 #include "mesostructure/solids.h"
 #include "viewer/scene/base_mesh.h"
 #include "viewer/scene/tile_texture.h"
@@ -72,7 +73,13 @@ private:
     Known colours_, normals_;
 };
 
-void warn(const MesoSurfaceDescription& d, const Shell& shell, std::vector<std::string>& warnings) {
+void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell& shell,
+          std::vector<std::string>& warnings) {
+    if (const auto edges = isFile(d) ? edgesOf(base) : SurfaceEdges(); !edges) {
+        Error error = edges.error();
+        error.file = d.base;
+        warnings.push_back(error.line() + "; it is drawn as it is");
+    }
     const auto say = [&](uint64_t count, const char* what) {
         if (count > 0) warnings.push_back(fmt::format("{}: {} {}", d.base, count, what));
     };
@@ -136,7 +143,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             if (isFile(d)) error.file = d.base;
             return d.from.blamed(std::move(error));
         }
-        warn(d, *shell, scene.warnings);
+        warn(d, *base, *shell, scene.warnings);
         scene.bounds = scene.bounds.joined({shell->low, shell->high});
         MesoSurface surface;
         auto colours = textures.colours(d.colourTexture), normals = textures.normals(d.normalTexture);

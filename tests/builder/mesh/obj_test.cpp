@@ -120,10 +120,10 @@ TEST(Obj, HandsOnAllCoordinatesWhereTheyAreWanted) {
     EXPECT_EQ(coordinatesOf(text, Coordinates::IfAny, 3, found), "");
     const glm::dvec2 a(0.1, 0.2), b(3, 4), c(-1e-9, 0.5);
     EXPECT_EQ(found, (std::vector<std::array<glm::dvec2, 3>>{{a, b, c}, {a, c, c}}));
-    EXPECT_EQ(coordinatesOf(text, Coordinates::Required, 3, found).substr(0, 42),
+    EXPECT_EQ(coordinatesOf(text, Coordinates::Required, 3, found).substr(0, 43),
               "a.obj: line 9: has no texture coordinates b");
     EXPECT_EQ(coordinatesOf(text, Coordinates::IfAny, 2, found),
-              "a.obj: line 7: byte 62: has more than 2 texture coordinates");
+              "a.obj: line 7: byte 54: has more than 2 texture coordinates");
     found.clear();
     EXPECT_EQ(coordinatesOf(text, Coordinates::OfMaterials, 0, found), "");
     EXPECT_TRUE(found.empty());
