@@ -1,5 +1,6 @@
 #include "builder/mesh/obj.h"
 
+#include "builder/measure/indexed_mesh.h"
 #include "tests/support/mesh_reading.h"
 
 namespace vcp {
@@ -127,6 +128,27 @@ TEST(Obj, HandsOnAllCoordinatesWhereTheyAreWanted) {
     found.clear();
     EXPECT_EQ(coordinatesOf(text, Coordinates::OfMaterials, 0, found), "");
     EXPECT_TRUE(found.empty());
+}
+
+TEST(Obj, IsLoadedWholeWithinLimits) {
+    const auto load = [](const std::string& text, const LoadOptions& options) {
+        auto stream = openObj(ByteSource::fromMemory(text, "a.obj", 4096));
+        return loadMesh(**stream, "a.obj", options);
+    };
+    const std::string text = kSquare + "f 1 2 3 4\n";
+    LoadOptions options{.mostTriangles = 2, .mostPositions = 4};
+    EXPECT_EQ(load(text, options)->triangles.size(), 2u);
+    options.mostTriangles = 1;
+    EXPECT_EQ(load(text, options).error().line(),
+              "a.obj: has more than 1 triangles or 4 vertices, the most that are held in memory here");
+    options = {.mostPositions = 3};
+    EXPECT_EQ(load(text, options).error().code, ErrorCode::Limit);
+    options = {.progress = [](double) { return false; }};
+    EXPECT_EQ(load(text, options).error().code, ErrorCode::Cancelled);
+    options = {.coordinates = Coordinates::Required};
+    EXPECT_NE(load(text, options).error().line().find("no texture coordinates"), std::string::npos);
+    options = {.coordinates = Coordinates::IfAny};
+    EXPECT_TRUE(load(text, options)->coordinates.empty());
 }
 
 TEST(Obj, Utf16IsNamed) {

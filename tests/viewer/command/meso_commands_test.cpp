@@ -287,7 +287,7 @@ TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
 
 TEST_F(MesoCommands, DecimatesAScanToABase) {
     const std::filesystem::path makeScan = std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan";
-    ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 40000 -o " + path("dog.obj")).c_str()), 0);
+    ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 30000 -o " + path("dog.obj")).c_str()), 0);
     const Ran ran =
         run("meso base " + path("dog.obj") + " --triangles 1500 --progress plain --json -o " + path("base.obj"));
     ASSERT_EQ(ran.status, 0) << ran.err;
@@ -301,8 +301,11 @@ TEST_F(MesoCommands, DecimatesAScanToABase) {
     const Ran once = run(render + path("a.png")), smooth = run(render + path("b.png") + " --subdivide 1");
     ASSERT_EQ(once.status, 0) << once.err;
     ASSERT_EQ(smooth.status, 0) << smooth.err;
-    EXPECT_GT(Json::parse(smooth.out)["panels"][0]["asset_bytes"],
-              2 * Json::parse(once.out)["panels"][0]["asset_bytes"].get<int64_t>());
+    // Three pieces of 112 bytes stand on each of four times as many triangles; the arrays of the asset stay.
+    const auto bytesOf = [](const Ran& drawn) {
+        return Json::parse(drawn.out)["panels"][0]["asset_bytes"].get<int64_t>();
+    };
+    EXPECT_GT(bytesOf(smooth) - bytesOf(once), 3 * 1490 * 3 * 112);
     // Written once more it is the same file, and it is not written over what it is made from.
     const std::string first = contentOf(path("base.obj"));
     EXPECT_EQ(run("meso base " + path("dog.obj") + " --triangles 1500 -o " + path("base.obj")).status, 0);

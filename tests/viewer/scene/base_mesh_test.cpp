@@ -4,6 +4,7 @@
 
 #include "mesostructure/base/surface_edges.h"
 #include "viewer/asset/tile_mesh.h"
+#include "viewer/scene/scene_file.h"
 
 namespace vcp {
 namespace {
@@ -91,6 +92,17 @@ TEST(BaseMesh, FilesOfOthersAreReadOrRefusedInOneLine) {
     EXPECT_GT(files, 100u);
     EXPECT_GT(bases, 5u);
     EXPECT_GT(tiles, 5u);
+}
+
+TEST(BaseMesh, ScenesSubdivideTheirSurfaces) {
+    const std::string scene =
+        R"({"mesostructure": [{"asset": "edge", "method": "pyramid", "surface": "quad", "subdivide": 2}]})";
+    const auto file = sceneFromJson(scene, "a.json", {});
+    ASSERT_TRUE(file) << file.error().line();
+    EXPECT_EQ(file->surfaces[0].subdivide, 2);
+    const auto made = makeMesoScene(file->surfaces);
+    ASSERT_TRUE(made) << made.error().line();
+    EXPECT_EQ(made->surfaces[0].shell.pieces, 3u * 2 * 16);
 }
 
 }  // namespace
