@@ -147,6 +147,8 @@ TEST(IncludeRules, SamplesAreJudged) {
         {"viewer", "#include \"tests/house/include_rules.h\"\n", 1},
         {"viewer/scene", "#include \"builder/build.h\"\n#include \"builder/stream/byte_source.h\"\n", 0},
         {"viewer/scene", "#include <CLI/CLI.hpp>\n#include \"viewer/command/commands.h\"\n", 2},
+        {"viewer/scene", "#include \"mesostructure/base/subdivision.h\"\n#include <OpenMesh/Core/IO/MeshIO.hh>\n", 1},
+        {"mesostructure/base", "#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>\n", 0},
         {"viewer/scene", "    std::fprintf(stderr, \"done\");\n", 1},
         {"viewer/command", "#include <CLI/CLI.hpp>\n    std::fprintf(stderr, \"done\");  // stderr\n", 0},
         {"viewer/window", "#include <GLFW/glfw3.h>\n#include \"viewer/viewer.h\"\n// on stdout\n", 0},
