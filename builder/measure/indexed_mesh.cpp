@@ -27,7 +27,7 @@ Result<void> append(MeshStream& stream, const std::string& name, const LoadOptio
         return Error{.code = code, .message = std::move(message), .file = name};
     };
     for (MeshChunk chunk;;) {
-        VCP_TRY_ASSIGN(const auto more, stream.next(chunk));
+        VCP_TRY_ASSIGN(const bool more, stream.next(chunk));
         if (!more) return {};
         if (mesh.positions.size() + chunk.positions.size() > options.mostPositions ||
             mesh.triangles.size() + chunk.triangles.size() > options.mostTriangles)
@@ -61,14 +61,14 @@ Result<IndexedMesh> loadMesh(MeshStream& stream, const std::string& name, const 
 Result<IndexedMesh> loadMesh(const std::filesystem::path& path, const LoadOptions& options) {
     MeshOpenOptions open;
     open.coordinates = options.coordinates;
-    VCP_TRY_ASSIGN(auto stream, openMesh(path, open));
+    VCP_TRY_ASSIGN(const auto stream, openMesh(path, open));
     return loadMesh(*stream, path.string(), options);
 }
 
 Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths) {
     IndexedMesh mesh;
     for (const auto& path : paths) {
-        VCP_TRY_ASSIGN(auto stream, openMesh(path));
+        VCP_TRY_ASSIGN(const auto stream, openMesh(path));
         VCP_TRY(append(*stream, path.string(), {}, mesh));
     }
     if (mesh.triangles.empty())

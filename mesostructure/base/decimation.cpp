@@ -246,7 +246,8 @@ Result<void> checkSize(const LinkedSurface& linked) {
 }  // namespace
 
 Result<BaseSurface> decimated(const BaseSurface& surface, const DecimationOptions& options) {
-    VCP_TRY_ASSIGN(auto linked, linkSurface(surface));
+    LinkedSurface linked;
+    VCP_TRY(linkSurface(surface, linked));
     VCP_TRY(checkSize(linked));
     HalfEdges& mesh = linked.mesh;
     MovingMap map(surface, linked);

@@ -23,9 +23,9 @@ struct Side {
 
 class Linker {
 public:
-    explicit Linker(const BaseSurface& surface) : surface_(surface) {}
+    Linker(const BaseSurface& surface, LinkedSurface& made) : surface_(surface), made_(made) {}
 
-    Result<LinkedSurface> linked() {
+    Result<void> link() {
         if (surface_.triangles.size() > kMostTriangles)
             return Error{.code = ErrorCode::Limit, .message = "the surface has too many triangles for half-edges"};
         chooseFaces();
@@ -33,7 +33,7 @@ public:
         numberVertices();
         linkFaces();
         linkBorder();
-        return std::move(made_);
+        return {};
     }
 
 private:
@@ -152,7 +152,7 @@ private:
     }
 
     const BaseSurface& surface_;
-    LinkedSurface made_;
+    LinkedSurface& made_;
     uint32_t sides_ = 0;
     std::vector<uint32_t> opposite_;  ///< number of the side on the other side of its edge, or kNone
     std::vector<uint32_t> edges_;     ///< a side of each edge
@@ -161,6 +161,6 @@ private:
 
 }  // namespace
 
-Result<LinkedSurface> linkSurface(const BaseSurface& surface) { return Linker(surface).linked(); }
+Result<void> linkSurface(const BaseSurface& surface, LinkedSurface& linked) { return Linker(surface, linked).link(); }
 
 }  // namespace vcp::meso

@@ -28,10 +28,11 @@ struct LinkedSurface {
 inline glm::dvec3 placeOf(const HalfEdges::Point& p) { return {p[0], p[1], p[2]}; }
 inline HalfEdges::Point pointOf(glm::dvec3 p) { return {p.x, p.y, p.z}; }
 
-/// Links the triangles that have three different corners; the others, and positions without a triangle, are left out.
-/// Where parts of a surface touch at a corner and share no edge there, each has a vertex of its own. Halfedge k of a
-/// face in OpenMesh's order runs from corner k of its triangle to the next. Errors: InvalidInput (an edge of three
-/// triangles, or of two that run along it in one direction), with the triangle and the place; Limit (2^29 triangles).
-Result<LinkedSurface> linkSurface(const BaseSurface& surface);
+/// Links, in an empty `linked`, the triangles that have three different corners; the others, and positions without a
+/// triangle, are left out. Where parts of a surface touch at a corner and share no edge there, each has a vertex of its
+/// own. Halfedge k of a face in OpenMesh's order runs from corner k of its triangle to the next. Errors: InvalidInput
+/// (an edge of three triangles, or of two that run along it in one direction), with the triangle and the place; Limit
+/// (2^29 triangles).
+Result<void> linkSurface(const BaseSurface& surface, LinkedSurface& linked);
 
 }  // namespace vcp::meso

@@ -45,7 +45,8 @@ void addQuarters(const std::array<Corner, 3>& corner, const std::array<Corner, 3
 }
 
 Result<BaseSurface> subdividedOnce(const BaseSurface& surface) {
-    VCP_TRY_ASSIGN(auto linked, linkSurface(surface));
+    LinkedSurface linked;
+    VCP_TRY(linkSurface(surface, linked));
     HalfEdges& mesh = linked.mesh;
     const auto vertices = uint32_t(mesh.n_vertices());
     BaseSurface made;

@@ -34,7 +34,8 @@ uint64_t countParts(const HalfEdges& mesh) {
 }  // namespace
 
 Result<SurfaceEdges> edgesOf(const BaseSurface& surface) {
-    VCP_TRY_ASSIGN(const auto linked, linkSurface(surface));
+    LinkedSurface linked;
+    VCP_TRY(linkSurface(surface, linked));
     const HalfEdges& mesh = linked.mesh;
     SurfaceEdges edges;
     edges.triangles = mesh.n_faces(), edges.all = mesh.n_edges();

@@ -31,7 +31,7 @@ Result<meso::BaseSurface> readBaseObj(ByteSource source, double tiles) {
     const std::string name = source.name();
     MeshOpenOptions open;
     open.coordinates = Coordinates::Required;
-    VCP_TRY_ASSIGN(auto stream, openObj(std::move(source), {}, open));
+    VCP_TRY_ASSIGN(const auto stream, openObj(std::move(source), {}, open));
     return surfaceOf(loadMesh(*stream, name, loading()), name, tiles);
 }
 
