@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "octree/caught.h"
+
 namespace vcp {
 
 namespace {
@@ -170,6 +172,21 @@ void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
     shareMemory();
 }
 
+/// Reads a run; an exception fails each of its pages.
+std::vector<Result<PageBytes>> PageLoader::read(Run run) const {
+    using Pages = std::vector<Result<PageBytes>>;
+    auto pages = caught([&]() -> Result<Pages> { return source_->readRun(run.first, run.count, options_.withColour); },
+                        source_->name());
+    if (pages) return *std::move(pages);
+    Pages failed;
+    for (uint32_t i = 0; i < run.count; ++i) {
+        Error error = pages.error();
+        error.element = elementOf(run.first.after(i));
+        failed.emplace_back(std::move(error));
+    }
+    return failed;
+}
+
 void PageLoader::work() {
     giveWay(std::max(options_.threads, options_.allThreads));
     std::unique_lock lock(mutex_);
@@ -177,7 +194,7 @@ void PageLoader::work() {
         const double now = steadySeconds();
         if (const auto run = beginRun(now)) {
             lock.unlock();
-            auto pages = source_->readRun(run->first, run->count, options_.withColour);
+            auto pages = read(*run);
             lock.lock();
             finishRun(*run, std::move(pages));
             work_.notify_all();  // memory was given back

@@ -5,7 +5,6 @@
 // that fails is tried again after a while, and given up after a few attempts (request_queue.h); meanwhile the
 // threads read other pages. Pages that lie together and are about as urgent are read together where the source
 // says so.
-// where the source says so.
 //
 // No read begins while as many bytes are done as the next collect() would take: a moving view changes its wishes before
 // more could be of use, and what was read would be wasted.
@@ -84,6 +83,7 @@ private:
     };
     void work();
     [[nodiscard]] std::optional<Run> beginRun(double now);
+    [[nodiscard]] std::vector<Result<PageBytes>> read(Run run) const;
     void finishRun(Run run, std::vector<Result<PageBytes>> pages);
     void shareMemory();
     void handOver(Request request, Result<PageBytes> bytes);

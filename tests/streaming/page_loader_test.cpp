@@ -30,6 +30,7 @@ public:
         }
         niceness = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
         if (page == failing) return Error{.code = ErrorCode::Io, .message = "broken", .element = "page 13"};
+        if (page == throwing) throw std::bad_alloc();
         PageBytes bytes;
         bytes.geometry.assign(words_, uint4(uint32_t(page)));
         if (withColour) bytes.colour.assign(1, uint4(7));
@@ -65,7 +66,7 @@ public:
     mutable std::atomic<uint64_t> kept{0};
 
     mutable std::atomic<int> niceness{0};
-    uint64_t failing = UINT64_MAX, stalling = UINT64_MAX;
+    uint64_t failing = UINT64_MAX, stalling = UINT64_MAX, throwing = UINT64_MAX;
 
 private:
     size_t words_;
@@ -197,6 +198,22 @@ TEST(PageLoader, AnErrorIsDeliveredLikeAPage) {
     ASSERT_FALSE(pages[0].bytes);
     EXPECT_EQ(pages[0].bytes.error().line(), "page 13: broken");
     EXPECT_EQ(loader.stats().bytesRead, 0u);
+}
+
+TEST(PageLoader, WhatAReadThrowsIsAnErrorOfItsPage) {
+    const auto source = std::make_shared<FakeSource>();
+    source->throwing = 13;
+    PageLoader loader(source, options(false, 2, 1 << 20));
+    loader.request({{12, 1.0}, {13, 1.0}, {14, 1.0}});
+    const auto pages = collectAll(loader, 3);
+    ASSERT_EQ(pages.size(), 3u);
+    for (const Loaded& page : pages) {
+        EXPECT_EQ(page.bytes.ok(), page.request.number != 13);
+        if (page.bytes) continue;
+        EXPECT_EQ(page.bytes.error().code, ErrorCode::Limit);
+        EXPECT_TRUE(page.bytes.error().line().starts_with("fake.vcp: page 13: needs more memory"))
+            << page.bytes.error().line();
+    }
 }
 
 TEST(PageLoader, APageThatIsTooLargeIsRefusedWithItsFile) {

@@ -9,7 +9,7 @@
 #include "viewer/command/commands.h"
 #include "viewer/command/progress_display.h"
 #include "viewer/scene/build_settings.h"
-#include "viewer/scene/dataset_opening.h"
+#include "viewer/scene/scene_opening.h"
 #include "viewer/scene/source_settings.h"
 
 namespace vcp {

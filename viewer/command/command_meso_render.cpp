@@ -18,10 +18,10 @@
 #include "mesostructure/base/subdivision.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/picture/image_files.h"
-#include "viewer/scene/dataset_opening.h"
 #include "viewer/scene/meso_scene.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/render_settings.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 

@@ -15,8 +15,8 @@
 #include "viewer/command/render_arguments.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/picture/picture_sequence.h"
-#include "viewer/scene/dataset_opening.h"
 #include "viewer/scene/option_values.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 

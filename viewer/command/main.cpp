@@ -1,10 +1,10 @@
 // vcp: the command line. Exit status 0: done; 1: failed, with one line on stderr; 2: wrong usage.
 #include <algorithm>
 #include <cstdio>
-#include <new>
 #include <string>
 #include <vector>
 
+#include "octree/caught.h"
 #include "streaming/web_address.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/terminal_text.h"
@@ -73,14 +73,7 @@ int complainOfUsage(const CLI::App& vcp, const std::string& message) {
 int runParsed(const CLI::App& vcp, const std::vector<Command>& commands) {
     const auto parsed =
         std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
-    const Result<int> status = [&]() -> Result<int> {
-        try {
-            return parsed->run();
-        } catch (const std::bad_alloc&) {
-            return Error{ErrorCode::Limit,
-                         "needs more memory than there is; close other programs, or give less at once", inputsOf(vcp)};
-        }
-    }();
+    const Result<int> status = caught([&] { return parsed->run(); }, inputsOf(vcp));
     if (status) return *status;
     if (status.error().code == ErrorCode::Usage) return complainOfUsage(vcp, status.error().line());
     complain(status.error().line());

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "viewer/scene/open_dataset.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 

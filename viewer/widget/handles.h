@@ -17,7 +17,7 @@
 #include <glm/vec2.hpp>
 
 #include "viewer/finest_pick.h"
-#include "viewer/scene/opened_scene.h"
+#include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
 #include "viewer/widget/vcp.h"
 

@@ -343,8 +343,8 @@ void Interface::layOutStart() {
 }
 
 void Interface::layOutOpening() {
-    DatasetOpening& opening = *session_->opening();
-    const DatasetOpening::Progress progress = opening.progress();
+    SceneOpening& opening = *session_->opening();
+    const SceneOpening::Progress progress = opening.progress();
     ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
     ImGui::SetNextWindowSize({std::min(360 * scale_, size_.x), 0});
     ImGui::Begin("opening", nullptr, kBare);

@@ -91,8 +91,8 @@ void ViewSession::open(std::vector<std::string> inputs) {
     if (inputs.empty()) return;
     dismissProblem();
     opening_.reset();
-    opening_ = std::make_unique<DatasetOpening>(std::move(inputs), options_.build, options_.render.source,
-                                                options_.makeProgress ? options_.makeProgress() : nullptr);
+    opening_ = std::make_unique<SceneOpening>(std::move(inputs), options_.build, options_.render.source,
+                                              options_.makeProgress ? options_.makeProgress() : nullptr);
 }
 
 void ViewSession::takeOpened() {

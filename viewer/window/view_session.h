@@ -15,7 +15,7 @@
 
 #include "viewer/finest_pick.h"
 #include "viewer/picture/picture_sequence.h"
-#include "viewer/scene/dataset_opening.h"
+#include "viewer/scene/scene_opening.h"
 #include "viewer/scene/render_settings.h"
 #include "viewer/viewer.h"
 #include "viewer/window/measurement.h"
@@ -32,7 +32,7 @@ struct SessionOptions {
     BuildSettings build;
     RenderSettings render;
     UserSettings user;  ///< the remembered settings; `render` takes precedence over them
-    /// Makes, for each opening, the function that is told its progress (DatasetOpening). May be empty.
+    /// Makes, for each opening, the function that is told its progress (SceneOpening). May be empty.
     std::function<std::function<bool(const BuildProgress&)>()> makeProgress;
 };
 
@@ -63,7 +63,7 @@ public:
     /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
     void open(std::vector<std::string> inputs);
     /// Returns what is being opened; null when nothing is.
-    [[nodiscard]] DatasetOpening* opening() { return opening_.get(); }
+    [[nodiscard]] SceneOpening* opening() { return opening_.get(); }
 
     /// Does Viewer::update, and takes in what was opened or picked meanwhile.
     Result<NextStep> update(double now);
@@ -147,7 +147,7 @@ private:
     std::unique_ptr<Viewer> viewer_;
     Looks seenLooks_;  // as of the last update
     UpAxis up_;        // for what is opened next
-    std::unique_ptr<DatasetOpening> opening_;
+    std::unique_ptr<SceneOpening> opening_;
     std::string shown_;  // rememberedName of what is shown; empty: nothing
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
     std::string problem_, note_;

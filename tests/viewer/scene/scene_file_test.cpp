@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "tests/support/test_folder.h"
-#include "viewer/scene/opened_scene.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 namespace {

@@ -10,7 +10,7 @@
 #include "tests/support/test_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/vcp_program.h"
-#include "viewer/scene/dataset_opening.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 namespace {
@@ -66,7 +66,7 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
     SourceAccess access;
     for (const bool isCancelled : {true, false}) {
         std::filesystem::remove(folder_ / "asked");
-        DatasetOpening opening({server_->url("scan.vcp?fault=silent&log=1")}, {}, access, nullptr);
+        SceneOpening opening({server_->url("scan.vcp?fault=silent&log=1")}, {}, access, nullptr);
         waitForRequest();
         if (!isCancelled) continue;  // destroyed
         opening.cancel();
@@ -76,7 +76,7 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
 }
 
 TEST_F(Servers, WhatWasOpenedIsReadAfterItsOpeningIsGone) {
-    auto opening = std::make_unique<DatasetOpening>(std::vector{server_->url("scan.vcp")}, BuildSettings{},
+    auto opening = std::make_unique<SceneOpening>(std::vector{server_->url("scan.vcp")}, BuildSettings{},
                                                     SourceAccess{}, nullptr);
     while (!opening->isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const auto open = opening->take();

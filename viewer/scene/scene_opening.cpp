@@ -1,0 +1,148 @@
+#include "viewer/scene/scene_opening.h"
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "octree/caught.h"
+#include "streaming/caching_reader.h"
+#include "streaming/http_reader.h"
+#include "streaming/web_address.h"
+
+namespace vcp {
+
+Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access) {
+    if (!isHttpUrl(where)) {
+        VCP_TRY_ASSIGN(auto file, openFile(where));
+        return std::shared_ptr<const ByteReader>(file);
+    }
+    HttpOptions options;
+    options.caFile = access.caFile;
+    options.cancelled = access.cancelled;
+    VCP_TRY_ASSIGN(auto http, HttpReader::open(where, options));
+    if (access.cache.empty()) return std::shared_ptr<const ByteReader>(http);
+    VCP_TRY_ASSIGN(auto cached, CachingReader::open(http, http->identity(), access.cache, access.cacheBytes));
+    return std::shared_ptr<const ByteReader>(cached);
+}
+
+Box OpenDataset::bounds() const {
+    const FileHeader& h = dataset->header;
+    return {{h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]}, {h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]}};
+}
+
+Result<OpenDataset> openDataset(const std::string& where, const SourceAccess& access) {
+    VCP_TRY_ASSIGN(auto reader, openReader(where, access));
+    VCP_TRY_ASSIGN(auto dataset, readDatasetStart(*reader));
+    OpenDataset open;
+    open.isRemote = isHttpUrl(where);
+    open.reader = reader;
+    open.dataset = std::make_shared<const Dataset>(std::move(dataset));
+    open.source = std::make_shared<const FilePageSource>(open.reader, open.dataset, open.runBytes());
+    return open;
+}
+
+Box OpenedScene::bounds() const {
+    Box all = surfaces.bounds;
+    for (const Part& part : parts) all = all.joined(placedBox(part.open.bounds(), part.placement));
+    return all;
+}
+
+std::vector<PlacedDataset> OpenedScene::placed() const {
+    std::vector<PlacedDataset> datasets;
+    for (const Part& part : parts)
+        datasets.push_back({part.open.dataset, part.open.source, part.placement, part.open.loaderThreads()});
+    return datasets;
+}
+
+Result<OpenedScene> openScene(SceneFile file, const std::string& name,
+                              const std::function<Result<OpenDataset>(const std::string& file)>& open) {
+    OpenedScene scene;
+    scene.file = std::move(file);
+    for (const SceneDataset& each : scene.file.datasets) {
+        auto opened = open(each.file);
+        if (!opened) return each.from.blamed(opened.error());
+        scene.parts.push_back({*std::move(opened), each.placement});
+    }
+    VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces));
+    const Box all = scene.bounds();
+    if (!std::isfinite(glm::length(all.high - all.low)))
+        return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together",
+                     shownAddress(name)};
+    return scene;
+}
+
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
+                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress) {
+    VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
+    SceneFile file;
+    if (kind == InputKind::Scene) {
+        VCP_TRY_ASSIGN(file, readScene(inputs.front()));
+    } else if (kind == InputKind::Datasets) {
+        for (const std::string& input : inputs) file.datasets.push_back({input, {}});
+    } else {
+        VCP_TRY_ASSIGN(const auto path, datasetFor(inputs, build, progress));
+        file.datasets.push_back({path.string(), {}});
+    }
+    const auto count = double(file.datasets.size());
+    double opened = 0;
+    std::vector<std::filesystem::path> filesRead = filesOf(file);
+    filesRead.insert(filesRead.end(), inputs.begin(), inputs.end());
+    const auto addSideFiles = [&](const std::vector<std::string>& meshes) {
+        const auto named = sideFilesOf(meshes, build);
+        filesRead.insert(filesRead.end(), named.begin(), named.end());
+    };
+    if (kind == InputKind::Meshes) addSideFiles(inputs);
+    auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
+        if (progress && !progress({.stage = "opening", .fraction = opened++ / count}))
+            return Error{ErrorCode::Cancelled, "cancelled"};
+        VCP_TRY_ASSIGN(const auto path, datasetFor({each}, build, progress));
+        addSideFiles({each});
+        return openDataset(path.string(), access);
+    });
+    if (scene) scene->filesRead = std::move(filesRead);
+    return scene;
+}
+
+std::string nameOf(const std::vector<std::string>& inputs) {
+    if (inputs.empty()) return {};
+    std::string first = std::filesystem::path(shownAddress(inputs.front())).filename().string();
+    return inputs.size() == 1 ? first : fmt::format("{} and {} more", first, inputs.size() - 1);
+}
+
+SceneOpening::SceneOpening(std::vector<std::string> inputs, BuildSettings build, SourceAccess access,
+                           std::function<bool(const BuildProgress&)> told)
+    : inputs_(std::move(inputs)), build_(std::move(build)), access_(std::move(access)), told_(std::move(told)) {
+    access_.cancelled = [token = cancelled_, others = access_.cancelled] { return *token || (others && others()); };
+    thread_ = std::thread([this] {
+        opened_ = caught([this] { return open(); }, nameOf(inputs_));
+        done_ = true;
+    });
+}
+
+SceneOpening::~SceneOpening() {
+    // A dataset that was opened stays usable.
+    if (!done_) cancel();
+    thread_.join();
+}
+
+SceneOpening::Progress SceneOpening::progress() const {
+    const std::lock_guard lock(mutex_);
+    return progress_;
+}
+
+Result<OpenedScene> SceneOpening::take() { return *std::exchange(opened_, std::nullopt); }
+
+Result<OpenedScene> SceneOpening::open() {
+    // The display goes with the work: it is taken away before an error is shown.
+    const auto told = std::exchange(told_, nullptr);
+    return openScene(inputs_, build_, access_, [&](const BuildProgress& at) {
+        const bool goesOn = !told || told(at);
+        const std::lock_guard lock(mutex_);
+        progress_ = {at.stage, at.fraction, at.triangles};
+        return goesOn && !*cancelled_;
+    });
+}
+
+}  // namespace vcp
