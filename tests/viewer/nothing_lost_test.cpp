@@ -130,8 +130,7 @@ TEST_F(NothingLost, ExtensionsSayWhatIsWritten) {
                                                                                         {"render", "x.jpg"},
                                                                                         {"render", "x.pngg"},
                                                                                         {"render", "x.vcp"},
-                                                                                        {"meso build", "x.png"},
-                                                                                        {"meso render", "x.jpg"}}) {
+                                                                                        {"meso build", "x.png"}}) {
         const std::string out = name == "-" ? name : std::string(folder_ / name);
         const Ran ran =
             VcpProgram(folder_).runWords(command + " " + (command.starts_with("meso") ? "ball" : ball) + " -o " + out);
@@ -178,7 +177,8 @@ TEST_F(NothingLost, RenderKeepsItsInputs) {
 
 TEST_F(NothingLost, MesoKeepsItsInputs) {
     expectKept({"meso", "build", folder_ / "wall.png", "--grid", "8"}, "wall.png");
-    expectKept({"meso", "render", "ball", "--texture", folder_ / "wall.png", "--size", "16x16"}, "wall.png");
+    write("ball.json", R"({"mesostructure": [{"asset": "ball", "texture": "wall.png"}]})");
+    expectKept({"render", folder_ / "ball.json", "--size", "16x16"}, "wall.png");
     const fs::path out = folder_ / "wall.meso";
     fs::create_hard_link(folder_ / "wall.png", out);
     EXPECT_EQ(run({"meso", "build", folder_ / "wall.png", "--grid", "8", "-o", out, "--overwrite"}).status, 1);

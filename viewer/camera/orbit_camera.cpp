@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <glm/trigonometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "viewer/camera/json_lines.h"
@@ -219,6 +220,16 @@ void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const Picture
             break;
     }
     fit(box, size, covered);
+}
+
+void OrbitCamera::look(const ViewAngles& from, const Box& box, glm::ivec2 size, const PictureMargins& covered) {
+    const glm::dvec3 upward = axisOf(up), right(1, 0, 0), away = glm::cross(upward, right);
+    const glm::dvec2 angles = glm::radians(glm::dvec2(from.azimuth, from.elevation));
+    const glm::dvec3 eye =
+        std::cos(angles.y) * (std::cos(angles.x) * right + std::sin(angles.x) * away) + std::sin(angles.y) * upward;
+    orientation = facing(-eye, upward);
+    fit(box, size, covered);
+    fovY = 2 * std::atan(std::tan(0.5 * fovY) / from.magnification);
 }
 
 namespace {

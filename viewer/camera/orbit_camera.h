@@ -58,6 +58,15 @@ struct PictureMargins {
     double left = 0, right = 0, top = 0, bottom = 0;
 };
 
+/// Where an eye is about what it looks at.
+struct ViewAngles {
+    double azimuth = 0;        ///< degrees about the up axis, from x towards y where z is up, from x to -z where y is
+    double elevation = 0;      ///< degrees above the horizon, less than 90 either way
+    double magnification = 1;  ///< > 0; 1: all just fits
+
+    bool operator==(const ViewAngles&) const = default;
+};
+
 struct OrbitCamera {
     glm::dvec3 position{0};
     glm::dquat orientation{1, 0, 0, 0};  ///< world from camera, unit
@@ -103,6 +112,9 @@ struct OrbitCamera {
 
     /// Turns to a standard view and fits.
     void look(View view, const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
+
+    /// Looks from so far around and up, fits, and then narrows the view.
+    void look(const ViewAngles& from, const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 
     /// Turns the view with the eye where it is: `yaw` about the up axis, `pitch` about the camera's x axis. The
     /// pitch stops short of the poles.

@@ -83,9 +83,9 @@ std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style) {
 }
 
 Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, const BuildSettings& build,
-                                   const SourceSettings& source, ProgressStyle style) {
+                                   const SourceSettings& source, ProgressStyle style, const std::string& method) {
     const InterruptScope catching;
-    return openScene(inputs, build, source, shownProgress(style));
+    return openScene(inputs, build, source, shownProgress(style), method);
 }
 
 }  // namespace vcp

@@ -24,6 +24,6 @@ std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style);
 
 /// Does openScene with its progress on stderr, cancelled by Ctrl-C.
 Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, const BuildSettings& build,
-                                   const SourceSettings& source, ProgressStyle style);
+                                   const SourceSettings& source, ProgressStyle style, const std::string& method);
 
 }  // namespace vcp

@@ -11,7 +11,7 @@
 #include "viewer/asset/height_image.h"
 #include "viewer/asset/tile_mesh.h"
 #include "viewer/command/command_meso_base.h"
-#include "viewer/command/command_meso_render.h"
+#include "viewer/command/commands.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
@@ -264,6 +264,17 @@ RunCommand addMesoBuild(CLI::App& meso) {
         ->type_name("X,Y");
     addJsonOption(*app, command->report);
     return [command] { return runBuild(*command); };
+}
+
+/// Says where the command of that name went, whatever it is given.
+RunCommand addMesoRender(CLI::App& meso) {
+    CLI::App* app = meso.add_subcommand("render", "Moved: `vcp render SCENE.json`, with --methods")->group("");
+    app->allow_extras();
+    return []() -> Result<int> {
+        return wrong(
+            "surfaces stand in a scene file now (docs/scenes.md): `vcp render SCENE.json -o OUT.png`, with --methods "
+            "A,B side by side, --shading steps for heat, --camera AZIMUTH,ELEVATION");
+    };
 }
 
 }  // namespace

@@ -5,13 +5,16 @@
 #include <thread>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "builder/measure/quantile.h"
+#include "mesostructure/method.h"
 #include "render/renderer.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/interrupt.h"
+#include "viewer/command/method_panels.h"
 #include "viewer/command/render_arguments.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/picture/picture_sequence.h"
@@ -40,6 +43,8 @@ struct RenderCommand {
     bool transparent = false;
     int turntable = 0;
     std::string path;
+    std::vector<std::string> methods;  // empty: those of the scene
+    bool validation = false;
     BuildSettings build;
     RenderSettings render;
     ReportOptions report;
@@ -92,8 +97,9 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
     return drawing;
 }
 
-Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const RenderCommand& command,
-                        const OutputRules& rules) {
+/// Writes depth and normals of the last frame, where they are asked for.
+Result<void> writePlanes(Renderer& renderer, const FrameRequest& request, const RenderCommand& command,
+                         const OutputRules& rules) {
     if (!command.depth.empty()) {
         VCP_TRY_ASSIGN(const auto depth, renderer.readDepth());
         VCP_TRY(writeDepth(depth, request.width, request.height, command.depth, rules));
@@ -102,8 +108,7 @@ Result<void> writeFiles(Renderer& renderer, const FrameRequest& request, const R
         VCP_TRY_ASSIGN(const auto normals, renderer.readNormals());
         VCP_TRY(writeNormals(normals, request.width, request.height, command.normals, rules));
     }
-    VCP_TRY_ASSIGN(const auto picture, renderer.readPicture());
-    return writePng(picture, command.output, rules);
+    return {};
 }
 
 Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
@@ -145,6 +150,21 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), device.name,
                        device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
                        error, update.settled ? "settled" : "not settled");
+}
+
+Result<void> report(const RenderCommand& command, const Drawing& drawing, const std::vector<MethodPanel>& panels,
+                    const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
+    if (command.report.json) {
+        Json json = toJson(drawing, device, request, camera);
+        json["iterations_mean"] = panels.front().iterationsMean;
+        for (const MethodPanel& panel : panels)
+            if (!command.methods.empty()) json["methods"].push_back(toJson(panel));
+        return printJson(json);
+    }
+    std::string text = summary(command, drawing, device);
+    for (const MethodPanel& panel : panels)
+        if (!command.methods.empty()) text += "\n  " + summary(panel);
+    return printLineAbout(command.output, text);
 }
 
 /// Returns the cameras of a sequence, or the one camera.
@@ -215,6 +235,11 @@ Result<void> checkOptions(const RenderCommand& command) {
     const std::filesystem::path output = command.output, depth = command.depth, normals = command.normals;
     if (depth == output || normals == output || (!command.depth.empty() && depth == normals))
         return usage("picture, --depth and --normals must be different files");
+    if (command.methods.empty()) return {};
+    if (command.tile > 0 || command.isSequence())
+        return usage("--methods goes with one picture, without --tile, --turntable and --path");
+    if (command.methods.size() > 1 && !(command.depth.empty() && command.normals.empty()))
+        return usage("--depth and --normals are of one method, not of several");
     return {};
 }
 
@@ -222,8 +247,9 @@ Result<void> checkOptions(const RenderCommand& command) {
 OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
     OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
     for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
-    for (const std::string& name : {command.path, command.render.camera, command.render.source.caFile})
+    for (const std::string& name : {command.path, command.render.source.caFile})
         if (!name.empty()) rules.inputs.emplace_back(name);
+    if (const auto* file = std::get_if<std::filesystem::path>(&command.render.camera)) rules.inputs.push_back(*file);
     return rules;
 }
 
@@ -238,23 +264,54 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
     return {};
 }
 
+Result<void> drawOne(Renderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
+                     const RenderCommand& command, const SceneFile& scene, const OutputRules& rules) {
+    std::vector<std::string> methods = command.methods;
+    if (methods.empty()) methods.emplace_back();
+    std::optional<Drawing> first;
+    std::vector<MethodPanel> panels;
+    for (const std::string& method : methods) {
+        if (first) {
+            VCP_TRY_ASSIGN(auto surfaces, surfacesBy(method, scene));
+            VCP_TRY(renderer.setSurfaces(surfaces.surfaces));
+        }
+        VCP_TRY_ASSIGN(auto drawing, draw(renderer, request, command));
+        VCP_TRY_ASSIGN(auto panel, readPanel(renderer, method, drawing.stats, drawing.medianMs()));
+        if (drawing.stats.unresolvedRays > 0)
+            warnOnTerminal(fmt::format(
+                "{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
+                drawing.stats.unresolvedRays));
+        panels.push_back(std::move(panel));
+        if (!first) first = std::move(drawing);
+    }
+    if (const auto problems = renderer.validationMessages(); !problems.empty())
+        return Error{ErrorCode::Device, problems.front()};
+    VCP_TRY(writePlanes(renderer, request, command, rules));
+    VCP_TRY(writePng(sideBySide(panels), command.output, rules));
+    return report(command, *first, panels, renderer.device(), request, camera);
+}
+
 Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     const glm::ivec2 size = parseSize(command.size).value();
-    VCP_TRY_ASSIGN(const auto open, openSceneShown(command.inputs, command.build, command.render.source,
-                                                   command.report.progressStyle()));
+    VCP_TRY_ASSIGN(const auto open,
+                   openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
+                                  command.methods.empty() ? "" : command.methods[0]));
+    if (!command.methods.empty() && open.file.surfaces.empty())
+        return Error{ErrorCode::Usage, "--methods goes with a scene that has mesostructure"};
     if (open.parts.size() == 1) VCP_TRY(command.render.checkFor(*open.parts.front().open.dataset));
     const SceneFile& scene = open.file;
     for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
     const Box bounds = open.bounds();
-    VCP_TRY_ASSIGN(const auto camera, command.render.camera == "fit" && scene.camera
-                                          ? *scene.camera
-                                          : command.render.cameraFor(bounds, size));
+    VCP_TRY_ASSIGN(const auto camera,
+                   command.render.isFit() && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size));
     VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
     const OutputRules rules = rulesOf(command, open.filesRead);
     VCP_TRY(checkOutputs(command, rules, cameras.size()));
-    VCP_TRY_ASSIGN(auto renderer, Renderer::create(command.render.rendererOptions()));
+    RendererOptions options = command.render.rendererOptions();
+    options.validation = command.validation;
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
     VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
 
     FrameRequest request;
@@ -276,20 +333,13 @@ Result<int> run(const RenderCommand& command) {
     }
     request.march = command.render.march;
     const InterruptScope catching;
-    if (command.isTiled(request)) {
-        VCP_TRY(makeTiled(*renderer, request, cameras, command, rules));
+    if (!command.isTiled(request)) {
+        VCP_TRY(drawOne(*renderer, request, camera, command, scene, rules));
         return 0;
     }
-    VCP_TRY_ASSIGN(const auto drawing, draw(*renderer, request, command));
-    VCP_TRY(writeFiles(*renderer, request, command, rules));
-    if (drawing.stats.unresolvedRays > 0)
-        warnOnTerminal(
-            fmt::format("{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
-                        drawing.stats.unresolvedRays));
-    if (command.report.json)
-        VCP_TRY(printJson(toJson(drawing, renderer->device(), request, camera)));
-    else
-        VCP_TRY(printLineAbout(command.output, summary(command, drawing, renderer->device())));
+    if (!command.methods.empty())
+        return Error{ErrorCode::Usage, fmt::format("--methods goes with at most {} M pixels", kMostPixelsAtOnce >> 20)};
+    VCP_TRY(makeTiled(*renderer, request, cameras, command, rules));
     return 0;
 }
 
@@ -349,6 +399,14 @@ Command addRender(CLI::App& vcp) {
                     "Draw so many frames after the first and report their median time [0; 5 with --json]")
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));
+    app->add_option("--methods", command->methods,
+                    fmt::format("Mesostructure by these methods in place of the scene's, side by side: {}",
+                                fmt::join(meso::methodNames(), ", ")))
+        ->type_name("A,B")
+        ->delimiter(',')
+        ->check(CLI::IsMember(std::vector<std::string>(meso::methodNames().begin(), meso::methodNames().end())))
+        ->allow_extra_args(false);
+    app->add_flag("--validation", command->validation, "With Vulkan's validation layers: what they say is an error");
     app->add_flag("--settle,!--no-settle", command->settle, "Wait until all that the view wants is loaded [on]");
     addBuildSettings(*app, command->build);
     addProgressOption(*app, command->report);

@@ -1,6 +1,7 @@
 #include "viewer/command/render_arguments.h"
 
 #include "viewer/command/paper_arguments.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
 #include "viewer/scene/option_values.h"
 
@@ -19,9 +20,14 @@ std::string checkDirection(const std::string& text) {
 }  // namespace
 
 void addRenderSettings(CLI::App& app, RenderSettings& settings) {
-    app.add_option("--camera", settings.camera, "Where from: " + viewNames() + ", or a camera file (JSON)")
+    addParsed(
+        app, "--camera", settings.camera, parseCamera,
+        "a view, a camera file, or an azimuth and an elevation below 90 degrees, like 30,35, and a magnification, "
+        "like 30,35,2",
+        "Where from: " + viewNames() +
+            ", a camera file (JSON), or azimuth and elevation in degrees and a magnification: 30,35 or 30,35,2")
         ->type_name("VIEW|FILE")
-        ->capture_default_str();
+        ->default_str("fit");
     app.add_option("--up", settings.up, "The axis that points up in the standard views: y or z")
         ->type_name("AXIS")
         ->capture_default_str()

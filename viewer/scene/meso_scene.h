@@ -1,5 +1,5 @@
-// Makes mesostructure surfaces from a person's description: asset, method, base. Scenes and `vcp meso render` hand them
-// to the renderer (Renderer::setSurfaces).
+// Makes mesostructure surfaces from a person's description: asset, method, base. A scene hands them to
+// the renderer (Renderer::setSurfaces).
 #pragma once
 
 #include <cstddef>

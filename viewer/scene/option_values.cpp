@@ -1,6 +1,5 @@
 #include "viewer/scene/option_values.h"
 
-#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -29,26 +28,23 @@ bool takeNumber(std::string_view& text, Number& number) {
     return true;
 }
 
-/// Parses numbers between commas: all of `text`, `count` of them.
-template <size_t count>
-std::optional<std::array<double, count>> takeList(std::string_view text) {
-    std::array<double, count> list{};
-    for (size_t i = 0; i < count; ++i) {
-        if (!takeNumber(text, list[i]) || !std::isfinite(list[i])) return std::nullopt;
-        if (i + 1 == count) break;
-        if (!text.starts_with(',')) return std::nullopt;
+}  // namespace
+
+std::vector<double> parseNumbers(std::string_view text) {
+    std::vector<double> numbers;
+    for (;;) {
+        if (!takeNumber(text, numbers.emplace_back()) || !std::isfinite(numbers.back())) return {};
+        if (text.empty()) return numbers;
+        if (!text.starts_with(',')) return {};
         text.remove_prefix(1);
     }
-    return text.empty() ? std::optional(list) : std::nullopt;
 }
-
-}  // namespace
 
 std::optional<PlaneText> parsePlane(std::string_view text) {
     PlaneText plane;
-    if (const auto list = takeList<4>(text)) {
-        plane.normal = {(*list)[0], (*list)[1], (*list)[2]};
-        plane.offset = (*list)[3];
+    if (const auto list = parseNumbers(text); list.size() == 4) {
+        plane.normal = {list[0], list[1], list[2]};
+        plane.offset = list[3];
         return plane.normal == glm::dvec3(0) ? std::nullopt : std::optional(plane);
     }
     if (text.size() < 3 || text[0] < 'x' || text[0] > 'z' || (text[1] != '<' && text[1] != '>')) return std::nullopt;
@@ -63,9 +59,9 @@ std::optional<PlaneText> parsePlane(std::string_view text) {
 }
 
 std::optional<glm::dvec3> parseDirection(std::string_view text) {
-    const auto list = takeList<3>(text);
-    if (!list) return std::nullopt;
-    const glm::dvec3 direction((*list)[0], (*list)[1], (*list)[2]);
+    const auto list = parseNumbers(text);
+    if (list.size() != 3) return std::nullopt;
+    const glm::dvec3 direction(list[0], list[1], list[2]);
     return direction == glm::dvec3(0) ? std::nullopt : std::optional(direction);
 }
 

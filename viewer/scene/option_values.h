@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -35,6 +36,9 @@ std::optional<uint64_t> parseCount(std::string_view text);
 
 /// Parses "1920x1200": each from 1 to 16384.
 std::optional<glm::ivec2> parseSize(std::string_view text);
+
+/// Parses finite numbers with commas between, such as "30,35.5". Returns none when malformed.
+std::vector<double> parseNumbers(std::string_view text);
 
 /// A plane that cuts: what has dot(normal, x) >= offset is kept.
 struct PlaneText {

@@ -1,6 +1,7 @@
 #include "viewer/scene/render_settings.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -15,6 +16,15 @@ namespace {
 constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
 
 }  // namespace
+
+std::optional<CameraChoice> parseCamera(std::string_view text) {
+    if (const auto view = viewNamed(text)) return *view;
+    const std::vector<double> numbers = parseNumbers(text);
+    if (numbers.empty()) return std::filesystem::path(text);
+    if (numbers.size() < 2 || numbers.size() > 3 || std::abs(numbers[1]) >= 90) return std::nullopt;
+    const ViewAngles angles{numbers[0], numbers[1], numbers.size() == 3 ? numbers[2] : 1};
+    return angles.magnification > 0 ? std::optional<CameraChoice>(angles) : std::nullopt;
+}
 
 RendererOptions RenderSettings::rendererOptions() const {
     RendererOptions options;
@@ -62,11 +72,11 @@ std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const
 }
 
 Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered) const {
-    const auto view = viewNamed(camera);
-    if (!view) return readCamera(camera);
+    if (const auto* file = std::get_if<std::filesystem::path>(&camera)) return readCamera(*file);
     OrbitCamera fitted;
     fitted.up = upAxis();
-    fitted.look(*view, bounds, size, covered);
+    if (const auto* view = std::get_if<View>(&camera)) fitted.look(*view, bounds, size, covered);
+    if (const auto* angles = std::get_if<ViewAngles>(&camera)) fitted.look(*angles, bounds, size, covered);
     return fitted;
 }
 

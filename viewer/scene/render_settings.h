@@ -2,7 +2,11 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "octree/paper_page.h"
@@ -13,12 +17,19 @@
 
 namespace vcp {
 
+/// A view by its name, a view from an angle, or a camera file.
+using CameraChoice = std::variant<View, ViewAngles, std::filesystem::path>;
+
+/// Parses "front", or azimuth, elevation and magnification, "30,35" or "30,35,2"; what is neither a name nor numbers is
+/// a file. Returns nothing for numbers that are no view.
+std::optional<CameraChoice> parseCamera(std::string_view text);
+
 struct RenderSettings {
     std::string device;
     std::string budget = "512M";
     std::string ram = "256M";
     double errorPixels = 0.5;
-    std::string camera = "fit";
+    CameraChoice camera = View::Fit;
     std::string up = "y";
     std::string light = "camera";
     std::string lightDirection;
@@ -39,6 +50,8 @@ struct RenderSettings {
     [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
     [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
+    /// Whether no camera was asked for: then a scene's own is used.
+    [[nodiscard]] bool isFit() const { return camera == CameraChoice(View::Fit); }
     /// Returns the camera of the view, or of the camera file. Errors: those of readCamera.
     [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size,
                                                 const PictureMargins& covered = {}) const;

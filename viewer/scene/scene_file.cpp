@@ -25,6 +25,7 @@ using Json = nlohmann::json;
 constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
 constexpr int kDeepest = 16;
+constexpr int kMostSteps = 4096;  // of relief mapping
 // Within this range double precision resolves a millimetre where units are metres, and more.
 constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
 
@@ -155,8 +156,8 @@ private:
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
         onlyKeys(json, at,
-                 {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
-                  "normal_texture", "method", "base"});
+                  {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
+                   "normal_texture", "method", "grid", "cones", "steps", "base", "far"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -178,7 +179,11 @@ private:
         if (json.contains("normal_texture"))
             made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
         if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
+        if (json.contains("grid")) made.method.cells = whole(json["grid"], at + "/grid", meso::kMaxGridEdge);
+        if (json.contains("cones")) made.method.cones = cones(json["cones"], at + "/cones");
+        if (json.contains("steps")) made.method.steps = whole(json["steps"], at + "/steps", kMostSteps);
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
+        if (json.contains("far")) made.withFar = flag(json["far"], at + "/far");
         return made;
     }
 
@@ -224,6 +229,18 @@ private:
         if (std::ranges::find(names, name) == names.end())
             wrong(at, fmt::format("must be one of {}", fmt::join(names, ", ")));
         return name;
+    }
+
+    int whole(const Json& json, const std::string& at, int most) {
+        if (!json.is_number_integer() || json < 1 || json > most)
+            return wrong(at, fmt::format("must be a whole number from 1 to {}", most)), 1;
+        return json.get<int>();
+    }
+
+    meso::Cones cones(const Json& json, const std::string& at) {
+        if (!json.is_array() || json.size() != 2)
+            return wrong(at, "must be two whole numbers: azimuths, elevations"), meso::Cones{};
+        return {whole(json[0], at, meso::kMostAzimuths), whole(json[1], at, meso::kMostElevations)};
     }
 
     [[nodiscard]] std::string fileNamed(const std::string& file) const {

@@ -74,11 +74,14 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
 }
 
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
-                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress) {
+                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress,
+                              const std::string& method) {
     VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
     SceneFile file;
     if (kind == InputKind::Scene) {
         VCP_TRY_ASSIGN(file, readScene(inputs.front()));
+        for (MesoSurfaceDescription& surface : file.surfaces)
+            if (!method.empty()) surface.method.name = method;
     } else if (kind == InputKind::Datasets) {
         for (const std::string& input : inputs) file.datasets.push_back({input, {}});
     } else {

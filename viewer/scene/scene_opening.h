@@ -72,10 +72,12 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
                               const std::function<Result<OpenDataset>(const std::string& file)>& open);
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
-/// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. Errors: Usage
-/// (.vcp files among meshes); those of readScene, MeshCache, openDataset and the other openScene.
+/// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. `method`:
+/// marches all mesostructure, in place of what the scene says; empty: the scene's. Errors: Usage (.vcp files among
+/// meshes); those of readScene, MeshCache, openDataset and the other openScene.
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
-                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress);
+                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress,
+                              const std::string& method = {});
 
 /// Returns "statue.ply", or "statue.ply and 2 more"; addresses without user and password.
 std::string nameOf(const std::vector<std::string>& inputs);

@@ -121,7 +121,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         else
             say(asked.error().line());
         viewer_->setSections(options_.render.sectionPlanes(open.bounds()));
-        if (options_.render.camera == "fit" && open.file.camera) camera = *open.file.camera;
+        if (options_.render.isFit() && open.file.camera) camera = *open.file.camera;
     } else {
         viewer_->setSections({});
         if (open.file.camera) camera = *open.file.camera;

@@ -28,6 +28,22 @@ protected:
     [[nodiscard]] Ran run(const std::string& arguments) const { return VcpProgram(folder_).runWords(arguments); }
     [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
+    /// Writes a scene of these surfaces, and of further keys after a comma.
+    [[nodiscard]] std::string scene(const std::string& surfaces, const std::string& rest = "") const {
+        std::ofstream(path("scene.json")) << R"({"mesostructure": [)" << surfaces << "]" << rest << "}";
+        return path("scene.json");
+    }
+    /// Draws a scene into a.png, with one JSON object.
+    [[nodiscard]] Ran draw(const std::string& scene, const std::string& options) const {
+        return run("render " + scene + " -o " + path("a.png") + " --up z --progress none --validation --json " +
+                   options);
+    }
+    [[nodiscard]] std::vector<uint8_t> pixels() const {
+        const auto picture = readPng(path("a.png"));
+        EXPECT_TRUE(picture);
+        return picture ? picture->rgba : std::vector<uint8_t>();
+    }
+
     /// A ramp along x, 16 x 8 texels.
     void writeRamp(const std::string& name, bool isWide) const {
         png_image image{};
@@ -144,38 +160,36 @@ TEST_F(MesoCommands, TheDogOfTheDocumentsIsDrawn) {
 
 TEST_F(MesoCommands, TexturesArePictures) {
     writeRamp("ramp.png", false);
-    const auto draw = [&](const std::string& options) {
-        const Ran ran =
-            run("meso render edge --method pyramid --size 64x48 --validation --json -o " + path("a.png") + options);
+    const auto drawn = [&](const std::string& key) {
+        const Ran ran = draw(scene(R"({"asset": "edge", "method": "pyramid")" + key + "}"), "--size 64x48");
         EXPECT_EQ(ran.status, 0) << ran.err;
-        const auto picture = readPng(path("a.png"));
-        EXPECT_TRUE(picture);
-        return picture ? picture->rgba : std::vector<uint8_t>();
+        return pixels();
     };
-    const auto plain = draw(""), textured = draw(" --texture " + path("ramp.png")),
-               bent = draw(" --normal-texture " + path("ramp.png"));
+    const auto plain = drawn(""), textured = drawn(R"(, "texture": "ramp.png")"),
+               bent = drawn(R"(, "normal_texture": "ramp.png")");
     EXPECT_NE(plain, textured);
     EXPECT_NE(plain, bent);
-    std::ofstream(path("scene.json"))
-        << R"({"mesostructure": [{"asset": "edge", "method": "pyramid", "texture": "ramp.png", "normal_texture": "ramp.png"}],
-        "camera": {"position": [0.5, 1, 1.2], "target": [0, 0, 0]}})";
-    const Ran scene = run("render " + path("scene.json") + " -o " + path("b.png") + " --size 64x48 --progress none");
-    EXPECT_EQ(scene.status, 0) << scene.err;
+    EXPECT_NE(drawn(R"(, "texture": "ramp.png", "normal_texture": "ramp.png")"), textured);
     std::ofstream(path("text.png")) << "not a picture";
+    std::filesystem::remove(path("a.png"));
     for (const std::string file : {"none.png", "text.png"}) {
-        const Ran ran = run("meso render edge --method pyramid --texture " + path(file) + " -o " + path("x.png"));
+        const Ran ran =
+            draw(scene(R"({"asset": "edge", "method": "pyramid", "texture": ")" + file + R"("})"), "--size 64x48");
         EXPECT_EQ(ran.status, 1);
         EXPECT_NE(ran.err.find(file), std::string::npos) << ran.err;
         EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+        EXPECT_FALSE(std::filesystem::exists(path("a.png")));
     }
 }
 
 TEST_F(MesoCommands, FarSurfacesAreNotMarched) {
-    const std::string arguments =
-        "meso render hemispheres --tiles 40 --height 0.5 --size 64x48 --view 30,35,0.5 --validation --json -o " +
-        path("a.png");
-    const Json far = Json::parse(run(arguments).out)["panels"][0],
-               marched = Json::parse(run(arguments + " --error-pixels 0").out)["panels"][0];
+    const auto figures = [&](const std::string& key) {
+        const Ran ran = draw(scene(R"({"asset": "hemispheres", "tiles": 40, "height": 0.5)" + key + "}"),
+                             "--size 64x48 --camera 30,35,0.5");
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return Json::parse(ran.out);
+    };
+    const Json far = figures(""), marched = figures(R"(, "far": false)");
     EXPECT_GT(far["far_hits"], far["hit_pixels"].get<int>() / 2);
     EXPECT_EQ(marched["far_hits"], 0);
     EXPECT_LT(far["iterations_mean"], 0.5 * marched["iterations_mean"].get<double>());
@@ -267,22 +281,23 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
 TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
     std::ofstream(path("mapped.obj"))
         << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
-    const Ran ran = run("meso render hemispheres --method pyramid --surface " + path("mapped.obj") +
-                        " --tiles 2 --size 64x48 --shadows --validation --json -o " + path("a.png"));
+    const Ran ran = draw(scene(R"({"asset": "hemispheres", "method": "pyramid", "surface": "mapped.obj", "tiles": 2})"),
+                         "--size 64x48 --camera 30,35 --shadows");
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json told = Json::parse(ran.out);
-    ASSERT_EQ(told["panels"].size(), 1u);
-    EXPECT_GT(told["panels"][0]["hit_pixels"], 64 * 48 / 8);
-    EXPECT_EQ(told["panels"][0]["unresolved"], 0);
-    EXPECT_EQ(told["warnings"].size(), 0u);
+    EXPECT_GT(told["hit_pixels"], 64 * 48 / 8);
+    EXPECT_EQ(told["unresolved_rays"], 0);
+    EXPECT_FALSE(told.contains("methods"));
+    EXPECT_EQ(ran.err, "");
     EXPECT_TRUE(std::filesystem::exists(path("a.png")));
     // Two assets, and coordinates along a line.
     std::ofstream(path("line.obj"))
         << "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 2/2\nf 1/1 2/1 3/1\n";
-    const Ran smeared = run("meso render fbm maze --method pyramid --tiles 2 --tiles 1 --heat --surface " +
-                            path("line.obj") + " --size 32x32 --json -o " + path("b.png"));
+    const Ran smeared = draw(scene(R"({"asset": "fbm", "method": "pyramid", "surface": "line.obj", "tiles": 2},
+                                      {"asset": "maze", "method": "pyramid", "surface": "line.obj", "tiles": 1})"),
+                             "--size 32x32 --shading steps");
     ASSERT_EQ(smeared.status, 0) << smeared.err;
-    EXPECT_NE(smeared.out.find("smeared"), std::string::npos) << smeared.out;
+    EXPECT_NE(smeared.err.find("smeared"), std::string::npos) << smeared.err;
 }
 
 TEST_F(MesoCommands, DecimatesAScanToABase) {
@@ -358,38 +373,66 @@ TEST_F(MesoCommands, WhatIsNotManifoldIsRefusedInOneLine) {
 }
 
 TEST_F(MesoCommands, RendersMethodsSideBySide) {
-    const Ran ran =
-        run("meso render maze ball --method boxes,dm,cells --tiles 1 --at 0,0,0 --at 0.1,0.2,-0.05 --scale 1 --scale "
-            "0.5 --heat --size 40x32 --json -o " +
-            path("a.png"));
-    ASSERT_EQ(ran.status, 0) << ran.err;
-    const Json panels = Json::parse(ran.out)["panels"];
+    const std::string both = scene(R"({"asset": "maze", "tiles": 1}, {"asset": "ball", "tiles": 1, "scale": 0.5,
+        "translate": [0.1, 0.2, -0.05], "base": false})"),
+                      options = "--size 40x32 --camera 30,35 --shading steps ";
+    const auto drawn = [&](const std::string& methods) {
+        const Ran ran = draw(both, options + methods);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return Json::parse(ran.out);
+    };
+    const Json told = drawn("--methods boxes,dm,cells --frames 2"), panels = told["methods"];
     ASSERT_EQ(panels.size(), 3u);
     EXPECT_EQ(panels[1]["method"], "dm");
     EXPECT_LT(panels[0]["iterations_mean"], panels[2]["iterations_mean"]);
-    const auto picture = readPng(path("a.png"));
-    ASSERT_TRUE(picture) << picture.error().line();
-    EXPECT_EQ(picture->width, 120u);
-    EXPECT_EQ(picture->height, 32u);
+    EXPECT_EQ(told["iterations_mean"], panels[0]["iterations_mean"]);
+    EXPECT_EQ(told["frames"], 2);
+    const auto all = readPng(path("a.png"));
+    ASSERT_TRUE(all) << all.error().line();
+    ASSERT_EQ(all->width, 120u);
+    ASSERT_EQ(all->height, 32u);
+    // Each part is the picture of that method alone; without a method it is that of the scene, boxes.
+    const std::string alone[] = {"", "--methods dm", "--methods cells"};
+    for (size_t i = 0; i < 3; ++i) {
+        drawn(alone[i]);
+        const std::vector<uint8_t> part = pixels();
+        ASSERT_EQ(part.size(), 4u * 40 * 32);
+        for (size_t y = 0; y < 32; ++y)
+            EXPECT_TRUE(
+                std::equal(part.begin() + 160 * y, part.begin() + 160 * (y + 1), all->rgba.begin() + 480 * y + 160 * i))
+                << alone[i] << ", row " << y;
+    }
+}
+
+TEST_F(MesoCommands, AMethodHasAGridConesAndSteps) {
+    const auto iterations = [&](const std::string& keys) {
+        const Ran ran = draw(scene(R"({"asset": "hemispheres", "tiles": 2, "far": false, )" + keys + "}"),
+                             "--size 40x32 --camera 30,12");
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return Json::parse(ran.out)["iterations_mean"].get<double>();
+    };
+    EXPECT_LT(iterations(R"("method": "cells", "grid": 16)"), iterations(R"("method": "cells", "grid": 64)"));
+    EXPECT_NE(iterations(R"("method": "ddm", "grid": 32, "cones": [1, 1])"),
+              iterations(R"("method": "ddm", "grid": 32, "cones": [4, 2])"));
+    EXPECT_LT(iterations(R"("method": "relief-binary", "steps": 8)"),
+              iterations(R"("method": "relief-binary", "steps": 64)"));
 }
 
 TEST_F(MesoCommands, RendersWithAScanInTheSamePicture) {
-    // A box from 0 to 0.4 over a quad, y up.
+    // A box from 0 to 0.4 over a quad.
     std::ofstream(path("box.obj"))
         << "v 0 0 0\nv .4 0 0\nv .4 .4 0\nv 0 .4 0\nv 0 0 .4\nv .4 0 .4\nv .4 .4 .4\nv 0 .4 .4\n"
            "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
     ASSERT_EQ(run("build " + path("box.obj") + " -o " + path("box.vcp")).status, 0);
-    const std::string arguments =
-        "meso render edge --method pyramid --up y --tiles 1 --scale 0.5 --camera front --size 64x64 --validation "
-        "--json -o " +
-        path("a.png");
-    const Ran alone = run(arguments), both = run(arguments + " --scan " + path("box.vcp"));
+    const std::string surface = R"({"asset": "edge", "method": "pyramid", "tiles": 1, "scale": 0.5})",
+                      options = "--camera front --size 64x64";
+    const Ran alone = draw(scene(surface), options),
+              both = draw(scene(surface, R"(, "datasets": [{"file": "box.vcp"}])"), options);
     ASSERT_EQ(alone.status, 0) << alone.err;
     ASSERT_EQ(both.status, 0) << both.err;
     // From the front the quad is a line, the box a square of two fifths of its width, and nearer.
-    EXPECT_GT(Json::parse(both.out)["panels"][0]["hit_pixels"],
-              Json::parse(alone.out)["panels"][0]["hit_pixels"].get<int>() + 64 * 64 / 16);
-    EXPECT_EQ(run(arguments + " --scan " + path("none.vcp")).status, 1);
+    EXPECT_GT(Json::parse(both.out)["hit_pixels"], Json::parse(alone.out)["hit_pixels"].get<int>() + 64 * 64 / 16);
+    EXPECT_EQ(draw(scene(surface, R"(, "datasets": [{"file": "none.vcp"}])"), options).status, 1);
 }
 
 TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
@@ -401,39 +444,59 @@ TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
     std::ofstream(path("far.obj")) << "v 0 0 0\nv 1e39 0 0\nv 1e39 1e39 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n";
     std::ofstream(path("bare.stl")) << "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 "
                                        "1 0\nendloop\nendfacet\nendsolid a\n";
+    writeBall(path("ball.ply"), 4, 8);
+    const auto withKeys = [&](const std::string& keys) { return R"({"asset": "fbm", )" + keys + "}"; };
+    const std::string plain = R"({"asset": "fbm"})";
     const struct {
-        std::string arguments;
+        std::string surfaces, options;
         int status;
         std::string says;
-    } cases[] = {{"fbm --surface " + path("bare.obj"), 1, "line 4: has no texture coordinates"},
-                 {"fbm --surface " + path("wild.obj"), 1,
-                  "line 5: byte 41: a face names vertex 9, more than a file of this size can hold"},
-                 {"fbm --surface " + path("nan.obj"), 1, "line 2, vertex 2: byte 8: the position is not finite"},
-                 {"fbm --surface " + path("bare.stl"), 1, "has no texture coordinates"},
-                 {"fbm --surface " + path("none.obj"), 1, "none.obj"},
-                 {"fbm --surface plate", 2, "teapot"},
-                 {"fbm --method magic", 2, "pyramid"},
-                 {"beads --method pyramid", 2, "height fields"},
-                 {"nothing", 2, "nothing"},
-                 {"fbm --view 30", 2, "--view"},
-                 {"fbm --at 1,2", 2, "--at"},
-                 {"fbm --scale 0", 2, "--scale"},
-                 {"fbm --surface " + path("back.obj"), 1, "own backs"},
-                 {"fbm --surface " + path("far.obj"), 1, "single precision"},
-                 {"fbm --method ddm --cones 4.5x2", 2, "--cones"},
-                 {"fbm --tiles 0", 2, "--tiles"},
-                 {"fbm --height -1", 2, "--height"},
-                 {"fbm --colour 2,0,0", 2, "--colour"},
-                 {"fbm --method pyramid,boxes --depth " + path("d.pfm"), 2, "--depth"},
-                 {"fbm maze --tiles 1 --tiles 2 --tiles 3", 2, "--tiles"},
-                 {"fbm --size 0x7", 2, "--size"}};
+    } cases[] = {{withKeys(R"("surface": "bare.obj")"), "", 1, "line 4: has no texture coordinates"},
+                 {withKeys(R"("surface": "wild.obj")"), "", 1,
+                   "line 5: byte 41: a face names vertex 9, more than a file of this size can hold"},
+                 {withKeys(R"("surface": "nan.obj")"), "", 1,
+                   "line 2, vertex 2: byte 8: the position is not finite"},
+                 {withKeys(R"("surface": "bare.stl")"), "", 1, "has no texture coordinates"},
+                 {withKeys(R"("surface": "none.obj")"), "", 1, "none.obj"},
+                 {withKeys(R"("surface": "back.obj")"), "", 1, "own backs"},
+                 {withKeys(R"("surface": "far.obj")"), "", 1, "single precision"},
+                 {R"({"asset": "nothing"})", "", 1, "\"asset\""},
+                 {R"({"asset": "beads", "method": "pyramid"})", "", 1, "height fields"},
+                 {R"({"asset": "beads"})", "--methods boxes,pyramid", 1, "height fields"},
+                 {withKeys(R"("method": "magic")"), "", 1, "pyramid"},
+                 {withKeys(R"("cones": [4.5, 2])"), "", 1, "cones"},
+                 {withKeys(R"("cones": [33, 1])"), "", 1, "from 1 to 32"},
+                 {withKeys(R"("cones": 4)"), "", 1, "\"cones\""},
+                 {withKeys(R"("grid": 0)"), "", 1, "\"grid\""},
+                 {withKeys(R"("steps": 5000)"), "", 1, "\"steps\""},
+                 {withKeys(R"("far": 1)"), "", 1, "\"far\""},
+                 {plain, "--methods magic", 2, "--methods"},
+                 {plain, "--methods", 2, "--methods"},
+                 {plain, "--methods pyramid,boxes --depth " + path("d.pfm"), 2, "--depth"},
+                 {plain, "--methods boxes --turntable 3", 2, "--methods"},
+                 {plain, "--methods boxes --size 9000x9000", 2, "--methods"},
+                 {plain, "--camera 30", 2, "--camera"},
+                 {plain, "--camera 30,90", 2, "--camera"},
+                 {plain, "--camera 30,35,0", 2, "--camera"},
+                 {plain, "--size 0x7", 2, "--size"}};
     for (const auto& c : cases) {
-        const Ran ran = run("meso render " + c.arguments + " -o " + path("x.png"));
-        EXPECT_EQ(ran.status, c.status) << c.arguments << ": " << ran.err;
-        EXPECT_NE(ran.err.find(c.says), std::string::npos) << c.arguments << ": " << ran.err;
+        const Ran ran = draw(scene(c.surfaces), c.options);
+        EXPECT_EQ(ran.status, c.status) << c.surfaces << c.options << ": " << ran.err;
+        EXPECT_NE(ran.err.find(c.says), std::string::npos) << c.surfaces << c.options << ": " << ran.err;
         EXPECT_EQ(ran.errLines(), 1u) << ran.err;
-        EXPECT_FALSE(std::filesystem::exists(path("x.png"))) << c.arguments;
+        EXPECT_FALSE(std::filesystem::exists(path("a.png"))) << c.surfaces << c.options;
     }
+    const Ran bare = draw(path("ball.ply"), "--methods boxes");
+    EXPECT_EQ(bare.status, 2) << bare.err;
+    EXPECT_NE(bare.err.find("mesostructure"), std::string::npos) << bare.err;
+}
+
+TEST_F(MesoCommands, TheOldCommandSaysWhereItWent) {
+    const Ran ran = run("meso render beads --surface teapot --tiles 6 --shadows --view=-30,35 -o " + path("x.png"));
+    EXPECT_EQ(ran.status, 2);
+    EXPECT_EQ(ran.errLines(), 1u) << ran.err;
+    EXPECT_NE(ran.err.find("`vcp render SCENE.json"), std::string::npos) << ran.err;
+    EXPECT_EQ(run("meso help").status, 2);
 }
 
 TEST_F(MesoCommands, BenchOnADeviceFindsWhatTheProcessorFinds) {
