@@ -5,70 +5,59 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
 #include "viewer/command/interrupt.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
 
 namespace {
 
-CLI::Validator lengthCheck() {
-    return {[](std::string& text) {
-                return parseLength(text) ? std::string() : "must be a length like 0.25 or 0.01%, not \"" + text + "\"";
-            },
-            ""};
+std::optional<ColourChoice> colourNamed(const std::string& name) {
+    if (name == "auto") return ColourChoice::Auto;
+    if (name == "vertex") return ColourChoice::Vertex;
+    if (name == "texture") return ColourChoice::Texture;
+    if (name == "none") return ColourChoice::None;
+    return std::nullopt;
 }
 
-CLI::Validator absoluteLengthCheck() {
-    return {[](std::string& text) {
-                const auto length = parseLength(text);
-                return length && !length->isRelative
-                           ? std::string()
-                           : "must be a length in world units like 0.25, not \"" + text + "\"";
-            },
-            ""};
-}
-
-CLI::Validator memoryCheck() {
-    return {[](std::string& text) {
-                return parseMemory(text, 2 * defaultMemoryBytes())
-                           ? std::string()
-                           : "must be like 512M, 4G or 50%, not \"" + text + "\"";
-            },
-            ""};
+void addError(CLI::App& app, BuildOptions& options) {
+    const auto take = [&options](const CLI::results_t& texts) {
+        const auto length = parseLength(texts.back());
+        if (!length) throw notTaken("--error", "a length like 0.25 or 0.01%", texts.back());
+        options.error = length->value;
+        options.errorIsRelative = length->isRelative;
+        return true;
+    };
+    app.add_option(
+           "--error", take,
+           fmt::format("Tolerated distance to the mesh: world units, or a part of the bounding box's diagonal like "
+                       "0.01% [{:g} cells]",
+                       kDefaultErrorCells))
+        ->type_name("LENGTH");
 }
 
 }  // namespace
 
-void addBuildSettings(CLI::App& app, BuildSettings& settings) {
-    app.add_option("--cell", settings.cell, "Edge of the finest cells, world units [chosen from the mesh]")
-        ->type_name("LENGTH")
-        ->check(absoluteLengthCheck());
-    app.add_option(
-           "--error", settings.error,
-           fmt::format("Tolerated distance to the mesh: world units, or a part of the bounding box's diagonal like "
-                       "0.01% [{:g} cells]",
-                       kDefaultErrorCells))
-        ->type_name("LENGTH")
-        ->check(lengthCheck());
-    app.add_option("--colour,--color", settings.colour, "Colour to keep: auto (all there is), vertex, texture or none")
+void addBuildSettings(CLI::App& app, BuildOptions& options) {
+    addCell(app, options.cell);
+    addError(app, options);
+    addParsed(app, "--colour,--color", options.colour, colourNamed, "auto, vertex, texture or none",
+              "Colour to keep: auto (all there is), vertex, texture or none")
         ->type_name("WHICH")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"auto", "vertex", "texture", "none"}));
-    app.add_option("--threads", settings.threads, "Threads that build [one a processor]")
+        ->default_str("auto");
+    app.add_option("--threads", options.threads, "Threads that build [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
-    app.add_option("--format", settings.format,
+    app.add_option("--format", options.format,
                    fmt::format("Format of meshes whose content does not tell it: {}", fmt::join(meshFormats(), ", ")))
         ->type_name("NAME")
         ->check(CLI::IsMember(std::vector<std::string>(meshFormats().begin(), meshFormats().end()), CLI::ignore_case));
-    app.add_option("--memory", settings.memory,
-                   "Cap on the memory that the build allocates: 512M, 4G, 50% [half of the machine's]")
-        ->type_name("BYTES")
-        ->check(memoryCheck());
-    app.add_option("--temp", settings.temp, "Folder for temporary files [that of the output]")
+    addMemory(app, options.memoryBytes,
+              "Cap on the memory that the build allocates: 512M, 4G, 50% [half of the machine's]");
+    const auto folder = [](const std::string& name) { return std::optional(std::filesystem::path(name)); };
+    addParsed(app, "--temp", options.temp, folder, "a folder", "Folder for temporary files [that of the output]")
         ->type_name("DIR")
         ->check(CLI::ExistingDirectory);
 }
@@ -82,10 +71,11 @@ std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style) {
     };
 }
 
-Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, const BuildSettings& build,
-                                   const SourceSettings& source, ProgressStyle style, const std::string& method) {
+Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, BuildOptions build,
+                                   const SourceAccess& source, ProgressStyle style, const std::string& method) {
     const InterruptScope catching;
-    return openScene(inputs, build, source, shownProgress(style), method);
+    build.progress = shownProgress(style);
+    return openScene(inputs, build, source, method);
 }
 
 }  // namespace vcp

@@ -8,13 +8,12 @@
 #include "builder/build.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/progress_display.h"
-#include "viewer/scene/build_settings.h"
 #include "viewer/scene/scene_opening.h"
-#include "viewer/scene/source_settings.h"
 
 namespace vcp {
 
-void addBuildSettings(CLI::App& app, BuildSettings& settings);
+/// Adds what a person may say of a build, beside its inputs and output.
+void addBuildSettings(CLI::App& app, BuildOptions& options);
 
 /// Returns what a display shows of a build.
 ProgressDetails detailsOf(const BuildProgress& at);
@@ -23,7 +22,7 @@ ProgressDetails detailsOf(const BuildProgress& at);
 std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style);
 
 /// Does openScene with its progress on stderr, cancelled by Ctrl-C.
-Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, const BuildSettings& build,
-                                   const SourceSettings& source, ProgressStyle style, const std::string& method);
+Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, BuildOptions build,
+                                   const SourceAccess& source, ProgressStyle style, const std::string& method);
 
 }  // namespace vcp

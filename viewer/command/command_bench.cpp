@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
-#include "builder/memory_plan.h"
 #include "viewer/bench/bench_build.h"
 #include "viewer/bench/bench_meso.h"
 #include "viewer/bench/rays/bench_methods.h"
@@ -15,6 +14,7 @@
 #include "viewer/command/commands.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/paper_arguments.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
 #include "viewer/scene/option_values.h"
 
@@ -33,24 +33,24 @@ struct BenchCommand {
     std::string out;
     int repetitions = 0;  // 0: the bench's own default
     unsigned threads = 0;
-    std::string cell;
+    double cell = 0;  // 0: chosen from the mesh
     bool overwrite = false;
     ReportOptions report;
 
     [[nodiscard]] std::vector<std::filesystem::path> modelPaths() const { return {models.begin(), models.end()}; }
-    [[nodiscard]] double cellLength() const { return cell.empty() ? 0 : parseLength(cell)->value; }
 };
 
 struct BuildBenchCommand : BenchCommand {
-    std::vector<std::string> generated;
+    std::vector<uint64_t> generated;
     std::vector<double> errors;
-    std::string memory, temp;
+    uint64_t memoryBytes = 0;
+    std::string temp;
     uint64_t samples = BenchBuildOptions().samples;
 };
 
 struct RaysCommand : BenchCommand {
     std::vector<std::string> methods, cameras;
-    std::string size = "1920x1200";
+    glm::ivec2 size{1920, 1200};
     std::string device;
     int views = 1;
     int judgeEvery = 1;
@@ -60,11 +60,14 @@ struct RaysCommand : BenchCommand {
 
 struct StreamCommand {
     BenchCommand bench;
-    std::vector<std::string> budgets = {"64M", "256M", "1G"}, paths = BenchStreamOptions().paths;
-    std::string size = "320x200", ram = "256M", device;
+    std::vector<uint64_t> budgets{64 << 20, 256 << 20, 1 << 30};
+    std::vector<std::string> paths = BenchStreamOptions().paths;
+    glm::ivec2 size{320, 200};
+    uint64_t ramBytes = 256 << 20;
+    std::string device;
     int frames = 240;
     double errorPixels = StressOptions().errorPixels;
-    SourceSettings source;
+    SourceAccess source;
 };
 
 constexpr const char* kBestDevice = "best";
@@ -119,7 +122,7 @@ Result<int> runBuild(const BuildBenchCommand& command) {
         return Error{ErrorCode::Usage, "which meshes? name them, or make some with --generated 1M,10M"};
     BenchBuildOptions options;
     options.models = command.modelPaths();
-    for (const std::string& size : command.generated) options.generated.push_back(*parseCount(size));
+    options.generated = command.generated;
     if (!options.generated.empty()) {
         VCP_TRY_ASSIGN(options.makeScan, findMakeScan());
     }
@@ -127,10 +130,10 @@ Result<int> runBuild(const BuildBenchCommand& command) {
     options.errors = command.errors;
     if (command.repetitions > 0) options.repetitions = command.repetitions;
     options.threads = command.threads;
-    options.memoryBytes = parseMemory(command.memory, 2 * defaultMemoryBytes()).value_or(0);
+    options.memoryBytes = command.memoryBytes;
     options.temp = command.temp;
     options.out = command.out;
-    options.cell = command.cellLength();
+    options.cell = command.cell;
     options.samples = command.samples;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
@@ -153,13 +156,13 @@ Result<int> runRays(const RaysCommand& command) {
     options.models = command.modelPaths();
     options.methods = command.methods;
     if (!command.cameras.empty()) options.cameras = command.cameras;
-    options.size = parseSize(command.size).value();
+    options.size = command.size;
     options.views = command.views;
     if (command.repetitions > 0) options.repetitions = command.repetitions;
     options.threads = command.threads;
     options.device = command.device;
     options.out = command.out;
-    options.cell = command.cellLength();
+    options.cell = command.cell;
     options.judgeEvery = command.judgeEvery;
     options.sweep = command.sweep;
     options.stability = command.stability;
@@ -181,15 +184,14 @@ Result<int> runStream(const StreamCommand& command) {
     BenchStreamOptions options;
     options.models = command.bench.models;
     options.paths = command.paths;
-    options.budgets.clear();
-    for (const std::string& budget : command.budgets) options.budgets.push_back(parseBytes(budget).value());
+    options.budgets = command.budgets;
     options.access = command.source;
     options.out = command.bench.out;
-    options.run.size = parseSize(command.size).value();
+    options.run.size = command.size;
     options.run.frames = command.frames;
     options.run.errorPixels = command.errorPixels;
     options.run.renderer.device = command.device;
-    options.run.renderer.ramBytes = parseBytes(command.ram).value();
+    options.run.renderer.ramBytes = command.ramBytes;
     const InterruptScope catching;
     ProgressDisplay display(command.bench.report.progressStyle(), stderr);
     options.run.progress = progressTo(display);
@@ -226,13 +228,7 @@ void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& mo
     app.add_option("--repetitions", command.repetitions, "Runs whose median is reported")
         ->type_name("N")
         ->check(CLI::Range(1, 1000));
-    app.add_option("--cell", command.cell, "Edge of the finest cells, world units [chosen from the mesh]")
-        ->type_name("LENGTH")
-        ->check([](const std::string& text) {
-            const auto length = parseLength(text);
-            return length && !length->isRelative ? std::string()
-                                                 : "must be a length in world units like 0.25, not \"" + text + "\"";
-        });
+    addCell(app, command.cell);
     app.add_option("--threads", command.threads, "Threads [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
@@ -240,35 +236,26 @@ void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& mo
     addJsonOption(app, command.report);
 }
 
-std::string scanSizeProblem(const std::string& text) {
+std::optional<uint64_t> parseScanSize(const std::string& text) {
     const auto count = parseCount(text);
-    return count && *count >= 10'000 && *count <= 1'000'000'000
-               ? std::string()
-               : "must be like 500k, 10M or 1G, from 10k to 1G, not \"" + text + "\"";
+    return count && *count >= 10'000 && *count <= 1'000'000'000 ? count : std::nullopt;
 }
 
 RunCommand addBenchBuild(CLI::App& bench) {
     auto command = std::make_shared<BuildBenchCommand>();
     CLI::App* app = bench.add_subcommand("build", "Time the build, beside Embree building its tree");
     addBenchOptions(*app, *command, "Meshes");
-    app->add_option("--generated", command->generated,
-                    "Also build scans of so many triangles, made by make_scan: 1M,10M,100M")
+    addParsedList(*app, "--generated", command->generated, parseScanSize, "like 500k, 10M or 1G, from 10k to 1G",
+                  "Also build scans of so many triangles, made by make_scan: 1M,10M,100M")
         ->type_name("N,N")
-        ->delimiter(',')
-        ->allow_extra_args(false)
-        ->check(scanSizeProblem);
+        ->delimiter(',');
     app->add_option("--errors", command->errors, "Also build each mesh with these tolerances, in cells: 0.02,0.05,0.1")
         ->type_name("X,X")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(1e-6, 1e3));
-    app->add_option("--memory", command->memory,
-                    "Cap on the memory that a build allocates: 512M, 4G, 50% [half of the machine's]")
-        ->type_name("BYTES")
-        ->check([](const std::string& text) {
-            return parseMemory(text, 2 * defaultMemoryBytes()) ? std::string()
-                                                               : "must be like 512M, 4G or 50%, not \"" + text + "\"";
-        });
+    addMemory(*app, command->memoryBytes,
+              "Cap on the memory that a build allocates: 512M, 4G, 50% [half of the machine's]");
     app->add_option("--temp", command->temp, "Folder for temporary files and generated scans [that of what is built]")
         ->type_name("DIR")
         ->check(CLI::ExistingDirectory);
@@ -305,12 +292,7 @@ RunCommand addBenchRays(CLI::App& bench) {
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 1000));
-    app->add_option("--size", command->size, "Rays across and down")
-        ->type_name("WxH")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            return parseSize(text) ? std::string() : "must be like 1920x1200, not \"" + text + "\"";
-        });
+    addSize(*app, command->size, "1920x1200", "Rays across and down")->default_str(sizeText(command->size));
     app->add_option("--judge-every", command->judgeEvery, "Compare every Nth row and column with the mesh")
         ->type_name("N")
         ->capture_default_str()
@@ -330,12 +312,11 @@ RunCommand addBenchStream(CLI::App& bench) {
     app->add_option("MODEL", command->bench.models,
                     ".vcp files, their http(s) addresses, or meshes [a sphere, a torus and a thin plate]")
         ->type_name("");
-    app->add_option("--budgets", command->budgets, "Memory for subvolumes on the device")
+    addParsedList(*app, "--budgets", command->budgets, parseBudget, "at least 1M, like 64M or 1G",
+                  "Memory for subvolumes on the device")
         ->type_name("N,N")
         ->delimiter(',')
-        ->allow_extra_args(false)
-        ->capture_default_str()
-        ->check(budgetProblem);
+        ->default_str("64M,256M,1G");
     app->add_option("--paths", command->paths,
                     fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("A,B")
@@ -346,17 +327,10 @@ RunCommand addBenchStream(CLI::App& bench) {
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 1'000'000));
-    app->add_option("--size", command->size, "Width and height in pixels")
-        ->type_name("WxH")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            return parseSize(text) ? std::string() : "must be like 320x200, not \"" + text + "\"";
-        });
-    app->add_option("--ram", command->ram,
-                    "Memory for subvolumes on their way to the device, and for stored ones kept to be read again")
-        ->type_name("BYTES")
-        ->capture_default_str()
-        ->check(budgetProblem);
+    addSize(*app, command->size, "320x200", "Width and height in pixels")->default_str(sizeText(command->size));
+    addBudget(*app, "--ram", command->ramBytes,
+              "Memory for subvolumes on their way to the device, and for stored ones kept to be read again")
+        ->default_str("256M");
     app->add_option("--error-pixels", command->errorPixels, "Error that a picture may have, in pixels")
         ->type_name("PIXELS")
         ->capture_default_str()

@@ -26,7 +26,7 @@ struct BuildCommand {
     std::string method = "certified";
     PaperOptions paper;
     bool paperOptionsGiven = false;
-    BuildSettings settings;
+    BuildOptions settings;
 
     [[nodiscard]] bool isPaper() const { return method == "paper"; }
     ReportOptions report;
@@ -120,19 +120,20 @@ Result<int> tell(const BuildOptions& options, bool asJson) {
 /// Refuses options that do not go with the method.
 Result<void> checkMethod(const BuildCommand& command) {
     const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
-    const BuildSettings& s = command.settings;
+    const BuildOptions& s = command.settings;
     if (!command.isPaper() && command.paperOptionsGiven) return usage("the options --paper-... go with --method paper");
     if (!command.isPaper()) return {};
-    if (!s.error.empty() || s.colour == "vertex" || s.colour == "texture")
+    if (s.error > 0 || s.colour == ColourChoice::Vertex || s.colour == ColourChoice::Texture)
         return usage("--method paper has neither a tolerance (--error) nor colour");
-    if (!s.memory.empty() || !s.temp.empty() || command.resume || command.dryRun)
+    if (s.memoryBytes > 0 || !s.temp.empty() || command.resume || command.dryRun)
         return usage("--method paper builds in memory: without --memory, --temp, --resume and --dry-run");
     return {};
 }
 
 Result<int> run(const BuildCommand& command) {
     VCP_TRY(checkMethod(command));
-    BuildOptions options = command.settings.optionsFor(command.inputs);
+    BuildOptions options = command.settings;
+    options.inputs.assign(command.inputs.begin(), command.inputs.end());
     if (command.output.empty() && !command.dryRun)
         return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
     options.output = command.output.empty() ? "." : command.output;

@@ -12,7 +12,7 @@ namespace {
 
 struct InfoCommand {
     std::string file;
-    SourceSettings source;
+    SourceAccess source;
     ReportOptions report;
 };
 

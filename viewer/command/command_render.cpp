@@ -15,6 +15,7 @@
 #include "viewer/command/commands.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/method_panels.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/picture/picture_sequence.h"
@@ -34,7 +35,7 @@ constexpr std::chrono::milliseconds kWait(100);
 struct RenderCommand {
     std::vector<std::string> inputs;
     std::string output;
-    std::string size = "1920x1200";
+    glm::ivec2 size{1920, 1200};
     std::string depth, normals;
     bool overwrite = false;
     int frames = 0;  // 0: not given
@@ -45,7 +46,7 @@ struct RenderCommand {
     std::string path;
     std::vector<std::string> methods;  // empty: those of the scene
     bool validation = false;
-    BuildSettings build;
+    BuildOptions build;
     RenderSettings render;
     ReportOptions report;
 
@@ -146,7 +147,7 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
     const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
                                                                 : "no certified error";
     return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s) on {}{}\n  {} subvolumes, {} resident, {}, {}",
-                       command.output, command.size, drawing.frameMs.empty() ? "first frame" : "a frame",
+                       command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), device.name,
                        device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
                        error, update.settled ? "settled" : "not settled");
@@ -221,8 +222,8 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
     const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(),
                                                                 numbered(command.output, cameras.size()).string())
                                                   : command.output;
-    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, command.size, total.tiles,
-                                                      formatSeconds(1e-3 * total.ms)));
+    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, sizeText(command.size),
+                                                      total.tiles, formatSeconds(1e-3 * total.ms)));
 }
 
 /// Refuses options of the output that do not go together.
@@ -294,7 +295,7 @@ Result<void> drawOne(Renderer& renderer, const FrameRequest& request, const Orbi
 Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
-    const glm::ivec2 size = parseSize(command.size).value();
+    const glm::ivec2 size = command.size;
     VCP_TRY_ASSIGN(const auto open,
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
                                   command.methods.empty() ? "" : command.methods[0]));
@@ -319,7 +320,7 @@ Result<int> run(const RenderCommand& command) {
     request.width = uint32_t(size.x);
     request.height = uint32_t(size.y);
     request.errorPixels = command.render.errorPixels;
-    request.shading = command.render.shadingChosen();
+    request.shading = command.render.shading;
     request.shading.transparent = command.transparent;
     request.sections = command.render.sectionPlanes(bounds);
     request.sectionCaps = command.render.caps;
@@ -343,10 +344,6 @@ Result<int> run(const RenderCommand& command) {
     return 0;
 }
 
-std::string checkSize(const std::string& text) {
-    return parseSize(text) ? std::string() : "must be like 1920x1200, at most 16384 each way, not \"" + text + "\"";
-}
-
 std::string checkPlane(const std::string& text) {
     return isImagePlanePath(text) ? std::string() : "must end in .pfm or .png, not \"" + text + "\"";
 }
@@ -367,10 +364,7 @@ Command addRender(CLI::App& vcp) {
         ->required()
         ->check([](const std::string& name) { return extensionProblem(name, ".png", true); });
     addOverwriteOption(*app, command->overwrite);
-    app->add_option("--size", command->size, "Width and height in pixels")
-        ->type_name("WxH")
-        ->capture_default_str()
-        ->check(checkSize);
+    addSize(*app, command->size, "1920x1200", "Width and height in pixels")->default_str(sizeText(command->size));
     addRenderSettings(*app, command->render);
     app->add_flag("--transparent", command->transparent, "No background: alpha 0 where nothing is hit");
     CLI::Option* turntable = app->add_option("--turntable", command->turntable,

@@ -11,8 +11,8 @@
 #include "viewer/bench/stress/stress_path.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/interrupt.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
-#include "viewer/scene/option_values.h"
 #include "viewer/scene/render_settings.h"
 
 namespace vcp {
@@ -22,9 +22,9 @@ namespace {
 struct StressCommand {
     std::string file, out, faults;
     std::string path = "orbit";
-    std::string size = "640x400";
-    std::string budget = "256M", ram = "256M";
-    std::string order = "feedback";
+    glm::ivec2 size{640, 400};
+    uint64_t budgetBytes = 256 << 20, ramBytes = 256 << 20;
+    std::vector<LoadOrder> orders{LoadOrder::Feedback};
     std::string device;
     uint64_t seed = 1;
     int frames = 120;
@@ -32,7 +32,7 @@ struct StressCommand {
     double errorPixels = 0.5;
     double motionSeconds = 0;  // 0: not given
     bool overwrite = false;
-    SourceSettings source;
+    SourceAccess source;
     ReportOptions report;
 };
 
@@ -57,14 +57,14 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
     options.faults = parseFaults(command.faults).value();
     options.faults.seed = command.seed;
     options.seed = command.seed;
-    options.size = parseSize(command.size).value();
+    options.size = command.size;
     options.frames = command.frames;
     options.views = command.views;
     options.errorPixels = command.errorPixels;
     options.renderer.device = command.device;
-    options.renderer.budgetBytes = parseBytes(command.budget).value();
-    options.renderer.ramBytes = parseBytes(command.ram).value();
-    options.orders = parseOrders(command.order).value();
+    options.renderer.budgetBytes = command.budgetBytes;
+    options.renderer.ramBytes = command.ramBytes;
+    options.orders = command.orders;
     options.renderer.order = options.orders[0];
     // Where reads are made to stall or fail late, more threads wait for them, as for a server.
     const bool isSlow = open.isRemote || options.faults.stallSeconds > 0 || options.faults.latencySeconds > 0;
@@ -76,7 +76,7 @@ Result<int> runMotion(const StressCommand& command, const OpenDataset& open, con
     MotionOptions options;
     options.viewer.renderer = renderer;
     options.viewer.errorPixels = command.errorPixels;
-    options.size = parseSize(command.size).value();
+    options.size = command.size;
     options.seconds = command.motionSeconds;
     options.cancel = interrupted;
     VCP_TRY_ASSIGN(const auto report, measureMotion({{open.dataset, open.source, {}}}, open.bounds(), options));
@@ -116,15 +116,10 @@ Command addStress(CLI::App& vcp) {
                     fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("PATH")
         ->capture_default_str();
-    app->add_option("--budget", command->budget, "Memory for subvolumes on the device")
-        ->type_name("BYTES")
-        ->capture_default_str()
-        ->check(budgetProblem);
-    app->add_option("--ram", command->ram,
-                    "Memory for subvolumes on their way there, and for stored ones kept to be read again")
-        ->type_name("BYTES")
-        ->capture_default_str()
-        ->check(budgetProblem);
+    addBudget(*app, "--budget", command->budgetBytes, "Memory for subvolumes on the device")->default_str("256M");
+    addBudget(*app, "--ram", command->ramBytes,
+              "Memory for subvolumes on their way there, and for stored ones kept to be read again")
+        ->default_str("256M");
     app->add_option("--faults", command->faults,
                     "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, "
                     "bandwidth=2.5M (bytes a second)")
@@ -132,15 +127,12 @@ Command addStress(CLI::App& vcp) {
         ->check([](const std::string& text) {
             return parseFaults(text) ? std::string() : "must be like error=0.1,stall=500ms, not \"" + text + "\"";
         });
-    app->add_option("--order", command->order,
-                    "Which pages are read first: feedback (what rays ask for), error, nearest, breadth, random; of "
-                    "several, the first is used and all\n"
-                    "are compared on the path's last view")
+    addParsed(*app, "--order", command->orders, parseOrders, "like feedback,nearest",
+              "Which pages are read first: feedback (what rays ask for), error, nearest, breadth, random; of "
+              "several, the first is used and all\n"
+              "are compared on the path's last view")
         ->type_name("A,B")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            return parseOrders(text) ? std::string() : "must be like feedback,nearest, not \"" + text + "\"";
-        });
+        ->default_str("feedback");
     app->add_option("--seed", command->seed, "Of the faults and of the paths teleport and jitter")
         ->type_name("N")
         ->capture_default_str();
@@ -153,12 +145,7 @@ Command addStress(CLI::App& vcp) {
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 100));
-    app->add_option("--size", command->size, "Width and height in pixels")
-        ->type_name("WxH")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            return parseSize(text) ? std::string() : "must be like 640x400, not \"" + text + "\"";
-        });
+    addSize(*app, command->size, "640x400", "Width and height in pixels")->default_str(sizeText(command->size));
     app->add_option("--error-pixels", command->errorPixels, "Error that a picture may have, in pixels")
         ->type_name("PIXELS")
         ->capture_default_str()

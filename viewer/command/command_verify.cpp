@@ -22,7 +22,7 @@ struct VerifyCommand {
     uint64_t samples = 200'000;
     uint32_t level = UINT32_MAX;
     unsigned threads = 0;
-    SourceSettings source;
+    SourceAccess source;
     ReportOptions report;
 };
 

@@ -8,10 +8,10 @@
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/interrupt.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
 #include "viewer/key_map.h"
 #include "viewer/scene/mesh_cache.h"
-#include "viewer/scene/option_values.h"
 #include "viewer/window/window.h"
 
 namespace vcp {
@@ -20,8 +20,8 @@ namespace {
 
 struct ViewCommand {
     std::vector<std::string> inputs;
-    std::string size;
-    BuildSettings build;
+    glm::ivec2 size{0};  // 0: not given
+    BuildOptions build;
     RenderSettings render;
     ReportOptions report;
 };
@@ -80,14 +80,20 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
         else
             warn(user.error().line());
     }
-    applyRemembered(command.render, options.session.user, [&](const char* option) { return app.count(option) > 0; });
+    const auto isGiven = [&](const char* option) { return app.count(option) > 0; };
+    applyRemembered(command.render, options.session.user,
+                    {.up = isGiven("--up"),
+                     .shadows = isGiven("--shadows"),
+                     .occlusion = isGiven("--occlusion"),
+                     .errorPixels = isGiven("--error-pixels"),
+                     .budget = isGiven("--budget")});
     options.session.inputs = command.inputs;
     options.session.build = command.build;
     options.session.render = command.render;
     options.session.makeProgress = [style = command.report.progressStyle()] { return shownProgress(style); };
     options.catchInterrupts = [] { return std::make_shared<InterruptScope>(); };
     options.interrupted = interrupted;
-    if (!command.size.empty()) options.size = parseSize(command.size).value();
+    if (command.size.x > 0) options.size = command.size;
     VCP_TRY_ASSIGN(const auto report, showWindow(options));
     if (settingsPath) {
         // The session itself worked: that it cannot be remembered is no failure.
@@ -109,11 +115,7 @@ Command addView(CLI::App& vcp) {
                     ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the "
                     "cache first")
         ->type_name("");
-    app->add_option("--size", command->size, "Width and height of the window [1280x800, then as it was left]")
-        ->type_name("WxH")
-        ->check([](const std::string& text) {
-            return parseSize(text) ? std::string() : "must be like 1280x800, not \"" + text + "\"";
-        });
+    addSize(*app, command->size, "1280x800", "Width and height of the window [1280x800, then as it was left]");
     addRenderSettings(*app, command->render);
     addBuildSettings(*app, command->build);
     addProgressOption(*app, command->report);

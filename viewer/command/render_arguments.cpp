@@ -1,5 +1,8 @@
 #include "viewer/command/render_arguments.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "viewer/command/paper_arguments.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
@@ -9,12 +12,32 @@ namespace vcp {
 
 namespace {
 
-std::string checkPlane(const std::string& text) {
-    return parsePlane(text) ? std::string() : "must be like \"x<0.2\", \"z>50%\" or \"a,b,c,d\", not \"" + text + "\"";
+// This light comes from the left, almost along a surface that faces the camera: relief of a millimetre casts shade.
+constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
+
+/// Adds --light and then --light-direction, which are taken in this order.
+void addLight(CLI::App& app, Shading& shading) {
+    const auto take = [&shading](const std::string& which) {
+        shading.lightFollowsCamera = which != "fixed";
+        if (which == "raking") shading.lightDirection = kRakingLight;
+    };
+    app.add_option_function<std::string>(
+           "--light", take,
+           "camera: the light follows it; raking: so, and falls from the side; fixed: it stays in the world")
+        ->type_name("WHICH")
+        ->default_str("camera")
+        ->check(CLI::IsMember({"camera", "raking", "fixed"}));
+    addParsed(app, "--light-direction", shading.lightDirection, parseDirection, "like 1,0,0.5",
+              "Towards the light: right, up, back of the camera; with --light fixed x, y, z of the world")
+        ->type_name("X,Y,Z");
 }
 
-std::string checkDirection(const std::string& text) {
-    return parseDirection(text) ? std::string() : "must be like 1,0,0.5, not \"" + text + "\"";
+void addUp(CLI::App& app, UpAxis& up) {
+    const auto take = [&up](const std::string& axis) { up = axis == "z" ? UpAxis::Z : UpAxis::Y; };
+    app.add_option_function<std::string>("--up", take, "The axis that points up in the standard views: y or z")
+        ->type_name("AXIS")
+        ->default_str("y")
+        ->check(CLI::IsMember({"y", "z"}));
 }
 
 }  // namespace
@@ -28,56 +51,37 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
             ", a camera file (JSON), or azimuth and elevation in degrees and a magnification: 30,35 or 30,35,2")
         ->type_name("VIEW|FILE")
         ->default_str("fit");
-    app.add_option("--up", settings.up, "The axis that points up in the standard views: y or z")
-        ->type_name("AXIS")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"y", "z"}));
-    app.add_option("--light", settings.light,
-                   "camera: the light follows it; raking: so, and falls from the side; fixed: it stays in the world")
-        ->type_name("WHICH")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"camera", "raking", "fixed"}));
-    app.add_option("--shading", settings.shading,
-                   "lit or unlit (with colour where there is any), clay, normals; false colours: steps, cells, fetches "
-                   "(work of each ray), level, "
-                   "error (certified, up to a pixel)")
+    addUp(app, settings.up);
+    addLight(app, settings.shading);
+    addParsed(app, "--shading", settings.shading.mode, shadingNamed,
+              fmt::format("one of {}", fmt::join(shadingNames(), ", ")),
+              "lit or unlit (with colour where there is any), clay, normals; false colours: steps, cells, fetches "
+              "(work of each ray), level, error (certified, up to a pixel)")
         ->type_name("MODE")
-        ->capture_default_str()
-        ->check(CLI::IsMember(std::vector<std::string>(kShadingNames.begin(), kShadingNames.end())));
-    app.add_option("--light-direction", settings.lightDirection,
-                   "Towards the light: right, up, back of the camera; with --light fixed x, y, z of the world")
-        ->type_name("X,Y,Z")
-        ->check(checkDirection);
-    app.add_flag("--shadows", settings.shadows, "Hard shadows: a further ray a pixel");
-    app.add_option("--occlusion", settings.occlusionRays, "Ambient occlusion, by so many further rays a pixel [0]")
+        ->default_str("lit");
+    app.add_flag("--shadows", settings.shading.shadows, "Hard shadows: a further ray a pixel");
+    app.add_option("--occlusion", settings.shading.occlusionRays,
+                   "Ambient occlusion, by so many further rays a pixel [0]")
         ->type_name("N")
         ->expected(0, 1)
         ->default_str(std::to_string(kUsualOcclusionRays))
         ->check(CLI::Range(0, int(kMostOcclusionRays)));
-    app.add_option("--section", settings.sections,
-                   "Keep one side of a plane: x<0.2, z>50% (of the bounding box), or a,b,c,d for ax + by + cz >= d; up "
-                   "to 6 times")
+    addParsedList(app, "--section", settings.sections, parsePlane, "like \"x<0.2\", \"z>50%\" or \"a,b,c,d\"",
+                  "Keep one side of a plane: x<0.2, z>50% (of the bounding box), or a,b,c,d for ax + by + cz >= d; up "
+                  "to 6 times")
         ->type_name("PLANE")
-        ->take_all()
-        ->expected(1, int(kMostSections))
-        ->allow_extra_args(false)
-        ->check(checkPlane);
+        ->expected(1, int(kMostSections));
     app.add_flag("--caps", settings.caps, "Fill what sections cut open (for closed surfaces)");
     app.add_option("--error-pixels", settings.errorPixels,
                    "Error that a picture may have, in pixels: finer levels are loaded until then")
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
-    app.add_option("--budget", settings.budget, "Memory for subvolumes on the device, never exceeded")
-        ->type_name("BYTES")
-        ->capture_default_str()
-        ->check(budgetProblem);
-    app.add_option(
-           "--ram", settings.ram,
-           "Memory for subvolumes on their way there, and for stored ones kept to be read again; never exceeded")
-        ->type_name("BYTES")
-        ->capture_default_str()
-        ->check(budgetProblem);
+    addBudget(app, "--budget", settings.budgetBytes, "Memory for subvolumes on the device, never exceeded")
+        ->default_str("512M");
+    addBudget(app, "--ram", settings.ramBytes,
+              "Memory for subvolumes on their way there, and for stored ones kept to be read again; never exceeded")
+        ->default_str("256M");
     addPaperMarchOptions(app, settings.march);
     addSourceSettings(app, settings.source);
     app.add_option("--device", settings.device,

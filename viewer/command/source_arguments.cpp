@@ -1,11 +1,12 @@
 #include "viewer/command/source_arguments.h"
 
 #include "viewer/command/interrupt.h"
+#include "viewer/command/parsed_option.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
 
-void addSourceSettings(CLI::App& app, SourceSettings& settings) {
+void addSourceSettings(CLI::App& app, SourceAccess& settings) {
     settings.cancelled = interrupted;
     app.add_option("--ca-file", settings.caFile, "Certificates of authorities to trust for https, PEM [the system's]")
         ->type_name("FILE")
@@ -13,13 +14,10 @@ void addSourceSettings(CLI::App& app, SourceSettings& settings) {
     app.add_option("--cache", settings.cache,
                    "Keep what a server sends in this folder, and read it from there next time")
         ->type_name("DIR");
-    app.add_option("--cache-limit", settings.cacheLimit,
-                   "Bytes that the folder may hold; what was used longest ago goes")
+    addParsed(app, "--cache-limit", settings.cacheBytes, parseBytes, "like 512M or 4G",
+              "Bytes that the folder may hold; what was used longest ago goes")
         ->type_name("BYTES")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            return parseBytes(text) ? std::string() : "must be like 512M or 4G, not \"" + text + "\"";
-        });
+        ->default_str("4G");
 }
 
 }  // namespace vcp

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "viewer/command/commands.h"
-#include "viewer/scene/source_settings.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 
-void addSourceSettings(CLI::App& app, SourceSettings& settings);
+void addSourceSettings(CLI::App& app, SourceAccess& settings);
 
 }  // namespace vcp

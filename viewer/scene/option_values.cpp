@@ -40,8 +40,8 @@ std::vector<double> parseNumbers(std::string_view text) {
     }
 }
 
-std::optional<PlaneText> parsePlane(std::string_view text) {
-    PlaneText plane;
+std::optional<PlaneChoice> parsePlane(std::string_view text) {
+    PlaneChoice plane;
     if (const auto list = parseNumbers(text); list.size() == 4) {
         plane.normal = {list[0], list[1], list[2]};
         plane.offset = list[3];
@@ -92,10 +92,9 @@ std::optional<uint64_t> parseBytes(std::string_view text) {
     return uint64_t(number);
 }
 
-std::string budgetProblem(const std::string& text) {
+std::optional<uint64_t> parseBudget(std::string_view text) {
     const auto bytes = parseBytes(text);
-    return bytes && *bytes >= 1 << 20 ? std::string()
-                                      : fmt::format("must be at least 1M, like 64M or 1G, not \"{}\"", text);
+    return bytes && *bytes >= 1 << 20 ? bytes : std::nullopt;
 }
 
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole) {
@@ -121,12 +120,11 @@ std::optional<uint64_t> parseCount(std::string_view text) {
 }
 
 std::optional<glm::ivec2> parseSize(std::string_view text) {
-    constexpr int kLargest = 16384;
     glm::ivec2 size(0);
     if (!takeNumber(text, size.x) || text.empty() || (text.front() != 'x' && text.front() != 'X')) return std::nullopt;
     text.remove_prefix(1);
     if (!takeNumber(text, size.y) || !text.empty()) return std::nullopt;
-    if (size.x < 1 || size.y < 1 || size.x > kLargest || size.y > kLargest) return std::nullopt;
+    if (size.x < 1 || size.y < 1 || size.x > kLargestSize || size.y > kLargestSize) return std::nullopt;
     return size;
 }
 

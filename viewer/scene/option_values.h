@@ -24,8 +24,8 @@ std::optional<Length> parseLength(std::string_view text);
 /// Parses "4096", "512K", "512M", "4G", "1T", also with "iB" or "B" behind; factors of 1024. Returns nothing when
 /// malformed, zero, or beyond 2^60.
 std::optional<uint64_t> parseBytes(std::string_view text);
-/// Returns what is wrong with a budget of the pool or of memory, which must be at least 1 MiB; empty: nothing is.
-std::string budgetProblem(const std::string& text);
+/// Parses the same, of at least 1 MiB: the pool or memory.
+std::optional<uint64_t> parseBudget(std::string_view text);
 
 /// Parses as parseBytes, or a part of `whole`: "50%".
 std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole);
@@ -34,14 +34,15 @@ std::optional<uint64_t> parseMemory(std::string_view text, uint64_t whole);
 /// beyond 10^15, or not whole.
 std::optional<uint64_t> parseCount(std::string_view text);
 
-/// Parses "1920x1200": each from 1 to 16384.
+constexpr int kLargestSize = 16384;
+/// Parses "1920x1200": each from 1 to kLargestSize.
 std::optional<glm::ivec2> parseSize(std::string_view text);
 
 /// Parses finite numbers with commas between, such as "30,35.5". Returns none when malformed.
 std::vector<double> parseNumbers(std::string_view text);
 
 /// A plane that cuts: what has dot(normal, x) >= offset is kept.
-struct PlaneText {
+struct PlaneChoice {
     glm::dvec3 normal{0};
     double offset = 0;        ///< world units, or a part of the bounding box along its axis
     bool isRelative = false;  ///< then the normal is an axis
@@ -49,7 +50,7 @@ struct PlaneText {
 
 /// Parses what to keep: "x<0.2", "z>50%" (of the bounding box), or four numbers "a,b,c,d" for ax + by + cz >= d.
 /// Returns nothing when malformed.
-std::optional<PlaneText> parsePlane(std::string_view text);
+std::optional<PlaneChoice> parsePlane(std::string_view text);
 
 /// Parses three numbers, "1,0,-0.5", not all zero. Returns nothing when malformed.
 std::optional<glm::dvec3> parseDirection(std::string_view text);

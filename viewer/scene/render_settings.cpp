@@ -12,10 +12,13 @@ namespace vcp {
 
 namespace {
 
-// This light comes from the left, almost along a surface that faces the camera: relief of a millimetre casts shade.
-constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
+std::vector<std::string> shadingNames() { return {kShadingNames.begin(), kShadingNames.end()}; }
 
-}  // namespace
+std::optional<ShadingMode> shadingNamed(std::string_view name) {
+    const auto found = std::ranges::find(kShadingNames, name);
+    if (found == kShadingNames.end()) return std::nullopt;
+    return static_cast<ShadingMode>(found - kShadingNames.begin());
+}
 
 std::optional<CameraChoice> parseCamera(std::string_view text) {
     if (const auto view = viewNamed(text)) return *view;
@@ -29,10 +32,10 @@ std::optional<CameraChoice> parseCamera(std::string_view text) {
 RendererOptions RenderSettings::rendererOptions() const {
     RendererOptions options;
     options.device = device;
-    options.budgetBytes = parseBytes(budget).value_or(options.budgetBytes);
-    options.ramBytes = parseBytes(ram).value_or(options.ramBytes);
+    options.budgetBytes = budgetBytes;
+    options.ramBytes = ramBytes;
     // Colour pages are neither read nor kept when nothing would show them.
-    options.colour = shading == "lit" || shading == "unlit";
+    options.colour = shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Unlit;
     return options;
 }
 
@@ -41,26 +44,14 @@ Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
     const bool isPaper = dataset.header.method == Method::Paper;
     if (!isPaper && march != PaperMarch{})
         return usage("the options --paper-... are for files built with --method paper");
-    if (isPaper && (shadows || occlusionRays > 0 || caps))
+    if (isPaper && (shading.shadows || shading.occlusionRays > 0 || caps))
         return usage("files built with --method paper have no --shadows, --occlusion or --caps");
     return {};
 }
 
-Shading RenderSettings::shadingChosen() const {
-    Shading chosen;
-    chosen.mode = static_cast<ShadingMode>(std::ranges::find(kShadingNames, shading) - kShadingNames.begin());
-    chosen.lightFollowsCamera = light != "fixed";
-    if (light == "raking") chosen.lightDirection = kRakingLight;
-    if (!lightDirection.empty()) chosen.lightDirection = parseDirection(lightDirection).value();
-    chosen.shadows = shadows;
-    chosen.occlusionRays = occlusionRays;
-    return chosen;
-}
-
 std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const {
     std::vector<SectionPlane> planes;
-    for (const std::string& text : sections) {
-        const PlaneText plane = parsePlane(text).value();
+    for (const PlaneChoice& plane : sections) {
         // An axis' offset counts from the box's lower side, whichever side is kept.
         const glm::dvec3 axis = glm::abs(plane.normal);
         const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) +
@@ -74,7 +65,7 @@ std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const
 Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered) const {
     if (const auto* file = std::get_if<std::filesystem::path>(&camera)) return readCamera(*file);
     OrbitCamera fitted;
-    fitted.up = upAxis();
+    fitted.up = up;
     if (const auto* view = std::get_if<View>(&camera)) fitted.look(*view, bounds, size, covered);
     if (const auto* angles = std::get_if<ViewAngles>(&camera)) fitted.look(*angles, bounds, size, covered);
     return fitted;

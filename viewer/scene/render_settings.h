@@ -13,7 +13,8 @@
 #include "octree/result.h"
 #include "render/renderer.h"
 #include "viewer/camera/orbit_camera.h"
-#include "viewer/scene/source_settings.h"
+#include "viewer/scene/option_values.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 
@@ -26,29 +27,23 @@ std::optional<CameraChoice> parseCamera(std::string_view text);
 
 struct RenderSettings {
     std::string device;
-    std::string budget = "512M";
-    std::string ram = "256M";
+    uint64_t budgetBytes = RendererOptions().budgetBytes;
+    uint64_t ramBytes = RendererOptions().ramBytes;
     double errorPixels = 0.5;
     CameraChoice camera = View::Fit;
-    std::string up = "y";
-    std::string light = "camera";
-    std::string lightDirection;
-    std::string shading = "lit";
-    bool shadows = false;
-    uint32_t occlusionRays = 0;
-    std::vector<std::string> sections;
+    UpAxis up = UpAxis::Y;
+    Shading shading;
+    std::vector<PlaneChoice> sections;
     bool caps = false;
     PaperMarch march;
-    SourceSettings source;
+    SourceAccess source;
 
     /// Checks that the settings go with the dataset's method. Errors: Usage.
     [[nodiscard]] Result<void> checkFor(const Dataset& dataset) const;
 
     /// Returns the renderer's options for a local file; a server needs more loader threads.
     [[nodiscard]] RendererOptions rendererOptions() const;
-    [[nodiscard]] Shading shadingChosen() const;
     [[nodiscard]] std::vector<SectionPlane> sectionPlanes(const Box& bounds) const;
-    [[nodiscard]] UpAxis upAxis() const { return up == "z" ? UpAxis::Z : UpAxis::Y; }
 
     /// Whether no camera was asked for: then a scene's own is used.
     [[nodiscard]] bool isFit() const { return camera == CameraChoice(View::Fit); }
@@ -57,9 +52,12 @@ struct RenderSettings {
                                                 const PictureMargins& covered = {}) const;
 };
 
-/// The names that RenderSettings::shading may have, in the order of ShadingMode.
+/// The names of shading modes, in the order of ShadingMode.
 inline constexpr std::array<const char*, 9> kShadingNames = {"lit",   "clay",    "unlit", "normals", "steps",
                                                              "cells", "fetches", "level", "error"};
 static_assert(kShadingNames.size() == size_t(ShadingMode::Error) + 1);
+std::vector<std::string> shadingNames();
+/// Returns the mode of such a name.
+std::optional<ShadingMode> shadingNamed(std::string_view name);
 
 }  // namespace vcp

@@ -73,9 +73,8 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
     return scene;
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
-                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress,
-                              const std::string& method) {
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+                              const SourceAccess& access, const std::string& method) {
     VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
     SceneFile file;
     if (kind == InputKind::Scene) {
@@ -85,7 +84,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     } else if (kind == InputKind::Datasets) {
         for (const std::string& input : inputs) file.datasets.push_back({input, {}});
     } else {
-        VCP_TRY_ASSIGN(const auto path, datasetFor(inputs, build, progress));
+        VCP_TRY_ASSIGN(const auto path, datasetFor(inputs, build));
         file.datasets.push_back({path.string(), {}});
     }
     const auto count = double(file.datasets.size());
@@ -98,9 +97,9 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     };
     if (kind == InputKind::Meshes) addSideFiles(inputs);
     auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
-        if (progress && !progress({.stage = "opening", .fraction = opened++ / count}))
+        if (build.progress && !build.progress({.stage = "opening", .fraction = opened++ / count}))
             return Error{ErrorCode::Cancelled, "cancelled"};
-        VCP_TRY_ASSIGN(const auto path, datasetFor({each}, build, progress));
+        VCP_TRY_ASSIGN(const auto path, datasetFor({each}, build));
         addSideFiles({each});
         return openDataset(path.string(), access);
     });
@@ -114,9 +113,8 @@ std::string nameOf(const std::vector<std::string>& inputs) {
     return inputs.size() == 1 ? first : fmt::format("{} and {} more", first, inputs.size() - 1);
 }
 
-SceneOpening::SceneOpening(std::vector<std::string> inputs, BuildSettings build, SourceAccess access,
-                           std::function<bool(const BuildProgress&)> told)
-    : inputs_(std::move(inputs)), build_(std::move(build)), access_(std::move(access)), told_(std::move(told)) {
+SceneOpening::SceneOpening(std::vector<std::string> inputs, BuildOptions build, SourceAccess access)
+    : inputs_(std::move(inputs)), build_(std::move(build)), access_(std::move(access)) {
     access_.cancelled = [token = cancelled_, others = access_.cancelled] { return *token || (others && others()); };
     thread_ = std::thread([this] {
         opened_ = caught([this] { return open(); }, nameOf(inputs_));
@@ -139,13 +137,14 @@ Result<OpenedScene> SceneOpening::take() { return *std::exchange(opened_, std::n
 
 Result<OpenedScene> SceneOpening::open() {
     // The display goes with the work: it is taken away before an error is shown.
-    const auto told = std::exchange(told_, nullptr);
-    return openScene(inputs_, build_, access_, [&](const BuildProgress& at) {
+    BuildOptions build = std::exchange(build_, {});
+    build.progress = [this, told = std::move(build.progress)](const BuildProgress& at) {
         const bool goesOn = !told || told(at);
         const std::lock_guard lock(mutex_);
         progress_ = {at.stage, at.fraction, at.triangles};
         return goesOn && !*cancelled_;
-    });
+    };
+    return openScene(inputs_, build, access_);
 }
 
 }  // namespace vcp

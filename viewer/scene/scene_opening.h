@@ -15,7 +15,7 @@
 
 #include "render/renderer.h"
 #include "streaming/page_source.h"
-#include "viewer/scene/build_settings.h"
+#include "viewer/scene/inputs.h"
 #include "viewer/scene/scene_file.h"
 
 namespace vcp {
@@ -72,12 +72,11 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
                               const std::function<Result<OpenDataset>(const std::string& file)>& open);
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
-/// dataset in the cache first; meshes of a scene are built one by one. `progress` as in BuildOptions. `method`:
-/// marches all mesostructure, in place of what the scene says; empty: the scene's. Errors: Usage (.vcp files among
-/// meshes); those of readScene, MeshCache, openDataset and the other openScene.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildSettings& build,
-                              const SourceAccess& access, const std::function<bool(const BuildProgress&)>& progress,
-                              const std::string& method = {});
+/// dataset in the cache first; meshes of a scene are built one by one. `build`: how, and who is told the progress.
+/// `method`: marches all mesostructure, in place of what the scene says; empty: the scene's. Errors: Usage (.vcp files
+/// among meshes); those of readScene, MeshCache, openDataset and the other openScene.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+                              const SourceAccess& access, const std::string& method = {});
 
 /// Returns "statue.ply", or "statue.ply and 2 more"; addresses without user and password.
 std::string nameOf(const std::vector<std::string>& inputs);
@@ -92,10 +91,8 @@ public:
         uint64_t triangles = 0;
     };
 
-    /// `inputs`: as openScene takes them. `told`: called in the thread with the progress, false cancels; destroyed when
-    /// the work is done; may be empty.
-    SceneOpening(std::vector<std::string> inputs, BuildSettings build, SourceAccess access,
-                 std::function<bool(const BuildProgress&)> told);
+    /// Takes what openScene takes. `build.progress` is called in the thread, and destroyed when the work is done.
+    SceneOpening(std::vector<std::string> inputs, BuildOptions build, SourceAccess access);
     ~SceneOpening();
     SceneOpening(const SceneOpening&) = delete;
     SceneOpening& operator=(const SceneOpening&) = delete;
@@ -112,9 +109,8 @@ private:
     Result<OpenedScene> open();
 
     std::vector<std::string> inputs_;
-    BuildSettings build_;
+    BuildOptions build_;  // used by the thread, as is access_
     SourceAccess access_;
-    std::function<bool(const BuildProgress&)> told_;  // used by the thread
     const std::shared_ptr<std::atomic<bool>> cancelled_ =
         std::make_shared<std::atomic<bool>>(false);  // shared with readers, which live longer
     std::atomic<bool> done_ = false;

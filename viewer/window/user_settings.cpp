@@ -20,6 +20,7 @@
 #include "octree/file_descriptor.h"
 #include "octree/output_file.h"
 #include "streaming/web_address.h"
+#include "viewer/camera/text_file.h"
 
 namespace vcp {
 
@@ -162,28 +163,14 @@ struct FileText {
 };
 
 /// Reads the file. Errors: Io (it exists and cannot be read), InvalidInput (too large).
-Result<FileText> readText(const fs::path& path) {
-    // A pipe in its place must not wait for a writer.
-    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-    if (!file.isOpen() && errno == ENOENT) return FileText{};
+Result<FileText> readFile(const fs::path& path) {
     struct stat status {};
-    if (!file.isOpen() || ::fstat(file.number(), &status) != 0)
-        return Error{ErrorCode::Io, "cannot be read: " + std::generic_category().message(errno), path.string()};
-    if (!S_ISREG(status.st_mode))
-        return Error{ErrorCode::Io, S_ISFIFO(status.st_mode) ? "is a pipe, not a file" : "is no file of settings",
-                     path.string()};
-    FileText read{true, {}, status.st_mode & 0777};
-    char buffer[16384];
-    for (;;) {
-        const ssize_t count = ::read(file.number(), buffer, sizeof(buffer));
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0)
-            return Error{ErrorCode::Io, "cannot be read: " + std::generic_category().message(errno), path.string()};
-        if (count == 0) return read;
-        read.text.append(buffer, size_t(count));
-        if (read.text.size() > kLargestFile)
-            return Error{ErrorCode::InvalidInput, "is larger than 1 MiB, which no file of settings is", path.string()};
-    }
+    if (::stat(path.c_str(), &status) != 0 && errno == ENOENT) return FileText{};
+    auto text = readText(path, kLargestFile, "a file of settings, which has at most 1 MiB");
+    if (text) return FileText{true, *std::move(text), status.st_mode & 0777};
+    Error error = text.error();
+    if (error.code == ErrorCode::Limit) error.code = ErrorCode::InvalidInput;
+    return error;
 }
 
 /// Locks the folder of the settings, so that one process at a time reads and replaces them. A network file system locks
@@ -276,7 +263,7 @@ Result<fs::path> userSettingsPath() {
 }
 
 Result<UserSettings> readUserSettings(const fs::path& path) {
-    VCP_TRY_ASSIGN(const auto file, readText(path));
+    VCP_TRY_ASSIGN(const auto file, readFile(path));
     if (!file.exists) return UserSettings{};
     const Json json = Json::parse(file.text, nullptr, false);
     if (!json.is_object()) return Error{ErrorCode::InvalidInput, "is no JSON object", path.string()};
@@ -292,7 +279,7 @@ Result<std::string> saveChanges(const SettingsChanges& changes, const fs::path& 
     const auto target = linkTarget(path);
     if (!target) return notSaved(path, target.error().message);
     VCP_TRY(FolderLock::of(*target));
-    const auto before = readText(*target);
+    const auto before = readFile(*target);
     if (!before && before.error().code != ErrorCode::InvalidInput) return notSaved(path, before.error().message);
     Json json = !before ? Json() : before->exists ? Json::parse(before->text, nullptr, false) : Json::object();
     std::string warning;

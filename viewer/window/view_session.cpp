@@ -41,13 +41,12 @@ std::string workingFolder() {
 
 }  // namespace
 
-void applyRemembered(RenderSettings& render, const UserSettings& user,
-                     const std::function<bool(const char* option)>& isGiven) {
-    if (!isGiven("--error-pixels")) render.errorPixels = user.errorPixels;
-    if (!isGiven("--budget")) render.budget = std::to_string(user.budgetBytes);
-    if (!isGiven("--shadows")) render.shadows = user.shadows;
-    if (!isGiven("--occlusion") && user.occlusion) render.occlusionRays = kUsualOcclusionRays;
-    if (!isGiven("--up")) render.up = user.up == UpAxis::Z ? "z" : "y";
+void applyRemembered(RenderSettings& render, const UserSettings& user, const GivenSettings& given) {
+    if (!given.errorPixels) render.errorPixels = user.errorPixels;
+    if (!given.budget) render.budgetBytes = user.budgetBytes;
+    if (!given.shadows) render.shading.shadows = user.shadows;
+    if (!given.occlusion && user.occlusion) render.shading.occlusionRays = kUsualOcclusionRays;
+    if (!given.up) render.up = user.up;
 }
 
 Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options,
@@ -58,7 +57,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
     viewerOptions.renderer.colour = true;
     viewerOptions.renderer.surface = std::move(surface);
     viewerOptions.errorPixels = options.render.errorPixels;
-    viewerOptions.shading = options.render.shadingChosen();
+    viewerOptions.shading = options.render.shading;
     viewerOptions.shading.backgroundTop = options.user.backgroundTop;
     viewerOptions.shading.backgroundBottom = options.user.backgroundBottom;
     viewerOptions.sectionCaps = options.render.caps;
@@ -69,11 +68,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options),
-      user_(options.user),
-      viewer_(std::move(viewer)),
-      seenLooks_(looks()),
-      up_(options.render.upAxis()) {}
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {}
 
 ViewSession::~ViewSession() {
     cancelSaving();
@@ -91,8 +86,9 @@ void ViewSession::open(std::vector<std::string> inputs) {
     if (inputs.empty()) return;
     dismissProblem();
     opening_.reset();
-    opening_ = std::make_unique<SceneOpening>(std::move(inputs), options_.build, options_.render.source,
-                                              options_.makeProgress ? options_.makeProgress() : nullptr);
+    BuildOptions build = options_.build;
+    build.progress = options_.makeProgress ? options_.makeProgress() : nullptr;
+    opening_ = std::make_unique<SceneOpening>(std::move(inputs), std::move(build), options_.render.source);
 }
 
 void ViewSession::takeOpened() {
@@ -132,7 +128,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     if (open.file.light || std::exchange(hasSceneLight_, false)) {
         // The light of one scene does not apply to the next.
         Shading shading = viewer_->shading();
-        const Shading chosen = options_.render.shadingChosen();
+        const Shading& chosen = options_.render.shading;
         shading.lightFollowsCamera = open.file.light ? open.file.light->followsCamera : chosen.lightFollowsCamera;
         shading.lightDirection = open.file.light ? open.file.light->direction : chosen.lightDirection;
         viewer_->setShading(shading);

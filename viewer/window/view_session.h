@@ -15,21 +15,24 @@
 
 #include "viewer/finest_pick.h"
 #include "viewer/picture/picture_sequence.h"
-#include "viewer/scene/scene_opening.h"
 #include "viewer/scene/render_settings.h"
+#include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
 #include "viewer/window/measurement.h"
 #include "viewer/window/user_settings.h"
 
 namespace vcp {
 
-/// Uses remembered values for options that were not given: `isGiven("--up")`.
-void applyRemembered(RenderSettings& render, const UserSettings& user,
-                     const std::function<bool(const char* option)>& isGiven);
+/// The settings that were given for this run: what is remembered does not replace them.
+struct GivenSettings {
+    bool up = false, shadows = false, occlusion = false, errorPixels = false, budget = false;
+};
+/// Uses remembered values for settings that were not given.
+void applyRemembered(RenderSettings& render, const UserSettings& user, const GivenSettings& given);
 
 struct SessionOptions {
     std::vector<std::string> inputs;  ///< what the window opens first
-    BuildSettings build;
+    BuildOptions build;               ///< of meshes; inputs, output and progress are ignored
     RenderSettings render;
     UserSettings user;  ///< the remembered settings; `render` takes precedence over them
     /// Makes, for each opening, the function that is told its progress (SceneOpening). May be empty.

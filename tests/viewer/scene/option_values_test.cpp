@@ -62,6 +62,19 @@ TEST(OptionValues, PlanesAndDirections) {
     for (const char* wrong : {"", "1,2", "0,0,0", "1,2,3,4", "1 2 3"}) EXPECT_FALSE(parseDirection(wrong)) << wrong;
 }
 
+TEST(OptionValues, ListsOfNumbers) {
+    EXPECT_EQ(parseNumbers("30,-35.5,1e-2"), (std::vector<double>{30, -35.5, 0.01}));
+    EXPECT_EQ(parseNumbers("7"), std::vector<double>{7});
+    for (const char* wrong : {"", ",", "1,", ",1", "1,,2", "1;2", "1, 2", "1,nan", "inf", "1,2x", "1,5e999"})
+        EXPECT_TRUE(parseNumbers(wrong).empty()) << wrong;
+}
+
+TEST(OptionValues, BudgetsAreAMebibyteAtLeast) {
+    EXPECT_EQ(parseBudget("1M"), 1u << 20);
+    EXPECT_EQ(parseBudget("2G"), uint64_t(2) << 30);
+    for (const char* wrong : {"", "0", "1023K", "much", "-1G"}) EXPECT_FALSE(parseBudget(wrong)) << wrong;
+}
+
 TEST(OptionValues, NumbersForPeople) {
     EXPECT_EQ(formatCount(0), "0");
     EXPECT_EQ(formatCount(999), "999");

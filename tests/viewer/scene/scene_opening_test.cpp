@@ -12,10 +12,12 @@ namespace {
 
 /// Opens a dataset, with `fail` called where the progress is told.
 Error errorOf(const std::function<void()>& fail) {
-    SceneOpening opening({"folder/none.vcp"}, {}, {}, [fail](const BuildProgress&) {
+    BuildOptions build;
+    build.progress = [fail](const BuildProgress&) {
         fail();
         return true;
-    });
+    };
+    SceneOpening opening({"folder/none.vcp"}, build, {});
     while (!opening.isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const auto opened = opening.take();
     EXPECT_FALSE(opened);

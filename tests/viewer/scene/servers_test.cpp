@@ -66,7 +66,7 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
     SourceAccess access;
     for (const bool isCancelled : {true, false}) {
         std::filesystem::remove(folder_ / "asked");
-        SceneOpening opening({server_->url("scan.vcp?fault=silent&log=1")}, {}, access, nullptr);
+        SceneOpening opening({server_->url("scan.vcp?fault=silent&log=1")}, {}, access);
         waitForRequest();
         if (!isCancelled) continue;  // destroyed
         opening.cancel();
@@ -76,8 +76,8 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
 }
 
 TEST_F(Servers, WhatWasOpenedIsReadAfterItsOpeningIsGone) {
-    auto opening = std::make_unique<SceneOpening>(std::vector{server_->url("scan.vcp")}, BuildSettings{},
-                                                    SourceAccess{}, nullptr);
+    auto opening =
+        std::make_unique<SceneOpening>(std::vector{server_->url("scan.vcp")}, BuildOptions{}, SourceAccess{});
     while (!opening->isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const auto open = opening->take();
     opening.reset();

@@ -32,7 +32,7 @@ protected:
         fs::create_directory(*folder_ / "work");
         fs::current_path(*folder_ / "work");
         SessionOptions options;
-        options.render.budget = "64M";
+        options.render.budgetBytes = 64 << 20;
         auto session = ViewSession::create(options, {});
         ASSERT_TRUE(session) << session.error().line();
         session_ = *std::move(session);
@@ -114,14 +114,14 @@ protected:
         }
     };
 
-    /// `given`: options, and what they say.
-    Remembering begin(const std::set<std::string>& given = {}, RenderSettings render = {}) {
+    /// `given`: which settings are given, and what they say.
+    Remembering begin(const GivenSettings& given = {}, RenderSettings render = {}) {
         const auto user = readUserSettings(settings_);
         EXPECT_TRUE(user);
         SessionOptions options;
         options.user = *user;
         options.render = std::move(render);
-        applyRemembered(options.render, options.user, [&](const char* option) { return given.contains(option); });
+        applyRemembered(options.render, options.user, given);
         auto session = ViewSession::create(options, {});
         EXPECT_TRUE(session) << session.error().line();
         Remembering made{*std::move(session)};
@@ -163,14 +163,15 @@ TEST_F(RememberingSessionTest, ThreeWindowsRememberThreeFiles) {
 
 TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
     RenderSettings render;
-    render.up = "z";
-    render.shadows = true;
-    render.occlusionRays = 16;
+    render.up = UpAxis::Z;
+    render.shading.shadows = true;
+    render.shading.occlusionRays = 16;
     render.errorPixels = 7;
-    render.budget = "64M";
-    render.light = "fixed";
-    render.sections = {"x<50%"};
-    Remembering given = begin({"--up", "--shadows", "--occlusion", "--error-pixels", "--budget"}, render);
+    render.budgetBytes = 64 << 20;
+    render.shading.lightFollowsCamera = false;
+    render.sections = {*parsePlane("x<50%")};
+    Remembering given =
+        begin({.up = true, .shadows = true, .occlusion = true, .errorPixels = true, .budget = true}, render);
     given.open(ball());
     EXPECT_EQ(given.session->viewer().camera().up, UpAxis::Z);
     EXPECT_TRUE(given.session->viewer().shading().shadows);
@@ -192,11 +193,11 @@ TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
 
 TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
     RenderSettings render;
-    render.up = "z";
-    render.shadows = true;
+    render.up = UpAxis::Z;
+    render.shading.shadows = true;
     render.errorPixels = 7;
-    render.budget = "64M";
-    Remembering first = begin({"--up", "--shadows", "--error-pixels", "--budget"}, render);
+    render.budgetBytes = 64 << 20;
+    Remembering first = begin({.up = true, .shadows = true, .errorPixels = true, .budget = true}, render);
     first.open(ball());
     first.session->act(ViewerAction::ToggleUpAxis);  // to y, which is the default: nothing of it shows below
     first.rest();

@@ -10,8 +10,8 @@
 #include "streaming/web_address.h"
 #include "viewer/bench/rays/analytic_models.h"
 #include "viewer/bench/report/bench_folder.h"
-#include "viewer/scene/build_settings.h"
 #include "viewer/scene/option_values.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 
@@ -73,9 +73,9 @@ private:
     }
 
     Result<std::string> datasetOf(const std::string& model) const {
-        VCP_TRY_ASSIGN(auto file, datasetFor({model}, {}, [&](const BuildProgress&) {
-                           return progress(fmt::format("{}: building", model), 0);
-                       }));
+        BuildOptions build;
+        build.progress = [&](const BuildProgress&) { return progress(fmt::format("{}: building", model), 0); };
+        VCP_TRY_ASSIGN(auto file, datasetFor({model}, std::move(build)));
         return file.string();
     }
 

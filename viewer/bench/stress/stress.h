@@ -20,7 +20,7 @@
 #include "streaming/faulty_reader.h"
 #include "viewer/bench/stress/stress_orders.h"
 #include "viewer/bench/stress/stress_views.h"
-#include "viewer/scene/source_settings.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 

@@ -10,7 +10,7 @@
 
 #include "octree/result.h"
 #include "render/renderer.h"
-#include "viewer/scene/source_settings.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 

@@ -1,0 +1,26 @@
+// What a person names to be shown: a scene, datasets, or meshes, which are built into the cache first.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "builder/build.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+/// One scene file (.json), .vcp files and addresses, or meshes.
+enum class InputKind { Scene, Datasets, Meshes };
+/// Returns the kind of the inputs. Errors: Usage (kinds are mixed; several scenes).
+Result<InputKind> kindOf(const std::vector<std::string>& inputs);
+
+/// Returns the .vcp to show for `inputs`: the input itself when it is one, else the mesh built into the default cache.
+/// Of `build` inputs and output are ignored. Any thread. Errors: those of MeshCache. Precondition: one .vcp or address,
+/// or meshes.
+Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, BuildOptions build);
+
+/// Returns the files that meshes named in datasetFor: material files, images, buffers. None for other inputs.
+std::vector<std::filesystem::path> sideFilesOf(const std::vector<std::string>& inputs, BuildOptions build);
+
+}  // namespace vcp
