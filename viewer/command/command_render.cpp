@@ -157,7 +157,7 @@ Result<void> report(const RenderCommand& command, const Drawing& drawing, const 
                     const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
     if (command.report.json) {
         Json json = toJson(drawing, device, request, camera);
-        json["iterations_mean"] = panels.front().iterationsMean;
+        if (panels.front().iterationsMean) json["iterations_mean"] = *panels.front().iterationsMean;
         for (const MethodPanel& panel : panels)
             if (!command.methods.empty()) json["methods"].push_back(toJson(panel));
         return printJson(json);
@@ -265,6 +265,12 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
     return {};
 }
 
+Result<void> checkValidation(const Renderer& renderer) {
+    const std::vector<std::string> problems = renderer.validationMessages();
+    return problems.empty() ? Result<void>() : Error{ErrorCode::Device, problems.front()};
+}
+
+/// Draws one picture, or one a method, side by side.
 Result<void> drawOne(Renderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
                      const RenderCommand& command, const SceneFile& scene, const OutputRules& rules) {
     std::vector<std::string> methods = command.methods;
@@ -277,7 +283,8 @@ Result<void> drawOne(Renderer& renderer, const FrameRequest& request, const Orbi
             VCP_TRY(renderer.setSurfaces(surfaces.surfaces));
         }
         VCP_TRY_ASSIGN(auto drawing, draw(renderer, request, command));
-        VCP_TRY_ASSIGN(auto panel, readPanel(renderer, method, drawing.stats, drawing.medianMs()));
+        VCP_TRY_ASSIGN(auto panel,
+                       readPanel(renderer, method, !scene.surfaces.empty(), drawing.stats, drawing.medianMs()));
         if (drawing.stats.unresolvedRays > 0)
             warnOnTerminal(fmt::format(
                 "{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
@@ -285,40 +292,19 @@ Result<void> drawOne(Renderer& renderer, const FrameRequest& request, const Orbi
         panels.push_back(std::move(panel));
         if (!first) first = std::move(drawing);
     }
-    if (const auto problems = renderer.validationMessages(); !problems.empty())
-        return Error{ErrorCode::Device, problems.front()};
+    VCP_TRY(checkValidation(renderer));
     VCP_TRY(writePlanes(renderer, request, command, rules));
     VCP_TRY(writePng(sideBySide(panels), command.output, rules));
     return report(command, *first, panels, renderer.device(), request, camera);
 }
 
-Result<int> run(const RenderCommand& command) {
-    VCP_TRY(checkOptions(command));
-    VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
-    const glm::ivec2 size = command.size;
-    VCP_TRY_ASSIGN(const auto open,
-                   openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
-                                  command.methods.empty() ? "" : command.methods[0]));
-    if (!command.methods.empty() && open.file.surfaces.empty())
-        return Error{ErrorCode::Usage, "--methods goes with a scene that has mesostructure"};
-    if (open.parts.size() == 1) VCP_TRY(command.render.checkFor(*open.parts.front().open.dataset));
-    const SceneFile& scene = open.file;
-    for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
-    const Box bounds = open.bounds();
-    VCP_TRY_ASSIGN(const auto camera,
-                   command.render.isFit() && scene.camera ? *scene.camera : command.render.cameraFor(bounds, size));
-    VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
-    const OutputRules rules = rulesOf(command, open.filesRead);
-    VCP_TRY(checkOutputs(command, rules, cameras.size()));
-    RendererOptions options = command.render.rendererOptions();
-    options.validation = command.validation;
-    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
-    VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
-
+/// Returns the request for the picture: options go before what the scene says, but for the light.
+FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, const OrbitCamera& camera,
+                        const Box& bounds) {
     FrameRequest request;
     request.camera = camera.current();
-    request.width = uint32_t(size.x);
-    request.height = uint32_t(size.y);
+    request.width = uint32_t(command.size.x);
+    request.height = uint32_t(command.size.y);
     request.errorPixels = command.render.errorPixels;
     request.shading = command.render.shading;
     request.shading.transparent = command.transparent;
@@ -333,6 +319,33 @@ Result<int> run(const RenderCommand& command) {
         request.shading.lightDirection = scene.light->direction;
     }
     request.march = command.render.march;
+    return request;
+}
+
+Result<int> run(const RenderCommand& command) {
+    VCP_TRY(checkOptions(command));
+    VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
+    VCP_TRY_ASSIGN(const auto open,
+                   openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
+                                  command.methods.empty() ? "" : command.methods[0]));
+    if (!command.methods.empty() && open.file.surfaces.empty())
+        return Error{ErrorCode::Usage, "--methods goes with a scene that has mesostructure"};
+    if (open.parts.size() == 1) VCP_TRY(command.render.checkFor(*open.parts.front().open.dataset));
+    const SceneFile& scene = open.file;
+    for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
+    const Box bounds = open.bounds();
+    VCP_TRY_ASSIGN(const auto camera, command.render.isFit() && scene.camera
+                                          ? *scene.camera
+                                          : command.render.cameraFor(bounds, command.size));
+    VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
+    const OutputRules rules = rulesOf(command, open.filesRead);
+    VCP_TRY(checkOutputs(command, rules, cameras.size()));
+    RendererOptions options = command.render.rendererOptions();
+    options.validation = command.validation;
+    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
+    VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
+
+    const FrameRequest request = requestFor(command, scene, camera, bounds);
     const InterruptScope catching;
     if (!command.isTiled(request)) {
         VCP_TRY(drawOne(*renderer, request, camera, command, scene, rules));
@@ -341,6 +354,7 @@ Result<int> run(const RenderCommand& command) {
     if (!command.methods.empty())
         return Error{ErrorCode::Usage, fmt::format("--methods goes with at most {} M pixels", kMostPixelsAtOnce >> 20)};
     VCP_TRY(makeTiled(*renderer, request, cameras, command, rules));
+    VCP_TRY(checkValidation(*renderer));
     return 0;
 }
 

@@ -13,12 +13,15 @@ Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene) {
     return makeMesoScene(scene.surfaces);
 }
 
-Result<MethodPanel> readPanel(Renderer& renderer, const std::string& method, const FrameStats& stats,
-                              double msPerFrame) {
+Result<MethodPanel> readPanel(Renderer& renderer, const std::string& method, bool withIterations,
+                              const FrameStats& stats, double msPerFrame) {
     VCP_TRY_ASSIGN(auto picture, renderer.readPicture());
+    MethodPanel panel{method, std::move(picture), stats, msPerFrame, {}};
+    if (!withIterations) return panel;
     VCP_TRY_ASSIGN(const auto iterations, renderer.readIterations());
     const double sum = std::accumulate(iterations.begin(), iterations.end(), 0.0);
-    return MethodPanel{method, std::move(picture), stats, msPerFrame, sum / double(iterations.size())};
+    panel.iterationsMean = sum / double(iterations.size());
+    return panel;
 }
 
 Picture sideBySide(std::span<const MethodPanel> panels) {
@@ -38,7 +41,7 @@ Json toJson(const MethodPanel& panel) {
     return {{"method", panel.method},
             {"ms_per_frame", panel.msPerFrame},
             {"hit_pixels", panel.stats.hitPixels},
-            {"iterations_mean", panel.iterationsMean},
+            {"iterations_mean", panel.iterationsMean.value_or(0)},
             {"unresolved_rays", panel.stats.unresolvedRays},
             {"far_hits", panel.stats.farHits},
             {"surface_bytes", panel.stats.surfaceBytes}};
@@ -46,7 +49,8 @@ Json toJson(const MethodPanel& panel) {
 
 std::string summary(const MethodPanel& panel) {
     return fmt::format("{}: {:.1f} ms, {:.1f} iterations a pixel, {} unresolved, {}", panel.method, panel.msPerFrame,
-                       panel.iterationsMean, panel.stats.unresolvedRays, formatBytes(panel.stats.surfaceBytes));
+                       panel.iterationsMean.value_or(0), panel.stats.unresolvedRays,
+                       formatBytes(panel.stats.surfaceBytes));
 }
 
 }  // namespace vcp
