@@ -62,8 +62,8 @@ public:
             if (error.code != ErrorCode::Usage) space_.folder().remove();
             if (error.code == ErrorCode::Cancelled) error.message = "cancelled; nothing was written";
         } else {
-            error.message += fmt::format("; the same command with --resume{} goes on from here, or delete {}",
-                                         needsMore ? " and the memory" : "", space_.folder().path().string());
+            error.message += fmt::format("; the same build, resumed{}, goes on from here, or delete {}",
+                                         needsMore ? " with that memory" : "", space_.folder().path().string());
         }
         if (error.file.empty()) error.file = options_.output.string();
         return error;
@@ -82,7 +82,7 @@ private:
         } catch (const std::bad_alloc&) {
             return Error{
                 .code = ErrorCode::Limit,
-                .message = "the system has no more memory to give; use a smaller --memory, or fewer --threads"};
+                .message = "the system has no more memory to give; use a smaller memory cap, or fewer threads"};
         }
     }
 
@@ -157,8 +157,7 @@ private:
         if (done_.build != buildFingerprint(options_))
             return Error{
                 .code = ErrorCode::Usage,
-                .message =
-                    "the unfinished build here is of other inputs or options; without --resume it is started again",
+                .message = "the unfinished build here is of other inputs or options; build again from the start",
                 .file = folder.path().string()};
         for (const SideFile& each : done_.sideFiles)
             if (fileStamp(each.path) != each.stamp)
@@ -212,7 +211,7 @@ private:
         VCP_TRY(files_.reopen(done_, space_));
         if (pass_ >= 0 && firstBin_ >= plan_.partitionOf(plan_.levelOf(pass_)).bins())
             return Error{.code = ErrorCode::InvalidInput,
-                         .message = "names a bin that there is not; build again without --resume",
+                         .message = "names a bin that there is not; build again from the start",
                          .file = (space_.folder().path() / kJournalName).string()};
         return reactivate();
     }
@@ -238,23 +237,23 @@ private:
 
     /// Checks the free space now: a disk that is too small would be noticed only after hours.
     Result<void> checkFreeSpace() const {
-        const auto check = [&](const std::filesystem::path& at, uint64_t needed, const char* option) -> Result<void> {
+        const auto check = [&](const std::filesystem::path& at, uint64_t needed, const char* what) -> Result<void> {
             const uint64_t free = freeBytesAt(at);
             if (needed <= free) return {};
             // The two numbers are rounded apart, so that they never read the same.
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("about {} MB are needed in the folder {} and {} MB are free there; "
-                                                "free some space or choose another folder{}",
+                                                "free some space or choose another {}",
                                                 needed / 1000000 + 1,
                                                 at.has_filename() && !std::filesystem::is_directory(at)
                                                     ? std::filesystem::absolute(at).parent_path().string()
                                                     : at.string(),
-                                                free / 1000000, option),
+                                                free / 1000000, what),
                          .file = options_.output.string()};
         };
         const uint64_t temp = expectedTempBytes(measures_.triangles, memory_.tempBytes), there = space_.diskBytes();
-        VCP_TRY(check(space_.folder().path(), temp > there ? temp - there : 0, " with --temp"));
-        return check(options_.output, expectedFileBytes(measures_.triangles), "");
+        VCP_TRY(check(space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"));
+        return check(options_.output, expectedFileBytes(measures_.triangles), "folder");
     }
 
     [[nodiscard]] bool usesVertexColours() const {

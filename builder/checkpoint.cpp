@@ -191,7 +191,7 @@ Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& 
     if (all.areWhole()) return recorded;
     return Error{
         .code = ErrorCode::InvalidInput,
-        .message = "some of what it should say is missing or wrong; check the disk, then build again without --resume",
+        .message = "some of what it should say is missing or wrong; check the disk, then build again from the start",
         .file = file.string()};
 }
 
@@ -211,7 +211,7 @@ Result<json> WorkFiles::sync() {
 Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
     const auto unlike = [&](const char* what) {
         return Error{.code = ErrorCode::InvalidInput,
-                     .message = fmt::format("{}; build again without --resume", what),
+                     .message = fmt::format("{}; build again from the start", what),
                      .file = (space.folder().path() / kJournalName).string()};
     };
     // The next level's bins are made with the first bin of a pass.

@@ -162,9 +162,9 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     if (m.triangles == m.degenerateTriangles || m.area == 0)
         return badInput(options, fmt::format("none of its {} triangles has an area", m.triangles));
     if (options.colour == ColourChoice::Vertex && !hasVertexColours)
-        return badInput(options, "has no vertex colours; leave out --colour vertex");
+        return badInput(options, "has no vertex colours; choose another colour to keep");
     if (options.colour == ColourChoice::Texture && !m.hasMaterials)
-        return badInput(options, "has no materials with a colour or a texture; leave out --colour texture");
+        return badInput(options, "has no materials with a colour or a texture; choose another colour to keep");
     return m;
 }
 
@@ -187,14 +187,15 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
         std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon();
     if (options.cell <= 0) frame.cell = std::max(frame.cell, std::max(longest / kMaxExtentCells, resolution * 1e4));
     if (longest / frame.cell > kMaxExtentCells)
-        return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format(
-                         "a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; use --cell {:g} or larger",
-                         frame.cell, longest, longest / kMaxExtentCells),
-                     .file = nameOf(options)};
+        return Error{
+            .code = ErrorCode::Limit,
+            .message = fmt::format(
+                "a cell of {:g} divides the mesh's {:g} into more than 2^20 cells; let the cell edge be {:g} or larger",
+                frame.cell, longest, longest / kMaxExtentCells),
+            .file = nameOf(options)};
     if (longest * kLatticePerCell < frame.cell)
         return badInput(options,
-                        fmt::format("all of it is smaller than 1/{} cell; use a smaller --cell", kLatticePerCell));
+                        fmt::format("all of it is smaller than 1/{} cell; use a smaller cell edge", kLatticePerCell));
     const double cellsAcross = longest / frame.cell + 2;
     while (std::ldexp(1.0, int(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
     frame.origin = m.boundsMin - glm::dvec3(frame.cell);
@@ -209,8 +210,9 @@ Result<double> chooseError(const BuildOptions& options, const SoupMeasures& meas
     const double least = 8 * kLatticeRounding * frame.cell;
     if (error < least)
         return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("an error of {:g} needs a finer cell than {:g}; use --cell {:g} or smaller",
-                                            error, frame.cell, error / (8 * kLatticeRounding))};
+                     .message = fmt::format(
+                         "an error of {:g} needs a finer cell than {:g}; let the cell edge be {:g} or smaller", error,
+                         frame.cell, error / (8 * kLatticeRounding))};
     return error;
 }
 

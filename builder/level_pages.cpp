@@ -41,7 +41,7 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
     if (const auto view = parsePage(encoded.geometry); encoded.leaves > 0 && !view)
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format(
-                         "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller --cell",
+                         "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller cell edge",
                          triangles.size(), encoded.leaves)};
     BuiltPage page;
     page.entry.morton = code;
@@ -131,7 +131,7 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
         if (const uint64_t most = left(settings.pageBytes + settings.roomBytes); work[i] > most)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a subvolume holds {} triangles and needs {} MiB more memory; use a "
-                                                "smaller --cell or a larger --memory",
+                                                "smaller cell edge or a larger memory cap",
                                                 bins.of(i).size(), ((work[i] - most) * 3 / 2 >> 20) + 1)};
         VCP_TRY(settings.makeRoom());
         VCP_TRY_ASSIGN(auto page, buildPage(settings, mesh, bins.pages[i], bins.of(i)));

@@ -40,9 +40,10 @@ uint64_t defaultMemoryBytes() {
 Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
     const uint64_t fixed = kBaseBytes + threads * kThreadBytes;
     if (memoryBytes < fixed + kLeastUsable)
-        return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("{} MiB of memory are too little for {} threads; give --memory {}M or more",
-                                            memoryBytes / kMiB, threads, (fixed + kLeastUsable) / kMiB + 1)};
+        return Error{
+            .code = ErrorCode::Limit,
+            .message = fmt::format("{} MiB of memory are too little for {} threads; let the memory cap be {}M or more",
+                                   memoryBytes / kMiB, threads, (fixed + kLeastUsable) / kMiB + 1)};
     const uint64_t usable = memoryBytes - fixed;
     MemoryPlan plan;
     plan.vertexBytes = usable / 2;

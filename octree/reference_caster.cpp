@@ -289,7 +289,7 @@ Result<PageCache> PageCache::open(const std::filesystem::path& path) {
     VCP_TRY_ASSIGN(auto dataset, readDataset(*reader));
     if (dataset.header.method != Method::Certified)
         return Error{.code = ErrorCode::Unsupported,
-                     .message = "was built with --method paper and has no certified surface; build it without",
+                     .message = "was built by the paper's method and has no certified surface; build it by the other",
                      .file = path.string()};
     return PageCache(reader, std::move(dataset));
 }

@@ -66,7 +66,7 @@ Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
         if (needed > each.loader.heldBytes)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to "
-                                                "read the coarsest page of one takes {}: allow more (--ram)",
+                                                "read the coarsest page of one takes {}: allow more",
                                                 placed.size(), options.ramBytes, needed)};
         VCP_TRY_ASSIGN(auto residency, Residency::create(*device, access, each, std::move(placed[i].dataset),
                                                          std::move(placed[i].source)));

@@ -91,7 +91,7 @@ Error failure(CURLcode code, const std::string& detail, const HttpOptions& optio
         case CURLE_PEER_FAILED_VERIFICATION:
         case CURLE_SSL_CACERT_BADFILE:
             return lasting("the server's TLS certificate is not trusted (" + why +
-                           "); name its authority with --ca-file");
+                           "); name its authority's certificate");
         case CURLE_URL_MALFORMAT:
             return lasting("is not an address: " + why);
         default:

@@ -38,7 +38,7 @@ Result<PageBytes> pageOf(const PaperCaster& octree) {
         return Error{
             .code = ErrorCode::Limit,
             .message = fmt::format(
-                "the octree takes {} bytes, and of this method a file holds {} at most; use larger cells (--cell)",
+                "the octree takes {} bytes, and of this method a file holds {} at most; use a larger cell edge",
                 sections.end, kMostPageBytes)};
     PageBytes page;
     page.geometry.resize(sections.end / 16);

@@ -57,7 +57,7 @@ bool isRegular(int folder, const char* name) {
 
 Error damagedTempFile(const std::filesystem::path& file, std::optional<uint64_t> byte) {
     return {.code = ErrorCode::InvalidInput,
-            .message = "temporary data came back damaged; check the disk, then build again without --resume",
+            .message = "temporary data came back damaged; check the disk, then build again from the start",
             .file = file.string(),
             .byte = byte};
 }
@@ -115,7 +115,7 @@ Result<bool> TempFolder::hold() {
         if ((code == ELOOP || code == ENOTDIR) && exists())
             return refused(path_,
                            "a build keeps its temporary files in a folder of this name, but it is a link or a file; "
-                           "move it away, or give --temp another folder");
+                           "move it away, or choose another temporary folder");
         return tempError(path_, "cannot make the temporary folder", code);
     }
     const NameLock lock = lockName(folder_, path_);
@@ -132,9 +132,10 @@ Result<bool> TempFolder::hold() {
 Result<void> TempFolder::mark() const {
     if (isRegular(folder_, kTempMark)) return {};
     if (!namesIn(folder_, 1).empty())
-        return refused(path_,
-                       "is not known to be a build's, since it has no file vcp-build, so nothing in it is touched; "
-                       "delete it if it is of an earlier version, else move it away or give --temp another folder");
+        return refused(
+            path_,
+            "is not known to be a build's, since it has no file vcp-build, so nothing in it is touched; "
+            "delete it if it is of an earlier version, else move it away or choose another temporary folder");
     VCP_TRY_ASSIGN(const auto file, create(kTempMark));
     ::close(file);
     Result<void> durable = sync();
@@ -163,7 +164,7 @@ Result<int> TempFolder::open(const std::string& name) const {
     const int file = ::openat(folder_, name.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     const int code = errno;
     if (file < 0 && code == ENOENT) return -1;
-    constexpr const char* kForeign = "is not a file that a build made; move it away, and build again without --resume";
+    constexpr const char* kForeign = "is not a file that a build made; move it away, and build again from the start";
     if (file < 0)
         return code == ELOOP || code == EISDIR || code == ENXIO ? refused(path_ / name, kForeign)
                                                                 : tempError(path_ / name, "cannot be opened", code);

@@ -24,7 +24,7 @@ inline constexpr const char* kTempMark = "vcp-build";
 inline constexpr const char* kTempSuffix = ".spill";
 
 /// What to do about a folder that is full.
-inline constexpr const char* kWhenTempIsFull = "free some space, or give --temp a folder with more";
+inline constexpr const char* kWhenTempIsFull = "free some space, or choose a temporary folder with more";
 
 /// Returns the error for bytes that differ from what was written: in `file`, at `byte`.
 Error damagedTempFile(const std::filesystem::path& file, std::optional<uint64_t> byte = {});

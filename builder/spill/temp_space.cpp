@@ -126,7 +126,7 @@ Result<void> TempFile::reopen(uint64_t bytes) {
     const off_t size = file_ < 0 ? -1 : ::lseek(file_, 0, SEEK_END);
     if (size < 0 || uint64_t(size) < bytes)
         return Error{.code = ErrorCode::InvalidInput,
-                     .message = "is shorter than the journal says; build again without --resume",
+                     .message = "is shorter than the journal says; build again from the start",
                      .file = path().string()};
     if (::ftruncate(file_, off_t(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
     flushed_ = end_ = bytes;

@@ -165,7 +165,7 @@ TEST_F(Build, SameBytesForAnyMemory) {
     BuildOptions o = options({input});
     o.memoryBytes = 140 << 20;
     fs::remove(o.output);
-    expectError(o, ErrorCode::Limit, "give --memory");
+    expectError(o, ErrorCode::Limit, "memory cap");
 }
 
 TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
@@ -356,13 +356,13 @@ TEST_F(Build, CellLargerThanTheMesh) {
     // So large that nothing is left of the mesh.
     o.cell = 1e7;
     fs::remove(o.output);
-    expectError(o, ErrorCode::InvalidInput, "use a smaller --cell");
+    expectError(o, ErrorCode::InvalidInput, "use a smaller cell edge");
 }
 
 TEST_F(Build, CellTooSmall) {
     BuildOptions o = options({ply(test::torusMesh(glm::dvec3(0), 2, 0.7, 60, 30))});
     o.cell = 1e-9;
-    expectError(o, ErrorCode::Limit, "use --cell");
+    expectError(o, ErrorCode::Limit, "let the cell edge be");
     // What the message advises, works in principle: it is within the limit. A cell a little below it is not.
     const auto report = buildOctree(o);
     ASSERT_FALSE(report.ok());

@@ -41,9 +41,9 @@ TEST(MemoryPlan, TooLittleSaysWhatIsEnough) {
         ASSERT_FALSE(none.ok());
         EXPECT_EQ(none.error().code, ErrorCode::Limit);
         const std::string line = none.error().line();
-        const size_t at = line.find("--memory ");
+        const size_t at = line.find("memory cap be ");
         ASSERT_NE(at, std::string::npos) << line;
-        const uint64_t enough = std::stoull(line.substr(at + 9));
+        const uint64_t enough = std::stoull(line.substr(at + 14));
         EXPECT_TRUE(planMemory(enough * kMiB, threads).ok()) << line;
         EXPECT_FALSE(planMemory((enough - 2) * kMiB, threads).ok()) << line;
     }

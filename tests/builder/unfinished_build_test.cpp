@@ -94,7 +94,7 @@ protected:
         const std::string line = report.error().line();
         EXPECT_EQ(line.find('\n'), std::string::npos) << what;
         EXPECT_TRUE(line.starts_with(temp().string())) << what << ": " << line;
-        EXPECT_NE(line.find("without --resume"), std::string::npos) << what << ": " << line;
+        EXPECT_NE(line.find("from the start"), std::string::npos) << what << ": " << line;
         EXPECT_FALSE(fs::exists(output())) << what;
         EXPECT_FALSE(fs::exists(folder_ / "out.vcp.partial")) << what;
         EXPECT_TRUE(fs::exists(temp())) << what << ": what there is stays";

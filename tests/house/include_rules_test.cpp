@@ -2,7 +2,9 @@
 #include "tests/house/include_rules.h"
 
 #include <algorithm>
+#include <regex>
 #include <set>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -62,6 +64,45 @@ TEST(IncludeRules, NothingBelowTheRendererIncludesIt) {
                 << fs::relative(file, kRoot).string() << " includes " << name;
     }
     EXPECT_GT(checked, 40u);
+}
+
+/// Messages name the thing, "the memory cap": the command line adds its option (viewer/command/option_names.h).
+TEST(IncludeRules, OnlyTheCommandLineNamesItsOptions) {
+    const std::regex option("\"[^\"]*--[a-z][^\"]*\"");
+    size_t checked = 0;
+    for (const Room& room : rooms()) {
+        if (room.path == "viewer/command" || room.path == "viewer/examples" || room.path == "datasets_scripts")
+            continue;
+        if (room.path.starts_with("viewer/bench")) continue;
+        for (const auto& entry : fs::directory_iterator(kRoot / room.path)) {
+            if (entry.path().extension() != ".cpp" && entry.path().extension() != ".h") continue;
+            ++checked;
+            std::istringstream lines(readText(entry.path()));
+            for (std::string line; std::getline(lines, line);) {
+                line.erase(std::min(line.find("//"), line.size()));
+                EXPECT_FALSE(std::regex_search(line, option))
+                    << fs::relative(entry.path(), kRoot).string() << ": " << line;
+            }
+        }
+    }
+    EXPECT_GT(checked, 250u);
+}
+
+/// What the command line adds its options to is said somewhere.
+TEST(IncludeRules, EachThingThatHasAnOptionIsSpokenOf) {
+    std::string all;
+    for (const Room& room : rooms())
+        for (const auto& entry : fs::directory_iterator(kRoot / room.path))
+            if (entry.path().extension() == ".cpp" || entry.path().extension() == ".h")
+                if (room.path != "viewer/command" && room.path != "viewer/widget") all += readText(entry.path());
+    size_t checked = 0;
+    const std::regex row("\\{\"([^\"]+)\", \"[^\"]+\"\\},");
+    for (const char* table : {"viewer/command/option_names.h", "viewer/widget/handles.cpp"}) {
+        const std::string text = readText(kRoot / table);
+        for (std::sregex_iterator at(text.begin(), text.end(), row), end; at != end; ++at, ++checked)
+            EXPECT_NE(all.find((*at)[1].str()), std::string::npos) << table << ": " << (*at)[1];
+    }
+    EXPECT_GE(checked, 20u);
 }
 
 TEST(IncludeRules, EveryRoomLinksWhatItMayInclude) {

@@ -163,7 +163,7 @@ TEST_F(PaperFileTest, ComesBackAndIsNoCertifiedDataset) {
     const auto cache = PageCache::open(file);
     ASSERT_FALSE(cache);
     EXPECT_EQ(cache.error().code, ErrorCode::Unsupported);
-    EXPECT_NE(cache.error().line().find("--method paper"), std::string::npos) << cache.error().line();
+    EXPECT_NE(cache.error().line().find("the paper's method"), std::string::npos) << cache.error().line();
 }
 
 TEST_F(PaperFileTest, UnknownMethodsAreNamed) {

@@ -57,7 +57,7 @@ Result<TileMesh> readTileMesh(const std::filesystem::path& path, const TileMeshO
             low = glm::min(low, positions[corner]), high = glm::max(high, positions[corner]);
     const glm::dvec3 size = high - low;
     if (!(std::max(size.x, size.y) > 0))
-        return fail(ErrorCode::InvalidInput, "has no size across the tile; is another axis up (--up)?");
+        return fail(ErrorCode::InvalidInput, "has no size across the tile; is another axis up?");
 
     TileMesh mesh;
     const double scale = options.period ? 1 / options.period->x : 0.9 / std::max(size.x, size.y);

@@ -7,6 +7,7 @@
 #include "octree/caught.h"
 #include "streaming/web_address.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/option_names.h"
 #include "viewer/command/terminal_text.h"
 
 namespace vcp {
@@ -18,7 +19,7 @@ constexpr int kWrongUsage = 2;
 
 /// Writes one line on stderr, whatever the message contains; mistyped text may be an address with a password.
 void complain(const std::string& what) {
-    std::string message = shownAddress(what);
+    std::string message = withSettingNames(shownAddress(what), kOptionNames);
     std::replace(message.begin(), message.end(), '\n', ' ');
     std::fprintf(stderr, "vcp: %s\n", terminalText(message).c_str());
 }

@@ -42,10 +42,9 @@ RendererOptions RenderSettings::rendererOptions() const {
 Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
     const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
     const bool isPaper = dataset.header.method == Method::Paper;
-    if (!isPaper && march != PaperMarch{})
-        return usage("the options --paper-... are for files built with --method paper");
+    if (!isPaper && march != PaperMarch{}) return usage("the paper's march is for files built by the paper's method");
     if (isPaper && (shading.shadows || shading.occlusionRays > 0 || caps))
-        return usage("files built with --method paper have no --shadows, --occlusion or --caps");
+        return usage("files built by the paper's method are drawn without shadows, ambient occlusion and caps");
     return {};
 }
 

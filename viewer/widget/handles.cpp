@@ -1,11 +1,24 @@
 #include "viewer/widget/handles.h"
 
+#include "viewer/scene/setting_names.h"
+
 namespace vcp::widget {
 
 namespace {
 
 // No struct of ours is nearly as large: a larger size means that it was not set.
 constexpr uint32_t kLargestStruct = 4096;
+
+constexpr SettingName kFieldNames[] = {
+    {"cell edge", "cell"},
+    {"memory cap", "memory_bytes"},
+    {"fewer threads", "threads"},
+    {"temporary folder", "temp_folder"},
+    {"from the start", "resume = 0"},
+    {"resumed", "resume = 1"},
+    {"memory for pages on their way", "ram_bytes"},
+    {"authority's certificate", "ca_file"},
+};
 
 /// Returns the bytes of the UTF-8 character at a place; 0 where there is none.
 size_t characterAt(const std::string& text, size_t at) {
@@ -37,7 +50,7 @@ std::string utf8Of(const std::string& text) {
     return valid;
 }
 
-Outcome::Outcome(const Error& error) : text(utf8Of(error.line())) {
+Outcome::Outcome(const Error& error) : text(utf8Of(withSettingNames(error.line(), kFieldNames))) {
     switch (error.code) {
         case ErrorCode::InvalidInput:
             status = VCP_INVALID_INPUT;
