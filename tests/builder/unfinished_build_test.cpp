@@ -61,7 +61,7 @@ protected:
         };
         const auto report = buildOctree(o);
         ASSERT_FALSE(report.ok()) << "stop at " << stage;
-        EXPECT_NE(report.error().line().find("--resume"), std::string::npos) << report.error().line();
+        EXPECT_NE(report.error().line().find("resumed"), std::string::npos) << report.error().line();
         fs::remove(output());
         left_.clear();
         for (const auto& entry : fs::directory_iterator(temp()))
