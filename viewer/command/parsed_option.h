@@ -13,8 +13,7 @@ namespace vcp {
 
 /// Returns the error for a text that an option does not take.
 inline CLI::ValidationError notTaken(const std::string& option, const std::string& wanted, const std::string& text) {
-    return CLI::ValidationError(option.substr(0, option.find(',')),
-                                "must be " + wanted + ", not \"" + text + "\"");
+    return CLI::ValidationError(option.substr(0, option.find(',')), "must be " + wanted + ", not \"" + text + "\"");
 }
 
 /// Adds an option of one text. `parse` returns an optional value, which goes to `value`; `wanted` follows "must be".
