@@ -10,8 +10,6 @@
 
 namespace vcp {
 
-namespace {
-
 std::vector<std::string> shadingNames() { return {kShadingNames.begin(), kShadingNames.end()}; }
 
 std::optional<ShadingMode> shadingNamed(std::string_view name) {
