@@ -40,6 +40,8 @@ const std::vector<Room>& rooms() {
         {"viewer/bench/peers", {"octree", "builder/", "streaming", "render"}},
         {"viewer/bench/rays",
          {"octree", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/peers"}},
+        {"viewer/bench/picture",
+         {"octree", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/rays"}},
         {"viewer/bench/stress",
          {"octree", "builder/", "streaming", "render", "viewer/camera", "viewer/scene", "viewer/bench/report",
           "viewer/bench/rays"}},

@@ -7,6 +7,7 @@
 
 #include "viewer/bench/bench_build.h"
 #include "viewer/bench/bench_meso.h"
+#include "viewer/bench/picture/bench_picture.h"
 #include "viewer/bench/rays/bench_methods.h"
 #include "viewer/bench/rays/bench_rays.h"
 #include "viewer/bench/stress/bench_stream.h"
@@ -56,6 +57,11 @@ struct RaysCommand : BenchCommand {
     int judgeEvery = 1;
     bool sweep = false, stability = false;
     PaperOptions paper;
+};
+
+struct PictureCommand : BenchCommand {
+    BenchPictureOptions options;
+    std::string size = "960x600";
 };
 
 struct StreamCommand {
@@ -177,6 +183,26 @@ Result<int> runRays(const RaysCommand& command) {
     return publish(
         command, "bench_rays",
         {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
+}
+
+Result<int> runPicture(const PictureCommand& command) {
+    VCP_TRY(makeFolder(command.out));
+    BenchPictureOptions options = command.options;
+    options.models = command.modelPaths();
+    options.size = parseSize(command.size).value();
+    if (command.repetitions > 0) options.repetitions = command.repetitions;
+    options.threads = command.threads;
+    options.out = command.out;
+    options.cell = command.cellLength();
+    const InterruptScope catching;
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    options.progress = progressTo(display);
+    const auto report = benchPicture(options);
+    display.finish();
+    if (!report) return report.error();
+    return publish(command, "bench_picture",
+                   {benchPictureJson(*report), benchPictureCsv(*report), benchPictureMarkdown(*report),
+                    benchPicturePlots(*report)});
 }
 
 Result<int> runStream(const StreamCommand& command) {
@@ -305,6 +331,45 @@ RunCommand addBenchRays(CLI::App& bench) {
     return [command] { return runRays(*command); };
 }
 
+RunCommand addBenchPicture(CLI::App& bench) {
+    auto command = std::make_shared<PictureCommand>();
+    BenchPictureOptions& options = command->options;
+    CLI::App* app = bench.add_subcommand("picture", "Compare pictures with many samples a pixel of the mesh itself");
+    addBenchOptions(
+        *app, *command,
+        "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
+    const auto list = [&](const char* name, std::vector<std::string>& values, const std::string& text) {
+        app->add_option(name, values, text)->type_name("A,B")->delimiter(',')->allow_extra_args(false);
+    };
+    list("--methods", options.methods, fmt::format("{} [all]", fmt::join(pictureMethodNames(), ", ")));
+    list("--cameras", options.cameras,
+         fmt::format("{} [all]; dive goes from whole to a cell of {:g} pixels", fmt::join(pictureCameraNames(), ", "),
+                     kDiveCellPixels));
+    app->add_option("--error-pixels", options.errorPixels, "Errors that a picture may have, in pixels: 0.25,0.5,1")
+        ->type_name("X,X")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 1000.0));
+    app->add_option("--size", command->size, "Width and height in pixels")
+        ->type_name("WxH")
+        ->capture_default_str()
+        ->check([](const std::string& text) {
+            return parseSize(text) ? std::string() : "must be like 960x600, not \"" + text + "\"";
+        });
+    const auto count = [&](const char* name, int& value, const char* text, int most) {
+        app->add_option(name, value, text)->type_name("N")->capture_default_str()->check(CLI::Range(1, most));
+    };
+    count("--dive-steps", options.diveSteps, "Frames of the dive", 1000);
+    count("--views", options.views, "Directions that each camera looks from", 1000);
+    count("--samples", options.samples, "The mesh's picture has N x N rays a pixel", 64);
+    app->add_flag("--pictures", options.pictures, "Also write the pictures into --out, with isolated pixels in red");
+    app->add_option("--device", options.device,
+                    "Vulkan device of the method certified, see `vcp devices` [the best one]")
+        ->type_name("DEVICE");
+    return [command] { return runPicture(*command); };
+}
+
 RunCommand addBenchStream(CLI::App& bench) {
     auto command = std::make_shared<StreamCommand>();
     CLI::App* app =
@@ -396,8 +461,8 @@ RunCommand addBenchMeso(CLI::App& bench) {
 Command addBench(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("bench", "Measure run time against error, beside a peer");
     app->require_subcommand(1);
-    const std::vector<RunCommand> runs{addBenchBuild(*app), addBenchRays(*app), addBenchStream(*app),
-                                       addBenchMeso(*app)};
+    const std::vector<RunCommand> runs{addBenchBuild(*app), addBenchRays(*app), addBenchPicture(*app),
+                                       addBenchStream(*app), addBenchMeso(*app)};
     return {app, [=] {
                 const auto all = app->get_subcommands([](CLI::App*) { return true; });
                 const auto at = std::ranges::find_if(all, [](const CLI::App* each) { return each->parsed(); });

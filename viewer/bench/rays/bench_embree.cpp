@@ -1,9 +1,7 @@
 // Embree 3 as the peer of the ray benchmark: packets of 8 coherent rays, or one ray at a time.
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <thread>
 
 #include <glm/geometric.hpp>
 
@@ -12,7 +10,7 @@
 #include "viewer/bench/rays/bench_tracer.h"
 
 #ifdef VCP_HAVE_EMBREE
-#include <embree3/rtcore.h>
+#include "viewer/bench/rays/embree_scene.h"
 #endif
 
 namespace vcp {
@@ -24,78 +22,6 @@ using Clock = std::chrono::steady_clock;
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 #ifdef VCP_HAVE_EMBREE
-
-bool countMemory(void* user, ssize_t bytes, bool) {
-    static_cast<std::atomic<int64_t>*>(user)->fetch_add(bytes);
-    return true;
-}
-
-/// A device and a scene with the mesh's tree. Coordinates are floats about the mesh's middle.
-class EmbreeScene {
-public:
-    EmbreeScene(const IndexedMesh& mesh, unsigned threads) {
-        const unsigned count = threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
-        device_ = rtcNewDevice(("threads=" + std::to_string(count)).c_str());
-        rtcSetDeviceMemoryMonitorFunction(device_, countMemory, &bytes_);
-        scene_ = rtcNewScene(device_);
-        glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-        for (const glm::dvec3& p : mesh.positions) {
-            low = glm::min(low, p);
-            high = glm::max(high, p);
-        }
-        middle_ = 0.5 * (low + high);
-        RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* positions = static_cast<float*>(
-            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
-        for (const glm::dvec3& p : mesh.positions)
-            for (int axis = 0; axis < 3; ++axis) *positions++ = float(p[axis] - middle_[axis]);
-        auto* indices = static_cast<uint32_t*>(
-            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
-        for (const auto& triangle : mesh.triangles)
-            for (const uint32_t vertex : triangle) *indices++ = vertex;
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometry(scene_, geometry);
-        rtcReleaseGeometry(geometry);
-        const auto start = Clock::now();
-        rtcCommitScene(scene_);
-        buildSeconds_ = secondsSince(start);
-    }
-    ~EmbreeScene() {
-        rtcReleaseScene(scene_);
-        rtcReleaseDevice(device_);
-    }
-    EmbreeScene(const EmbreeScene&) = delete;
-    EmbreeScene& operator=(const EmbreeScene&) = delete;
-
-    [[nodiscard]] RTCScene scene() const { return scene_; }
-    [[nodiscard]] glm::dvec3 middle() const { return middle_; }
-    [[nodiscard]] double buildSeconds() const { return buildSeconds_; }
-    [[nodiscard]] uint64_t bytes() const { return uint64_t(bytes_.load()); }
-
-private:
-    std::atomic<int64_t> bytes_{0};
-    RTCDevice device_ = nullptr;
-    RTCScene scene_ = nullptr;
-    glm::dvec3 middle_{0};
-    double buildSeconds_ = 0;
-};
-
-/// A camera's rays in floats about the mesh's middle: right, up and forward, scaled to a step of a pixel.
-struct FloatCamera {
-    glm::vec3 eye, corner, perX, perY;
-
-    FloatCamera(const Camera& camera, glm::ivec2 size, glm::dvec3 middle) {
-        const auto width = uint32_t(size.x), height = uint32_t(size.y);
-        const CameraBasis b = cameraBasis(camera, width, height);
-        eye = glm::vec3(camera.eye - middle);
-        perX = glm::vec3(b.right * (2 * b.halfWidth / size.x));
-        perY = glm::vec3(b.up * (-2 * b.halfHeight / size.y));
-        corner = glm::vec3(b.forward - b.right * b.halfWidth + b.up * b.halfHeight);
-    }
-    [[nodiscard]] glm::vec3 direction(int x, int y) const {
-        return glm::normalize(corner + (float(x) + 0.5f) * perX + (float(y) + 0.5f) * perY);
-    }
-};
 
 struct FloatHit {
     float t = std::numeric_limits<float>::infinity();
@@ -111,7 +37,7 @@ void traceTile(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x
     for (int k = 0; k < 8; ++k) {
         const int px = x + k % kTileWidth, py = y + k / kTileWidth;
         valid[k] = px < size.x && py < size.y ? -1 : 0;
-        const glm::vec3 d = camera.direction(px, py);
+        const glm::vec3 d = camera.direction(float(px) + 0.5f, float(py) + 0.5f);
         r.ray.org_x[k] = camera.eye.x, r.ray.org_y[k] = camera.eye.y, r.ray.org_z[k] = camera.eye.z;
         r.ray.dir_x[k] = d.x, r.ray.dir_y[k] = d.y, r.ray.dir_z[k] = d.z;
         r.ray.tnear[k] = 0, r.ray.time[k] = 0;
@@ -134,7 +60,7 @@ void traceTile(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x
 
 void traceOne(RTCScene scene, const FloatCamera& camera, glm::ivec2 size, int x, int y, std::vector<FloatHit>& out) {
     RTCRayHit r{};
-    const glm::vec3 d = camera.direction(x, y);
+    const glm::vec3 d = camera.direction(float(x) + 0.5f, float(y) + 0.5f);
     r.ray.org_x = camera.eye.x, r.ray.org_y = camera.eye.y, r.ray.org_z = camera.eye.z;
     r.ray.dir_x = d.x, r.ray.dir_y = d.y, r.ray.dir_z = d.z;
     r.ray.tfar = std::numeric_limits<float>::infinity();

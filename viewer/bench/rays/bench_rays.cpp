@@ -6,46 +6,16 @@
 
 #include <fmt/format.h>
 
-#include "builder/build.h"
 #include "builder/paper/parallel_rows.h"
 #include "viewer/bench/rays/analytic_models.h"
 #include "viewer/bench/rays/bench_cameras.h"
 #include "viewer/bench/rays/bench_methods.h"
+#include "viewer/bench/rays/bench_model.h"
 #include "viewer/bench/report/bench_folder.h"
 
 namespace vcp {
 
 namespace {
-
-/// The mesh of a model and its .vcp.
-struct ModelFiles {
-    std::filesystem::path mesh, vcp;
-    std::string name;
-};
-
-/// Names the files: datasets of one mesh with several cells have several names. `cell` 0: chosen from the mesh.
-Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder, double cell) {
-    if (model.extension() != ".vcp") {
-        const std::string name = model.stem().string();
-        return ModelFiles{model, folder / (cell > 0 ? fmt::format("{}-cell-{}.vcp", name, cell) : name + ".vcp"), name};
-    }
-    for (const char* extension : {".ply", ".obj", ".stl"}) {
-        std::filesystem::path mesh = model;
-        mesh.replace_extension(extension);
-        if (std::filesystem::exists(mesh)) return ModelFiles{mesh, model, model.stem().string()};
-    }
-    return Error{.code = ErrorCode::Usage,
-                 .message = "no mesh of the same name lies beside it (.ply, .obj, .stl)",
-                 .file = model.string()};
-}
-
-/// Everything about one model that the methods share.
-struct BenchModel {
-    ModelFiles files;
-    IndexedMesh mesh;
-    std::unique_ptr<MeshBvh> bvh;
-    std::unique_ptr<PageCache> cache;
-};
 
 class RaysBench {
 public:
@@ -110,32 +80,10 @@ private:
         return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
     }
 
-    Result<BenchModel> loadModel(const std::filesystem::path& path) const {
-        VCP_TRY_ASSIGN(auto files, filesOf(path, folder_.path(), options_.cell));
-        BenchModel model;
-        model.files = files;
-        VCP_TRY(report(fmt::format("{}: reading the mesh", files.name), 0));
-        VCP_TRY_ASSIGN(auto mesh, loadMesh(files.mesh));
-        model.mesh = std::move(mesh);
-        if (!std::filesystem::exists(files.vcp)) {
-            VCP_TRY(report(fmt::format("{}: building", files.name), 0.02));
-            BuildOptions build;
-            build.inputs = {files.mesh};
-            build.output = files.vcp;
-            build.cell = options_.cell;
-            build.threads = options_.threads;
-            VCP_TRY(buildOctree(build));
-        }
-        VCP_TRY_ASSIGN(auto cache, PageCache::open(files.vcp));
-        model.cache = std::make_unique<PageCache>(std::move(cache));
-        return model;
-    }
-
     Result<void> runModel(const std::filesystem::path& path) {
-        VCP_TRY_ASSIGN(auto model, loadModel(path));
-        // The dataset was moved into its place: the tree points at it.
-        BenchModel& m = model;
-        m.bvh = std::make_unique<MeshBvh>(m.mesh);
+        VCP_TRY_ASSIGN(const auto model, loadBenchModel(path, folder_.path(), options_.cell, options_.threads,
+                                                        [&](const std::string& what) { return report(what, 0); }));
+        const BenchModel& m = *model;
         VCP_TRY(m.cache->loadLevel(m.cache->dataset().header.levels - 1));
         std::unique_ptr<RayTracer> peer;
         if (benchHasEmbree()) {

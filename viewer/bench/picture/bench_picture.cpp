@@ -1,0 +1,389 @@
+#include "viewer/bench/picture/bench_picture.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <ctime>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <glm/geometric.hpp>
+
+#include "render/picture.h"
+#include "render/renderer.h"
+#include "viewer/bench/picture/flip.h"
+#include "viewer/bench/picture/mesh_picture.h"
+#include "viewer/bench/picture/picture_difference.h"
+#include "viewer/bench/rays/analytic_models.h"
+#include "viewer/bench/rays/bench_cameras.h"
+#include "viewer/bench/rays/bench_model.h"
+#include "viewer/bench/report/bench_folder.h"
+
+namespace vcp {
+
+namespace {
+
+/// A file whose bytes are counted as they are read.
+class CountingReader final : public ByteReader {
+public:
+    explicit CountingReader(std::shared_ptr<ByteReader> file) : file_(std::move(file)) {}
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
+        bytes_ += bytes.size();
+        return file_->read(offset, bytes);
+    }
+    [[nodiscard]] uint64_t size() const override { return file_->size(); }
+    [[nodiscard]] const std::string& name() const override { return file_->name(); }
+    [[nodiscard]] uint64_t bytes() const { return bytes_; }
+
+private:
+    std::shared_ptr<ByteReader> file_;
+    mutable std::atomic<uint64_t> bytes_{0};
+};
+
+double processorSeconds() {
+    std::timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+}
+
+/// One frame of a camera's way, and its name in the report.
+struct NamedCamera {
+    std::string name;
+    Camera camera;
+};
+
+/// What drawing a picture took.
+struct PictureCost {
+    double cpuMs = 0;
+    uint64_t bytesRead = 0, residentBytes = 0;
+    uint32_t coarsestLevel = 0, finestLevel = 0;
+};
+
+struct DrawnPicture {
+    LightPicture picture;
+    PictureCost cost;
+};
+
+/// What draws the pictures of one model.
+class PictureMethod {
+public:
+    virtual ~PictureMethod() = default;
+    [[nodiscard]] virtual std::string name() const = 0;
+    [[nodiscard]] virtual std::string knob() const { return ""; }
+    [[nodiscard]] virtual std::string device() const = 0;
+    /// Forgets what was read.
+    virtual Result<void> startAnew() { return {}; }
+    virtual Result<DrawnPicture> draw(const FrameRequest& request) = 0;
+};
+
+/// Draws `repetitions` times after a warm-up. Returns the median of the processor times.
+template <class Draw>
+Result<double> medianCpuMs(int repetitions, const Draw& draw) {
+    std::vector<double> seconds;
+    for (int repetition = 0; repetition <= repetitions; ++repetition) {
+        const double start = processorSeconds();
+        VCP_TRY(draw());
+        if (repetition > 0) seconds.push_back(processorSeconds() - start);
+    }
+    return 1e3 * upperQuantile(seconds, 0.5);
+}
+
+class RendererMethod final : public PictureMethod {
+public:
+    static Result<std::unique_ptr<PictureMethod>> create(const std::filesystem::path& file, const std::string& device,
+                                                         double errorPixels, int repetitions) {
+        RendererOptions options;
+        options.device = device;
+        options.budgetBytes = uint64_t{2} << 30;
+        VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
+        std::unique_ptr<RendererMethod> method(new RendererMethod(std::move(renderer), file, errorPixels));
+        method->repetitions_ = repetitions;
+        return std::unique_ptr<PictureMethod>(std::move(method));
+    }
+
+    [[nodiscard]] std::string name() const override { return "certified"; }
+    [[nodiscard]] std::string knob() const override { return fmt::format("error-pixels {:g}", errorPixels_); }
+    [[nodiscard]] std::string device() const override { return renderer_->device().name; }
+
+    Result<void> startAnew() override {
+        VCP_TRY_ASSIGN(auto file, openFile(file_));
+        reader_ = std::make_shared<CountingReader>(file);
+        VCP_TRY_ASSIGN(auto dataset, readDataset(*reader_));
+        const auto shared = std::make_shared<const Dataset>(std::move(dataset));
+        return renderer_->open(shared, std::make_shared<FilePageSource>(reader_, shared));
+    }
+
+    Result<DrawnPicture> draw(const FrameRequest& light) override {
+        FrameRequest request = light;
+        request.errorPixels = errorPixels_;
+        VCP_TRY_ASSIGN(const auto settled, renderer_->settle(request));
+        DrawnPicture drawn;
+        drawn.cost = {0, reader_->bytes(), settled.residentBytes, settled.coarsestLevel, settled.finestLevel};
+        VCP_TRY_ASSIGN(drawn.cost.cpuMs, medianCpuMs(repetitions_, [&]() -> Result<void> {
+                           VCP_TRY(renderer_->render(request));
+                           return {};
+                       }));
+        VCP_TRY(read(drawn.picture));
+        return drawn;
+    }
+
+private:
+    RendererMethod(std::unique_ptr<Renderer> renderer, std::filesystem::path file, double errorPixels)
+        : renderer_(std::move(renderer)), file_(std::move(file)), errorPixels_(errorPixels) {}
+
+    Result<void> read(LightPicture& light) {
+        VCP_TRY_ASSIGN(const auto picture, renderer_->readPicture());
+        VCP_TRY_ASSIGN(auto depth, renderer_->readDepth());
+        VCP_TRY_ASSIGN(auto normals, renderer_->readNormals());
+        light.size = {picture.width, picture.height};
+        light.depth = std::move(depth);
+        light.normals = std::move(normals);
+        light.light.resize(light.depth.size());
+        light.coverage.resize(light.depth.size());
+        for (size_t i = 0; i < light.depth.size(); ++i) {
+            light.light[i] = float(picture.rgba[4 * i]) / 255;
+            light.coverage[i] = std::isfinite(light.depth[i]) ? 1.0f : 0.0f;
+        }
+        return {};
+    }
+
+    std::unique_ptr<Renderer> renderer_;
+    std::filesystem::path file_;
+    double errorPixels_;
+    int repetitions_ = 1;
+    std::shared_ptr<CountingReader> reader_;
+};
+
+class EmbreeMethod final : public PictureMethod {
+public:
+    EmbreeMethod(const MeshPicture& mesh, uint64_t meshBytes, int repetitions)
+        : mesh_(mesh), meshBytes_(meshBytes), repetitions_(repetitions) {}
+    [[nodiscard]] std::string name() const override { return "embree"; }
+    [[nodiscard]] std::string device() const override { return "CPU"; }
+
+    Result<DrawnPicture> draw(const FrameRequest& request) override {
+        DrawnPicture drawn;
+        VCP_TRY_ASSIGN(const auto ms, medianCpuMs(repetitions_, [&]() -> Result<void> {
+                           drawn.picture = mesh_.draw(request, 1);
+                           return {};
+                       }));
+        drawn.cost = {ms, meshBytes_, mesh_.bytes(), 0, 0};
+        return drawn;
+    }
+
+private:
+    const MeshPicture& mesh_;
+    uint64_t meshBytes_;
+    int repetitions_;
+};
+
+/// Returns the steps from `whole` to where a cell is kDiveCellPixels wide, at the point that `cells` looks at: what is
+/// looked at moves there from the middle, and the distance shrinks by the same factor from step to step.
+std::vector<NamedCamera> diveCameras(const Camera& whole, const Camera& cells, glm::dvec3 middle, double cell,
+                                     glm::ivec2 size, int steps) {
+    const double perCell = size.y / (2 * std::tan(whole.verticalFov / 2));
+    const glm::dvec3 forward = glm::normalize(whole.forward);
+    const glm::dvec3 target = cells.eye + glm::normalize(cells.forward) * (cell * perCell / kCellsCameraPixels);
+    const double far = glm::distance(whole.eye, middle), near = std::min(cell * perCell / kDiveCellPixels, far);
+    std::vector<NamedCamera> cameras;
+    for (int step = 1; step <= steps; ++step) {
+        const double distance = far * std::pow(near / far, double(step) / steps);
+        const glm::dvec3 seen = target + (middle - target) * ((distance - near) / std::max(far - near, 1e-300));
+        Camera camera = whole;
+        camera.eye = seen - distance * forward;
+        cameras.push_back({fmt::format("dive-{}", step), camera});
+    }
+    return cameras;
+}
+
+ColourPicture greyPicture(const LightPicture& light) {
+    ColourPicture picture{light.size.x, light.size.y, {}};
+    picture.pixels.reserve(light.light.size());
+    for (const float value : light.light) picture.pixels.emplace_back(value);
+    return picture;
+}
+
+/// The greatest, where views have quantiles of their own.
+void takeWorse(Quantiles& all, const Quantiles& one) {
+    all = {std::max(all.p50, one.p50), std::max(all.p95, one.p95), std::max(all.p99, one.p99),
+           std::max(all.max, one.max)};
+}
+
+class PictureBench {
+public:
+    explicit PictureBench(const BenchPictureOptions& options) : o_(options), folder_(options.out) {}
+
+    Result<BenchPictureReport> run() {
+        VCP_TRY(checkNames(o_.methods, pictureMethodNames(), "method"));
+        VCP_TRY(checkNames(o_.cameras, pictureCameraNames(), "camera"));
+        VCP_TRY(folder_.make());
+        if (o_.models.empty()) VCP_TRY(writeAnalyticModels());
+        for (size_t i = 0; i < o_.models.size(); ++i) {
+            done_ = double(i) / double(o_.models.size());
+            VCP_TRY(runModel(o_.models[i]));
+        }
+        return std::move(report_);
+    }
+
+private:
+    static Result<void> checkNames(const std::vector<std::string>& wanted, const std::vector<std::string>& known,
+                                   const char* kind) {
+        for (const std::string& name : wanted)
+            if (std::ranges::find(known, name) == known.end())
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = fmt::format("unknown {} \"{}\"; there are {}", kind, name, fmt::join(known, ", "))};
+        return {};
+    }
+
+    Result<void> writeAnalyticModels() {
+        for (const AnalyticModel& model : analyticModels()) {
+            o_.models.push_back(folder_.path() / (model.name + ".ply"));
+            VCP_TRY(writePly(model.mesh, o_.models.back()));
+        }
+        if (!(o_.cell > 0)) o_.cell = kAnalyticModelCell;
+        return {};
+    }
+
+    Result<void> report(const std::string& what) const {
+        if (!o_.progress || o_.progress(what, done_)) return {};
+        return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+    }
+
+    Result<void> runModel(const std::filesystem::path& path) {
+        VCP_TRY_ASSIGN(const auto model, loadBenchModel(path, folder_.path(), o_.cell, o_.threads,
+                                                        [&](const std::string& what) { return report(what); }));
+        const BenchModel& m = *model;
+        VCP_TRY_ASSIGN(const auto mesh, MeshPicture::create(m.mesh, o_.threads));
+        std::vector<std::unique_ptr<PictureMethod>> methods;
+        for (const std::string& name : o_.methods) {
+            if (name == "embree") {
+                methods.push_back(
+                    std::make_unique<EmbreeMethod>(*mesh, std::filesystem::file_size(m.files.mesh), o_.repetitions));
+                continue;
+            }
+            for (const double pixels : o_.errorPixels) {
+                VCP_TRY_ASSIGN(auto method, RendererMethod::create(m.files.vcp, o_.device, pixels, o_.repetitions));
+                methods.push_back(std::move(method));
+            }
+        }
+        for (const std::string& camera : o_.cameras) VCP_TRY(runCamera(m, *mesh, methods, camera));
+        return {};
+    }
+
+    [[nodiscard]] std::vector<NamedCamera> camerasOf(const BenchModel& model, const std::string& name, int view) const {
+        const FileHeader& header = model.cache->dataset().header;
+        const CellGrid grid{{header.origin[0], header.origin[1], header.origin[2]}, header.cell};
+        const auto of = [&](const char* camera) {
+            return *benchCamera(camera, *model.bvh, grid, o_.size, view, o_.views);
+        };
+        if (name != "dive") return {{name, of(name.c_str())}};
+        return diveCameras(of("whole"), of("cells"), 0.5 * (model.bvh->low() + model.bvh->high()), grid.cell, o_.size,
+                           o_.diveSteps);
+    }
+
+    /// Draws a camera's frames with all methods: one after the other, so that the mesh's pictures are drawn once.
+    Result<void> runCamera(const BenchModel& model, const MeshPicture& mesh,
+                           std::vector<std::unique_ptr<PictureMethod>>& methods, const std::string& name) {
+        const size_t frames = name == "dive" ? size_t(o_.diveSteps) : 1;
+        std::vector<BenchPictureRow> rows(frames * methods.size());
+        for (int view = 0; view < o_.views; ++view) {
+            const std::vector<NamedCamera> cameras = camerasOf(model, name, view);
+            for (const auto& method : methods) VCP_TRY(method->startAnew());
+            for (size_t frame = 0; frame < cameras.size(); ++frame) {
+                const FrameRequest request = lightRequest(cameras[frame].camera, o_.size);
+                VCP_TRY(report(fmt::format("{}: {}, the mesh", model.files.name, cameras[frame].name)));
+                const LightPicture reference = mesh.draw(request, o_.samples);
+                VCP_TRY(keepPicture(model, cameras[frame], view, "mesh", reference));
+                for (size_t k = 0; k < methods.size(); ++k) {
+                    VCP_TRY(report(fmt::format("{}: {}, {} {}", model.files.name, cameras[frame].name,
+                                               methods[k]->name(), methods[k]->knob())));
+                    VCP_TRY_ASSIGN(const auto drawn, methods[k]->draw(request));
+                    BenchPictureRow& row = rows[frame * methods.size() + k];
+                    nameRow(row, model, cameras[frame], *methods[k]);
+                    judge(row, reference, drawn, cameras[frame].camera, model.cache->dataset().header.cell);
+                    VCP_TRY(keepPicture(model, cameras[frame], view, methods[k]->name() + methods[k]->knob(),
+                                        drawn.picture));
+                }
+            }
+        }
+        report_.rows.insert(report_.rows.end(), rows.begin(), rows.end());
+        return {};
+    }
+
+    void nameRow(BenchPictureRow& row, const BenchModel& model, const NamedCamera& camera,
+                 const PictureMethod& method) const {
+        row.model = model.files.name;
+        row.camera = camera.name;
+        row.method = method.name();
+        row.knob = method.knob();
+        row.device = method.device();
+    }
+
+    /// Adds a view's picture to its row: sums of counts and costs, means of errors, the worst of quantiles.
+    void judge(BenchPictureRow& row, const LightPicture& reference, const DrawnPicture& drawn, const Camera& camera,
+               double cell) const {
+        const LightPicture& picture = drawn.picture;
+        const double share = 1.0 / o_.views;
+        const double perCell = o_.size.y / (2 * std::tan(camera.verticalFov / 2));
+        const float middle = reference.depth[size_t(o_.size.y / 2) * o_.size.x + o_.size.x / 2];
+        row.cellPixels = std::isfinite(middle) ? cell * perCell / middle : 0;
+        row.pixels += picture.light.size();
+        row.hitPixels += uint64_t(std::ranges::count(picture.coverage, 1.0f));
+        const double error = lightError(reference, picture);
+        row.rmse = std::sqrt(row.rmse * row.rmse + share * error * error);
+        std::vector<double> differences = flip(greyPicture(reference), greyPicture(picture));
+        double sum = 0;
+        for (const double difference : differences) sum += difference;
+        row.flipMean += share * sum / double(differences.size());
+        row.flipP99 = std::max(row.flipP99, quantile(std::move(differences), 0.99));
+        row.isolatedPixels += isolatedPixels(picture, camera).size();
+        const SilhouetteDifference silhouette = silhouetteDifference(reference, picture);
+        row.silhouettePixels += silhouette.pixels;
+        takeWorse(row.silhouetteDistance, silhouette.distancePixels);
+        takeWorse(row.normalDegrees, normalDifference(reference, picture));
+        row.cpuMs += share * drawn.cost.cpuMs;
+        row.bytesRead += uint64_t(share * double(drawn.cost.bytesRead));
+        row.residentBytes = std::max(row.residentBytes, drawn.cost.residentBytes);
+        row.coarsestLevel = drawn.cost.coarsestLevel;
+        row.finestLevel = std::max(row.finestLevel, drawn.cost.finestLevel);
+    }
+
+    Result<void> keepPicture(const BenchModel& model, const NamedCamera& camera, int view, std::string method,
+                             const LightPicture& light) const {
+        if (!o_.pictures || o_.out.empty()) return {};
+        std::ranges::replace(method, ' ', '-');
+        Picture picture{uint32_t(light.size.x), uint32_t(light.size.y), {}};
+        for (const float value : light.light) {
+            const auto grey = uint8_t(std::lround(255 * std::clamp(value, 0.0f, 1.0f)));
+            picture.rgba.insert(picture.rgba.end(), {grey, grey, grey, 255});
+        }
+        for (const glm::ivec2 at : isolatedPixels(light, camera.camera)) {
+            uint8_t* pixel = &picture.rgba[4 * (size_t(at.y) * light.size.x + at.x)];
+            pixel[0] = 255, pixel[1] = pixel[2] = 0;
+        }
+        const std::string name = fmt::format("{}_{}_{}_{}.png", model.files.name, camera.name, view, method);
+        return writePng(picture, o_.out / name, {.overwrite = true});
+    }
+
+    BenchPictureOptions o_;
+    BenchFolder folder_;
+    BenchPictureReport report_;
+    double done_ = 0;
+};
+
+}  // namespace
+
+const std::vector<std::string>& pictureCameraNames() {
+    static const std::vector<std::string> names = {"whole", "half", "close", "dive"};
+    return names;
+}
+
+const std::vector<std::string>& pictureMethodNames() {
+    static const std::vector<std::string> names = {"certified", "embree"};
+    return names;
+}
+
+Result<BenchPictureReport> benchPicture(const BenchPictureOptions& options) { return PictureBench(options).run(); }
+
+}  // namespace vcp

@@ -1,0 +1,194 @@
+#include "viewer/bench/picture/mesh_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <unordered_map>
+
+#include <glm/geometric.hpp>
+
+#include "builder/paper/parallel_rows.h"
+#include "render/frame_setup.h"
+
+#ifdef VCP_HAVE_EMBREE
+#include "viewer/bench/rays/embree_scene.h"
+#endif
+
+namespace vcp {
+
+namespace {
+
+constexpr float kBackground = 0.17f;  // linear
+
+#ifdef VCP_HAVE_EMBREE
+
+// The cosine of the angle up to which a triangle takes a vertex' normal.
+const double kCreaseCosine = std::cos(40 * std::numbers::pi / 180);
+
+struct PositionHash {
+    size_t operator()(const glm::dvec3& p) const {
+        size_t hash = 0;
+        for (int axis = 0; axis < 3; ++axis) hash = hash * 0x9e3779b97f4a7c15u + std::hash<double>()(p[axis]);
+        return hash;
+    }
+};
+
+/// For each corner of each triangle its shading normal.
+std::vector<glm::vec3> shadingNormals(const IndexedMesh& mesh) {
+    std::unordered_map<glm::dvec3, uint32_t, PositionHash> places;
+    std::vector<uint32_t> place(mesh.positions.size());
+    for (size_t v = 0; v < place.size(); ++v)
+        place[v] = places.try_emplace(mesh.positions[v], uint32_t(places.size())).first->second;
+    std::vector<glm::dvec3> sums(places.size(), glm::dvec3(0)), flat(mesh.triangles.size());
+    for (size_t t = 0; t < flat.size(); ++t) {
+        const auto corners = mesh.corners(t);
+        flat[t] = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+        for (const uint32_t vertex : mesh.triangles[t]) {
+            glm::dvec3& sum = sums[place[vertex]];
+            sum += glm::dot(sum, flat[t]) < 0 ? -flat[t] : flat[t];
+        }
+    }
+    std::vector<uint8_t> crease(sums.size(), 0);
+    for (size_t t = 0; t < flat.size(); ++t)
+        for (const uint32_t vertex : mesh.triangles[t]) {
+            const glm::dvec3 sum = sums[place[vertex]];
+            if (std::abs(glm::dot(sum, flat[t])) < kCreaseCosine * glm::length(sum) * glm::length(flat[t]))
+                crease[place[vertex]] = 1;
+        }
+    std::vector<glm::vec3> normals(3 * flat.size());
+    for (size_t t = 0; t < flat.size(); ++t)
+        for (int i = 0; i < 3; ++i) {
+            const uint32_t at = place[mesh.triangles[t][i]];
+            const glm::dvec3 n = crease[at] ? flat[t] : glm::dot(sums[at], flat[t]) < 0 ? -sums[at] : sums[at];
+            const double length = glm::length(n);
+            normals[3 * t + i] = glm::vec3(length > 0 ? n / length : n);
+        }
+    return normals;
+}
+
+/// What the samples of a pixel sum up to.
+struct PixelSum {
+    float light = 0, depth = 0;
+    glm::vec3 normal{0};
+    int hits = 0;
+};
+
+class EmbreePicture final : public MeshPicture {
+public:
+    EmbreePicture(const IndexedMesh& mesh, unsigned threads)
+        : scene_(mesh, threads, true), normals_(shadingNormals(mesh)), threads_(threads) {}
+
+    [[nodiscard]] uint64_t bytes() const override { return scene_.bytes(); }
+
+    [[nodiscard]] LightPicture draw(const FrameRequest& request, int samples) const override {
+        const glm::ivec2 size(request.width, request.height);
+        const FloatCamera rays(request.camera, size, scene_.middle());
+        const LightDirections lights =
+            lightDirections(request, cameraBasis(request.camera, request.width, request.height));
+        const size_t count = size_t(size.x) * size.y;
+        LightPicture picture{size, std::vector<float>(count), std::vector<float>(count),
+                             std::vector<glm::vec3>(count, glm::vec3(0)), std::vector<float>(count)};
+        forEachRow(size.y, threads_, [&](int y) {
+            std::vector<PixelSum> row(size.x);
+            sumRow(rays, lights, y, samples, row);
+            const auto all = float(samples * samples);
+            for (int x = 0; x < size.x; ++x) {
+                const PixelSum& sum = row[x];
+                const size_t at = size_t(y) * size.x + x;
+                const float light = sum.light + (all - float(sum.hits)) * kBackground;
+                picture.light[at] = std::pow(light / all, 1 / 2.2f);
+                picture.coverage[at] = float(sum.hits) / all;
+                picture.depth[at] = sum.hits > 0 ? sum.depth / float(sum.hits) : INFINITY;
+                const float length = glm::length(sum.normal);
+                if (length > 0) picture.normals[at] = sum.normal / length;
+            }
+        });
+        return picture;
+    }
+
+private:
+    /// Traces the samples of a row of pixels, eight at a time, from left to right and then downwards.
+    void sumRow(const FloatCamera& rays, const LightDirections& lights, int y, int samples,
+                std::vector<PixelSum>& row) const {
+        const int across = int(row.size()) * samples;
+        for (int line = 0; line < samples; ++line)
+            for (int first = 0; first < across; first += 8) {
+                alignas(32) int valid[8];
+                alignas(32) RTCRayHit8 r;
+                for (int k = 0; k < 8; ++k) {
+                    valid[k] = first + k < across ? -1 : 0;
+                    const float px = (float(first + k) + 0.5f) / float(samples);
+                    const float py = float(y) + (float(line) + 0.5f) / float(samples);
+                    const glm::vec3 d = rays.direction(px, py);
+                    r.ray.org_x[k] = rays.eye.x, r.ray.org_y[k] = rays.eye.y, r.ray.org_z[k] = rays.eye.z;
+                    r.ray.dir_x[k] = d.x, r.ray.dir_y[k] = d.y, r.ray.dir_z[k] = d.z;
+                    r.ray.tnear[k] = 0, r.ray.time[k] = 0, r.ray.tfar[k] = INFINITY;
+                    r.ray.mask[k] = ~0u, r.ray.flags[k] = 0, r.ray.id[k] = 0;
+                    r.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+                }
+                RTCIntersectContext context;
+                rtcInitIntersectContext(&context);
+                context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+                rtcIntersect8(valid, scene_.scene(), &context, &r);
+                for (int k = 0; k < 8; ++k)
+                    if (valid[k] && r.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
+                        addSample(r, k, lights, row[(first + k) / samples]);
+            }
+    }
+
+    void addSample(const RTCRayHit8& r, int k, const LightDirections& lights, PixelSum& sum) const {
+        const glm::vec3 d(r.ray.dir_x[k], r.ray.dir_y[k], r.ray.dir_z[k]);
+        const glm::vec3 flat(r.hit.Ng_x[k], r.hit.Ng_y[k], r.hit.Ng_z[k]);
+        const glm::vec3* corners = &normals_[3 * size_t{r.hit.primID[k]}];
+        const float u = r.hit.u[k], v = r.hit.v[k];
+        // Embree's normals and ours may be of either side: the ray's side is that of the triangle.
+        const bool away = glm::dot(flat, d) > 0;
+        glm::vec3 n = (1 - u - v) * corners[0] + u * corners[1] + v * corners[2];
+        if ((glm::dot(n, flat) < 0) != away) n = -n;
+        n = glm::normalize(n);
+        // As in trace.comp: a normal that leans away from the ray is bent back to it.
+        n = glm::normalize(n - std::max(glm::dot(n, d), 0.0f) * d);
+        sum.light += lightOn(n, glm::vec3(lights.light), glm::vec3(lights.sky));
+        sum.depth += r.ray.tfar[k];
+        sum.normal += n;
+        ++sum.hits;
+    }
+
+    EmbreeScene scene_;
+    std::vector<glm::vec3> normals_;  // three a triangle
+    unsigned threads_;
+};
+
+#endif
+
+}  // namespace
+
+FrameRequest lightRequest(const Camera& camera, glm::ivec2 size) {
+    FrameRequest request;
+    request.camera = camera;
+    request.width = uint32_t(size.x);
+    request.height = uint32_t(size.y);
+    request.shading.mode = ShadingMode::Clay;
+    request.shading.clay = glm::vec3(1);
+    request.shading.backgroundTop = request.shading.backgroundBottom = glm::vec3(kBackground);
+    return request;
+}
+
+float lightOn(glm::vec3 normal, glm::vec3 towardsLight, glm::vec3 towardsSky) {
+    const float sun = std::max(glm::dot(normal, towardsLight), 0.0f);
+    return 0.72f * sun + 0.10f + 0.18f * (0.5f + 0.5f * glm::dot(normal, towardsSky));
+}
+
+Result<std::unique_ptr<MeshPicture>> MeshPicture::create([[maybe_unused]] const IndexedMesh& mesh,
+                                                         [[maybe_unused]] unsigned threads) {
+#ifdef VCP_HAVE_EMBREE
+    return std::unique_ptr<MeshPicture>(std::make_unique<EmbreePicture>(mesh, threads));
+#else
+    return Error{
+        .code = ErrorCode::Usage,
+        .message = "this build has no Embree to draw the mesh with; install libembree-dev and configure again"};
+#endif
+}
+
+}  // namespace vcp

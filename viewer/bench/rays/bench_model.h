@@ -1,0 +1,36 @@
+// A model of the benchmarks: its mesh in memory, and the .vcp built from it.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "builder/measure/mesh_bvh.h"
+#include "octree/reference_caster.h"
+#include "octree/result.h"
+
+namespace vcp {
+
+/// The mesh of a model and its .vcp.
+struct ModelFiles {
+    std::filesystem::path mesh, vcp;
+    std::string name;
+};
+
+/// Everything about one model that methods share.
+struct BenchModel {
+    ModelFiles files;
+    IndexedMesh mesh;
+    std::unique_ptr<MeshBvh> bvh;
+    std::unique_ptr<PageCache> cache;  ///< no page is loaded
+};
+
+/// Loads a mesh and builds its .vcp in `folder`, unless it is there; of a .vcp, the mesh of the same name beside it.
+/// `cell` 0: chosen from the mesh. `report` hears what is being done. Errors: Usage, where no mesh is beside a .vcp;
+/// those of loadMesh, buildOctree, PageCache::open and `report`.
+Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& model,
+                                                   const std::filesystem::path& folder, double cell, unsigned threads,
+                                                   const std::function<Result<void>(const std::string& what)>& report);
+
+}  // namespace vcp
