@@ -273,9 +273,27 @@ double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leave
     return best;
 }
 
+/// A hit of the surface; its normal is a unit, on either side.
+struct SurfacePoint {
+    glm::dvec3 position, normal;
+};
+
+/// Returns the angle between two units' lines, 0 to 90 degrees.
+double lineDegrees(glm::dvec3 a, glm::dvec3 b) {
+    return std::acos(std::min(std::abs(glm::dot(a, b)), 1.0)) * 180 / std::numbers::pi;
+}
+
+/// Returns the unit normal of a triangle, of length 0 where it has no area.
+glm::dvec3 triangleNormal(const IndexedMesh& mesh, uint32_t triangle) {
+    const auto v = mesh.corners(triangle);
+    const glm::dvec3 n = glm::cross(v[1] - v[0], v[2] - v[0]);
+    const double length = glm::length(n);
+    return length > 0 ? n / length : glm::dvec3(0);
+}
+
 /// Finds the hits of one random ray through a leaf that lie in the leaf.
 void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random,
-                std::vector<glm::dvec3>& hits) {
+                std::vector<SurfacePoint>& hits) {
     const Dataset& dataset = caster.cache().dataset();
     const PageEntry& entry = dataset.pages[leaf.page];
     const double cell = dataset.cellOf(entry.level);
@@ -285,7 +303,7 @@ void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom
     const glm::dvec3 middle = dataset.originOf(entry) + inLeaf * cell;
     for (const RayHit& hit : caster.castAll({middle - reach * direction, direction, 0, 2 * reach}))
         if (hit.page == leaf.page && hit.leafMin == leaf.lowest && hit.leafEdge == leaf.edge)
-            hits.push_back(hit.position);
+            hits.push_back({hit.position, hit.normal});
 }
 
 /// Keeps the largest distance that threads report; ties go to the lowest sample.
@@ -333,27 +351,31 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
         return cancelled;
 
     const std::vector<LeafBox> leaves = leavesOfLevel.list();
-    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock);
+    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock), degrees(toMesh.size());
     Worst worstOfSurface;
     if (!leaves.empty() && !runner.run(options.samples, 0.6, 1, [&](uint64_t i) {
             SampleRandom random(options.seed, 2 * i + 1);
-            std::vector<glm::dvec3> hits;
+            std::vector<SurfacePoint> hits;
             // Most lines through a leaf miss its surface.
             const LeafBox& leaf = leaves[random.below(leaves.size())];
             for (int ray = 0; ray < 8 && hits.empty(); ++ray) hitsOfLeaf(caster, leaf, random, hits);
-            for (const glm::dvec3& hit : hits) {
-                const double distance = mesh.nearestPoint(hit)->distance;
-                toMesh[i / kBlock].push_back(float(distance));
-                worstOfSurface.add(distance, i, hit);
+            for (const SurfacePoint& hit : hits) {
+                const auto nearest = *mesh.nearestPoint(hit.position);
+                toMesh[i / kBlock].push_back(float(nearest.distance));
+                worstOfSurface.add(nearest.distance, i, hit.position);
+                const glm::dvec3 normal = triangleNormal(mesh.mesh(), nearest.triangle);
+                if (normal != glm::dvec3(0)) degrees[i / kBlock].push_back(float(lineDegrees(hit.normal, normal)));
             }
         }))
         return cancelled;
 
-    std::vector<float> allToMesh;
+    std::vector<float> allToMesh, allDegrees;
     for (const auto& block : toMesh) allToMesh.insert(allToMesh.end(), block.begin(), block.end());
+    for (const auto& block : degrees) allDegrees.insert(allDegrees.end(), block.begin(), block.end());
     result.samples = toSurface.size() + allToMesh.size();
     result.meshToSurface = quantilesOf(std::move(toSurface));
     result.surfaceToMesh = quantilesOf(std::move(allToMesh));
+    result.normalDegrees = quantilesOf(std::move(allDegrees));
     result.worstOfMesh = worstOfMesh.position;
     result.worstOfSurface = worstOfSurface.position;
     return result;

@@ -7,7 +7,8 @@
 //                     sample in eight and more directions, which start with no wall tolerance, and by the
 //                     exact distance to the triangles of hard leaves, each cut off at its leaf's walls.
 //   surface to mesh   samples: hits of random rays through the leaves of the level, every leaf alike.
-//                     The distance to the mesh is exact (MeshBvh).
+//                     The distance to the mesh is exact (MeshBvh). Of the same hits, the angle between
+//                     the surface's normal and that of the nearest triangle's plane.
 // Both measurements are seeded: the numbers are the same whatever the number of threads.
 #pragma once
 
@@ -32,6 +33,7 @@ struct SurfaceDistanceOptions {
 struct SurfaceDistance {
     Quantiles meshToSurface;       ///< world units
     Quantiles surfaceToMesh;       ///< world units
+    Quantiles normalDegrees;       ///< between the surface's normals and the mesh's, 0 to 90
     glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
     glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
     uint64_t samples = 0;          ///< samples measured, both ways together

@@ -86,6 +86,7 @@ void addDistances(Json& json, const SurfaceDistance& distance) {
     json["surface_to_mesh"] = toJson(distance.surfaceToMesh);
     json["mesh_to_surface_cells"] = toJson(inCells(distance.meshToSurface, distance.cell));
     json["surface_to_mesh_cells"] = toJson(inCells(distance.surfaceToMesh, distance.cell));
+    json["normal_degrees"] = toJson(distance.normalDegrees);
     json["cell"] = distance.cell;
     json["certified_error_max"] = distance.certifiedErrorMax;
     json["samples"] = distance.samples;
@@ -103,6 +104,9 @@ std::string distanceTable(const SurfaceDistance& distance) {
                                    "p99", "max", formatCount(distance.samples));
     text += row("mesh to surface", distance.meshToSurface, distance.cell);
     text += row("surface to mesh", distance.surfaceToMesh, distance.cell);
+    const Quantiles& degrees = distance.normalDegrees;
+    text += fmt::format("  {:<16} {:>11.2f} {:>11.2f} {:>11.2f} {:>11.2f}\n", "normals, degrees", degrees.p50,
+                        degrees.p95, degrees.p99, degrees.max);
     text += fmt::format("  {:<16} {:>47}\n  {:<16} {:>47.5f}", "certified", formatLength(distance.certifiedErrorMax),
                         "  in cells", distance.certifiedErrorMax / distance.cell);
     return text;

@@ -42,6 +42,19 @@ TEST(SurfaceDistance, SphereAgainstItsMesh) {
     EXPECT_GT(d.samples, 12000u);
 }
 
+TEST(SurfaceDistance, NormalsAreComparedWithThoseOfTheNearestTriangles) {
+    // Facets of 600 meridians and 300 parallels turn 0.6 degrees from one to the next, those of 48 and 24 turn 7.5: the
+    // ball's normals turn away by at most some 0.7 of that, at a facet's corners.
+    const Quantiles fine = measured(sphereCache(11), test::sphereMesh(kCentre, 11, 300)).normalDegrees;
+    EXPECT_GT(fine.p50, 0.05);
+    EXPECT_LT(fine.p99, 1);
+    const Quantiles coarse = measured(sphereCache(11), test::sphereMesh(kCentre, 11, 24)).normalDegrees;
+    EXPECT_GT(coarse.p50, 1);
+    EXPECT_LT(coarse.p50, 4);
+    EXPECT_GT(coarse.p95, 2.5);
+    EXPECT_LT(coarse.p99, 7);
+}
+
 TEST(SurfaceDistance, OffsetIsMeasuredBothWays) {
     const SurfaceDistance d = measured(sphereCache(11.25), test::sphereMesh(kCentre, 11, 300));
     EXPECT_NEAR(d.meshToSurface.p50, 0.25, 3e-3);

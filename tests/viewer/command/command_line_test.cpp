@@ -299,6 +299,13 @@ TEST_F(CommandLine, VerifyMeasuresAgainstTheMesh) {
         EXPECT_LE(json[way]["max"].get<double>(), json["certified_error_max"].get<double>() * (1 + 1e-6));
     }
     EXPECT_GE(json["samples"].get<uint64_t>(), 20000u);
+    const Json& degrees = json["normal_degrees"];
+    EXPECT_LE(degrees["p50"], degrees["p95"]);
+    EXPECT_LE(degrees["p95"], degrees["p99"]);
+    EXPECT_LE(degrees["p99"], degrees["max"]);
+    EXPECT_LT(degrees["p99"], 30);
+    const Ran table = run({"verify", dataset().string(), "--against", ball().string(), "--samples", "2000"});
+    EXPECT_NE(table.out.find("normals, degrees"), std::string::npos) << table.out;
 }
 
 TEST_F(CommandLine, VerifyRefusesAnotherMesh) {

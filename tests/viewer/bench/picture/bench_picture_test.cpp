@@ -1,4 +1,5 @@
 // vcp bench picture from the outside: the rows that programs rely on, and what they must say of a ball.
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -99,6 +100,34 @@ TEST_F(BenchPicture, UnknownNamesAreWrongUsage) {
     EXPECT_EQ(camera.status, 2);
     EXPECT_NE(camera.err.find("unknown camera \"nowhere\""), std::string::npos) << camera.err;
     EXPECT_EQ(run(ball_ + kQuick + " --methods none").status, 2);
+}
+
+/// A ball with waves on it, so that many rays graze it.
+IndexedMesh wavyBall() {
+    IndexedMesh mesh = test::sphereMesh({0, 0, 0}, 1, 128);
+    for (glm::dvec3& p : mesh.positions) p *= 1 + 0.03 * std::sin(17 * p.x) * std::sin(17 * p.y) * std::sin(17 * p.z);
+    return mesh;
+}
+
+TEST_F(BenchPicture, RaysThatGrazeASmoothSurfaceLeaveNoSpecks) {
+    const fs::path model = folder_ / "wavy.ply";
+    ASSERT_TRUE(writePly(wavyBall(), model));
+    BenchPictureOptions options;
+    options.models = {model};
+    options.methods = {"certified"};
+    options.cameras = {"whole", "half", "close"};
+    options.size = {480, 300};
+    options.views = 8;
+    options.samples = options.repetitions = 1;
+    options.cell = 0.02;
+    const auto report = benchPicture(options);
+    ASSERT_TRUE(report) << report.error().line();
+    ASSERT_EQ(report->rows.size(), 3u);
+    for (const BenchPictureRow& row : report->rows) {
+        EXPECT_EQ(row.pixels, 8u * 480 * 300);
+        EXPECT_GT(row.hitPixels, row.pixels / 8);
+        EXPECT_EQ(row.isolatedPixels, 0u) << row.camera;
+    }
 }
 
 }  // namespace
