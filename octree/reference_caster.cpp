@@ -76,7 +76,7 @@ std::optional<LeafHit> castSoftF64(const PageView& view, uint32_t node, glm::dve
     const double u = f64::firstCrossing(ray, wallIn, wallOut, f64::dipBound(node), steps);
     if (!(u >= 0)) return {};
     const f64::LeafField leaf = f64::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
-    const glm::dvec3 normal = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, ray.c.x);
+    const glm::dvec3 normal = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, f64::sideBefore(ray, u, d));
     return LeafHit{u, normal, 0, u == 0 || u == 1};
 }
 
@@ -87,7 +87,7 @@ std::optional<LeafHit> castSoftF32(const PageView& view, uint32_t node, glm::vec
     const float u = f32::firstCrossing(ray, wallIn, wallOut, f32::dipBound(node), steps);
     if (!(u >= 0)) return {};
     const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
-    const glm::vec3 normal = f32::facingNormal(f32::leafNormal(leaf, p + u * d), d, ray.c.x);
+    const glm::vec3 normal = f32::facingNormal(f32::leafNormal(leaf, p + u * d), d, f32::sideBefore(ray, u, d));
     return LeafHit{u, normal, 0, u == 0 || u == 1};
 }
 

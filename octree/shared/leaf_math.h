@@ -132,12 +132,11 @@ INLINE Real3 leafNormal(LeafField leaf, Real3 x) {
 INLINE Real3 turnedTo(Real3 n, Real3 reference) { return dot(n, reference) < Real(0.0) ? -n : n; }
 
 // Turns a soft leaf's normal (leafNormal) to the side that a ray along d comes from. Where the ray grazes the surface,
-// the side is that of the ray's first point in the leaf, where f is `first`: a normal a little past the silhouette must
-// not turn over.
-INLINE Real3 facingNormal(Real3 n, Real3 d, Real first) {
+// `side` decides (sideBefore): a normal a little past the silhouette must not turn over.
+INLINE Real3 facingNormal(Real3 n, Real3 d, Real side) {
     Real along = dot(n, d);
     bool grazing = along * along < Real(0.09) * dot(n, n) * dot(d, d);
-    bool away = grazing ? first < Real(0.0) : along > Real(0.0);
+    bool away = grazing ? side < Real(0.0) : along > Real(0.0);
     return away ? -n : n;
 }
 
@@ -198,6 +197,14 @@ INLINE RayField restrictToRay(uint4 face0, uint4 face1, uint axis, Real3 p, Real
 
 INLINE Real rayValue(RayField ray, Real u) {
     return ray.c.x + u * (ray.c.y + u * (ray.c.z + u * (ray.c.w + u * ray.fourth)));
+}
+
+// Returns a number with the sign of f on the side that the ray comes from to its hit at u: that of its first point in
+// the leaf. A hit on the wall by which the ray enters may lie a little before or behind the surface: there f an eighth
+// of a leaf edge before the wall decides. d: the segment's extent in leaf space.
+INLINE Real sideBefore(RayField ray, Real u, Real3 d) {
+    if (u > Real(0.0)) return ray.c.x;
+    return rayValue(ray, Real(-0.125) * inversesqrt(max(dot(d, d), Real(1e-12))));
 }
 
 INLINE Real wallTolerance(uint node) {

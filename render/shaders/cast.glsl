@@ -14,7 +14,8 @@ struct Hit {
     uint record;   // record of the hit page in the table
     int pageBits;  // log2 of the page's edge on the lattice
     uint leaf;     // its node
-    // Soft: the point in leaf space, and f where the ray entered. Hard: weights of the second and third vertex.
+    // Soft: the point in leaf space, and the side the ray came from (sideBefore). Hard: weights of the second and third
+    // vertex.
     vec4 at;
     uint triangle;  // hard: its record
 };
@@ -226,7 +227,7 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     float wall = wallTolerance(node);
     RayField ray = restrictToRay(face0, face1, node >> kSoftAxisShift & 3u, p, d);
     float u = firstCrossing(ray, s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
-    hit.at = vec4(p + u * d, ray.c.x);
+    hit.at = vec4(p + u * d, sideBefore(ray, u, d));
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 

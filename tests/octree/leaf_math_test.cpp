@@ -343,6 +343,29 @@ TEST(LeafMath, WallsCountWithinTheirTolerance) {
     EXPECT_EQ(cross(0.5, 0.1, 0, 0), 0) << "a start on the surface is a hit";
 }
 
+TEST(LeafMath, AHitOnTheWallFacesTheSideTheRayComesFrom) {
+    // The plane z = 0.5 under rays that enter by the wall x = 0 and graze it.
+    Corners corners;
+    for (int i = 0; i < 8; ++i) corners[i] = {(cornerOf(i).z - 0.5) * 1.0, {0, 0, 1}};
+    const f64::LeafField leaf = exactLeaf(corners, 0);
+    const auto upward = [&](double z, double rise, double wall) {
+        const glm::dvec3 p(0, 0.3, z), d(0.5, 0, 0.5 * rise);
+        const f64::RayField ray =
+            f64::blendOnRay(leaf.a0 + leaf.gx0 * p.x + leaf.gy0 * p.y + leaf.gz0 * p.z, leaf.gz0 * d.z,
+                            leaf.a1 + leaf.gx1 * p.x + leaf.gy1 * p.y + leaf.gz1 * p.z, leaf.gz1 * d.z, p, d);
+        const double u = f64::firstCrossing(ray, wall, 0, 0.02, 32);
+        EXPECT_GE(u, 0);
+        const glm::dvec3 n = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, f64::sideBefore(ray, u, d));
+        return n.z > 0;
+    };
+    EXPECT_TRUE(upward(0.51, -0.2, 0)) << "a crossing inside of the leaf, from above";
+    EXPECT_FALSE(upward(0.49, 0.2, 0)) << "from below";
+    EXPECT_TRUE(upward(0.49, -0.2, 0.02)) << "crossed before the wall, from above";
+    EXPECT_FALSE(upward(0.51, 0.2, 0.02)) << "from below";
+    EXPECT_TRUE(upward(0.51, 0.02, 0.02)) << "not crossed at all: the ray passes above and recedes";
+    EXPECT_FALSE(upward(0.49, -0.02, 0.02)) << "below";
+}
+
 TEST(LeafMath, WallAndDipCodes) {
     EXPECT_EQ(f64::wallTolerance(kNodeSoft << kNodeTypeShift), double(kWallRounding));
     for (uint32_t code = 1; code <= kSoftWallMask; ++code)

@@ -302,8 +302,8 @@ private:
                     BenchPictureRow& row = rows[frame * methods.size() + k];
                     nameRow(row, model, cameras[frame], *methods[k]);
                     judge(row, reference, drawn, cameras[frame].camera, model.cache->dataset().header.cell);
-                    VCP_TRY(keepPicture(model, cameras[frame], view, methods[k]->name() + methods[k]->knob(),
-                                        drawn.picture));
+                    VCP_TRY(keepPicture(model, cameras[frame], view,
+                                        fmt::format("{} {}", methods[k]->name(), methods[k]->knob()), drawn.picture));
                 }
             }
         }
@@ -352,6 +352,7 @@ private:
     Result<void> keepPicture(const BenchModel& model, const NamedCamera& camera, int view, std::string method,
                              const LightPicture& light) const {
         if (!o_.pictures || o_.out.empty()) return {};
+        while (method.ends_with(' ')) method.pop_back();
         std::ranges::replace(method, ' ', '-');
         Picture picture{uint32_t(light.size.x), uint32_t(light.size.y), {}};
         for (const float value : light.light) {
