@@ -22,7 +22,7 @@
 #include "builder/mesh/open_mesh.h"
 #include "builder/progress_meter.h"
 #include "builder/spill/journal.h"
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 
 namespace vcp {
 
@@ -162,8 +162,8 @@ private:
         for (const SideFile& each : done_.sideFiles)
             if (fileStamp(each.path) != each.stamp)
                 return Error{.code = ErrorCode::Usage,
-                             .message = fmt::format("was changed since the unfinished build in {} read it; without "
-                                                    "--resume that is started again",
+                             .message = fmt::format("was changed since the unfinished build in {} read it; build "
+                                                    "again from the start",
                                                     folder.path().string()),
                              .file = each.path.string()};
         return {};

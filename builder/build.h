@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "builder/stream/side_file.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 
@@ -40,7 +40,7 @@ struct BuildOptions {
         inputs;          ///< inputs: files, folders of them, "-" for standard input; joined into one dataset
     std::string format;  ///< format of inputs whose content does not tell it (meshFormats())
     std::filesystem::path output;
-    bool overwrite = false;  ///< also replaces an output that is no dataset (octree/output_file.h); never an input
+    bool overwrite = false;  ///< also replaces an output that is no dataset (octree/io/output_file.h); never an input
     double cell = 0;         ///< finest cell edge, world units; 0: chosen from the mesh
     double error = 0;        ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
     bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "octree/page.h"
+#include "octree/page/page.h"
 #include "octree/vcp_writer.h"
 
 namespace vcp {

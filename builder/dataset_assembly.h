@@ -7,8 +7,8 @@
 
 #include "builder/ingest.h"
 #include "builder/spill/page_spool.h"
-#include "octree/output_file.h"
-#include "octree/result.h"
+#include "octree/io/output_file.h"
+#include "octree/io/result.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {

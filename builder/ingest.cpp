@@ -13,7 +13,7 @@
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/mesh/open_mesh.h"
 #include "builder/vertex_join.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

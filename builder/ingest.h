@@ -11,7 +11,7 @@
 #include "builder/spill/record_bins.h"
 #include "builder/stream/material.h"
 #include "builder/stream/mesh_stream.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

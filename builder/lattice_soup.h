@@ -7,7 +7,7 @@
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/lattice/soup.h"
 #include "builder/texture/material_colours.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -16,8 +16,8 @@
 
 #include "datasets_scripts/dog.h"
 #include "datasets_scripts/scan_mesh.h"
-#include "octree/durable_file.h"
-#include "octree/output_file.h"
+#include "octree/io/durable_file.h"
+#include "octree/io/output_file.h"
 
 namespace {
 

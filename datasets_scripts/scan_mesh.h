@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "datasets_scripts/statue.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp::scan {
 

@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 
 #include "mesostructure/solids.h"
-#include "octree/byte_reader.h"
-#include "octree/content_hash.h"
-#include "octree/durable_file.h"
+#include "octree/io/byte_reader.h"
+#include "octree/io/content_hash.h"
+#include "octree/io/durable_file.h"
 
 namespace vcp::meso {
 

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "mesostructure/march.h"
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 
 namespace vcp::meso {
 

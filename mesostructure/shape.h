@@ -13,7 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include "mesostructure/tile_grid.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp::meso {
 

@@ -9,10 +9,10 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include "octree/content_hash.h"
 #include "octree/directory_check.h"
 #include "octree/header_check.h"
-#include "octree/morton.h"
+#include "octree/io/content_hash.h"
+#include "octree/surface/morton.h"
 
 namespace vcp {
 

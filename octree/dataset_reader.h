@@ -5,9 +5,9 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/byte_reader.h"
+#include "octree/io/byte_reader.h"
+#include "octree/io/result.h"
 #include "octree/page_directory.h"
-#include "octree/result.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {

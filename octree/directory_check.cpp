@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "octree/byte_reader.h"
-#include "octree/content_hash.h"
+#include "octree/io/byte_reader.h"
+#include "octree/io/content_hash.h"
 
 namespace vcp {
 

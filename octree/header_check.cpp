@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "octree/content_hash.h"
+#include "octree/io/content_hash.h"
 
 namespace vcp {
 

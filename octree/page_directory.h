@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "octree/result.h"
-#include "octree/sparse_array.h"
+#include "octree/io/result.h"
+#include "octree/io/sparse_array.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {

@@ -5,10 +5,10 @@
 
 #include <fmt/format.h>
 
-#include "octree/content_hash.h"
-#include "octree/page.h"
-#include "octree/page_codec.h"
-#include "octree/paper_page.h"
+#include "octree/io/content_hash.h"
+#include "octree/page/page.h"
+#include "octree/page/page_codec.h"
+#include "octree/page/paper_page.h"
 
 namespace vcp {
 

@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "octree/byte_reader.h"
 #include "octree/dataset_reader.h"
-#include "octree/page.h"
-#include "octree/result.h"
+#include "octree/io/byte_reader.h"
+#include "octree/io/result.h"
+#include "octree/page/page.h"
 
 namespace vcp {
 

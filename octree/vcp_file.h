@@ -6,7 +6,7 @@
 //                         (x lowest) within a level, so that the coarsest pages' entries and the header are
 //                         within the first 16 KiB
 //   ...                   pages, in the order of the directory, each on 256 bytes: geometry, then colour;
-//                         each as octree/page_codec.h says; zero bytes between
+//                         each as octree/page/page_codec.h says; zero bytes between
 //   end-64   64           CommitRecord, written last
 //
 // Every header, block and page carries an XXH3-64; a file whose commit record, header or size disagree was
@@ -21,7 +21,7 @@
 #include <cstdint>
 #include <iterator>
 
-#include "octree/paper_page.h"
+#include "octree/page/paper_page.h"
 
 namespace vcp {
 
@@ -41,8 +41,8 @@ constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock -
 
 /// What the pages hold.
 enum class Method : uint32_t {
-    Certified,  ///< octree/page.h
-    Paper,      ///< octree/paper_page.h: one level, one page, no certificate and no colour
+    Certified,  ///< octree/page/page.h
+    Paper,      ///< octree/page/paper_page.h: one level, one page, no certificate and no colour
 };
 
 /// One level's row in the header.

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "octree/byte_reader.h"
-#include "octree/result.h"
+#include "octree/io/byte_reader.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

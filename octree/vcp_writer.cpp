@@ -2,8 +2,8 @@
 
 #include <cstring>
 
-#include "octree/content_hash.h"
-#include "octree/page_codec.h"
+#include "octree/io/content_hash.h"
+#include "octree/page/page_codec.h"
 
 namespace vcp {
 

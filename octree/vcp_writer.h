@@ -1,11 +1,11 @@
-// Writes a .vcp file through OUT.vcp.partial (octree/output_file.h): OUT.vcp is whole or absent.
+// Writes a .vcp file through OUT.vcp.partial (octree/io/output_file.h): OUT.vcp is whole or absent.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 
-#include "octree/output_file.h"
-#include "octree/result.h"
+#include "octree/io/output_file.h"
+#include "octree/io/result.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {
@@ -18,7 +18,7 @@ struct StoredPage {
     uint32_t colourBytes = 0;
 };
 
-/// Packs a page with octree/page_codec.h; the same page gives the same bytes everywhere.
+/// Packs a page with octree/page/page_codec.h; the same page gives the same bytes everywhere.
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
 
 /// Writes one file, in one thread. Removes the partial file when destroyed before commit.

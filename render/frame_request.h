@@ -8,7 +8,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/paper_page.h"
+#include "octree/page/paper_page.h"
 #include "render/camera.h"
 
 namespace vcp {
@@ -64,9 +64,9 @@ struct PictureTile {
     bool operator==(const PictureTile&) const = default;
 };
 
-/// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/paper_page.h) are drawn by
-/// their own march, from their one page. They have no beam pass, no shadows, no ambient occlusion and no caps: where a
-/// request asks for these, they are left out.
+/// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/page/paper_page.h) are drawn
+/// by their own march, from their one page. They have no beam pass, no shadows, no ambient occlusion and no caps: where
+/// a request asks for these, they are left out.
 struct FrameRequest {
     Camera camera;                        ///< camera of the whole picture, where this one is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each

@@ -9,7 +9,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/frame_request.h"
 
 namespace vcp {

@@ -10,7 +10,7 @@
 
 #include <glm/vec4.hpp>
 #include "octree/dataset_reader.h"
-#include "octree/page.h"
+#include "octree/page/page.h"
 
 namespace vcp {
 

@@ -8,7 +8,7 @@
 #include <png.h>
 #include <unistd.h>
 
-#include "octree/regular_file.h"
+#include "octree/io/regular_file.h"
 
 namespace vcp {
 

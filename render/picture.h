@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "octree/output_file.h"
-#include "octree/result.h"
+#include "octree/io/output_file.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -39,7 +39,7 @@
 #include <glm/vec3.hpp>
 
 #include "octree/dataset_reader.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/frame_request.h"
 #include "render/frame_result.h"
 #include "render/picture.h"

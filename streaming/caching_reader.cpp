@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "octree/content_hash.h"
-#include "octree/durable_file.h"
-#include "octree/regular_file.h"
+#include "octree/io/content_hash.h"
+#include "octree/io/durable_file.h"
+#include "octree/io/regular_file.h"
 
 namespace vcp {
 

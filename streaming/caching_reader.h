@@ -12,7 +12,7 @@
 #include <mutex>
 #include <string>
 #include <vector>
-#include "octree/byte_reader.h"
+#include "octree/io/byte_reader.h"
 
 namespace vcp {
 

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <condition_variable>
 
-#include "octree/content_hash.h"
+#include "octree/io/content_hash.h"
 
 namespace vcp {
 

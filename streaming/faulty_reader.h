@@ -9,7 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <unordered_map>
-#include "octree/byte_reader.h"
+#include "octree/io/byte_reader.h"
 
 namespace vcp {
 

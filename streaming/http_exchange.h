@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "streaming/http_reader.h"
 #include "streaming/web_address.h"
 

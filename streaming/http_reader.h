@@ -24,7 +24,7 @@
 #include <memory>
 #include <string>
 
-#include "octree/byte_reader.h"
+#include "octree/io/byte_reader.h"
 #include "streaming/web_address.h"
 
 namespace vcp {

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "octree/caught.h"
+#include "octree/io/caught.h"
 
 namespace vcp {
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <memory>
 #include <vector>
-#include "octree/byte_reader.h"
+#include "octree/io/byte_reader.h"
 
 namespace vcp {
 

@@ -14,7 +14,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "streaming/request.h"
 
 namespace vcp {

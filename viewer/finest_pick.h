@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "octree/io/result.h"
 #include "octree/reference_caster.h"
-#include "octree/result.h"
 #include "render/renderer.h"
 
 namespace vcp {

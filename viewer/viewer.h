@@ -28,7 +28,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/meso_scene.h"

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "builder/lattice/lattice_mesh.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

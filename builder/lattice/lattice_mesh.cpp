@@ -7,9 +7,9 @@
 #include <oneapi/tbb/parallel_sort.h>
 #include <glm/geometric.hpp>
 
-#include "octree/leaf_math.h"
-#include "octree/morton.h"
-#include "octree/vertex_normal.h"
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/morton.h"
+#include "octree/surface/vertex_normal.h"
 
 namespace vcp {
 

@@ -40,9 +40,9 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
 /// Returns the number of the vertex at `p` in a mesh from meshOf, or none.
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 
-/// Computes vertex normals (octree/vertex_normal.h): the mean of the incident triangles' normals by area, taken without
-/// orientation (a mesh need not have one); the page codec predicts them from a page's triangles. A vertex where a
-/// triangle turns away by more than 40 degrees is marked as a crease: its normal is not to be interpolated.
+/// Computes vertex normals (octree/surface/vertex_normal.h): the mean of the incident triangles' normals by area, taken
+/// without orientation (a mesh need not have one); the page codec predicts them from a page's triangles. A vertex where
+/// a triangle turns away by more than 40 degrees is marked as a crease: its normal is not to be interpolated.
 void computeNormals(LatticeMesh& mesh);
 
 }  // namespace vcp

@@ -9,8 +9,8 @@
 #include <glm/vec3.hpp>
 
 #include "builder/lattice/triangle_geometry.h"
-#include "octree/leaf_math.h"
-#include "octree/morton.h"
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/morton.h"
 
 namespace vcp {
 

@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/level/stray_bound.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

@@ -13,7 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/level/triangle_cover.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

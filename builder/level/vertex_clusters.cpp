@@ -8,9 +8,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "octree/leaf_math.h"
-#include "octree/morton.h"
-#include "octree/packing.h"
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/morton.h"
+#include "octree/surface/packing.h"
 
 namespace vcp {
 

@@ -15,7 +15,7 @@
 #include <glm/vec3.hpp>
 
 #include "builder/stream/mesh_stream.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

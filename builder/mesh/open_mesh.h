@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "builder/stream/mesh_stream.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

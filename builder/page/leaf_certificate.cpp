@@ -5,8 +5,8 @@
 
 #include "builder/lattice/wider_clones.h"
 #include "builder/page/quadric_fit.h"
-#include "octree/leaf_math.h"
-#include "octree/packing.h"
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/packing.h"
 
 namespace vcp {
 

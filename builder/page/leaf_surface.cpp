@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/lattice/wider_clones.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

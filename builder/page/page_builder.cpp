@@ -6,7 +6,7 @@
 
 #include <glm/common.hpp>
 
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

@@ -9,7 +9,7 @@
 
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/page/page_geometry.h"
-#include "octree/page.h"
+#include "octree/page/page.h"
 
 namespace vcp {
 

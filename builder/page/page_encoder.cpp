@@ -7,10 +7,10 @@
 #include <limits>
 #include <unordered_map>
 
-#include "octree/clearance.h"
-#include "octree/leaf_math.h"
-#include "octree/packing.h"
-#include "octree/page.h"
+#include "octree/page/page.h"
+#include "octree/surface/clearance.h"
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/packing.h"
 
 namespace vcp {
 

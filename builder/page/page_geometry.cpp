@@ -7,7 +7,7 @@
 #include <glm/common.hpp>
 
 #include "builder/page/cell_overlap.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 

@@ -12,7 +12,7 @@
 
 #include "builder/ingest.h"
 #include "builder/mesh/open_mesh.h"
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 #include "octree/vcp_writer.h"
 
 namespace vcp {

@@ -7,7 +7,7 @@
 
 namespace vcp {
 
-/// What such a file holds: one page (octree/paper_page.h).
+/// What such a file holds: one page (octree/page/paper_page.h).
 struct PaperFile {
     FileHeader header;
     PageEntry entry;

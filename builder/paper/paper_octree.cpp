@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "octree/packing.h"
+#include "octree/surface/packing.h"
 
 namespace vcp {
 

@@ -21,7 +21,7 @@
 
 #include "builder/paper/corner_octree.h"
 #include "builder/paper/node_finder.h"
-#include "octree/paper_page.h"
+#include "octree/page/paper_page.h"
 
 namespace vcp {
 

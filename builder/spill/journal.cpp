@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
-#include "octree/durable_file.h"
+#include "octree/io/durable_file.h"
 
 namespace vcp {
 

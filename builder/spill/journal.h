@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "builder/spill/temp_folder.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
-#include "octree/content_hash.h"
+#include "octree/io/content_hash.h"
 
 namespace vcp {
 

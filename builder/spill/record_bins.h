@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "builder/spill/temp_space.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

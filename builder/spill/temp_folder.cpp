@@ -9,7 +9,7 @@
 #include <memory>
 #include <string_view>
 
-#include "octree/durable_file.h"
+#include "octree/io/durable_file.h"
 
 namespace vcp {
 

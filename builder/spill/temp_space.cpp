@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "octree/durable_file.h"
+#include "octree/io/durable_file.h"
 
 namespace vcp {
 

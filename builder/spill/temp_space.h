@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "builder/spill/temp_folder.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "builder/stream/byte_input.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

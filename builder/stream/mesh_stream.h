@@ -24,7 +24,7 @@
 
 #include "builder/stream/material.h"
 #include "builder/stream/side_file.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "octree/file_descriptor.h"
-#include "octree/result.h"
+#include "octree/io/file_descriptor.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

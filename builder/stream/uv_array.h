@@ -11,7 +11,7 @@
 #include <glm/vec2.hpp>
 
 #include "builder/stream/random_bytes.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "builder/stream/material.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -16,7 +16,7 @@
 
 #include "builder/stream/material.h"
 #include "builder/texture/image.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "mesostructure/base_surface.h"
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 
 namespace vcp::meso {
 

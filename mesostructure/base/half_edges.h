@@ -13,7 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include "mesostructure/base_surface.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp::meso {
 

@@ -1,5 +1,5 @@
 // The surface inside a leaf: decoding, evaluation, intersection. Compiles as GLSL (Real = float) and as
-// C++ in float and double (octree/leaf_math.h), so that the tests of the C++ cover the shader.
+// C++ in float and double (octree/surface/leaf_math.h), so that the tests of the C++ cover the shader.
 // Only the common subset of GLSL and GLM is used: no swizzles, no in/out arguments.
 //
 // Source: Demir and Westermann 2015, section 2.2, replaced by the half-gradient surface of

@@ -1,5 +1,6 @@
 // Layout of a page: the bytes of one subvolume in memory and in the GPU pool; in the file they are coded
-// (octree/page_codec.h). Compiles as C++ (inside namespace vcp) and as GLSL; octree/page.h is the C++ entrance.
+// (octree/page/page_codec.h). Compiles as C++ (inside namespace vcp) and as GLSL; octree/page/page.h is the C++
+// entrance.
 //
 // A page covers S = 2^log2Cells cells per edge of its level. Its coordinates ("page space") have the
 // page's lowest corner as origin and the level's cell edge as unit. All sections begin on 16 bytes:

@@ -3,7 +3,7 @@
 // barrierComputeToCompute, recorded here. Made only where such a dataset is drawn.
 #pragma once
 
-#include "octree/paper_page.h"
+#include "octree/page/paper_page.h"
 #include "render/passes/frame_resources.h"
 
 namespace vcp {

@@ -1,5 +1,5 @@
-// Casts a ray through a page of the method `paper` (octree/paper_page.h): the march of Demir and Westermann 2015, as
-// builder/paper/paper_octree.h does it on the CPU. Grid space: finest cells from the page's lowest corner.
+// Casts a ray through a page of the method `paper` (octree/page/paper_page.h): the march of Demir and Westermann 2015,
+// as builder/paper/paper_octree.h does it on the CPU. Grid space: finest cells from the page's lowest corner.
 #define INLINE
 #define CONST_REF(T) T
 #include "octree/shared/paper_math.h"

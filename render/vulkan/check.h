@@ -5,7 +5,7 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -15,7 +15,7 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/vulkan/command_queue.h"
 #include "render/vulkan/device_info.h"
 #include "render/vulkan/instance.h"

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/vulkan/device.h"
 
 namespace vcp {

@@ -11,9 +11,9 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "octree/content_hash.h"
 #include "octree/dataset_reader.h"
 #include "octree/header_check.h"
+#include "octree/io/content_hash.h"
 #include "octree/vcp_verify.h"
 
 namespace {

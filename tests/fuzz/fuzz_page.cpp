@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "octree/page_codec.h"
-#include "octree/paper_page.h"
+#include "octree/page/page_codec.h"
+#include "octree/page/paper_page.h"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "octree/packing.h"
-#include "octree/page.h"
+#include "octree/page/page.h"
+#include "octree/surface/packing.h"
 
 int main() {
     const glm::dvec3 v(0.25, -0.5, 0.75);

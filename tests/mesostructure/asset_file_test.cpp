@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "octree/content_hash.h"
+#include "octree/io/content_hash.h"
 #include "tests/support/meso_rays.h"
 #include "tests/support/test_folder.h"
 

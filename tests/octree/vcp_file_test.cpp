@@ -17,7 +17,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "octree/content_hash.h"
+#include "octree/io/content_hash.h"
 #include "octree/vcp_verify.h"
 #include "octree/vcp_writer.h"
 #include "tests/support/analytic_page.h"

@@ -1,6 +1,6 @@
 // The cut through the page tree, on trees made by hand.
 #include "streaming/page_selection.h"
-#include "octree/morton.h"
+#include "octree/surface/morton.h"
 
 #include <bit>
 #include <cmath>

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "octree/morton.h"
-#include "octree/packing.h"
-#include "octree/page.h"
+#include "octree/page/page.h"
 #include "octree/page_reader.h"
+#include "octree/surface/morton.h"
+#include "octree/surface/packing.h"
 
 namespace vcp::test {
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-#include "octree/content_hash.h"
 #include "octree/dataset_reader.h"
+#include "octree/io/content_hash.h"
 
 namespace vcp::test {
 

@@ -7,7 +7,7 @@
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/lattice_soup.h"
 #include "builder/measure/indexed_mesh.h"
-#include "octree/leaf_math.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp::test {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "octree/leaf_triangles.h"
-#include "octree/page.h"
-#include "octree/vertex_normal.h"
+#include "octree/page/page.h"
+#include "octree/surface/leaf_triangles.h"
+#include "octree/surface/vertex_normal.h"
 
 namespace vcp::test {
 

@@ -8,7 +8,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

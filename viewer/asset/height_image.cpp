@@ -13,7 +13,7 @@
 #include <png.h>
 
 #include "builder/texture/png_chunks.h"
-#include "octree/regular_file.h"
+#include "octree/io/regular_file.h"
 #include "viewer/asset/exr_picture.h"
 
 namespace vcp {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "builder/measure/surface_distance.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

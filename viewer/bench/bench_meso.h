@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "mesostructure/asset_file.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

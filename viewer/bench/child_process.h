@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

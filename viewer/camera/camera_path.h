@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "viewer/camera/orbit_camera.h"
 
 namespace vcp {

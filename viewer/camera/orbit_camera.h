@@ -23,7 +23,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/camera.h"
 #include "render/similarity.h"
 

@@ -6,7 +6,7 @@
 
 #include <cerrno>
 
-#include "octree/regular_file.h"
+#include "octree/io/regular_file.h"
 
 namespace vcp {
 

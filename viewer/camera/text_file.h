@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -72,10 +72,10 @@ std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style) {
 }
 
 Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, BuildOptions build,
-                                   const SourceAccess& source, ProgressStyle style, const std::string& method) {
+                                   const SourceAccess& source, ProgressStyle style, const SurfaceChoices& instead) {
     const InterruptScope catching;
     build.progress = shownProgress(style);
-    return openScene(inputs, build, source, method);
+    return openScene(inputs, build, source, instead);
 }
 
 }  // namespace vcp

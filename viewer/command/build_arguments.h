@@ -23,6 +23,6 @@ std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style);
 
 /// Does openScene with its progress on stderr, cancelled by Ctrl-C.
 Result<OpenedScene> openSceneShown(const std::vector<std::string>& inputs, BuildOptions build,
-                                   const SourceAccess& source, ProgressStyle style, const std::string& method);
+                                   const SourceAccess& source, ProgressStyle style, const SurfaceChoices& instead);
 
 }  // namespace vcp

@@ -61,7 +61,7 @@ struct RaysCommand : BenchCommand {
 
 struct PictureCommand : BenchCommand {
     BenchPictureOptions options;
-    std::string size = "960x600";
+    glm::ivec2 size{960, 600};
 };
 
 struct StreamCommand {
@@ -189,11 +189,11 @@ Result<int> runPicture(const PictureCommand& command) {
     VCP_TRY(makeFolder(command.out));
     BenchPictureOptions options = command.options;
     options.models = command.modelPaths();
-    options.size = parseSize(command.size).value();
+    options.size = command.size;
     if (command.repetitions > 0) options.repetitions = command.repetitions;
     options.threads = command.threads;
     options.out = command.out;
-    options.cell = command.cellLength();
+    options.cell = command.cell;
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = progressTo(display);
@@ -351,12 +351,7 @@ RunCommand addBenchPicture(CLI::App& bench) {
         ->allow_extra_args(false)
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
-    app->add_option("--size", command->size, "Width and height in pixels")
-        ->type_name("WxH")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            return parseSize(text) ? std::string() : "must be like 960x600, not \"" + text + "\"";
-        });
+    addSize(*app, command->size, "960x600", "Width and height in pixels")->default_str(sizeText(command->size));
     const auto count = [&](const char* name, int& value, const char* text, int most) {
         app->add_option(name, value, text)->type_name("N")->capture_default_str()->check(CLI::Range(1, most));
     };

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "builder/measure/quantile.h"
+#include "mesostructure/base/subdivision.h"
 #include "mesostructure/method.h"
 #include "render/renderer.h"
 #include "viewer/camera/camera_path.h"
@@ -45,6 +46,7 @@ struct RenderCommand {
     int turntable = 0;
     std::string path;
     std::vector<std::string> methods;  // empty: those of the scene
+    std::optional<int> subdivide;
     bool validation = false;
     BuildOptions build;
     RenderSettings render;
@@ -327,9 +329,10 @@ Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     VCP_TRY_ASSIGN(const auto open,
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
-                                  command.methods.empty() ? "" : command.methods[0]));
-    if (!command.methods.empty() && open.file.surfaces.empty())
-        return Error{ErrorCode::Usage, "--methods goes with a scene that has mesostructure"};
+                                  {command.methods.empty() ? "" : command.methods[0], command.subdivide}));
+    if ((!command.methods.empty() || command.subdivide) && open.file.surfaces.empty())
+        return Error{ErrorCode::Usage, fmt::format("{} goes with a scene that has mesostructure",
+                                                   command.subdivide ? "--subdivide" : "--methods")};
     if (open.parts.size() == 1) VCP_TRY(command.render.checkFor(*open.parts.front().open.dataset));
     const SceneFile& scene = open.file;
     for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
@@ -414,6 +417,10 @@ Command addRender(CLI::App& vcp) {
         ->delimiter(',')
         ->check(CLI::IsMember(std::vector<std::string>(meso::methodNames().begin(), meso::methodNames().end())))
         ->allow_extra_args(false);
+    app->add_option("--subdivide", command->subdivide,
+                    "Smooth all surfaces of the scene by Loop subdivision, so many times, in place of what it says")
+        ->type_name("N")
+        ->check(CLI::Range(0, meso::kMostSubdivisions));
     app->add_flag("--validation", command->validation, "With Vulkan's validation layers: what they say is an error");
     app->add_flag("--settle,!--no-settle", command->settle, "Wait until all that the view wants is loaded [on]");
     addBuildSettings(*app, command->build);

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 #include "viewer/command/terminal_text.h"
 
 namespace vcp {

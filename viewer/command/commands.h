@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "viewer/command/progress_display.h"
 
 namespace vcp {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "octree/caught.h"
+#include "octree/io/caught.h"
 #include "streaming/web_address.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/option_names.h"

@@ -1,4 +1,4 @@
-// Writes depth and normals as files, each whole or absent (octree/output_file.h).
+// Writes depth and normals as files, each whole or absent (octree/io/output_file.h).
 //
 //   .pfm   32-bit float, lower row first, little endian (scale -1), as the format wants it. Depth: one
 //          channel, world units along the ray, infinity where nothing was hit. Normals: three channels, world
@@ -13,8 +13,8 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/output_file.h"
-#include "octree/result.h"
+#include "octree/io/output_file.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

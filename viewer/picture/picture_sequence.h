@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 #include "viewer/picture/png_rows.h"
 #include "viewer/picture/tiled_picture.h"

@@ -7,12 +7,12 @@
 #include <memory>
 #include <span>
 
-#include "octree/output_file.h"
-#include "octree/result.h"
+#include "octree/io/output_file.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 
-/// For one thread. The file appears with finish(), whole; without it, nothing is left (octree/output_file.h).
+/// For one thread. The file appears with finish(), whole; without it, nothing is left (octree/io/output_file.h).
 class PngRows {
 public:
     /// Begins a file of 8-bit RGBA, `width` and `height` from 1 to 2^20. Errors: Io, Usage.

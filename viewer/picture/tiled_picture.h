@@ -11,7 +11,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 
 namespace vcp {

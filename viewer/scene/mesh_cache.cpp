@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "octree/content_hash.h"
 #include "octree/dataset_reader.h"
-#include "octree/output_file.h"
-#include "octree/regular_file.h"
+#include "octree/io/content_hash.h"
+#include "octree/io/output_file.h"
+#include "octree/io/regular_file.h"
 
 namespace vcp {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "builder/build.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

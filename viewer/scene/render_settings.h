@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "octree/paper_page.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
+#include "octree/page/paper_page.h"
 #include "render/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/option_values.h"

@@ -156,8 +156,8 @@ private:
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
         onlyKeys(json, at,
-                  {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
-                   "normal_texture", "method", "grid", "cones", "steps", "base", "far"});
+                 {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
+                  "normal_texture", "method", "grid", "cones", "steps", "base", "far"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/meso_scene.h"

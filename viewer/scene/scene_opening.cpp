@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "octree/caught.h"
+#include "octree/io/caught.h"
 #include "streaming/caching_reader.h"
 #include "streaming/http_reader.h"
 #include "streaming/web_address.h"
@@ -74,13 +74,15 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
 }
 
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const SourceAccess& access, const std::string& method) {
+                              const SourceAccess& access, const SurfaceChoices& instead) {
     VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
     SceneFile file;
     if (kind == InputKind::Scene) {
         VCP_TRY_ASSIGN(file, readScene(inputs.front()));
-        for (MesoSurfaceDescription& surface : file.surfaces)
-            if (!method.empty()) surface.method.name = method;
+        for (MesoSurfaceDescription& surface : file.surfaces) {
+            if (!instead.method.empty()) surface.method.name = instead.method;
+            if (instead.subdivide) surface.subdivide = *instead.subdivide;
+        }
     } else if (kind == InputKind::Datasets) {
         for (const std::string& input : inputs) file.datasets.push_back({input, {}});
     } else {

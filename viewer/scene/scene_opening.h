@@ -71,12 +71,18 @@ struct OpenedScene {
 Result<OpenedScene> openScene(SceneFile file, const std::string& name,
                               const std::function<Result<OpenDataset>(const std::string& file)>& open);
 
+/// What holds for all surfaces of a scene.
+struct SurfaceChoices {
+    std::string method;            ///< empty: the scene's
+    std::optional<int> subdivide;  ///< times that Loop's rules are applied; none: the scene's
+};
+
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
 /// dataset in the cache first; meshes of a scene are built one by one. `build`: how, and who is told the progress.
-/// `method`: marches all mesostructure, in place of what the scene says; empty: the scene's. Errors: Usage (.vcp files
+/// `instead`: for all surfaces, in place of what the scene says. Errors: Usage (.vcp files
 /// among meshes); those of readScene, MeshCache, openDataset and the other openScene.
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const SourceAccess& access, const std::string& method = {});
+                              const SourceAccess& access, const SurfaceChoices& instead = {});
 
 /// Returns "statue.ply", or "statue.ply and 2 more"; addresses without user and password.
 std::string nameOf(const std::vector<std::string>& inputs);

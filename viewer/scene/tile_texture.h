@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/meso_texture.h"
 
 namespace vcp {

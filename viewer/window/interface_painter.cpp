@@ -7,7 +7,7 @@
 #include <backends/imgui_impl_vulkan.h>
 #include <imgui.h>
 
-#include "octree/content_hash.h"
+#include "octree/io/content_hash.h"
 #include "render/vulkan/check.h"
 
 namespace vcp {

@@ -12,7 +12,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 
 struct ImDrawData;

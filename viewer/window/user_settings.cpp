@@ -17,8 +17,8 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include "octree/file_descriptor.h"
-#include "octree/output_file.h"
+#include "octree/io/file_descriptor.h"
+#include "octree/io/output_file.h"
 #include "streaming/web_address.h"
 #include "viewer/camera/text_file.h"
 

@@ -13,7 +13,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "viewer/camera/orbit_camera.h"
 
 namespace vcp {

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 #include "viewer/camera/camera_path.h"
 
 namespace vcp {

@@ -134,8 +134,10 @@ public:
             if (next.draw) {
                 VCP_TRY_ASSIGN(const auto waited, viewer.waitForFrame());
                 // The frame is to show what was done up to now.
-                if (waited) glfwPollEvents(), next = session_->update(seconds());
-                if (!next) return next.error();
+                if (waited) {
+                    glfwPollEvents();
+                    VCP_TRY_ASSIGN(next, session_->update(seconds()));
+                }
             }
             if (next.draw) VCP_TRY(viewer.draw());
             if (!painter_) VCP_TRY(makePainter());

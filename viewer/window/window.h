@@ -11,7 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "viewer/window/view_session.h"
 
 namespace vcp {

@@ -15,7 +15,7 @@
 
 #include "builder/stream/byte_source.h"
 #include "builder/stream/material.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "builder/stream/byte_source.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

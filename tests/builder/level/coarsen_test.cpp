@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "builder/measure/mesh_bvh.h"
-#include "octree/packing.h"
+#include "octree/surface/packing.h"
 #include "tests/support/lattice_meshes.h"
 #include "tests/support/test_meshes.h"
 

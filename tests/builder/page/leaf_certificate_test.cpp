@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "builder/page/page_geometry.h"
-#include "octree/leaf_math.h"
-#include "octree/packing.h"
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/packing.h"
 #include "tests/support/lattice_meshes.h"
 #include "tests/support/test_meshes.h"
 

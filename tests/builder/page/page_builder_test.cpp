@@ -12,8 +12,8 @@
 
 #include "builder/page/bin_triangles.h"
 #include "builder/page/page_encoder.h"
-#include "octree/packing.h"
-#include "octree/page.h"
+#include "octree/page/page.h"
+#include "octree/surface/packing.h"
 #include "octree/vcp_writer.h"
 #include "tests/support/lattice_meshes.h"
 #include "tests/support/test_meshes.h"

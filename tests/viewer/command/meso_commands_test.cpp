@@ -312,14 +312,12 @@ TEST_F(MesoCommands, DecimatesAScanToABase) {
     EXPECT_EQ(told["texture_coordinates"], true);
     EXPECT_NE(ran.err.find("collapsing edges"), std::string::npos) << ran.err;
     // The base carries mesostructure, as it is and smoothed.
-    const std::string render = "meso render ball --tiles 20 --size 32x32 --json --surface " + path("base.obj") + " -o ";
-    const Ran once = run(render + path("a.png")), smooth = run(render + path("b.png") + " --subdivide 1");
+    const std::string balls = scene(R"({"asset": "ball", "tiles": 20, "surface": "base.obj"})");
+    const Ran once = draw(balls, "--size 32x32"), smooth = draw(balls, "--size 32x32 --subdivide 1");
     ASSERT_EQ(once.status, 0) << once.err;
     ASSERT_EQ(smooth.status, 0) << smooth.err;
     // Three pieces of 112 bytes stand on each of four times as many triangles; the arrays of the asset stay.
-    const auto bytesOf = [](const Ran& drawn) {
-        return Json::parse(drawn.out)["panels"][0]["asset_bytes"].get<int64_t>();
-    };
+    const auto bytesOf = [](const Ran& drawn) { return Json::parse(drawn.out)["surface_bytes"].get<int64_t>(); };
     EXPECT_GT(bytesOf(smooth) - bytesOf(once), 3 * 1490 * 3 * 112);
     // Written once more it is the same file, and it is not written over what it is made from.
     const std::string first = contentOf(path("base.obj"));
@@ -352,12 +350,13 @@ TEST_F(MesoCommands, AClosedScanBecomesAClosedBase) {
 TEST_F(MesoCommands, WhatIsNotManifoldIsRefusedInOneLine) {
     std::ofstream(path("fin.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
                                       "f 1/1 2/2 3/3\nf 2/1 1/2 4/3\nf 1/1 2/2 5/3\n";
-    for (const std::string command :
-         {"render ball --subdivide 1 --surface ", "base --triangles 4 ", "build --grid 8 "}) {
-        const std::string out = path(command.starts_with("render") ? "x.png"
-                                     : command.starts_with("base") ? "x.obj"
-                                                                   : "x.meso");
-        const Ran ran = run("meso " + command + path("fin.obj") + " -o " + out);
+    const std::string fin = scene(R"({"asset": "ball", "surface": "fin.obj"})");
+    for (const std::string& command : {"render --subdivide 1 " + fin, "meso base --triangles 4 " + path("fin.obj"),
+                                       "meso build --grid 8 " + path("fin.obj")}) {
+        const std::string out = path(command.starts_with("render")      ? "x.png"
+                                     : command.starts_with("meso base") ? "x.obj"
+                                                                        : "x.meso");
+        const Ran ran = run(command + " -o " + out);
         EXPECT_EQ(ran.status, 1) << command;
         EXPECT_EQ(ran.errLines(), 1u) << ran.err;
         EXPECT_NE(ran.err.find("fin.obj: triangle 2: 3 triangles meet at the edge from (0, 0, 0) to (1, 0, 0)"),
@@ -366,10 +365,10 @@ TEST_F(MesoCommands, WhatIsNotManifoldIsRefusedInOneLine) {
         EXPECT_FALSE(std::filesystem::exists(out));
     }
     // As it is it can be drawn, with a warning.
-    const Ran drawn = run("meso render ball --size 16x16 --json --surface " + path("fin.obj") + " -o " + path("x.png"));
+    const Ran drawn = draw(fin, "--size 16x16");
     ASSERT_EQ(drawn.status, 0) << drawn.err;
-    EXPECT_NE(drawn.out.find("triangle 2: 3 triangles meet at the edge from"), std::string::npos) << drawn.out;
-    EXPECT_NE(drawn.out.find("drawn as it is"), std::string::npos) << drawn.out;
+    EXPECT_NE(drawn.err.find("triangle 2: 3 triangles meet at the edge from"), std::string::npos) << drawn.err;
+    EXPECT_NE(drawn.err.find("drawn as it is"), std::string::npos) << drawn.err;
 }
 
 TEST_F(MesoCommands, RendersMethodsSideBySide) {
@@ -453,9 +452,8 @@ TEST_F(MesoCommands, RenderSaysWhatIsWrong) {
         std::string says;
     } cases[] = {{withKeys(R"("surface": "bare.obj")"), "", 1, "line 4: has no texture coordinates"},
                  {withKeys(R"("surface": "wild.obj")"), "", 1,
-                   "line 5: byte 41: a face names vertex 9, more than a file of this size can hold"},
-                 {withKeys(R"("surface": "nan.obj")"), "", 1,
-                   "line 2, vertex 2: byte 8: the position is not finite"},
+                  "line 5: byte 41: a face names vertex 9, more than a file of this size can hold"},
+                 {withKeys(R"("surface": "nan.obj")"), "", 1, "line 2, vertex 2: byte 8: the position is not finite"},
                  {withKeys(R"("surface": "bare.stl")"), "", 1, "has no texture coordinates"},
                  {withKeys(R"("surface": "none.obj")"), "", 1, "none.obj"},
                  {withKeys(R"("surface": "back.obj")"), "", 1, "own backs"},

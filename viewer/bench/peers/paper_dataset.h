@@ -8,7 +8,7 @@
 
 namespace vcp {
 
-/// A dataset of one page (octree/paper_page.h), in memory.
+/// A dataset of one page (octree/page/paper_page.h), in memory.
 struct PaperDataset {
     std::shared_ptr<const Dataset> dataset;
     std::shared_ptr<const PageSource> source;

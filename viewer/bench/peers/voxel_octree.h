@@ -18,7 +18,7 @@
 
 #include "builder/measure/mesh_bvh.h"
 #include "builder/paper/octree_walk.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -16,7 +16,7 @@
 #include <glm/vec2.hpp>
 
 #include "builder/measure/quantile.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -2,14 +2,14 @@
 //
 // The light is that of the shade pass (render/shaders/shade.comp) on white. Normals are the means, weighted by area, of
 // the triangles about a vertex, found by its position; across creases, where one of them turns away from the mean by
-// more than 40 degrees, a triangle keeps its own (octree/vertex_normal.h has the same rule). Samples are added as
-// light, and the sum is encoded.
+// more than 40 degrees, a triangle keeps its own (octree/surface/vertex_normal.h has the same rule). Samples are added
+// as light, and the sum is encoded.
 #pragma once
 
 #include <memory>
 
 #include "builder/measure/indexed_mesh.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/frame_request.h"
 #include "viewer/bench/picture/picture_difference.h"
 

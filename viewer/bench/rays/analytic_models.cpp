@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "octree/output_file.h"
+#include "octree/io/output_file.h"
 
 namespace vcp {
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "builder/measure/mesh_bvh.h"
+#include "octree/io/result.h"
 #include "octree/reference_caster.h"
-#include "octree/result.h"
 
 namespace vcp {
 

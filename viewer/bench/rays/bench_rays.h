@@ -17,7 +17,7 @@
 
 #include "builder/measure/ray_classes.h"
 #include "builder/paper/paper_octree.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "viewer/bench/rays/bench_stability.h"
 #include "viewer/bench/report/work_histogram.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "builder/measure/ray_classes.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 
 namespace vcp {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "builder/measure/ray_classes.h"
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 #include "streaming/faulty_reader.h"
 #include "viewer/bench/stress/stress_orders.h"

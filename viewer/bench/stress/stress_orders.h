@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "octree/result.h"
+#include "octree/io/result.h"
 #include "render/renderer.h"
 #include "viewer/scene/scene_opening.h"
 

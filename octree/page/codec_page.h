@@ -1,0 +1,80 @@
+// What the parts of the page codec (page_codec.h) share: the page that is being made, in canonical order, by
+// the encoder and the decoder alike, and, for the encoder, the page it codes.
+#pragma once
+
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "octree/page/page.h"
+
+namespace vcp {
+
+/// A node's place in a page: lowest corner and edge in subcells (1/8 cell).
+struct NodePlace {
+    uint16_t x = 0, y = 0, z = 0, edge = 0;
+
+    [[nodiscard]] glm::ivec3 lower() const { return {x, y, z}; }
+    [[nodiscard]] NodePlace child(uint32_t octant) const {
+        const uint16_t half = edge / 2;
+        return {uint16_t(x + (octant & 1u ? half : 0)), uint16_t(y + (octant & 2u ? half : 0)),
+                uint16_t(z + (octant & 4u ? half : 0)), half};
+    }
+};
+
+inline constexpr int kSubcellsPerCell = 1 << kMaxSubcellDepth;
+
+/// The places of a checked page's nodes.
+inline std::vector<NodePlace> placesOf(const PageView& page) {
+    std::vector<NodePlace> places(page.nodes.size());
+    const auto fill = [&](uint32_t word, NodePlace place) {
+        if (nodeType(word) != kNodeInternal) return;
+        for (uint32_t o = 0; o < 8; ++o) places[size_t{8} * (word & kNodePayloadMask) + o] = place.child(o);
+    };
+    fill(page.header.root, {0, 0, 0, uint16_t(kSubcellsPerCell << page.header.log2Cells)});
+    for (size_t i = 0; i < places.size(); ++i) fill(page.nodes[i], places[i]);
+    return places;
+}
+
+struct CodecPage {
+    PageHeader header;
+    std::vector<uint4> block;  ///< the page
+    std::span<uint32_t> nodes;
+    std::span<uint4> faces;
+    std::span<glm::u32vec2> triangles, vertices;
+    std::span<uint32_t> normals;
+    std::vector<NodePlace> places;  ///< places of the nodes in `nodes`
+
+    const PageView* source = nullptr;                             ///< the page that the encoder codes
+    std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: which element of `source` each one is
+
+    bool wrong = false;  ///< decoder: the bytes are no page; encoder: the page needs the plain form
+
+    /// Makes room for as much as the header says.
+    void allocate() {
+        const PageSections s = pageSections(header);
+        block.resize(s.end / 16);
+        auto* bytes = reinterpret_cast<std::byte*>(block.data());
+        nodes = {reinterpret_cast<uint32_t*>(bytes + s.nodes), size_t{8} * header.groups};
+        faces = {reinterpret_cast<uint4*>(bytes + s.faces), header.faces};
+        triangles = {reinterpret_cast<glm::u32vec2*>(bytes + s.triangles), header.triangles};
+        vertices = {reinterpret_cast<glm::u32vec2*>(bytes + s.vertices), header.vertices};
+        normals = {reinterpret_cast<uint32_t*>(bytes + s.normals), header.vertices};
+    }
+    /// The word of node i in the page that the encoder codes; 0 for the decoder.
+    [[nodiscard]] uint32_t sourceWord(size_t i) const {
+        return source != nullptr ? source->nodes[size_t{8} * groupSource[i / 8] + i % 8] : 0u;
+    }
+
+    /// Calls `visit(word, source word, place)` for the root and every node, in order, until something is wrong.
+    template <class Visit>
+    void forEachNode(Visit&& visit) {
+        const uint16_t edge = uint16_t(kSubcellsPerCell << header.log2Cells);
+        visit(header.root, source != nullptr ? source->header.root : 0u, NodePlace{0, 0, 0, edge});
+        for (size_t i = 0; i < nodes.size() && !wrong; ++i) visit(nodes[i], sourceWord(i), places[i]);
+    }
+};
+
+}  // namespace vcp

@@ -1,0 +1,82 @@
+#include "octree/page/mesh_source.h"
+
+#include <algorithm>
+
+#include "octree/surface/leaf_math.h"
+#include "octree/surface/position_map.h"
+
+namespace vcp {
+
+MeshSource::MeshSource(const PageView& page) : positions_(page.vertices), newVertex_(page.vertices.size(), kNone) {
+    collect(page);
+    newTriangle_.assign(vertices_.size(), kNone);
+    oldVertex_.reserve(page.vertices.size());
+    linkVertices(uint32_t(page.vertices.size()));
+}
+
+void MeshSource::collect(const PageView& page) {
+    triangleOf_.assign(page.triangles.size(), kNone);
+    PositionMap<uint32_t> numbers(page.triangles.size() / 4);
+    const auto visit = [&](uint32_t word) {
+        if (nodeType(word) != kNodeHard) return;
+        const TriangleRange range = hardLeafTriangles(page, word);
+        for (uint32_t r = range.first; r < range.first + range.count; ++r) {
+            const glm::u32vec2 record = page.triangles[r];
+            const Index3 t{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
+                           f64::decodeIndex2(record.y)};
+            if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) wrong_ = true;
+            const uint64_t key = uint64_t{t[0]} << 42 | uint64_t{t[1]} << 21 | t[2];
+            uint32_t& number = numbers.findOrAdd(key);  // the number plus 1
+            if (number == 0) {
+                vertices_.push_back(t);
+                number = uint32_t(vertices_.size());
+            }
+            triangleOf_[r] = number - 1;
+        }
+    };
+    visit(page.header.root);
+    for (const uint32_t word : page.nodes) visit(word);
+}
+
+void MeshSource::linkVertices(uint32_t vertices) {
+    begin_.assign(size_t{vertices} + 1, 0);
+    for (const Index3& t : vertices_)
+        for (const uint32_t v : t) ++begin_[v + 1];
+    for (uint32_t v = 0; v < vertices; ++v) begin_[v + 1] += begin_[v];
+    around_.resize(vertices_.size() * 3);
+    std::vector<uint32_t> next(begin_.begin(), begin_.end() - 1);
+    for (uint32_t k = 0; k < vertices_.size(); ++k)
+        for (const uint32_t v : vertices_[k]) around_[next[v]++] = k;
+}
+
+uint32_t MeshSource::across(uint32_t from, uint32_t to) const {
+    const uint32_t a = oldVertex_[from], b = oldVertex_[to];
+    for (uint32_t i = begin_[a]; i < begin_[a + 1]; ++i) {
+        const uint32_t k = around_[i];
+        const Index3& t = vertices_[k];
+        if (newTriangle_[k] == kNone && (t[0] == b || t[1] == b || t[2] == b)) return k;
+    }
+    return kNone;
+}
+
+uint32_t MeshSource::thirdVertex(uint32_t triangle, uint32_t from, uint32_t to) {
+    const uint32_t a = oldVertex_[from], b = oldVertex_[to];
+    for (const uint32_t v : vertices_[triangle])
+        if (v != a && v != b) third_ = v;
+    return newVertex_[third_];
+}
+
+glm::i32vec3 MeshSource::take(uint32_t vertex, uint32_t number) {
+    newVertex_[vertex] = number;
+    oldVertex_.push_back(vertex);
+    const glm::u32vec2 p = positions_[vertex];
+    return glm::i32vec3(glm::u32vec3(f64::decodeIndex0(p.x), f64::decodeIndex1(p.x, p.y), f64::decodeIndex2(p.y))) -
+           kLatticeBias;
+}
+
+uint32_t MeshSource::nextSeed() {
+    while (newTriangle_[seed_] != kNone) ++seed_;
+    return seed_;
+}
+
+}  // namespace vcp

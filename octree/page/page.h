@@ -1,0 +1,75 @@
+// A page in memory: the bytes of one subvolume, checked, as spans. The layout is drawn in
+// octree/shared/page_layout.h.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "octree/io/result.h"
+#include "octree/surface/leaf_math.h"
+
+namespace vcp {
+
+/// First 64 bytes of a page. Byte map: see the offsets asserted below. All words little endian.
+struct PageHeader {
+    uint32_t magic = kMagic;
+    uint32_t log2Cells = 0;   ///< S = 2^log2Cells cells an edge, 1 to 7
+    uint32_t root = 0;        ///< node word of the whole page
+    uint32_t groups = 0;      ///< groups of 8 node words
+    uint32_t faces = 0;       ///< faces of 16 bytes; at most 2^22
+    uint32_t triangles = 0;   ///< records of 8 bytes; at most 2^22
+    uint32_t vertices = 0;    ///< at most 2^21
+    uint32_t softLeaves = 0;  ///< counts, checked against the nodes
+    uint32_t hardLeaves = 0;
+    float certifiedError = 0;  ///< in cells of this page's level, rounded up
+    uint32_t reserved[6] = {};
+
+    static constexpr uint32_t kMagic = 0x47504356;  // "VCPG"
+};
+static_assert(sizeof(PageHeader) == kPageHeaderBytes);
+static_assert(offsetof(PageHeader, groups) == 12 && offsetof(PageHeader, certifiedError) == 36);
+
+/// Byte offsets of a page's sections, computed from its counts.
+struct PageSections {
+    uint64_t nodes, faces, triangles, vertices, normals, end;
+};
+PageSections pageSections(const PageHeader& header);
+
+/// Returns the bytes of the colour page that belongs to a page.
+uint64_t colourPageBytes(const PageHeader& header);
+
+/// A checked page. Spans point into the bytes it was parsed from, which must outlive it.
+struct PageView {
+    PageHeader header;
+    std::span<const uint32_t> nodes;
+    std::span<const uint4> faces;
+    std::span<const glm::u32vec2> triangles;
+    std::span<const glm::u32vec2> vertices;
+    std::span<const uint32_t> normals;
+    std::span<const uint4> faceColours;       ///< empty without colour
+    std::span<const uint32_t> vertexColours;  ///< empty without colour
+};
+
+/// Checks every word of a page, so that a traversal cannot leave it or loop: counts against the size, nodes
+/// form a tree of bounded depth, leaves and indices are in range. `bytes` must be 16-byte aligned; may be
+/// hostile. `colours` is empty or a colour page. Errors: InvalidInput, with the byte within the page.
+Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
+
+/// The parts of a node word.
+inline uint32_t nodeType(uint32_t node) { return node >> kNodeTypeShift; }
+inline uint32_t emptyNode(double clearanceCells) {
+    return kNodeEmpty << kNodeTypeShift | uint32_t(clearanceCells * double(kClearancePerCell));
+}
+inline double nodeClearance(uint32_t node) { return (node & kNodePayloadMask) / double(kClearancePerCell); }
+
+/// Where a hard leaf's triangles are: the first record and the count, with the long form resolved.
+struct TriangleRange {
+    uint32_t first, count;
+};
+TriangleRange hardLeafTriangles(const PageView& page, uint32_t node);
+
+}  // namespace vcp

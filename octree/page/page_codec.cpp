@@ -1,0 +1,152 @@
+#include "octree/page/page_codec.h"
+
+#include <algorithm>
+#include <memory>
+
+#include <zstd.h>
+
+#include "octree/page/codec_page.h"
+#include "octree/page/colour_codec.h"
+#include "octree/page/face_codec.h"
+#include "octree/page/mesh_codec.h"
+#include "octree/page/node_codec.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr std::byte kPlain{0}, kCoded{1};
+constexpr int kPlainLevel = 3;
+
+Error broken(std::string message) { return {.code = ErrorCode::InvalidInput, .message = std::move(message)}; }
+
+std::vector<std::byte> plain(std::span<const std::byte> bytes) {
+    std::vector<std::byte> out(1 + ZSTD_compressBound(bytes.size()), kPlain);
+    const size_t size = ZSTD_compress(out.data() + 1, out.size() - 1, bytes.data(), bytes.size(), kPlainLevel);
+    out.resize(1 + (ZSTD_isError(size) ? 0 : size));  // cannot fail with room for compressBound
+    return out;
+}
+
+Result<std::vector<uint4>> unpackPlain(std::span<const std::byte> packed, uint64_t bytes) {
+    if (bytes % 16 != 0 || ZSTD_getFrameContentSize(packed.data(), packed.size()) != bytes)
+        return broken("page does not decode to its size");
+    std::vector<uint4> out(bytes / 16);
+    if (ZSTD_decompress(out.data(), bytes, packed.data(), packed.size()) != bytes)
+        return broken("page does not decode to its size");
+    return out;
+}
+
+std::vector<std::byte> coded(RangeEncoder& coder) {
+    std::vector<std::byte> out{kCoded};
+    coder.finish(out);
+    return out;
+}
+
+template <class Coder>
+void codeHeader(Coder& coder, PageHeader& header) {
+    NumberModel model;
+    for (uint32_t* field : {&header.log2Cells, &header.groups, &header.faces, &header.triangles, &header.vertices,
+                            &header.softLeaves, &header.hardLeaves})
+        model.code(coder, *field);
+    uint32_t error = std::bit_cast<uint32_t>(header.certifiedError), low = error & 0xffffu, high = error >> 16;
+    coder.raw(low, 16);
+    coder.raw(high, 16);
+    header.certifiedError = std::bit_cast<float>(low | high << 16);
+}
+
+/// Checks the counts of a header, before anything is allocated by them.
+bool plausible(const PageHeader& h, uint64_t pageBytes) {
+    return h.log2Cells >= 1 && h.log2Cells <= 7 && h.groups <= 1u << 27 && h.faces <= kLeafIndexMask &&
+           h.triangles <= kLeafIndexMask && h.vertices <= kField21Mask && h.softLeaves <= h.faces &&
+           h.hardLeaves <= h.triangles && pageSections(h).end == pageBytes;
+}
+
+template <class Coder>
+void codePage(Coder& coder, CodecPage& page) {
+    // The models take some tens of kilobytes, too much for the stack of a small thread.
+    std::make_unique<NodeCodec<Coder>>(coder, page)->run();
+    if (!page.wrong) std::make_unique<FaceCodec<Coder>>(coder, page)->run();
+    if (!page.wrong) std::make_unique<MeshCodec<Coder>>(coder, page)->run();
+    std::memcpy(page.block.data(), &page.header, sizeof page.header);
+}
+
+/// Returns the colour page of a page in canonical order.
+std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& page) {
+    std::vector<uint4> block(colour.size() / 16);
+    const size_t faces = page.faceSource.size();
+    const auto* oldFaces = reinterpret_cast<const uint4*>(colour.data());
+    const auto* oldVertices = reinterpret_cast<const uint32_t*>(oldFaces + faces);
+    auto* vertices = reinterpret_cast<uint32_t*>(block.data() + faces);
+    for (size_t i = 0; i < faces; ++i) block[i] = oldFaces[page.faceSource[i]];
+    for (size_t i = 0; i < page.vertexSource.size(); ++i) vertices[i] = oldVertices[page.vertexSource[i]];
+    return block;
+}
+
+/// Codes a colour page, or reads it into `block`. Returns false when some of it has no place in the page.
+template <class Coder>
+bool codeColour(Coder& coder, const PageView& page, std::span<uint4> block) {
+    const std::span vertices(reinterpret_cast<uint32_t*>(block.data() + page.header.faces), page.header.vertices);
+    return std::make_unique<ColourCodec<Coder>>(coder, page, block.first(page.header.faces), vertices)->run();
+}
+
+/// Whether stored bytes decode to `block`.
+bool isBlock(const Result<std::vector<uint4>>& decoded, const std::vector<uint4>& block) {
+    return decoded && std::memcmp(decoded->data(), block.data(), block.size() * sizeof(uint4)) == 0;
+}
+
+}  // namespace
+
+PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
+    const auto plainly = [&] {
+        return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
+    };
+    const auto source = parsePage(geometry);
+    if (!source.ok()) return plainly();
+    CodecPage page;
+    page.header = source->header;
+    page.source = &*source;
+    if (!plausible(page.header, geometry.size())) return plainly();
+    page.allocate();
+    RangeEncoder coder;
+    codeHeader(coder, page.header);
+    codePage(coder, page);
+    if (page.wrong) return plainly();
+    PackedPage packed{coded(coder), {}};
+    // A page whose coded form does not decode to it is stored plainly: a lost page costs more than this check.
+    if (!isBlock(unpackGeometry(packed.geometry, geometry.size()), page.block)) return plainly();
+    if (colour.empty()) return packed;
+    const auto view = parsePage(std::as_bytes(std::span(page.block)));
+    std::vector<uint4> block = inOrder(colour, page);
+    RangeEncoder colourCoder;
+    codeColour(colourCoder, *view, block);
+    packed.colour = coded(colourCoder);
+    return isBlock(unpackColour(packed.colour, colour.size(), *view), block) ? packed : plainly();
+}
+
+Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {
+    if (packed.empty()) return broken("page does not decode: it is empty");
+    if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), pageBytes);
+    if (packed[0] != kCoded) return broken("page does not decode: unknown form");
+    RangeDecoder coder(packed.subspan(1));
+    CodecPage page;
+    codeHeader(coder, page.header);
+    if (!plausible(page.header, pageBytes)) return broken("page does not decode to its size");
+    page.allocate();
+    codePage(coder, page);
+    if (page.wrong || !coder.complete()) return broken("page does not decode to its size");
+    return std::move(page.block);
+}
+
+Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page) {
+    if (packed.empty()) return broken("colour page does not decode: it is empty");
+    if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), colourBytes);
+    if (packed[0] != kCoded) return broken("colour page does not decode: unknown form");
+    if (colourPageBytes(page.header) != colourBytes) return broken("colour page does not decode to its size");
+    std::vector<uint4> block(colourBytes / 16);
+    RangeDecoder coder(packed.subspan(1));
+    const bool all = codeColour(coder, page, block);
+    if (!all || !coder.complete()) return broken("colour page does not decode to its size");
+    return block;
+}
+
+}  // namespace vcp

@@ -1,0 +1,42 @@
+// How pages are stored in the file: all that follows from the rest is left out, and what remains is range coded.
+//
+//   byte 0     0: plain: a zstd frame of the page follows; 1: coded, two streams (range_coder.h) follow
+//   nodes      types, breadth first; wall and dip codes; clearances as differences from what the types allow
+//   faces      runs of soft leaves; the vector of each of their corners once, foretold by its neighbours
+//   mesh       the distinct triangles of the hard leaves, growing across their edges; vertices by the parallelogram
+//              rule; normals as differences from those of the triangles
+//   colour     coded on its own: the colour of each corner and vertex once, foretold by its neighbours
+//
+// The numbers of children, faces and records and the leaves' lists of triangles are derived.
+//
+// Coding loses nothing, but the page that comes back has its groups, faces, triangle records, vertices and the corners
+// of a triangle in the codec's own order. A page that is not as the builder makes them is stored plainly.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "octree/io/result.h"
+#include "octree/page/page.h"
+
+namespace vcp {
+
+/// A page as it is stored.
+struct PackedPage {
+    std::vector<std::byte> geometry, colour;
+};
+
+/// Packs `geometry`, a page, and `colour`, its colour page or nothing; both 16-byte aligned. The same page gives the
+/// same bytes everywhere. Any thread.
+PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
+
+/// Returns the page, `pageBytes` long. `packed` may be hostile: nothing is allocated before its counts match pageBytes,
+/// then at most a few times that much, and the result still has to be checked by parsePage. Errors: InvalidInput.
+Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes);
+
+/// Returns the colour page of a checked page; as safe on hostile bytes. Errors: InvalidInput.
+Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page);
+
+}  // namespace vcp

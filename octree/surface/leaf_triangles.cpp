@@ -1,0 +1,99 @@
+#include "octree/surface/leaf_triangles.h"
+
+namespace vcp {
+
+namespace {
+
+template <class Vector>
+auto sumOfSizes(const Vector& v) {
+    const auto size = [](auto x) { return x < 0 ? -x : x; };
+    return size(v.x) + size(v.y) + size(v.z);
+}
+
+}  // namespace
+
+void CubeTest::prepare() {
+    std::array<glm::i64vec3, 3> e;
+    for (size_t i = 0; i < 3; ++i) e[i] = glm::i64vec3(corners_[(i + 1) % 3] - corners_[i]);
+    normal_ = {e[0].y * e[1].z - e[0].z * e[1].y, e[0].z * e[1].x - e[0].x * e[1].z, e[0].x * e[1].y - e[0].y * e[1].x};
+    normalSize_ = sumOfSizes(normal_);
+    offset_ = normal_.x * corners_[0].x + normal_.y * corners_[0].y + normal_.z * corners_[0].z;
+    int n = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        const glm::dvec3 d(e[i]), a(corners_[i]), c(corners_[(i + 2) % 3]);
+        // Both ends of the edge itself project to the same point.
+        const auto set = [&](double x, double y, double z) {
+            const double pa = 2 * (x * a.x + y * a.y + z * a.z), pc = 2 * (x * c.x + y * c.y + z * c.z);
+            along_[0][n] = x;
+            along_[1][n] = y;
+            along_[2][n] = z;
+            least_[n] = std::min(pa, pc);
+            most_[n] = std::max(pa, pc);
+            size_[n++] = std::abs(x) + std::abs(y) + std::abs(z);
+        };
+        set(0, d.z, -d.y);
+        set(-d.z, 0, d.x);
+        set(d.y, -d.x, 0);
+    }
+    prepared_ = true;
+}
+
+bool CubeTest::touches(glm::i32vec3 lower, int edge) {
+    for (const glm::i32vec3& p : corners_) {
+        const glm::i32vec3 d = p - lower;
+        if (std::min(d.x, std::min(d.y, d.z)) >= 0 && std::max(d.x, std::max(d.y, d.z)) <= edge) return true;
+    }
+    if (!prepared_) prepare();
+    // All values are doubled, so that the cube's centre is whole.
+    const int64_t cx = 2 * int64_t{lower.x} + edge, cy = 2 * int64_t{lower.y} + edge, cz = 2 * int64_t{lower.z} + edge;
+    const int64_t plane = 2 * offset_ - (normal_.x * cx + normal_.y * cy + normal_.z * cz);
+    if ((plane < 0 ? -plane : plane) > edge * normalSize_) return false;
+    const double x = double(cx), y = double(cy), z = double(cz), half = edge;
+    int apart = 0;
+    for (int n = 0; n < kAxes; ++n) {
+        const double centre = along_[0][n] * x + along_[1][n] * y + along_[2][n] * z, reach = half * size_[n];
+        apart |= (least_[n] - centre > reach) | (most_[n] - centre < -reach);
+    }
+    return apart == 0;
+}
+
+NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)
+    : nodes_(nodes),
+      cells_(1 << log2Cells),
+      log2Cells_(int(log2Cells)),
+      word_(size_t{1} << (3 * log2Cells), kNodeEmpty << kNodeTypeShift),
+      size_(word_.size()) {
+    fillCells(root, glm::i32vec3(0), log2Cells);
+}
+
+void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge) {
+    const int edge = 1 << log2Edge;
+    if (word >> kNodeTypeShift == kNodeInternal && log2Edge > 0) {
+        const uint32_t* child = &nodes_[size_t{8} * (word & kNodePayloadMask)];
+        for (int o = 0; o < 8; ++o)
+            if (child[o] >> kNodeTypeShift != kNodeEmpty)
+                fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
+        return;
+    }
+    for (int z = lower.z; z < lower.z + edge; ++z)
+        for (int y = lower.y; y < lower.y + edge; ++y) {
+            size_t i = cell(lower.x, y, z);
+            for (int x = 0; x < edge; ++x, ++i) {
+                word_[i] = word;
+                size_[i] = uint8_t(log2Edge);
+            }
+        }
+}
+
+uint32_t NodePlaces::typeAt(glm::i32vec3 p) const {
+    const glm::i32vec3 c = p >> kCellShift;
+    if (std::min(c.x, std::min(c.y, c.z)) < 0 || std::max(c.x, std::max(c.y, c.z)) >= cells_) return kNodeEmpty;
+    uint32_t word = word_[cell(c.x, c.y, c.z)];
+    for (int half = kLatticePerCell / 2; word >> kNodeTypeShift == kNodeInternal; half /= 2) {
+        const uint32_t octant = (p.x & half ? 1u : 0u) | (p.y & half ? 2u : 0u) | (p.z & half ? 4u : 0u);
+        word = nodes_[size_t{8} * (word & kNodePayloadMask) + octant];
+    }
+    return word >> kNodeTypeShift;
+}
+
+}  // namespace vcp

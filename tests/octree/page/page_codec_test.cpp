@@ -1,0 +1,280 @@
+// The page codec: every page comes back as it was, but for the order of its parts; what is not a page of the
+// builder's kind is stored plainly; hostile bytes are refused or decode to something of the size that was asked for.
+#include "octree/page/page_codec.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "octree/io/content_hash.h"
+#include "octree/surface/leaf_triangles.h"
+#include "tests/support/analytic_page.h"
+#include "tests/support/soup_page.h"
+
+namespace vcp {
+namespace {
+
+using test::asBytes, test::Block, test::randomColours, test::sheet, test::soup, test::SoupPage, test::WholePage;
+
+constexpr std::byte kPlain{0}, kCoded{1};
+
+/// A vertex with all that belongs to it; triangles as sorted triples of them.
+using Vertex = std::array<uint32_t, 4>;
+using Triangle = std::array<Vertex, 3>;
+
+std::vector<Triangle> trianglesOf(const PageView& page, uint32_t word) {
+    std::vector<Triangle> triangles;
+    const TriangleRange range = hardLeafTriangles(page, word);
+    for (uint32_t r = range.first; r < range.first + range.count; ++r) {
+        const glm::u32vec2 record = page.triangles[r];
+        Triangle t;
+        const uint32_t vertices[] = {f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
+                                     f64::decodeIndex2(record.y)};
+        for (size_t i = 0; i < 3; ++i) {
+            const uint32_t v = vertices[i];
+            t[i] = {page.vertices[v].x, page.vertices[v].y, page.normals[v],
+                    page.vertexColours.empty() ? 0 : page.vertexColours[v]};
+        }
+        std::sort(t.begin(), t.end());
+        triangles.push_back(t);
+    }
+    std::sort(triangles.begin(), triangles.end());
+    return triangles;
+}
+
+void expectSameNode(const PageView& a, uint32_t wordA, const PageView& b, uint32_t wordB) {
+    ASSERT_EQ(nodeType(wordA), nodeType(wordB));
+    if (nodeType(wordA) == kNodeHard) {
+        ASSERT_EQ(trianglesOf(a, wordA), trianglesOf(b, wordB));
+        return;
+    }
+    if (nodeType(wordA) == kNodeInternal) {
+        for (uint32_t o = 0; o < 8 && !testing::Test::HasFatalFailure(); ++o)
+            expectSameNode(a, a.nodes[8 * wordA + o], b, b.nodes[8 * wordB + o]);
+        return;
+    }
+    if (nodeType(wordA) == kNodeEmpty) {
+        ASSERT_EQ(wordA, wordB);
+        return;
+    }
+    ASSERT_EQ(wordA & ~kLeafIndexMask, wordB & ~kLeafIndexMask);
+    for (uint32_t end = 0; end < 2; ++end) {
+        const uint32_t faceA = (wordA & kLeafIndexMask) + end, faceB = (wordB & kLeafIndexMask) + end;
+        ASSERT_EQ(a.faces[faceA], b.faces[faceB]);
+        if (!a.faceColours.empty()) {
+            ASSERT_EQ(a.faceColours[faceA], b.faceColours[faceB]);
+        }
+    }
+}
+
+void expectSamePage(const PageView& a, const PageView& b) {
+    PageHeader header = b.header;
+    header.root = a.header.root;
+    ASSERT_EQ(std::memcmp(&a.header, &header, sizeof header), 0);
+    expectSameNode(a, a.header.root, b, b.header.root);
+}
+
+WholePage unpack(const PackedPage& packed, const WholePage& like) {
+    WholePage page;
+    auto geometry = unpackGeometry(packed.geometry, like.geometry.size() * 16);
+    EXPECT_TRUE(geometry.ok()) << geometry.error().line();
+    page.geometry = *std::move(geometry);
+    const auto view = parsePage(asBytes(page.geometry));
+    EXPECT_TRUE(view.ok()) << view.error().line();
+    if (like.colour.empty()) return page;
+    auto colour = unpackColour(packed.colour, like.colour.size() * 16, *view);
+    EXPECT_TRUE(colour.ok()) << colour.error().line();
+    page.colour = *std::move(colour);
+    return page;
+}
+
+void expectRoundTrip(const WholePage& page, std::byte form) {
+    ASSERT_TRUE(parsePage(asBytes(page.geometry), asBytes(page.colour)).ok());
+    const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
+    ASSERT_FALSE(packed.geometry.empty());
+    EXPECT_EQ(packed.geometry[0], form);
+    const WholePage back = unpack(packed, page);
+    expectSamePage(page.view(), back.view());
+    // What comes back is in the codec's order already, and the same page costs the same bytes.
+    const PackedPage again = packPage(asBytes(page.geometry), asBytes(page.colour));
+    EXPECT_EQ(again.geometry, packed.geometry);
+    EXPECT_EQ(again.colour, packed.colour);
+    expectSamePage(page.view(), unpack(packPage(asBytes(back.geometry), asBytes(back.colour)), page).view());
+}
+
+WholePage analyticPage(const test::SignedDistanceField& field, uint32_t log2Cells, uint32_t axis) {
+    return {test::AnalyticPageBuilder(field, glm::dvec3(0), 1, log2Cells, axis, 0.05f, 3).build().bytes.geometry, {}};
+}
+
+TEST(PageCodec, SoftPagesComeBack) {
+    for (uint32_t log2Cells = 1; log2Cells <= 5; ++log2Cells)
+        for (uint32_t axis = 0; axis < 3; ++axis) {
+            SCOPED_TRACE(log2Cells * 10 + axis);
+            const double n = std::exp2(log2Cells);
+            for (const auto& field :
+                 {test::sphere(glm::dvec3(n * 0.45), n * 0.4), test::plane(glm::normalize(glm::dvec3(1, 2, 3)), n),
+                  test::torus(glm::dvec3(n * 0.5), n * 0.3, n * 0.11)}) {
+                WholePage page = analyticPage(field, log2Cells, axis);
+                expectRoundTrip(page, kCoded);
+                page.colour = randomColours(page.view(), log2Cells);
+                expectRoundTrip(page, kCoded);
+            }
+        }
+}
+
+TEST(PageCodec, TriangleSoupsComeBack) {
+    for (uint32_t seed = 0; seed < 60; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937 random(seed);
+        const uint32_t log2Cells = 1 + seed % 3, depth = log2Cells + seed % (kMaxSubcellDepth + 1);
+        expectRoundTrip(
+            soup(seed, log2Cells, std::min(depth, 4u), 8 + uint32_t(random() % 30), 1 + uint32_t(random() % 40))
+                .build(seed),
+            kCoded);
+    }
+}
+
+TEST(PageCodec, SheetsComeBack) {
+    for (uint32_t seed = 0; seed < 20; ++seed) {
+        SCOPED_TRACE(seed);
+        expectRoundTrip(sheet(seed, 2, 2 + seed % 2, 4 + seed).build(seed), kCoded);
+    }
+}
+
+TEST(PageCodec, LongLeavesComeBack) {
+    // One leaf with 254, 255 and 300 triangles: both forms of the count.
+    for (const uint32_t count : {254u, 255u, 300u}) {
+        SCOPED_TRACE(count);
+        expectRoundTrip(soup(count, 1, 0, 40, count).build(count), kCoded);
+    }
+}
+
+TEST(PageCodec, EmptyPageComesBack) {
+    PageHeader header;
+    header.log2Cells = 5;
+    header.root = emptyNode(0);
+    WholePage page{Block(sizeof header / 16), {}};
+    std::memcpy(page.geometry.data(), &header, sizeof header);
+    expectRoundTrip(page, kCoded);
+    EXPECT_LT(packPage(asBytes(page.geometry), {}).geometry.size(), 24u);
+}
+
+TEST(PageCodec, PagesOfAnotherKindAreStoredPlainly) {
+    // A leaf without one of the triangles that touch it.
+    SoupPage lacking = soup(5, 2, 2, 20, 30);
+    lacking.forgetATriangle = true;
+    expectRoundTrip(lacking.build(5), kPlain);
+    EXPECT_FALSE(lacking.forgetATriangle);
+
+    // Edges longer than a page can hold.
+    SoupPage large(7, 0);
+    const int far = kMaxEdgeSteps / 2 + 1000;
+    large.triangle(large.vertex({-far, 0, 0}), large.vertex({far, 0, 0}), large.vertex({0, far, 0}));
+    expectRoundTrip(large.build(1), kPlain);
+
+    // A vertex that no triangle has.
+    WholePage page = analyticPage(test::sphere({2, 2, 2}, 1.5), 2, 0);
+    PageHeader header = page.view().header;
+    header.vertices = 1;
+    page.geometry.resize(pageSections(header).end / 16, uint4(7));
+    std::memcpy(page.geometry.data(), &header, sizeof header);
+    expectRoundTrip(page, kPlain);
+
+    // A face that no leaf has.
+    page = analyticPage(test::sphere({2, 2, 2}, 1.5), 2, 0);
+    header = page.view().header;
+    ++header.faces;
+    page.geometry.resize(pageSections(header).end / 16, uint4(7));
+    std::memcpy(page.geometry.data(), &header, sizeof header);
+    expectRoundTrip(page, kPlain);
+}
+
+TEST(PageCodec, SmoothSurfaceCostsLittle) {
+    // A soft leaf of the sphere takes 20 to 25 bytes in memory; its vectors are foretold to a few steps.
+    const WholePage page = analyticPage(test::sphere({15.2, 16.1, 15.7}, 12), 5, 2);
+    const size_t bytes = packPage(asBytes(page.geometry), {}).geometry.size();
+    EXPECT_LT(bytes, size_t{5} * page.view().header.softLeaves);
+    EXPECT_LT(bytes * 5, page.geometry.size() * 16);
+}
+
+// Else files written before can no longer be read: raise kFileVersion.
+TEST(PageCodec, GoldenBytes) {
+    const WholePage soft = analyticPage(test::sphere({7.2, 8.1, 7.7}, 6), 4, 1), hard = sheet(1, 2, 3, 9).build(1);
+    const PackedPage a = packPage(asBytes(soft.geometry), {}),
+                     b = packPage(asBytes(hard.geometry), asBytes(hard.colour));
+    EXPECT_EQ(hashBytes(a.geometry), 10564386174724560174u);
+    EXPECT_EQ(hashBytes(b.geometry), 1920278069947240605u);
+    EXPECT_EQ(hashBytes(b.colour), 2651053299021788687u);
+}
+
+/// Decodes hostile bytes: refused, or of the size that was asked for.
+bool decodes(std::span<const std::byte> bytes, const WholePage& like) {
+    const auto geometry = unpackGeometry(bytes, like.geometry.size() * 16);
+    if (!geometry.ok()) {
+        EXPECT_FALSE(geometry.error().message.empty());
+        return false;
+    }
+    EXPECT_EQ(geometry->size(), like.geometry.size());
+    static_cast<void>(parsePage(asBytes(*geometry)));
+    return true;
+}
+
+TEST(PageCodec, EveryTruncationIsRefused) {
+    const WholePage page = sheet(2, 2, 3, 8).build(2);
+    const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
+    for (size_t size = 0; size < packed.geometry.size(); ++size) {
+        // A copy of its own, so that a read behind the end is seen.
+        const std::vector<std::byte> part(packed.geometry.begin(), packed.geometry.begin() + std::ptrdiff_t(size));
+        // The last bytes may be rounding that a decoder does not need.
+        const bool decoded = decodes(part, page);
+        EXPECT_TRUE(!decoded || size + 4 >= packed.geometry.size()) << size;
+    }
+    std::vector<std::byte> longer = packed.geometry;
+    longer.resize(longer.size() + 16, std::byte{1});
+    EXPECT_FALSE(decodes(longer, page));
+    // Sizes that are no page's, for both forms.
+    for (const std::byte form : {kPlain, kCoded})
+        for (const uint64_t bytes : {0u, 1u, 8u, 63u, 72u, 1000u}) {
+            std::vector<std::byte> other = packed.geometry;
+            other[0] = form;
+            EXPECT_FALSE(unpackGeometry(other, bytes).ok()) << bytes;
+        }
+    EXPECT_FALSE(unpackGeometry(packed.geometry, page.geometry.size() * 16 + 16).ok());
+    EXPECT_FALSE(unpackColour(packed.colour, page.colour.size() * 16 + 16, page.view()).ok());
+    EXPECT_FALSE(unpackColour({}, page.colour.size() * 16, page.view()).ok());
+}
+
+TEST(PageCodec, HostileBytesAreHarmless) {
+    for (const WholePage& page :
+         {sheet(3, 2, 3, 8).build(3), soup(4, 2, 4, 20, 25).build(4), analyticPage(test::sphere({4, 4, 4}, 3), 3, 0)}) {
+        const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
+        std::mt19937 random(11);
+        for (int i = 0; i < 3000; ++i) {
+            std::vector<std::byte> bytes = packed.geometry;
+            // Mostly behind the counts, which lie in the first bytes of either stream.
+            for (auto k = 1 + random() % 3; k > 0; --k)
+                bytes[1 + random() % (bytes.size() - 1)] ^= std::byte(1u << random() % 8);
+            decodes(bytes, page);
+            if (page.colour.empty()) continue;
+            std::vector<std::byte> colour = packed.colour;
+            colour[1 + random() % (colour.size() - 1)] ^= std::byte(1u << random() % 8);
+            const auto decoded =
+                unpackColour(colour, page.colour.size() * 16,
+                             *parsePage(asBytes(*unpackGeometry(packed.geometry, page.geometry.size() * 16))));
+            EXPECT_TRUE(!decoded.ok() || decoded->size() == page.colour.size());
+        }
+        for (int i = 0; i < 3000; ++i) {
+            std::vector<std::byte> bytes(random() % 400);
+            for (std::byte& b : bytes) b = std::byte(random());
+            if (!bytes.empty()) bytes[0] = kCoded;
+            decodes(bytes, page);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace vcp
