@@ -30,8 +30,7 @@ Result<void> checkEdges(meso::BaseSurface& surface, const TileMeshOptions& optio
     if (!edges) return named(edges.error());
     if (edges->border > 0 && !options.period)
         return named({.message = fmt::format("the mesh is not closed: {} of its edges have a triangle on one side "
-                                             "only, the first {}; close it, or name the length after which it "
-                                             "repeats (--period)",
+                                             "only, the first {}; close it, or say how far it repeats",
                                              edges->border, edges->firstBorder),
                       .element = fmt::format("triangle {}", edges->firstBorderTriangle)});
     return {};

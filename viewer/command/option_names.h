@@ -19,6 +19,7 @@ inline constexpr SettingName kOptionNames[] = {
     {"memory for pages on their way", "--ram"},
     {"authority's certificate", "--ca-file"},
     {"another axis up", "--up"},
+    {"how far it repeats", "--period"},
 };
 
 }  // namespace vcp

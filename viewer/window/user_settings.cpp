@@ -278,7 +278,7 @@ Result<std::string> saveChanges(const SettingsChanges& changes, const fs::path& 
     if (failed) return notSaved(path, failed.message());
     const auto target = linkTarget(path);
     if (!target) return notSaved(path, target.error().message);
-    VCP_TRY(FolderLock::of(*target));
+    VCP_TRY_ASSIGN(const auto lock, FolderLock::of(*target));
     const auto before = readFile(*target);
     if (!before && before.error().code != ErrorCode::InvalidInput) return notSaved(path, before.error().message);
     Json json = !before ? Json() : before->exists ? Json::parse(before->text, nullptr, false) : Json::object();

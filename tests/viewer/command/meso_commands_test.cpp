@@ -342,7 +342,7 @@ TEST_F(MesoCommands, AClosedScanBecomesAClosedBase) {
     EXPECT_EQ(told["texture_coordinates"], false);
     EXPECT_EQ(told["vertices"], 202);
     // It has no map yet.
-    const Ran bare = run("meso render ball --surface " + path("base.obj") + " -o " + path("a.png"));
+    const Ran bare = draw(scene(R"({"asset": "ball", "surface": "base.obj"})"), "");
     EXPECT_EQ(bare.status, 1);
     EXPECT_NE(bare.err.find("has no texture coordinates"), std::string::npos) << bare.err;
 }
