@@ -32,6 +32,19 @@ std::array<uint32_t, 3> edgesOfFace(const HalfEdges& mesh, OpenMesh::FaceHandle 
     return edges;
 }
 
+/// Checks that no two triangles stand back to back on the same three corners: the edges within them would become one.
+Result<void> checkNoTwins(const LinkedSurface& linked) {
+    const HalfEdges& mesh = linked.mesh;
+    for (const auto face : mesh.faces()) {
+        const auto side = mesh.halfedge_handle(face);
+        const auto other = mesh.opposite_face_handle(side);
+        if (other.is_valid() && other == mesh.opposite_face_handle(mesh.next_halfedge_handle(side)))
+            return Error{.message = "another triangle stands on the same three corners, back to back; remove both",
+                         .element = fmt::format("triangle {}", linked.triangleOf[size_t(face.idx())])};
+    }
+    return {};
+}
+
 /// Adds the four triangles of one: a, b and c are its corners; ab, bc and ca between them.
 template <class Corner>
 void addQuarters(const std::array<Corner, 3>& corner, const std::array<Corner, 3>& middle,
@@ -47,6 +60,7 @@ void addQuarters(const std::array<Corner, 3>& corner, const std::array<Corner, 3
 Result<BaseSurface> subdividedOnce(const BaseSurface& surface) {
     LinkedSurface linked;
     VCP_TRY(linkSurface(surface, linked));
+    VCP_TRY(checkNoTwins(linked));
     HalfEdges& mesh = linked.mesh;
     const auto vertices = uint32_t(mesh.n_vertices());
     BaseSurface made;

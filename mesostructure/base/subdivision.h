@@ -14,7 +14,8 @@ inline constexpr size_t kMostSubdivided = 5'000'000;  ///< triangles afterwards
 /// triangles 4 i to 4 i + 3 (those at its corners, the middle one), and the corners that were there come first, in
 /// their order; triangles with equal corners are left out first, and so are positions without a triangle. Corners must
 /// be joined (joinPositions). Errors: those of edgesOf; Usage (times not from 0 to kMostSubdivisions); Limit
-/// (kMostSubdivided); InvalidInput (no triangle with three different corners).
+/// (kMostSubdivided); InvalidInput (no triangle with three different corners; two on the
+/// same three).
 Result<BaseSurface> subdivided(const BaseSurface& surface, int times);
 
 }  // namespace vcp::meso

@@ -171,6 +171,9 @@ TEST(Subdivision, SaysWhatItRefuses) {
     BaseSurface fin = tetrahedron();
     fin.triangles.push_back({0, 1, 2});
     EXPECT_NE(subdivided(fin, 1).error().line().find("triangles meet"), std::string::npos);
+    // Within two triangles back to back, all new edges would have four triangles.
+    const BaseSurface twins{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}, {}};
+    EXPECT_NE(subdivided(twins, 1).error().line().find("back to back"), std::string::npos);
     const BaseSurface same = finer(square(2), 0);
     EXPECT_EQ(same.positions, square(2).positions);
 }
