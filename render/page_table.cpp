@@ -4,8 +4,6 @@
 #include <bit>
 #include <unordered_map>
 
-#include "render/frame.h"
-
 namespace vcp {
 
 namespace {
@@ -37,46 +35,54 @@ Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
     return parts;
 }
 
-void writePage(glm::uvec4* record, const ResidentPage& page, uint64_t entry, float errorCells) {
+frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, float errorCells) {
     const PageSections sections = pageSections(page.header);
     const auto texelOf = [&](uint64_t byte) { return page.texel + uint32_t(byte / 16); };
     const uint32_t error = (std::bit_cast<uint32_t>(errorCells) + ~frame::kRecordErrorMask) & frame::kRecordErrorMask;
-    record[0] = {frame::kRecordResident | error, 0, page.header.root, page.texel};
-    record[1] = {texelOf(sections.faces), texelOf(sections.triangles), texelOf(sections.vertices),
-                 texelOf(sections.normals)};
-    record[2] = {page.colourTexel, page.colourTexel + page.header.faces, uint32_t(entry), 0};
+    return {.node = {.flags = frame::kRecordResident | error,
+                     .firstChild = 0,
+                     .root = page.header.root,
+                     .pageTexel = page.texel},
+            .sections = {.faces = texelOf(sections.faces),
+                         .triangles = texelOf(sections.triangles),
+                         .vertices = texelOf(sections.vertices),
+                         .normals = texelOf(sections.normals)},
+            .colours = {.faces = page.colourTexel,
+                        .vertices = page.colourTexel + page.header.faces,
+                        .entry = uint32_t(entry),
+                        .unused = 0}};
 }
 
 }  // namespace
 
-std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
-                                  const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf) {
-    if (cut.empty()) return std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+std::vector<frame::TableRecord> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
+                                          const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf) {
+    if (cut.empty()) return {frame::TableRecord{}};
     const Parts parts = partsOf(dataset, cut);
     // The order is breadth first, so that the children of a page stand together.
     std::vector<uint64_t> order{0};
-    std::vector<glm::uvec4> table;
+    std::vector<frame::TableRecord> table;
     for (size_t next = 0; next < order.size(); ++next) {
         const uint64_t page = order[next];
-        glm::uvec4 record[frame::kRecordTexels] = {};
+        frame::TableRecord record{};
         const PageEntry& entry = dataset.pages[page];
         if (const auto resident = pageOf(page))
-            writePage(record, *resident, page, float(double(entry.certifiedError) / dataset.header.cell));
+            record = recordOf(*resident, page, float(double(entry.certifiedError) / dataset.header.cell));
         if (partOf(parts, page) == Part::Cut) {
-            record[0].x |= frame::kRecordInCut;
+            record.node.flags |= frame::kRecordInCut;
         } else {
-            record[0].y = uint32_t(order.size());
+            record.node.firstChild = uint32_t(order.size());
             uint64_t child = entry.firstChild;
             for (uint32_t octant = 0; octant < 8; ++octant) {
                 if ((entry.childMask >> octant & 1) == 0) continue;
                 if (partOf(parts, child) != Part::None) {
-                    record[0].x |= 1u << octant;
+                    record.node.flags |= 1u << octant;
                     order.push_back(child);
                 }
                 ++child;
             }
         }
-        table.insert(table.end(), record, record + frame::kRecordTexels);
+        table.push_back(record);
     }
     return table;
 }

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include <glm/vec4.hpp>
 #include "octree/dataset_reader.h"
 #include "octree/page/page.h"
+#include "render/frame.h"
 
 namespace vcp {
 
@@ -21,10 +21,10 @@ struct ResidentPage {
     uint32_t colourTexel = 0;  ///< first texel of its colour in the same pool; 0 without colour
 };
 
-/// Returns the texels of the table, three a record, the root's first. `cut`: numbers of pages, none above another;
+/// Returns the records of the table, the root's first. `cut`: numbers of pages, none above another;
 /// `pageOf(page)`: gives a page of the cut, or one above it if it is resident. An empty cut gives a root without
 /// children.
-std::vector<glm::uvec4> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
-                                  const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf);
+std::vector<frame::TableRecord> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
+                                          const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf);
 
 }  // namespace vcp

@@ -148,7 +148,7 @@ Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::fu
             result->problems = std::move(problems);
             return result;
         }
-        if (cancel && cancel()) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        if (cancel && cancel()) return Error::cancelled();
         waitForPage(std::chrono::milliseconds(100));
     }
 }

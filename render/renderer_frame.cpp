@@ -69,8 +69,7 @@ Result<void> Renderer::View::checkLimits(const Layer& layer, const FrameRequest&
 Result<void> Renderer::View::prepareTable(Layer& layer, LayerFrame& frame) {
     const uint64_t version = layer.residency != nullptr ? layer.residency->version() : 0;
     if (layer.tableStale || version != layer.tableVersion) {
-        auto next = layer.residency != nullptr ? layer.residency->table(number)
-                                               : std::vector<glm::uvec4>(frame::kRecordTexels, glm::uvec4(0));
+        auto next = layer.residency != nullptr ? layer.residency->table(number) : std::vector{frame::TableRecord{}};
         if (layer.tableStale || next != layer.table) ++layer.tableNumber;
         layer.table = std::move(next);
         layer.tableVersion = version;

@@ -32,7 +32,7 @@ struct Renderer::View {
         Similarity placement;
         bool tableStale = true;
         uint64_t tableVersion = 0;
-        std::vector<glm::uvec4> table;
+        std::vector<frame::TableRecord> table;
         uint64_t tableNumber = 0;  // counts changes of the table
         double errorPixels = 0;    // largest error in the cut
 

@@ -211,7 +211,7 @@ uint64_t Residency::colourBytes() const {
     return bytes;
 }
 
-std::vector<glm::uvec4> Residency::table(ViewNumber number) {
+std::vector<frame::TableRecord> Residency::table(ViewNumber number) {
     return pageTable(*dataset_, cut(number), [&](uint64_t page) -> std::optional<ResidentPage> {
         if (!policy_->isResident(page)) return {};
         const uint32_t texel = pool_->texel(policy_->slotOf(page));

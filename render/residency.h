@@ -60,7 +60,7 @@ public:
     [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
     /// The pages that the view can draw now, in directory order.
     [[nodiscard]] const std::vector<uint64_t>& cut(ViewNumber number = 0);
-    [[nodiscard]] std::vector<glm::uvec4> table(ViewNumber number = 0);
+    [[nodiscard]] std::vector<frame::TableRecord> table(ViewNumber number = 0);
     /// A number that changes whenever the page table may: with another cut, or with pages in other places.
     [[nodiscard]] uint64_t version() const { return policy_->version(); }
     /// There is none after an error of setBudgets() or rebuild(): then only the destructor may be called.

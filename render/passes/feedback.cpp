@@ -33,12 +33,11 @@ Result<void> FeedbackTarget::reserve(Device& device, uint64_t words) {
 }
 
 Result<void> FeedbackPass::prepare(Device& device, FeedbackTarget& target, FrameResources& resources,
-                                   const PassConstants& constants, std::span<const glm::uvec4> table) {
-    const size_t records = table.size() / frame::kRecordTexels;
-    VCP_TRY(target.reserve(device, kRayWords + records));
+                                   const PassConstants& constants, std::span<const frame::TableRecord> table) {
+    VCP_TRY(target.reserve(device, kRayWords + table.size()));
     resources.setFeedback(&target.buffer_);
-    target.pages_.resize(records);
-    for (size_t i = 0; i < records; ++i) target.pages_[i] = table[i * frame::kRecordTexels + 2].z;
+    target.pages_.resize(table.size());
+    for (size_t i = 0; i < table.size(); ++i) target.pages_[i] = table[i].colours.entry;
     PassConstants plain = constants;
     plain.colour = plain.countSteps = plain.falseColour = false;
     return pipelines_.choose(resources, plain);

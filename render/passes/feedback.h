@@ -35,7 +35,7 @@ public:
     FeedbackPass();
     /// `table`: the frame's page table. Makes pipeline and buffers on first use. Errors: Device.
     Result<void> prepare(Device& device, FeedbackTarget& target, FrameResources& resources,
-                         const PassConstants& constants, std::span<const glm::uvec4> table);
+                         const PassConstants& constants, std::span<const frame::TableRecord> table);
     /// Precondition: prepare().
     void record(VkCommandBuffer commands, const FeedbackTarget& target);
     /// Forgets the pipelines, before pools with another layout come.

@@ -63,7 +63,7 @@ Result<std::unique_ptr<FrameResources>> FrameResources::create(Device& device) {
     VCP_TRY_ASSIGN(made->counted_,
                    device.createBuffer(sizeof(FrameCounts), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
     VCP_TRY_ASSIGN(made->none_, made->wordBuffer(16, 0, VK_FORMAT_R32G32B32A32_UINT));
-    const glm::uvec4 empty[frame::kRecordTexels] = {};
+    const frame::TableRecord empty[1] = {};
     VCP_TRY(made->setTable(empty));
     return made;
 }
@@ -146,7 +146,7 @@ void FrameResources::setBackground(std::vector<uint32_t> rows) {
     backgroundRows_ = std::move(rows);
 }
 
-Result<void> FrameResources::setTable(std::span<const glm::uvec4> table) {
+Result<void> FrameResources::setTable(std::span<const frame::TableRecord> table) {
     if (table_.buffer.bytes() < table.size_bytes()) {
         const uint64_t words = std::bit_ceil(std::max<uint64_t>(table.size_bytes() / 4, 1024));
         VCP_TRY_ASSIGN(table_, wordBuffer(words, VK_BUFFER_USAGE_TRANSFER_DST_BIT, VK_FORMAT_R32G32B32A32_UINT));

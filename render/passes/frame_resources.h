@@ -97,7 +97,7 @@ public:
     Result<void> resize(PictureSize size, uint32_t hitPlanes);
     /// Sets the table for the frames from the next one on; grows its buffer. Where the CPU does not see the device's
     /// memory, begin() copies it. Errors: Device.
-    Result<void> setTable(std::span<const glm::uvec4> table);
+    Result<void> setTable(std::span<const frame::TableRecord> table);
     /// Sets what the picture shows where nothing is hit: a word a row. Precondition: resize(), and a word for each row.
     void setBackground(std::vector<uint32_t> rows);
     /// Sets the pools; both may be the same. Null: nothing is shown, or nothing has colour.

@@ -116,11 +116,11 @@ float tileStart(Bundle bundle) {
         int bits = int(kLatticeBits) - depth;
         // Arrive at a node whose box is corner, bits; a page's record comes first.
         uint open = 0u, base = 0u;
-        uvec4 record = fetchTable(inTable ? node * kRecordTexels : 0u);
-        bool isPage = inTable && (record.x & kRecordInCut) != 0u;
+        TableNode record = fetchTableNode(inTable ? node : 0u);
+        bool isPage = inTable && (record.flags & kRecordInCut) != 0u;
         if (isPage) {
-            nodesTexel = record.w + kPageHeaderBytes / 16u;
-            node = record.z;
+            nodesTexel = record.pageTexel + kPageHeaderBytes / 16u;
+            node = record.root;
             cellBits = bits - int(frame.log2Cells);
         }
         OctantTimes times = octantTimes(bundle, corner, bits);
@@ -138,7 +138,7 @@ float tileStart(Bundle bundle) {
                 bool deep = type == kNodeInternal && bits - 1 > cellBits;
                 if (deep) open |= 1u << k;
                 if (!deep && type != kNodeEmpty) best = min(best, first);
-            } else if (!inPage && (record.x >> octant & 1u) != 0u) {
+            } else if (!inPage && hasOctant(record, octant)) {
                 open |= 1u << k;
             }
         }
@@ -148,9 +148,9 @@ float tileStart(Bundle bundle) {
             for (uint octant = 0u; octant < 8u; octant++) first = min(first, octantStart(times, octant));
             best = min(best, first);
         }
-        base = inPage ? group : record.y | kInTable;
+        base = inPage ? group : record.firstChild | kInTable;
         stackBase[depth] = base;
-        stackOpen[depth] = open | (inPage ? 0u : (record.x & 255u) << 8);
+        stackOpen[depth] = open | (inPage ? 0u : (record.flags & 255u) << 8);
 
         // Continue with the nearest open child of the deepest box that has one.
         while (depth >= 0 && (stackOpen[depth] & 255u) == 0u) {

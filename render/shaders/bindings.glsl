@@ -81,6 +81,29 @@ uvec4 fetchTable(uint texel) {
     return kTexelAccess == 1u ? texelFetch(tableTexels, int(texel)) : tableBlock.texels[texel];
 }
 
+// The parts of record `number` of the page table.
+TableNode fetchTableNode(uint number) {
+    uvec4 t = fetchTable(number * kRecordTexels);
+    return TableNode(t.x, t.y, t.z, t.w);
+}
+
+TableSections fetchTableSections(uint number) {
+    uvec4 t = fetchTable(number * kRecordTexels + 1u);
+    return TableSections(t.x, t.y, t.z, t.w);
+}
+
+TableColours fetchTableColours(uint number) {
+    uvec4 t = fetchTable(number * kRecordTexels + 2u);
+    return TableColours(t.x, t.y, t.z, t.w);
+}
+
+bool hasOctant(TableNode record, uint octant) { return (record.flags >> octant & 1u) != 0u; }
+
+// Number in the table of the child in an octant that has one.
+uint childIn(TableNode record, uint octant) {
+    return record.firstChild + bitCount(record.flags & ((1u << octant) - 1u));
+}
+
 float fetchTileStart(uint tile) {
     return uintBitsToFloat(kTexelAccess == 1u ? texelFetch(tileStartTexels, int(tile)).x : tileStarts[tile]);
 }

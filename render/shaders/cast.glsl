@@ -34,11 +34,11 @@ struct Work {
 // A page of the cut, as the walk needs it.
 struct Page {
     uint nodesTexel, root;
-    uvec4 sections;  // texels: faces, triangles, vertices, normals
-    ivec3 corner;    // lattice
-    int bits;        // log2 of its edge on the lattice
-    float cell;      // finest cells
-    uint record;     // number in the table
+    TableSections sections;
+    ivec3 corner;  // lattice
+    int bits;      // log2 of its edge on the lattice
+    float cell;    // finest cells
+    uint record;   // number in the table
 };
 
 // Returns an exact power of two.
@@ -74,10 +74,10 @@ bool levelChanges(Region before, Region after) {
            ((before.isPage && after.bits < before.bits) || (after.isPage && after.bits > before.bits));
 }
 
-void usePage(uint node, uvec4 record, inout Page page) {
-    page.root = record.z;
-    page.nodesTexel = record.w + kPageHeaderBytes / 16u;
-    page.sections = fetchTable(node * kRecordTexels + 1u);
+void usePage(uint node, TableNode record, inout Page page) {
+    page.root = record.root;
+    page.nodesTexel = record.pageTexel + kPageHeaderBytes / 16u;
+    page.sections = fetchTableSections(node);
     page.record = node;
     page.cell = powerOfTwo(int(frame.finestLevel) + page.bits - int(kLatticeBits));
 }
@@ -90,7 +90,7 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
               inout uint steps) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     uint node = 0u;
-    uvec4 record = uvec4(0u);
+    TableNode record = TableNode(0u, 0u, 0u, 0u);
     bool inside = true, found = false;
     while (inside && !found) {
         // Go down to a page of the cut or an octant without one.
@@ -98,22 +98,22 @@ bool findPage(Ray ray, inout vec3 reached, float last, inout Region before, out 
         region.corner = ivec3(0);
         region.bits = int(kLatticeBits);
         bool exists = true;
-        record.x = 0u;
-        while (exists && (record.x & kRecordInCut) == 0u) {
-            record = fetchTable(node * kRecordTexels);
+        record.flags = 0u;
+        while (exists && (record.flags & kRecordInCut) == 0u) {
+            record = fetchTableNode(node);
             if (kCountSteps != 0u) steps++;
-            if ((record.x & kRecordInCut) == 0u) {
+            if ((record.flags & kRecordInCut) == 0u) {
                 region.bits--;
                 ivec3 upper = ivec3(
                     equal(ahead, lessThanEqual(planeDistances(ray, region.corner + (1 << region.bits)), reached)));
                 region.corner += upper << region.bits;
                 uint octant = uint(upper.x | upper.y << 1 | upper.z << 2);
-                exists = (record.x >> octant & 1u) != 0u;
-                node = record.y + bitCount(record.x & ((1u << octant) - 1u));
+                exists = hasOctant(record, octant);
+                node = childIn(record, octant);
             }
         }
         region.isPage = exists;
-        region.error = exists ? uintBitsToFloat(record.x & kRecordErrorMask) : 0.0;
+        region.error = exists ? uintBitsToFloat(record.flags & kRecordErrorMask) : 0.0;
         found = exists || levelChanges(before, region);
         if (!found) {
             before = region;
@@ -166,22 +166,22 @@ bool nextBox(Ray ray, inout Seam seam) {
 // resident.
 bool coarserPage(Seam seam, inout Page page, inout uint steps) {
     uint node = 0u;
-    uvec4 record = uvec4(0u);
+    TableNode record = TableNode(0u, 0u, 0u, 0u);
     bool exists = true;
     page.bits = int(kLatticeBits) + 1;
     while (exists && page.bits > seam.bits) {
-        record = fetchTable(node * kRecordTexels);
+        record = fetchTableNode(node);
         if (kCountSteps != 0u) steps++;
         page.bits--;
         if (page.bits > seam.bits) {
             uint octant = octantAt(seam.corner, page.bits - 1);
-            exists = (record.x >> octant & 1u) != 0u;
-            node = record.y + bitCount(record.x & ((1u << octant) - 1u));
+            exists = hasOctant(record, octant);
+            node = childIn(record, octant);
         }
     }
     page.corner = seam.corner;
     usePage(node, record, page);
-    return exists && (record.x & kRecordResident) != 0u;
+    return exists && (record.flags & kRecordResident) != 0u;
 }
 
 // Brings the ray into page space. Both points at the page's walls come from the lattice, as its neighbours see them. No
@@ -215,7 +215,7 @@ PageRay enterPage(Ray ray, Page page, out float sStart) {
 
 // Returns the distance along the page's ray of the crossing in a soft leaf, or -1.
 float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
-    uint face = page.sections.x + (node & kLeafIndexMask);
+    uint face = page.sections.faces + (node & kLeafIndexMask);
     uvec4 face0 = fetchTexel(face), face1 = fetchTexel(face + 1u);
     if (kCountSteps != 0u) {
         work.cells++;
@@ -237,17 +237,17 @@ float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hi
     uint first = node & kLeafIndexMask;
     uint count = node >> kHardCountShift & kHardCountMask;
     if (count == kHardCountLong) {
-        count = fetchPair(page.sections.y, first).x;
+        count = fetchPair(page.sections.triangles, first).x;
         first++;
     }
     float lowest = s.fromWall ? -kIntervalSlack : 0.0;
     float best = s.tauTo - s.tauFrom + kIntervalSlack;
     bool found = false;
     for (uint i = 0u; i < count; i++) {
-        uvec2 record = fetchPair(page.sections.y, first + i);
+        uvec2 record = fetchPair(page.sections.triangles, first + i);
         uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
-        uvec2 a = fetchPair(page.sections.z, v.x), b = fetchPair(page.sections.z, v.y),
-              c = fetchPair(page.sections.z, v.z);
+        uvec2 a = fetchPair(page.sections.vertices, v.x), b = fetchPair(page.sections.vertices, v.y),
+              c = fetchPair(page.sections.vertices, v.z);
         if (kCountSteps != 0u) work.fetches += 4u;
         vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y),
                                    decodeVertex(c.x, c.y), kTriangleSlack);
@@ -283,11 +283,11 @@ Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
     return surface;
 }
 
-Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction) {
-    uvec2 record = fetchPair(sections.y, hit.triangle);
+Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 direction) {
+    uvec2 record = fetchPair(sections.triangles, hit.triangle);
     uvec3 corners = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
-    uvec2 a = fetchPair(sections.z, corners.x), b = fetchPair(sections.z, corners.y),
-          c = fetchPair(sections.z, corners.z);
+    uvec2 a = fetchPair(sections.vertices, corners.x), b = fetchPair(sections.vertices, corners.y),
+          c = fetchPair(sections.vertices, corners.z);
     vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
     vec3 flatNormal = cross(pb - pa, pc - pa);
     flatNormal *= inversesqrt(max(dot(flatNormal, flatNormal), 1e-30));
@@ -295,7 +295,7 @@ Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction
     vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
     Surface surface = Surface(vec3(0.0), vec4(0.0));
     for (int i = 0; i < 3; i++) {
-        uint code = fetchWord(sections.w, corners[i]);
+        uint code = fetchWord(sections.normals, corners[i]);
         surface.normal +=
             w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
         if (kColour != 0u)
@@ -310,16 +310,17 @@ Surface hardSurface(Hit hit, uvec4 sections, uint colourVertices, vec3 direction
 Surface surfaceAt(Hit hit, vec3 direction) {
     Surface surface = Surface(vec3(0.0, 0.0, 1.0), vec4(0.0));
     bool found = hit.depth < kNoHit;
-    uvec4 sections = fetchTable(hit.record * kRecordTexels + 1u);
-    uvec2 colours = kColour != 0u ? fetchTable(hit.record * kRecordTexels + 2u).xy : uvec2(0u);
+    TableSections sections = fetchTableSections(hit.record);
+    TableColours colours = TableColours(0u, 0u, 0u, 0u);
+    if (kColour != 0u) colours = fetchTableColours(hit.record);
     bool soft = found && hit.leaf >> kNodeTypeShift == kNodeSoft;
     while (soft) {
-        surface = softSurface(hit, sections.x, colours.x, direction);
+        surface = softSurface(hit, sections.faces, colours.faces, direction);
         soft = false;
     }
     bool hard = found && hit.leaf >> kNodeTypeShift == kNodeHard;
     while (hard) {
-        surface = hardSurface(hit, sections, colours.y, direction);
+        surface = hardSurface(hit, sections, colours.vertices, direction);
         hard = false;
     }
     return surface;

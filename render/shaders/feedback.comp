@@ -25,18 +25,18 @@ uint boxAt(ivec3 place, out uint node, out int bits) {
     node = 0u;
     bits = int(kLatticeBits);
     bool exists = true;
-    uvec4 record = uvec4(0u);
-    while (exists && (record.x & kRecordInCut) == 0u) {
-        record = fetchTable(node * kRecordTexels);
-        if ((record.x & kRecordInCut) == 0u) {
+    TableNode record = TableNode(0u, 0u, 0u, 0u);
+    while (exists && (record.flags & kRecordInCut) == 0u) {
+        record = fetchTableNode(node);
+        if ((record.flags & kRecordInCut) == 0u) {
             bits--;
             ivec3 b = (place >> bits) & 1;
             uint octant = uint(b.x | b.y << 1 | b.z << 2);
-            exists = (record.x >> octant & 1u) != 0u;
-            node = record.y + bitCount(record.x & ((1u << octant) - 1u));
+            exists = hasOctant(record, octant);
+            node = childIn(record, octant);
         }
     }
-    return exists ? record.x : 0u;
+    return exists ? record.flags : 0u;
 }
 
 void main() {

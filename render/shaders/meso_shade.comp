@@ -7,9 +7,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
-
-// Maps 0 to 1 from blue through green to red.
-vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
+#include "render/shaders/heat.glsl"
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;

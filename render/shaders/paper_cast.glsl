@@ -27,10 +27,10 @@ struct PaperPage {
 };
 
 PaperPage fetchPaperPage() {
-    uvec4 record = fetchTable(0u);
+    TableNode record = fetchTableNode(0u);
     PaperPage page;
-    page.isThere = (record.x & kRecordInCut) != 0u;
-    uint at = page.isThere ? record.w : 0u;
+    page.isThere = (record.flags & kRecordInCut) != 0u;
+    uint at = page.isThere ? record.pageTexel : 0u;
     uvec4 words0 = fetchTexel(at), words1 = fetchTexel(at + 1u), words2 = fetchTexel(at + 2u);
     page.nodes = at + kPaperHeaderBytes / 16u;
     page.slices = page.nodes + (words0.w + 3u) / 4u;

@@ -5,12 +5,10 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/hit_records.glsl"
+#include "render/shaders/heat.glsl"
 
 layout(constant_id = 6) const uint kLight = 0u;  // 1: the hits have a plane of light
 layout(local_size_x = 8, local_size_y = 8) in;
-
-// Maps 0 to 1 from blue through green to red.
-vec3 heat(float x) { return clamp(vec3(3.0 * x - 1.2, 1.5 - abs(3.0 * x - 1.2), 1.4 - 3.0 * x), 0.0, 1.0); }
 
 // Returns the light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
 // colours come encoded, so that one power a pixel is enough.

@@ -65,7 +65,7 @@ Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work wor
 // Returns what a false colour shows of a hit, 0 to 1 (ShadingMode).
 float falseColour(Hit hit, Work work) {
     int level = int(kLatticeBits) - hit.pageBits;
-    float error = uintBitsToFloat(fetchTable(hit.record * kRecordTexels).x & kRecordErrorMask);
+    float error = uintBitsToFloat(fetchTableNode(hit.record).flags & kRecordErrorMask);
     float pixels = error / max(pixelEdgeAt(hit.depth), 1e-30);
     return frame.shadingMode == kShadeSteps     ? float(work.steps) / kMostShownSteps
            : frame.shadingMode == kShadeCells   ? float(work.cells) / kMostShownCells

@@ -64,12 +64,28 @@ struct FrameConstants {
     vec4 sections[kMaxSections];
 };
 
-// A node of the frame's page tree: three texels of the table.
-//   0: flags, first child (number in the table), root word of the page, texel of the page in the pool
-//   1: texels of faces, triangles, vertices, normals
-//   2: texels of the faces' and the vertices' colours in the colour pool, entry in the directory
-// flags: bits 0..7 octants that have a child; bit 8: this page is in the cut; bit 9: it is resident, so that its
-// fields are there; bits 16..31: its certified error in finest cells, the upper half of a float, rounded up.
+// A record of the table is a node of the frame's page tree: three structs, each one texel.
+struct TableNode {
+    // Bits 0..7: octants that have a child; bit 8: this page is in the cut; bit 9: it is resident, so that its fields
+    // are there; bits 16..31: its certified error in finest cells, the upper half of a float, rounded up.
+    uint flags;
+    uint firstChild;  // number in the table
+    uint root;        // root word of the page
+    uint pageTexel;   // of the page in the pool
+};
+struct TableSections {
+    uint faces, triangles, vertices, normals;  // texels in the pool
+};
+struct TableColours {
+    uint faces, vertices;  // texels in the colour pool
+    uint entry;            // of the page in the directory
+    uint unused;
+};
+struct TableRecord {
+    TableNode node;
+    TableSections sections;
+    TableColours colours;
+};
 const uint kRecordTexels = 3u;
 const uint kRecordInCut = 256u;
 const uint kRecordResident = 512u;

@@ -43,8 +43,9 @@ Result<size_t> CommandQueue::freeRecording() {
 }
 
 Result<VkCommandBuffer> CommandQueue::begin() {
-    if (current_) VCP_VK(vkResetCommandBuffer, recordings_[*current_].commands, 0);
-    if (!current_) {
+    if (current_) {
+        VCP_VK(vkResetCommandBuffer, recordings_[*current_].commands, 0);
+    } else {
         VCP_TRY_ASSIGN(current_, freeRecording());
     }
     VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};

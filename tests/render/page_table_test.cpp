@@ -37,21 +37,22 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
 
     std::vector<uint64_t> found;
     const std::function<void(uint32_t, uint64_t)> walk = [&](uint32_t node, uint64_t page) {
-        const glm::uvec4 r0 = table[node * frame::kRecordTexels], r1 = table[node * frame::kRecordTexels + 1];
-        if ((r0.x & frame::kRecordInCut) != 0) {
-            const PageSections sections = pageSections(resident[page].header);
-            EXPECT_EQ(r0.z, resident[page].header.root);
-            EXPECT_EQ(r0.w, 1000 * page);
-            EXPECT_EQ(r1.x, 1000 * page + sections.faces / 16);
-            EXPECT_EQ(r1.w, 1000 * page + sections.normals / 16);
+        const auto& [record, sections, colours] = table[node];
+        if ((record.flags & frame::kRecordInCut) != 0) {
+            const PageSections bytes = pageSections(resident[page].header);
+            EXPECT_EQ(record.root, resident[page].header.root);
+            EXPECT_EQ(record.pageTexel, 1000 * page);
+            EXPECT_EQ(sections.faces, 1000 * page + bytes.faces / 16);
+            EXPECT_EQ(sections.normals, 1000 * page + bytes.normals / 16);
+            EXPECT_EQ(colours.entry, page);
             found.push_back(page);
             return;
         }
-        EXPECT_EQ(r0.x & 255u, dataset.pages[page].childMask);
-        uint32_t child = r0.y;
+        EXPECT_EQ(record.flags & 255u, dataset.pages[page].childMask);
+        uint32_t child = record.firstChild;
         uint64_t childPage = dataset.pages[page].firstChild;
         for (uint32_t octant = 0; octant < 8; ++octant)
-            if ((r0.x >> octant & 1) != 0) walk(child++, childPage++);
+            if ((record.flags >> octant & 1) != 0) walk(child++, childPage++);
     };
     walk(0, 0);
     std::sort(found.begin(), found.end());
@@ -61,8 +62,8 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
 TEST(PageTable, WithoutACutTheRootIsEmpty) {
     const auto table =
         pageTable(sphereDataset().dataset, {}, [](uint64_t) -> std::optional<ResidentPage> { std::abort(); });
-    ASSERT_EQ(table.size(), frame::kRecordTexels);
-    EXPECT_EQ(table[0].x, 0u);
+    ASSERT_EQ(table.size(), 1u);
+    EXPECT_EQ(table[0].node.flags, 0u);
 }
 
 }  // namespace

@@ -553,7 +553,7 @@ TEST_F(RendererTest, AFrameIsOneSubmissionWhereTheMemoryIsSeparate) {
             const auto stats = renderer_->render(request);
             ASSERT_TRUE(stats.ok()) << stats.error().line();
             EXPECT_EQ(stats->submissions, 1u) << view << " " << frame;
-            EXPECT_EQ(stats->hostWaits, 1u) << view << " " << frame;
+            EXPECT_LE(stats->hostWaits, 1u) << view << " " << frame << ": none where it has ended at once";
         }
         drawAllTheWay(*renderer_, request);
     }
