@@ -64,7 +64,7 @@ Error inPath(Error error, std::string_view text, size_t number) {
     std::string pointer = fmt::format("/{}", number), field;
     if (error.element.starts_with('"')) {
         field = ": " + error.element;
-        pointer += "/" + error.element.substr(1, error.element.size() - 2);
+        pointer += fmt::format("/{}", std::string_view(error.element).substr(1, error.element.size() - 2));
     }
     error.element = fmt::format("line {}: camera {}{}", LinesOf(text)(pointer), number, field);
     error.byte.reset();
@@ -109,8 +109,9 @@ Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const st
     const auto isShallow = [](int depth, nlohmann::json::parse_event_t, nlohmann::json&) { return depth <= kDeepest; };
     const auto json = nlohmann::json::parse(text, isShallow, false);
     if (!json.is_array() || json.empty() || json.size() > kMostCameras)
-        return Error{ErrorCode::InvalidInput, fmt::format("is not a JSON array of 1 to {} cameras", kMostCameras),
-                     name};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = fmt::format("is not a JSON array of 1 to {} cameras", kMostCameras),
+                     .file = name};
     std::vector<OrbitCamera> cameras;
     for (size_t i = 0; i < json.size(); ++i) {
         auto camera = cameraFromJson(json[i].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), name);
