@@ -116,9 +116,7 @@ private:
                              {.fraction = fraction, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
     }
 
-    Error cancelled() const {
-        return {.code = ErrorCode::Cancelled, .message = "cancelled", .file = options_.output.string()};
-    }
+    Error cancelled() const { return Error::cancelled(options_.output.string()); }
 
     /// Returns what the output may replace: no file that is read.
     [[nodiscard]] OutputRules rules() const {

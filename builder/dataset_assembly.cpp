@@ -101,8 +101,7 @@ Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& head
             VCP_TRY_ASSIGN(auto page,
                            entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passagePage(header.log2Cells)));
             VCP_TRY(writer->append(entry, page));
-            if (!progress(double(++done) / double(header.pages + 1)))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = output.string()};
+            if (!progress(double(++done) / double(header.pages + 1))) return Error::cancelled(output.string());
         }
     return writer->commit(header);
 }

@@ -50,7 +50,7 @@ Result<void> forLatticeTriangles(const Dealing& dealing, bool painted, MakeVisit
     };
     all(dealing.soup.floats);
     all(dealing.soup.doubles);
-    if (result && cancelled) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+    if (result && cancelled) return Error::cancelled();
     return result;
 }
 

@@ -94,7 +94,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
             if (!more) break;
             measurer.add(chunk);
             if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles}))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+                return Error::cancelled();
         }
         measured += measurer.measured();
         m.area += measurer.area();

@@ -135,8 +135,7 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             const uint64_t bytes = doneBytes + stream->bytesRead();
             // A pipe does not say how many bytes will come.
             const double fraction = totalBytes > 0 ? std::min(double(bytes) / double(totalBytes), 1.0) : 0;
-            if (!progress(fraction, writer.triangles()))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            if (!progress(fraction, writer.triangles())) return Error::cancelled();
         }
         doneBytes += stream->bytesRead();
         soup.materials.insert(soup.materials.end(), stream->materials().begin(), stream->materials().end());

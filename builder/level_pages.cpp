@@ -151,8 +151,7 @@ Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, 
             put = page ? inOrder.put(i, std::move(*page)) : Result<void>(page.error());
             admission.leave(work[i]);
         }
-        if (put && !progress(double(++done) / double(bins.pages.size())))
-            return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        if (put && !progress(double(++done) / double(bins.pages.size()))) return Error::cancelled();
         return put;
     };
     // Pages differ in weight, so they are taken one by one, in order: few must wait for an earlier one.

@@ -102,8 +102,7 @@ Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64
     VCP_TRY(verification.sums());
     for (uint64_t i = 0; i < dataset.pages.size(); ++i) {
         VCP_TRY(verification.page(i));
-        if (progress != nullptr && !progress(user, verification.done()))
-            return Error{.code = ErrorCode::Cancelled, .message = "cancelled", .file = reader.name()};
+        if (progress != nullptr && !progress(user, verification.done())) return Error::cancelled(reader.name());
     }
     return verification.gap(reader.size() - sizeof(CommitRecord));
 }

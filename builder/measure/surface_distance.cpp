@@ -337,7 +337,7 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     result.cell = cell;
     result.certifiedErrorMax = certified;
     BlockRunner runner(options);
-    const Error cancelled{.code = ErrorCode::Cancelled, .message = "cancelled"};
+    const Error cancelled = Error::cancelled();
 
     std::vector<float> toSurface(options.samples);
     Worst worstOfMesh;

@@ -112,7 +112,7 @@ public:
     Result<void> at(const char* stage, double fraction, uint64_t triangles = 0) const {
         if (!options_.progress || options_.progress({.stage = stage, .fraction = fraction, .triangles = triangles}))
             return {};
-        return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        return Error::cancelled();
     }
 
 private:

@@ -262,7 +262,7 @@ Result<BaseSurface> decimated(const BaseSurface& surface, const DecimationOption
     decimater.set_observer(&progress);
     progress.notify(0);
     if (!progress.abort() && options.triangles < mesh.n_faces()) decimater.decimate_to_faces(0, options.triangles);
-    if (progress.abort()) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+    if (progress.abort()) return Error::cancelled();
     return whatIsLeft(surface, linked, map);
 }
 

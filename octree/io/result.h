@@ -29,6 +29,11 @@ struct Error {
     std::string element = {};           ///< "vertex 17", "line 12", "page 5"; empty when none
     std::optional<uint64_t> byte = {};  ///< offset in the file of the first wrong byte
 
+    /// `path`: of the file that was being read or written, if any.
+    static Error cancelled(std::string path = {}) {
+        return {.code = ErrorCode::Cancelled, .message = "cancelled", .file = std::move(path)};
+    }
+
     /// The one line shown to a person.
     [[nodiscard]] std::string line() const {
         std::string text;

@@ -176,7 +176,7 @@ TEST(ScanMesh, StopsAtTheFirstWriteError) {
     int calls = 0;
     const auto result = mesh.writePly([&](std::span<const std::byte>) -> Result<void> {
         if (++calls < 3) return {};
-        return Error{ErrorCode::Io, "full"};
+        return Error{.code = ErrorCode::Io, .message = "full"};
     });
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().message, "full");

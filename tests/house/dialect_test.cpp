@@ -20,6 +20,8 @@ std::vector<std::string> dialectViolations(const std::string& text) {
     static const std::regex oldCast("\\(" + number + "\\)[\\w(]");
     static const std::regex declared("^\\s*(?:const )?auto (\\w+) = .*;$");
     static const std::regex handedOn("^\\s*if \\(!(\\w+)\\) return (\\w+)\\.error\\(\\);$");
+    static const std::regex unnamed("\\bError\\{\\s*[^\\s.}]");
+    static const std::regex cancelled("\\bError\\{\\.code = ErrorCode::Cancelled");
     std::vector<std::string> found;
     std::istringstream lines(text);
     std::string line, before;
@@ -28,6 +30,9 @@ std::vector<std::string> dialectViolations(const std::string& text) {
         const std::string code = line.substr(0, line.find("//"));
         if (std::regex_search(code, longCast)) found.push_back(where + "a number is converted as double(x)");
         if (std::regex_search(code, oldCast)) found.push_back(where + "a number is converted as double(x)");
+        if (std::regex_search(code, unnamed))
+            found.push_back(where + "an error's fields are named: Error{.code = ...}");
+        if (std::regex_search(code, cancelled)) found.push_back(where + "Error::cancelled() is what was cancelled");
         std::smatch name, test;
         if (std::regex_match(before, name, declared) && std::regex_match(line, test, handedOn) && name[1] == test[1] &&
             test[1] == test[2])
@@ -57,6 +62,9 @@ TEST(Dialect, SamplesAreJudged) {
     EXPECT_EQ(count("const auto shade = static_cast<ShadingMode>(n);\n"), 0u);
     EXPECT_EQ(count("auto file = openFile(path);\nif (!file) return file.error();\n"), 1u);
     EXPECT_EQ(count("auto file = openFile(path);\nif (!other) return other.error();\n"), 0u);
+    EXPECT_EQ(count("return Error{ErrorCode::Io, \"is a folder\"};\n"), 1u);
+    EXPECT_EQ(count("return Error{.code = ErrorCode::Io, .message = what};\nreturn Error{};\n"), 0u);
+    EXPECT_EQ(count("return Error{.code = ErrorCode::Cancelled, .message = \"cancelled\"};\n"), 1u);
     EXPECT_EQ(count("VCP_TRY_ASSIGN(auto file, openFile(path));\n"), 0u);
 }
 

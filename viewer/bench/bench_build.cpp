@@ -125,7 +125,7 @@ Result<SurfaceDistance> distanceOf(const fs::path& file, const MeshBvh& mesh, co
 /// Runs in a child: returns the median time of Embree's tree (0 without Embree), then a SurfaceDistance for each file.
 Result<std::string> judge(const BenchBuildOptions& options, const fs::path& model, const std::vector<fs::path>& files,
                           const ChildProgress& progress) {
-    const auto cancelled = [] { return Error{ErrorCode::Cancelled, "cancelled"}; };
+    const auto cancelled = [] { return Error::cancelled(); };
     if (!progress("reading the mesh", 0)) return cancelled();
     VCP_TRY_ASSIGN(const auto mesh, loadMesh(model));
     std::vector<double> embreeSeconds;
@@ -222,7 +222,7 @@ Result<BenchBuildReport> measureAll(const BenchBuildOptions& options, const fs::
     for (size_t i = 0; i < count; ++i) {
         const Report report = [&](const std::string& what, double fraction) -> Result<void> {
             if (!options.progress || options.progress(what, (double(i) + fraction) / double(count))) return {};
-            return Error{ErrorCode::Cancelled, "cancelled"};
+            return Error::cancelled();
         };
         const bool isModel = i < options.models.size();
         auto rows = isModel ? measure(options, {options.models[i].stem().string(), options.models[i], folder}, report)
@@ -252,7 +252,8 @@ std::string scanSizeName(uint64_t triangles) {
 }
 
 Result<BenchBuildReport> benchBuild(const BenchBuildOptions& options) {
-    if (options.models.empty() && options.generated.empty()) return Error{ErrorCode::Usage, "no model to measure"};
+    if (options.models.empty() && options.generated.empty())
+        return Error{.code = ErrorCode::Usage, .message = "no model to measure"};
     const BenchFolder folder(options.out);
     VCP_TRY(folder.make());
     return measureAll(options, folder.path());

@@ -219,8 +219,6 @@ bool isAsked(const std::vector<std::string>& asked, std::string_view name) {
     return asked.empty() || std::ranges::find(asked, name) != asked.end();
 }
 
-Error cancelled() { return {.code = ErrorCode::Cancelled, .message = "cancelled"}; }
-
 /// Measures all requested methods over all views; the rows of a method stand together.
 Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
                                          const std::function<bool(const std::string&)>& told) {
@@ -236,7 +234,7 @@ Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMeso
     for (const Entry& entry : entries()) {
         const bool isPeer = entry.options.name == peerName && entry.isDefault;
         if (!isPeer && !isMeasured(entry)) continue;
-        if (!told(entry.options.name)) return cancelled();
+        if (!told(entry.options.name)) return Error::cancelled();
         VCP_TRY_ASSIGN(auto made, measuredOf(subject, entry));
         if (isPeer) peer = methods.size();
         methods.push_back(std::move(made));
@@ -245,7 +243,7 @@ Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMeso
     std::vector<std::vector<BenchMesoRow>> byMethod(methods.size());
     for (const RayView& view : kViews) {
         if (!isAsked(options.views, view.name)) continue;
-        if (!told(std::string(view.name))) return cancelled();
+        if (!told(std::string(view.name))) return Error::cancelled();
         const std::vector<MarchRay> rays = raysOf(subject, view, options.rays);
         std::vector<TruthHit> truths;
         for (const MarchRay& ray : rays) truths.push_back(subject.shape->trace(ray.origin, ray.direction, ray.tMax));
@@ -298,7 +296,7 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         VCP_TRY_ASSIGN(auto rows, rowsOf(*subject, options, renderer.get(), told));
         report.rows.insert(report.rows.end(), rows.begin(), rows.end());
         if (options.checkRays == 0) continue;
-        if (!told("conservative maps")) return cancelled();
+        if (!told("conservative maps")) return Error::cancelled();
         VCP_TRY_ASSIGN(const auto checks,
                        checkMesoMaps(subject->asset.name, *subject->shape, subject->texel, options.checkRays));
         report.checks.insert(report.checks.end(), checks.begin(), checks.end());

@@ -199,9 +199,10 @@ Result<ChildOutcome> runInChild(const ChildWork& work, const ChildProgress& prog
     const int status = waitFor(child, usage);
     if (!heard.result) {
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
-            return Error{ErrorCode::Limit, "the child process was killed; is there too little memory?"};
-        return Error{ErrorCode::Limit,
-                     "the child process ended without a result, with status " + std::to_string(status)};
+            return Error{.code = ErrorCode::Limit,
+                         .message = "the child process was killed; is there too little memory?"};
+        return Error{.code = ErrorCode::Limit,
+                     .message = "the child process ended without a result, with status " + std::to_string(status)};
     }
     if (!*heard.result) return heard.result->error();
     return ChildOutcome{**heard.result, seconds(usage.ru_utime) + seconds(usage.ru_stime),
@@ -237,9 +238,11 @@ Result<void> runProgram(const std::vector<std::string>& arguments, const std::fu
         });
     rusage usage{};
     const int status = waitFor(child, usage);
-    if (cancelled) return Error{ErrorCode::Cancelled, "cancelled"};
+    if (cancelled) return Error::cancelled();
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
-    return Error{ErrorCode::Io, said.empty() ? "failed without a word" : firstLine(said), arguments.front()};
+    return Error{.code = ErrorCode::Io,
+                 .message = said.empty() ? "failed without a word" : firstLine(said),
+                 .file = arguments.front()};
 }
 
 }  // namespace vcp

@@ -35,7 +35,7 @@ public:
     Motion(Viewer& viewer, const MotionOptions& options) : viewer_(viewer), options_(options) {}
 
     Result<bool> turn() {
-        if (options_.cancel && options_.cancel()) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        if (options_.cancel && options_.cancel()) return Error::cancelled();
         VCP_TRY_ASSIGN(const auto next, viewer_.update(seconds()));
         if (!next.draw) {
             std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(next.waitSeconds, 0.0, 0.002)));

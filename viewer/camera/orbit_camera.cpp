@@ -306,7 +306,9 @@ public:
     }
 
     void wrong(const std::string& field, const std::string& what) {
-        if (!error_) error_ = Error{ErrorCode::InvalidInput, what, name_, "\"" + field + "\""};
+        if (!error_)
+            error_ =
+                Error{.code = ErrorCode::InvalidInput, .message = what, .file = name_, .element = "\"" + field + "\""};
     }
 
     [[nodiscard]] const std::optional<Error>& error() const { return error_; }
@@ -339,9 +341,11 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
         return notJson(text, e.byte, name);
     } catch (const Json::exception&) {
         // The text has a number beyond the range of a double.
-        return Error{ErrorCode::InvalidInput, "not a camera: a number is out of range", name};
+        return Error{
+            .code = ErrorCode::InvalidInput, .message = "not a camera: a number is out of range", .file = name};
     }
-    if (!json.is_object()) return Error{ErrorCode::InvalidInput, "not a camera: must be a JSON object", name};
+    if (!json.is_object())
+        return Error{.code = ErrorCode::InvalidInput, .message = "not a camera: must be a JSON object", .file = name};
 
     CameraFields fields(json, name);
     OrbitCamera camera;

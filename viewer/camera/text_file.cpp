@@ -33,15 +33,18 @@ Result<std::string> readText(const std::filesystem::path& path, size_t most, con
         std::error_code failed;
         const bool isThere = std::filesystem::exists(path, failed);
         auto opened = openRegularStream(path);
-        if (!opened) return isThere ? opened.error() : Error{ErrorCode::Io, unopened, path.string()};
+        if (!opened)
+            return isThere ? opened.error() : Error{.code = ErrorCode::Io, .message = unopened, .file = path.string()};
         file = *std::move(opened);
     }
     std::string text, block(size_t{1} << 16, '\0');
     while (const size_t got = std::fread(block.data(), 1, block.size(), file.get())) {
         text.append(block, 0, got);
-        if (text.size() > most) return Error{ErrorCode::Limit, "too large for " + what, path.string()};
+        if (text.size() > most)
+            return Error{.code = ErrorCode::Limit, .message = "too large for " + what, .file = path.string()};
     }
-    if (std::ferror(file.get())) return Error{ErrorCode::Io, "cannot be read", path.string()};
+    if (std::ferror(file.get()))
+        return Error{.code = ErrorCode::Io, .message = "cannot be read", .file = path.string()};
     return text;
 }
 

@@ -87,7 +87,9 @@ struct MesoCommand {
 Result<void> makeFolder(const std::string& folder) {
     std::error_code failed;
     if (!folder.empty()) std::filesystem::create_directories(folder, failed);
-    if (failed) return Error{ErrorCode::Io, "the folder cannot be made: " + failed.message(), folder};
+    if (failed)
+        return Error{
+            .code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = folder};
     return {};
 }
 
@@ -106,11 +108,29 @@ Result<int> publish(const BenchCommand& command, const std::string& name, const 
     return 0;
 }
 
-auto progressTo(ProgressDisplay& display) {
-    return [&display](const std::string& what, double fraction) {
+/// Hands on what all benches with models are asked.
+template <class Options>
+void takeShared(const BenchCommand& command, Options& options) {
+    options.models = command.modelPaths();
+    if (command.repetitions > 0) options.repetitions = command.repetitions;
+    options.threads = command.threads;
+    options.out = command.out;
+    options.cell = command.cell;
+}
+
+/// Runs bench(options) with its progress on stderr until Ctrl-C. `progress`: where `options` has the function that is
+/// told it.
+template <class Bench, class Options, class Progress>
+auto runShown(const BenchCommand& command, Bench bench, Options& options, Progress& progress) {
+    const InterruptScope catching;
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    progress = [&display](const std::string& what, double fraction) {
         display.update(what, fraction);
         return !interrupted();
     };
+    auto report = bench(options);
+    display.finish();
+    return report;
 }
 
 /// Returns the path of make_scan, which lies beside vcp.
@@ -119,90 +139,64 @@ Result<std::filesystem::path> findMakeScan() {
     const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
     auto program = self.parent_path() / "make_scan";
     if (!failed && ::access(program.c_str(), X_OK) == 0) return program;
-    return Error{ErrorCode::Usage, "--generated needs the program make_scan beside vcp, and it is not there",
-                 program.string()};
+    return Error{.code = ErrorCode::Usage,
+                 .message = "--generated needs the program make_scan beside vcp, and it is not there",
+                 .file = program.string()};
 }
 
 Result<int> runBuild(const BuildBenchCommand& command) {
     if (command.models.empty() && command.generated.empty())
-        return Error{ErrorCode::Usage, "which meshes? name them, or make some with --generated 1M,10M"};
+        return Error{.code = ErrorCode::Usage,
+                     .message = "which meshes? name them, or make some with --generated 1M,10M"};
     BenchBuildOptions options;
-    options.models = command.modelPaths();
+    takeShared(command, options);
     options.generated = command.generated;
     if (!options.generated.empty()) {
         VCP_TRY_ASSIGN(options.makeScan, findMakeScan());
     }
     VCP_TRY(makeFolder(command.out));
     options.errors = command.errors;
-    if (command.repetitions > 0) options.repetitions = command.repetitions;
-    options.threads = command.threads;
     options.memoryBytes = command.memoryBytes;
     options.temp = command.temp;
-    options.out = command.out;
-    options.cell = command.cell;
     options.samples = command.samples;
-    const InterruptScope catching;
-    ProgressDisplay display(command.report.progressStyle(), stderr);
-    options.progress = progressTo(display);
-    const auto report = benchBuild(options);
-    display.finish();
-    if (!report) return report.error();
-    if (report->rows.empty() && !report->failures.empty()) return report->failures.front();
-    const auto published = publish(
-        command, "bench_build",
-        {benchBuildJson(*report), benchBuildCsv(*report), benchBuildMarkdown(*report), benchBuildPlots(*report)});
-    if (!published || report->failures.empty()) return published;
+    VCP_TRY_ASSIGN(const auto report, runShown(command, benchBuild, options, options.progress));
+    if (report.rows.empty() && !report.failures.empty()) return report.failures.front();
+    const auto published =
+        publish(command, "bench_build",
+                {benchBuildJson(report), benchBuildCsv(report), benchBuildMarkdown(report), benchBuildPlots(report)});
+    if (!published || report.failures.empty()) return published;
     // What could be measured is published; the first failure is the error.
-    return report->failures.front();
+    return report.failures.front();
 }
 
 Result<int> runRays(const RaysCommand& command) {
     VCP_TRY(makeFolder(command.out));
     BenchRaysOptions options;
-    options.models = command.modelPaths();
+    takeShared(command, options);
     options.methods = command.methods;
     if (!command.cameras.empty()) options.cameras = command.cameras;
     options.size = command.size;
     options.views = command.views;
-    if (command.repetitions > 0) options.repetitions = command.repetitions;
-    options.threads = command.threads;
     options.device = command.device;
-    options.out = command.out;
-    options.cell = command.cell;
     options.judgeEvery = command.judgeEvery;
     options.sweep = command.sweep;
     options.stability = command.stability;
     options.paper = command.paper;
     options.paper.mergeScheme = command.paper.march.scheme;
-    const InterruptScope catching;
-    ProgressDisplay display(command.report.progressStyle(), stderr);
-    options.progress = progressTo(display);
-    const auto report = benchRays(options);
-    display.finish();
-    if (!report) return report.error();
-    return publish(
-        command, "bench_rays",
-        {benchRaysJson(*report), benchRaysCsv(*report), benchRaysMarkdown(*report), benchRaysPlots(*report)});
+    VCP_TRY_ASSIGN(const auto report, runShown(command, benchRays, options, options.progress));
+    return publish(command, "bench_rays",
+                   {benchRaysJson(report), benchRaysCsv(report), benchRaysMarkdown(report), benchRaysPlots(report)});
 }
 
 Result<int> runPicture(const PictureCommand& command) {
     VCP_TRY(makeFolder(command.out));
     BenchPictureOptions options = command.options;
-    options.models = command.modelPaths();
+    takeShared(command, options);
     options.size = command.size;
-    if (command.repetitions > 0) options.repetitions = command.repetitions;
-    options.threads = command.threads;
-    options.out = command.out;
-    options.cell = command.cell;
-    const InterruptScope catching;
-    ProgressDisplay display(command.report.progressStyle(), stderr);
-    options.progress = progressTo(display);
-    const auto report = benchPicture(options);
-    display.finish();
-    if (!report) return report.error();
-    return publish(command, "bench_picture",
-                   {benchPictureJson(*report), benchPictureCsv(*report), benchPictureMarkdown(*report),
-                    benchPicturePlots(*report)});
+    VCP_TRY_ASSIGN(const auto report, runShown(command, benchPicture, options, options.progress));
+    return publish(
+        command, "bench_picture",
+        {benchPictureJson(report), benchPictureCsv(report), benchPictureMarkdown(report), benchPicturePlots(report)});
 }
 
 Result<int> runStream(const StreamCommand& command) {
@@ -218,31 +212,19 @@ Result<int> runStream(const StreamCommand& command) {
     options.run.errorPixels = command.errorPixels;
     options.run.renderer.device = command.device;
     options.run.renderer.ramBytes = command.ramBytes;
-    const InterruptScope catching;
-    ProgressDisplay display(command.bench.report.progressStyle(), stderr);
-    options.run.progress = progressTo(display);
-    const auto rows = benchStream(options);
-    display.finish();
-    if (!rows) return rows.error();
-    VCP_TRY(
-        publish(command.bench, "bench_stream",
-                {benchStreamJson(*rows), benchStreamCsv(*rows), benchStreamMarkdown(*rows), benchStreamPlots(*rows)}));
-    return std::ranges::all_of(*rows, [](const StressReport& row) { return row.violations.empty(); }) ? 0 : 1;
+    VCP_TRY_ASSIGN(const auto rows, runShown(command.bench, benchStream, options, options.run.progress));
+    VCP_TRY(publish(command.bench, "bench_stream",
+                    {benchStreamJson(rows), benchStreamCsv(rows), benchStreamMarkdown(rows), benchStreamPlots(rows)}));
+    return std::ranges::all_of(rows, [](const StressReport& row) { return row.violations.empty(); }) ? 0 : 1;
 }
 
 Result<int> runMeso(const MesoCommand& command) {
     VCP_TRY(makeFolder(command.bench.out));
     BenchMesoOptions options = command.options;
     if (!command.device.empty()) options.device = command.device == kBestDevice ? "" : command.device;
-    const InterruptScope catching;
-    ProgressDisplay display(command.bench.report.progressStyle(), stderr);
-    options.progress = progressTo(display);
-    const auto report = benchMeso(options);
-    display.finish();
-    if (!report) return report.error();
-    return publish(
-        command.bench, "bench_meso",
-        {benchMesoJson(*report), benchMesoCsv(*report), benchMesoMarkdown(*report), benchMesoPlots(*report)});
+    VCP_TRY_ASSIGN(const auto report, runShown(command.bench, benchMeso, options, options.progress));
+    return publish(command.bench, "bench_meso",
+                   {benchMesoJson(report), benchMesoCsv(report), benchMesoMarkdown(report), benchMesoPlots(report)});
 }
 
 void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {

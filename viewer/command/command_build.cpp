@@ -119,7 +119,7 @@ Result<int> tell(const BuildOptions& options, bool asJson) {
 
 /// Refuses options that do not go with the method.
 Result<void> checkMethod(const BuildCommand& command) {
-    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const auto usage = [](const char* message) { return Error{.code = ErrorCode::Usage, .message = message}; };
     const BuildOptions& s = command.settings;
     if (!command.isPaper() && command.paperOptionsGiven) return usage("the options --paper-... go with --method paper");
     if (!command.isPaper()) return {};
@@ -135,7 +135,7 @@ Result<int> run(const BuildCommand& command) {
     BuildOptions options = command.settings;
     options.inputs.assign(command.inputs.begin(), command.inputs.end());
     if (command.output.empty() && !command.dryRun)
-        return Error{ErrorCode::Usage, "--output is required; only --dry-run does without"};
+        return Error{.code = ErrorCode::Usage, .message = "--output is required; only --dry-run does without"};
     options.output = command.output.empty() ? "." : command.output;
     options.resume = command.resume;
     options.overwrite = command.overwrite;

@@ -77,7 +77,7 @@ Result<UpdateResult> updateUntilDrawable(Renderer& renderer, const FrameRequest&
     for (;;) {
         auto update = renderer.update(request);
         if (!update || update->drawable || !update->problems.empty() || update->settled) return update;
-        if (interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        if (interrupted()) return Error::cancelled();
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
 }
@@ -89,7 +89,7 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
     Drawing drawing;
     drawing.update = std::move(update);
     for (int i = 0; i <= command.framesToTime(); ++i) {
-        if (interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        if (interrupted()) return Error::cancelled();
         VCP_TRY_ASSIGN(auto stats, renderer.render(request));
         drawing.stats = stats;
         if (i == 0)
@@ -215,7 +215,7 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
     for (bool isDone = false; !isDone;) {
         VCP_TRY_ASSIGN(isDone, sequence.step());
         display.update("drawing", sequence.fraction());
-        if (!isDone && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
+        if (!isDone && interrupted()) return Error::cancelled();
         if (sequence.isWaiting()) renderer.waitForPage(kWait);
     }
     display.finish();
@@ -230,7 +230,7 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
 
 /// Refuses options of the output that do not go together.
 Result<void> checkOptions(const RenderCommand& command) {
-    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const auto usage = [](const char* message) { return Error{.code = ErrorCode::Usage, .message = message}; };
     if (command.output == kStandardOutput && command.isSequence())
         return usage("several pictures cannot go to standard output; give a file name");
     if (command.output == kStandardOutput && command.report.json)
@@ -269,7 +269,7 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
 
 Result<void> checkValidation(const Renderer& renderer) {
     const std::vector<std::string> problems = renderer.validationMessages();
-    return problems.empty() ? Result<void>() : Error{ErrorCode::Device, problems.front()};
+    return problems.empty() ? Result<void>() : Error{.code = ErrorCode::Device, .message = problems.front()};
 }
 
 /// Draws one picture, or one a method, side by side.
@@ -331,8 +331,9 @@ Result<int> run(const RenderCommand& command) {
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
                                   {command.methods.empty() ? "" : command.methods[0], command.subdivide}));
     if ((!command.methods.empty() || command.subdivide) && open.file.surfaces.empty())
-        return Error{ErrorCode::Usage, fmt::format("{} goes with a scene that has mesostructure",
-                                                   command.subdivide ? "--subdivide" : "--methods")};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("{} goes with a scene that has mesostructure",
+                                            command.subdivide ? "--subdivide" : "--methods")};
     if (open.parts.size() == 1) VCP_TRY(command.render.checkFor(*open.parts.front().open.dataset));
     const SceneFile& scene = open.file;
     for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
@@ -355,7 +356,8 @@ Result<int> run(const RenderCommand& command) {
         return 0;
     }
     if (!command.methods.empty())
-        return Error{ErrorCode::Usage, fmt::format("--methods goes with at most {} M pixels", kMostPixelsAtOnce >> 20)};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("--methods goes with at most {} M pixels", kMostPixelsAtOnce >> 20)};
     VCP_TRY(makeTiled(*renderer, request, cameras, command, rules));
     VCP_TRY(checkValidation(*renderer));
     return 0;

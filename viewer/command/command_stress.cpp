@@ -41,7 +41,9 @@ Result<void> writeReport(const StressCommand& command, const StressReport& repor
     const std::filesystem::path folder = command.out;
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
-    if (failed) return Error{ErrorCode::Io, "the folder cannot be made: " + failed.message(), command.out};
+    if (failed)
+        return Error{
+            .code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = command.out};
     const OutputRules rules{.overwrite = command.overwrite, .inputs = {command.file, command.path}};
     VCP_TRY(writeFile(folder / "stress.json", OutputKind::JsonText, stressJson(report), rules));
     VCP_TRY(writeFile(folder / "stress.md", OutputKind::Text, stressMarkdown(report), rules));

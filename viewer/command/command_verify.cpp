@@ -58,8 +58,9 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     VCP_TRY_ASSIGN(auto cache, PageCache::open(command.file));
     const uint32_t levels = cache.dataset().header.levels;
     if (command.level != UINT32_MAX && command.level >= levels)
-        return Error{ErrorCode::Usage, fmt::format("has no level {}, only 0 to {}", command.level, levels - 1),
-                     command.file};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("has no level {}, only 0 to {}", command.level, levels - 1),
+                     .file = command.file};
     VCP_TRY(cache.loadLevel(std::min(command.level, levels - 1)));
 
     SurfaceDistanceOptions options;
@@ -130,7 +131,7 @@ Result<int> broken(const VerifyCommand& command, const Error& error) {
 
 Result<int> run(const VerifyCommand& command) {
     if (isHttpUrl(command.file) && !command.against.empty())
-        return Error{ErrorCode::Usage, "--against needs a local file"};
+        return Error{.code = ErrorCode::Usage, .message = "--against needs a local file"};
     const InterruptScope catching;
     VCP_TRY_ASSIGN(const auto reader, openReader(command.file, command.source));
     const ReadAhead ahead(reader);

@@ -60,7 +60,7 @@ Result<void> checkInputs(const ViewCommand& command) {
             VCP_TRY_ASSIGN(const auto open, openDataset(input, command.render.source));
             if (inputs.size() == 1) VCP_TRY(command.render.checkFor(*open.dataset));
         } else if (std::error_code failed; !std::filesystem::exists(input, failed)) {
-            return Error{ErrorCode::Io, "cannot be opened: there is no such file", input};
+            return Error{.code = ErrorCode::Io, .message = "cannot be opened: there is no such file", .file = input};
         }
     }
     return {};
@@ -101,8 +101,9 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
         if (!saved || !saved->empty()) warn(saved ? *saved : saved.error().line());
     }
     if (command.report.json) VCP_TRY(printJson(toJson(report)));
-    if (!report.firstPictureSeconds && interrupted()) return Error{ErrorCode::Cancelled, "cancelled"};
-    if (!report.firstPictureSeconds && !report.problem.empty()) return Error{ErrorCode::InvalidInput, report.problem};
+    if (!report.firstPictureSeconds && interrupted()) return Error::cancelled();
+    if (!report.firstPictureSeconds && !report.problem.empty())
+        return Error{.code = ErrorCode::InvalidInput, .message = report.problem};
     return 0;
 }
 

@@ -14,7 +14,9 @@ namespace {
 
 Result<void> print(const std::string& text) {
     if (std::fprintf(stdout, "%s\n", text.c_str()) < 0 || std::fflush(stdout) != 0)
-        return Error{ErrorCode::Io, std::string("cannot be written: ") + std::strerror(errno), "standard output"};
+        return Error{.code = ErrorCode::Io,
+                     .message = std::string("cannot be written: ") + std::strerror(errno),
+                     .file = "standard output"};
     return {};
 }
 

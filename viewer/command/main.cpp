@@ -34,7 +34,8 @@ Command addHelp(CLI::App& vcp) {
         std::string path = vcp.get_name();
         for (const std::string& word : *words) {
             const auto found = about->get_subcommands([&](const CLI::App* sub) { return sub->check_name(word); });
-            if (found.empty()) return Error{ErrorCode::Usage, "there is no command \"" + word + "\""};
+            if (found.empty())
+                return Error{.code = ErrorCode::Usage, .message = "there is no command \"" + word + "\""};
             about = found.front();
             path += " " + word;
         }

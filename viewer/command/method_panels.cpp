@@ -5,11 +5,12 @@
 #include <fmt/format.h>
 
 #include "viewer/scene/option_values.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 
 Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene) {
-    for (MesoSurfaceDescription& surface : scene.surfaces) surface.method.name = method;
+    SurfaceChoices{.method = method, .subdivide = {}}.applyTo(scene);
     return makeMesoScene(scene.surfaces);
 }
 

@@ -54,7 +54,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     addUp(app, settings.up);
     addLight(app, settings.shading);
     addParsed(app, "--shading", settings.shading.mode, shadingNamed,
-              fmt::format("one of {}", fmt::join(shadingNames(), ", ")),
+              fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
               "lit or unlit (with colour where there is any), clay, normals; false colours: steps, cells, fetches "
               "(work of each ray), level, error (certified, up to a pixel)")
         ->type_name("MODE")

@@ -79,7 +79,9 @@ std::vector<uint8_t> normalRows(std::span<const glm::vec3> normals) {
 
 Result<void> writePlane(const std::vector<uint8_t>& bytes, OutputKind kind, const fs::path& path,
                         const OutputRules& rules) {
-    if (bytes.empty()) return Error{ErrorCode::Limit, "not enough memory to compress the picture", path.string()};
+    if (bytes.empty())
+        return Error{
+            .code = ErrorCode::Limit, .message = "not enough memory to compress the picture", .file = path.string()};
     return writeFile(path, kind, std::as_bytes(std::span(bytes)), rules);
 }
 

@@ -44,10 +44,13 @@ Result<std::string> identity(const fs::path& mesh) {
     std::error_code failed;
     const fs::path absolute = fs::canonical(mesh, failed);
     if (failed) return ioError(mesh, "cannot be opened", failed);
-    if (fs::is_directory(absolute, failed)) return Error{ErrorCode::Io, "is a folder, not a mesh", mesh.string()};
+    if (fs::is_directory(absolute, failed))
+        return Error{.code = ErrorCode::Io, .message = "is a folder, not a mesh", .file = mesh.string()};
     // A pipe would be waited for, and what comes through it has no identity.
     if (!fs::is_regular_file(absolute, failed))
-        return Error{ErrorCode::Io, "is not a regular file; build it first, with `vcp build`", mesh.string()};
+        return Error{.code = ErrorCode::Io,
+                     .message = "is not a regular file; build it first, with `vcp build`",
+                     .file = mesh.string()};
     return fmt::format("{}\n{}\n", absolute.string(), fileStamp(absolute));
 }
 
@@ -97,8 +100,9 @@ void writeList(const fs::path& path, const std::vector<fs::path>& files) {
 /// Checks that the inputs did not change while they were read. Errors: InvalidInput.
 Result<void> checkUnchanged(const BuildOptions& options, const std::string& keyBefore, const BuildReport& report) {
     const auto changed = [](const fs::path& file) {
-        return Error{ErrorCode::InvalidInput, "was changed while it was read; open it again once it is whole",
-                     file.string()};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "was changed while it was read; open it again once it is whole",
+                     .file = file.string()};
     };
     VCP_TRY_ASSIGN(const auto key, keyOf(options));
     if (key != keyBefore) return changed(options.inputs.front());
@@ -148,7 +152,8 @@ Result<fs::path> defaultCacheFolder() {
     if (cache && fs::path(cache).is_absolute()) return fs::path(cache) / "vcp";
     const char* home = std::getenv("HOME");
     if (home && *home) return fs::path(home) / ".cache" / "vcp";
-    return Error{ErrorCode::Io, "no folder for the cache: set XDG_CACHE_HOME or HOME, or build with `vcp build` first"};
+    return Error{.code = ErrorCode::Io,
+                 .message = "no folder for the cache: set XDG_CACHE_HOME or HOME, or build with `vcp build` first"};
 }
 
 bool looksLikeDataset(const fs::path& path) {

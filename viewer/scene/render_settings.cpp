@@ -10,8 +10,6 @@
 
 namespace vcp {
 
-std::vector<std::string> shadingNames() { return {kShadingNames.begin(), kShadingNames.end()}; }
-
 std::optional<ShadingMode> shadingNamed(std::string_view name) {
     const auto found = std::ranges::find(kShadingNames, name);
     if (found == kShadingNames.end()) return std::nullopt;
@@ -38,7 +36,7 @@ RendererOptions RenderSettings::rendererOptions() const {
 }
 
 Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
-    const auto usage = [](const char* message) { return Error{ErrorCode::Usage, message}; };
+    const auto usage = [](const char* message) { return Error{.code = ErrorCode::Usage, .message = message}; };
     const bool isPaper = dataset.header.method == Method::Paper;
     if (!isPaper && march != PaperMarch{}) return usage("the paper's march is for files built by the paper's method");
     if (isPaper && (shading.shadows || shading.occlusionRays > 0 || caps))

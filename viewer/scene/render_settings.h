@@ -56,7 +56,6 @@ struct RenderSettings {
 inline constexpr std::array<const char*, 9> kShadingNames = {"lit",   "clay",    "unlit", "normals", "steps",
                                                              "cells", "fetches", "level", "error"};
 static_assert(kShadingNames.size() == size_t(ShadingMode::Error) + 1);
-std::vector<std::string> shadingNames();
 /// Returns the mode of such a name.
 std::optional<ShadingMode> shadingNamed(std::string_view name);
 

@@ -68,8 +68,10 @@ private:
         const std::string key = at.substr(at.rfind('/') + 1);
         const bool isKey =
             !key.empty() && !std::all_of(key.begin(), key.end(), [](char c) { return c >= '0' && c <= '9'; });
-        error_ = Error{ErrorCode::InvalidInput, isKey ? fmt::format("\"{}\" {}", key, what) : what, name_,
-                       fmt::format("line {}", lines_(at))};
+        error_ = Error{.code = ErrorCode::InvalidInput,
+                       .message = isKey ? fmt::format("\"{}\" {}", key, what) : what,
+                       .file = name_,
+                       .element = fmt::format("line {}", lines_(at))};
     }
 
     void onlyKeys(const Json& object, const std::string& at, std::initializer_list<std::string_view> keys) {
@@ -345,7 +347,11 @@ std::optional<Error> notJson(std::string_view text, const std::string& name) {
     const size_t at = std::min(mistake.at, text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');
     const char* what = mistake.isNumber ? "a number is out of range" : "the JSON breaks off or goes wrong here";
-    return Error{ErrorCode::InvalidInput, what, name, fmt::format("line {}", line), at};
+    return Error{.code = ErrorCode::InvalidInput,
+                 .message = what,
+                 .file = name,
+                 .element = fmt::format("line {}", line),
+                 .byte = at};
 }
 
 }  // namespace
@@ -356,9 +362,9 @@ Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
     const glm::dvec3 far = glm::abs(placement->translation);
     if (std::max({far.x, far.y, far.z}) > kLargestNumber || placement->scale > kLargestScale ||
         placement->scale < 1 / kLargestScale)
-        return Error{ErrorCode::Usage,
-                     fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}",
-                                 kLargestNumber, kLargestScale, 1 / kLargestScale)};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}",
+                                            kLargestNumber, kLargestScale, 1 / kLargestScale)};
     return placement;
 }
 
@@ -378,12 +384,15 @@ bool isSceneName(const std::string& name) {
 Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
     if (auto error = notJson(text, name)) return *std::move(error);
     const Json json = Json::parse(text);
-    if (isDeeperThan(json, kDeepest)) return Error{ErrorCode::InvalidInput, "not a scene: nested too deeply", name};
+    if (isDeeperThan(json, kDeepest))
+        return Error{.code = ErrorCode::InvalidInput, .message = "not a scene: nested too deeply", .file = name};
     const LinesOf lines(text);
     if (lines.twice()) {
         const std::string& at = lines.twice()->first;
-        return Error{ErrorCode::InvalidInput, fmt::format("\"{}\" is there twice", at.substr(at.rfind('/') + 1)), name,
-                     fmt::format("line {}", lines.twice()->second)};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = fmt::format("\"{}\" is there twice", at.substr(at.rfind('/') + 1)),
+                     .file = name,
+                     .element = fmt::format("line {}", lines.twice()->second)};
     }
     SceneReader reader(lines, name, folder);
     SceneFile scene = reader.scene(json);

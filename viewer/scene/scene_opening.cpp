@@ -68,9 +68,17 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
     VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces));
     const Box all = scene.bounds();
     if (!std::isfinite(glm::length(all.high - all.low)))
-        return Error{ErrorCode::InvalidInput, "the datasets lie too far apart to be shown together",
-                     shownAddress(name)};
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = "the datasets lie too far apart to be shown together",
+                     .file = shownAddress(name)};
     return scene;
+}
+
+void SurfaceChoices::applyTo(SceneFile& scene) const {
+    for (MesoSurfaceDescription& surface : scene.surfaces) {
+        if (!method.empty()) surface.method.name = method;
+        if (subdivide) surface.subdivide = *subdivide;
+    }
 }
 
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
@@ -79,10 +87,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     SceneFile file;
     if (kind == InputKind::Scene) {
         VCP_TRY_ASSIGN(file, readScene(inputs.front()));
-        for (MesoSurfaceDescription& surface : file.surfaces) {
-            if (!instead.method.empty()) surface.method.name = instead.method;
-            if (instead.subdivide) surface.subdivide = *instead.subdivide;
-        }
+        instead.applyTo(file);
     } else if (kind == InputKind::Datasets) {
         for (const std::string& input : inputs) file.datasets.push_back({input, {}});
     } else {
@@ -100,7 +105,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     if (kind == InputKind::Meshes) addSideFiles(inputs);
     auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
         if (build.progress && !build.progress({.stage = "opening", .fraction = opened++ / count}))
-            return Error{ErrorCode::Cancelled, "cancelled"};
+            return Error::cancelled();
         VCP_TRY_ASSIGN(const auto path, datasetFor({each}, build));
         addSideFiles({each});
         return openDataset(path.string(), access);

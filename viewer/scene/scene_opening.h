@@ -75,6 +75,8 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
 struct SurfaceChoices {
     std::string method;            ///< empty: the scene's
     std::optional<int> subdivide;  ///< times that Loop's rules are applied; none: the scene's
+
+    void applyTo(SceneFile& scene) const;
 };
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one

@@ -259,14 +259,15 @@ Result<fs::path> userSettingsPath() {
     if (config && fs::path(config).is_absolute()) return fs::path(config) / "vcp" / "view.json";
     const char* home = std::getenv("HOME");
     if (home && *home) return fs::path(home) / ".config" / "vcp" / "view.json";
-    return Error{ErrorCode::Io, "no folder for settings: set XDG_CONFIG_HOME or HOME"};
+    return Error{.code = ErrorCode::Io, .message = "no folder for settings: set XDG_CONFIG_HOME or HOME"};
 }
 
 Result<UserSettings> readUserSettings(const fs::path& path) {
     VCP_TRY_ASSIGN(const auto file, readFile(path));
     if (!file.exists) return UserSettings{};
     const Json json = Json::parse(file.text, nullptr, false);
-    if (!json.is_object()) return Error{ErrorCode::InvalidInput, "is no JSON object", path.string()};
+    if (!json.is_object())
+        return Error{.code = ErrorCode::InvalidInput, .message = "is no JSON object", .file = path.string()};
     return settingsFrom(json);
 }
 

@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/random_bytes.h"
 #include "tests/support/test_folder.h"
 
 namespace vcp {
@@ -18,13 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 using Bytes = std::vector<std::byte>;
-
-Bytes randomBytes(size_t count, uint64_t seed) {
-    std::mt19937_64 random(seed);
-    Bytes bytes(count);
-    for (std::byte& b : bytes) b = std::byte(random());
-    return bytes;
-}
 
 class Temp : public ::testing::Test {
 protected:
@@ -43,7 +37,7 @@ protected:
 TEST_F(Temp, LittleStaysInMemory) {
     TempSpace space(place(), 4 << 20);
     TempFile file(space, "pages1.spill");
-    const Bytes bytes = randomBytes(3 << 20, 1);
+    const Bytes bytes = test::randomBytes(3 << 20, 1);
     ASSERT_TRUE(file.append(bytes).ok());
     expectHolds(file, bytes);
     EXPECT_FALSE(fs::exists(place()));
@@ -58,7 +52,7 @@ TEST_F(Temp, MuchGoesToTheDisk) {
         std::mt19937_64 random(seed);
         while (inA.size() + inB.size() < 8 << 20) {
             const bool toA = random() % 3 != 0;
-            const Bytes bytes = randomBytes(random() % (random() % 8 == 0 ? 900000 : 3000), random());
+            const Bytes bytes = test::randomBytes(random() % (random() % 8 == 0 ? 900000 : 3000), random());
             Bytes& all = toA ? inA : inB;
             const auto at = (toA ? a : b).append(bytes);
             ASSERT_TRUE(at.ok());
@@ -91,7 +85,7 @@ TEST_F(Temp, MuchGoesToTheDisk) {
 TEST_F(Temp, ReadersBesideTheWriter) {
     TempSpace space(place(), 1 << 20);
     TempFile file(space, "pages1.spill");
-    const Bytes bytes = randomBytes(6 << 20, 9);
+    const Bytes bytes = test::randomBytes(6 << 20, 9);
     std::atomic<bool> wrong = false;
     std::vector<std::thread> readers;
     for (int i = 0; i < 3; ++i)
@@ -114,7 +108,7 @@ TEST_F(Temp, ReadersBesideTheWriter) {
 }
 
 TEST_F(Temp, TakenOverAndCut) {
-    const Bytes bytes = randomBytes(700000, 4);
+    const Bytes bytes = test::randomBytes(700000, 4);
     {
         TempSpace space(place(), 1 << 30);
         TempFile file(space, "pages1.spill");
@@ -162,7 +156,7 @@ TEST_F(Temp, OneBuildAtATime) {
         EXPECT_NE(refused.error().line().find("another build"), std::string::npos) << refused.error().line();
         // Nor by writing there.
         TempFile file(second, "pages1.spill");
-        EXPECT_FALSE(file.append(randomBytes(10, 1)).ok());
+        EXPECT_FALSE(file.append(test::randomBytes(10, 1)).ok());
         second.folder().remove();
         EXPECT_TRUE(fs::exists(place()));
     }
@@ -177,7 +171,7 @@ TEST_F(Temp, PlacesThatCannotBe) {
     std::ofstream(folder_ / "file") << "x";
     TempSpace space(folder_ / "file" / "temp", 0);
     TempFile file(space, "pages1.spill");
-    const auto result = file.append(randomBytes(10, 1));
+    const auto result = file.append(test::randomBytes(10, 1));
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::Io);
     EXPECT_NE(result.error().line().find("temporary folder"), std::string::npos) << result.error().line();

@@ -15,6 +15,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "tests/support/random_bytes.h"
 #include "tests/support/test_folder.h"
 
 namespace vcp {
@@ -22,13 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Bytes = std::vector<std::byte>;
-
-Bytes randomBytes(size_t count, uint64_t seed) {
-    std::mt19937_64 random(seed);
-    Bytes bytes(count);
-    for (std::byte& b : bytes) b = std::byte(random());
-    return bytes;
-}
 
 std::string textOf(const Bytes& bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
@@ -57,7 +51,7 @@ protected:
 
 TEST_F(DurableFile, WritesWhereItIsTold) {
     const Opened fd(file_, O_RDWR | O_CREAT);
-    const Bytes bytes = randomBytes(3000, 1);
+    const Bytes bytes = test::randomBytes(3000, 1);
     ASSERT_TRUE(writeAll(fd, 1000, std::span(bytes).subspan(1000), file_).ok());
     ASSERT_TRUE(writeAll(fd, 0, std::span(bytes).first(1000), file_).ok());
     ASSERT_TRUE(writeAll(fd, 77, {}, file_).ok());
@@ -73,7 +67,7 @@ TEST_F(DurableFile, PartialWritesGoOnToTheEndOrTheError) {
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
     const rlimit small{4096, before.rlim_max};
-    const Bytes bytes = randomBytes(5000, 2);
+    const Bytes bytes = test::randomBytes(5000, 2);
     const Opened fd(file_, O_RDWR | O_CREAT);
     ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
     const auto result = writeAll(fd, 0, bytes, file_);
@@ -95,7 +89,7 @@ TEST_F(DurableFile, InterruptedWritesGoOn) {
     ASSERT_EQ(sigaction(SIGUSR1, &action, &before), 0);
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
-    const Bytes bytes = randomBytes(300000, 3);
+    const Bytes bytes = test::randomBytes(300000, 3);
     const pthread_t writer = pthread_self();
     std::string read;
     std::thread reader([&] {

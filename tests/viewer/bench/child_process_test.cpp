@@ -64,7 +64,8 @@ TEST(ChildProcess, ProgressArrives) {
     const auto outcome = runInChild(
         [](const ChildProgress& progress) -> Result<std::string> {
             for (int i = 0; i <= 10; ++i)
-                if (!progress("step " + std::to_string(i), i / 10.0)) return Error{ErrorCode::Cancelled, "cancelled"};
+                if (!progress("step " + std::to_string(i), i / 10.0))
+                    return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
             return std::string("done");
         },
         [&](const std::string& what, double fraction) {
@@ -81,7 +82,7 @@ TEST(ChildProcess, AChildThatIsAskedToStopStops) {
     const auto outcome = runInChild(
         [](const ChildProgress& progress) -> Result<std::string> {
             while (progress("turning", 0.5)) ::usleep(1000);
-            return Error{ErrorCode::Cancelled, "stopped when asked"};
+            return Error{.code = ErrorCode::Cancelled, .message = "stopped when asked"};
         },
         [](const std::string& what, double) { return what.empty(); });
     ASSERT_FALSE(outcome);

@@ -32,7 +32,7 @@ protected:
         return [this](const BuildOptions& options) -> Result<BuildReport> {
             ++builds_;
             built_ = options.output;
-            return Error{ErrorCode::InvalidInput, "wrong", "mesh.ply"};
+            return Error{.code = ErrorCode::InvalidInput, .message = "wrong", .file = "mesh.ply"};
         };
     }
     // Writes bytes that are no dataset: the cache must not take them for one the next time.

@@ -47,7 +47,7 @@ TEST(RenderSettings, AnglesSayWhereTheEyeIs) {
 }
 
 TEST(RenderSettings, EachShadingHasItsName) {
-    for (const std::string& name : shadingNames()) EXPECT_TRUE(shadingNamed(name)) << name;
+    for (const char* name : kShadingNames) EXPECT_TRUE(shadingNamed(name)) << name;
     EXPECT_EQ(shadingNamed("steps"), ShadingMode::Steps);
     EXPECT_FALSE(shadingNamed("shiny"));
 }

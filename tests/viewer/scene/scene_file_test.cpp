@@ -113,7 +113,7 @@ TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
         auto scene = sceneFromJson(text, "museum.json", {});
         EXPECT_TRUE(scene) << scene.error().line();
         const auto open = [](const std::string& file) -> Result<OpenDataset> {
-            return Error{ErrorCode::Usage, "unknown mesh format", file};
+            return Error{.code = ErrorCode::Usage, .message = "unknown mesh format", .file = file};
         };
         const auto opened = openScene(*std::move(scene), "museum.json", open);
         EXPECT_FALSE(opened);

@@ -6,7 +6,6 @@
 #include <ctime>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
 #include "render/picture.h"
@@ -217,7 +216,10 @@ public:
         VCP_TRY(checkNames(o_.methods, pictureMethodNames(), "method"));
         VCP_TRY(checkNames(o_.cameras, pictureCameraNames(), "camera"));
         VCP_TRY(folder_.make());
-        if (o_.models.empty()) VCP_TRY(writeAnalyticModels());
+        if (o_.models.empty()) {
+            VCP_TRY_ASSIGN(o_.models, writeAnalyticModels(folder_.path()));
+            if (!(o_.cell > 0)) o_.cell = kAnalyticModelCell;
+        }
         for (size_t i = 0; i < o_.models.size(); ++i) {
             done_ = double(i) / double(o_.models.size());
             VCP_TRY(runModel(o_.models[i]));
@@ -226,28 +228,9 @@ public:
     }
 
 private:
-    static Result<void> checkNames(const std::vector<std::string>& wanted, const std::vector<std::string>& known,
-                                   const char* kind) {
-        for (const std::string& name : wanted)
-            if (std::ranges::find(known, name) == known.end())
-                return Error{
-                    .code = ErrorCode::Usage,
-                    .message = fmt::format("unknown {} \"{}\"; there are {}", kind, name, fmt::join(known, ", "))};
-        return {};
-    }
-
-    Result<void> writeAnalyticModels() {
-        for (const AnalyticModel& model : analyticModels()) {
-            o_.models.push_back(folder_.path() / (model.name + ".ply"));
-            VCP_TRY(writePly(model.mesh, o_.models.back()));
-        }
-        if (!(o_.cell > 0)) o_.cell = kAnalyticModelCell;
-        return {};
-    }
-
     Result<void> report(const std::string& what) const {
         if (!o_.progress || o_.progress(what, done_)) return {};
-        return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        return Error::cancelled();
     }
 
     Result<void> runModel(const std::filesystem::path& path) {
@@ -364,7 +347,7 @@ private:
             pixel[0] = 255, pixel[1] = pixel[2] = 0;
         }
         const std::string name = fmt::format("{}_{}_{}_{}.png", model.files.name, camera.name, view, method);
-        return writePng(picture, o_.out / name, {.overwrite = true});
+        return writePng(picture, o_.out / name, {.inputs = o_.models});
     }
 
     BenchPictureOptions o_;

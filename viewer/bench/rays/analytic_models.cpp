@@ -79,6 +79,15 @@ IndexedMesh plate() {
 
 std::vector<AnalyticModel> analyticModels() { return {{"sphere", sphere()}, {"torus", torus()}, {"plate", plate()}}; }
 
+Result<std::vector<std::filesystem::path>> writeAnalyticModels(const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> files;
+    for (const AnalyticModel& model : analyticModels()) {
+        files.push_back(folder / (model.name + ".ply"));
+        VCP_TRY(writePly(model.mesh, files.back()));
+    }
+    return files;
+}
+
 Result<void> writePly(const IndexedMesh& mesh, const std::filesystem::path& path) {
     std::string file = fmt::format(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\n"

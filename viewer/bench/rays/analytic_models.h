@@ -22,6 +22,9 @@ struct AnalyticModel {
 /// turned against the axes and 0.4 cell thick. All are closed and oriented outwards.
 std::vector<AnalyticModel> analyticModels();
 
+/// Writes all of them into `folder` and returns their files. Errors: Io.
+Result<std::vector<std::filesystem::path>> writeAnalyticModels(const std::filesystem::path& folder);
+
 /// Writes a binary PLY with double coordinates. Errors: Io.
 Result<void> writePly(const IndexedMesh& mesh, const std::filesystem::path& path);
 

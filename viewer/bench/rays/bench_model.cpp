@@ -1,6 +1,9 @@
 #include "viewer/bench/rays/bench_model.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "builder/build.h"
 
@@ -25,6 +28,15 @@ Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesy
 }
 
 }  // namespace
+
+Result<void> checkNames(const std::vector<std::string>& wanted, const std::vector<std::string>& known,
+                        const char* kind) {
+    for (const std::string& name : wanted)
+        if (std::ranges::find(known, name) == known.end())
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format("unknown {} \"{}\"; there are {}", kind, name, fmt::join(known, ", "))};
+    return {};
+}
 
 Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& path,
                                                    const std::filesystem::path& folder, double cell, unsigned threads,

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "builder/measure/mesh_bvh.h"
 #include "octree/io/result.h"
@@ -32,5 +33,9 @@ struct BenchModel {
 Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& model,
                                                    const std::filesystem::path& folder, double cell, unsigned threads,
                                                    const std::function<Result<void>(const std::string& what)>& report);
+
+/// Checks that all names that were asked for are known. `kind`: "camera". Errors: Usage.
+Result<void> checkNames(const std::vector<std::string>& wanted, const std::vector<std::string>& known,
+                        const char* kind);
 
 }  // namespace vcp

@@ -27,9 +27,13 @@ public:
     }
 
     Result<BenchRaysReport> run() {
-        VCP_TRY(checkNames());
+        VCP_TRY(checkNames(options_.methods, rayMethodNames(), "method"));
+        VCP_TRY(checkNames(options_.cameras, benchCameraNames(), "camera"));
         VCP_TRY(folder_.make());
-        if (options_.models.empty()) VCP_TRY(writeAnalyticModels());
+        if (options_.models.empty()) {
+            VCP_TRY_ASSIGN(options_.models, writeAnalyticModels(folder_.path()));
+            if (!(options_.cell > 0)) options_.cell = kAnalyticModelCell;
+        }
         for (size_t i = 0; i < options_.models.size(); ++i) {
             modelFrom_ = double(i) / double(options_.models.size());
             modelShare_ = 1.0 / double(options_.models.size());
@@ -40,31 +44,6 @@ public:
     }
 
 private:
-    Result<void> checkNames() const {
-        const auto& methods = rayMethodNames();
-        for (const std::string& method : options_.methods)
-            if (std::find(methods.begin(), methods.end(), method) == methods.end())
-                return Error{
-                    .code = ErrorCode::Usage,
-                    .message = fmt::format("unknown method \"{}\"; there are {}", method, fmt::join(methods, ", "))};
-        const auto& cameras = benchCameraNames();
-        for (const std::string& camera : options_.cameras)
-            if (std::find(cameras.begin(), cameras.end(), camera) == cameras.end())
-                return Error{
-                    .code = ErrorCode::Usage,
-                    .message = fmt::format("unknown camera \"{}\"; there are {}", camera, fmt::join(cameras, ", "))};
-        return {};
-    }
-
-    Result<void> writeAnalyticModels() {
-        for (const AnalyticModel& model : analyticModels()) {
-            options_.models.push_back(folder_.path() / (model.name + ".ply"));
-            VCP_TRY(writePly(model.mesh, options_.models.back()));
-        }
-        if (!(options_.cell > 0)) options_.cell = kAnalyticModelCell;
-        return {};
-    }
-
     Result<void> runStability() {
         StabilityOptions options;
         options.device = options_.device;
@@ -77,7 +56,7 @@ private:
 
     Result<void> report(const std::string& what, double fractionOfModel) const {
         if (!options_.progress || options_.progress(what, modelFrom_ + modelShare_ * fractionOfModel)) return {};
-        return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        return Error::cancelled();
     }
 
     Result<void> runModel(const std::filesystem::path& path) {

@@ -183,7 +183,7 @@ Result<std::vector<StabilityRow>> benchStability(const StabilityOptions& options
         for (const double origin : options.originCells) {
             const auto what = fmt::format("stability: cell {:g}, origin {:g} cells", cell, origin);
             if (options.progress && !options.progress(what, double(rows.size()) / double(cases)))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+                return Error::cancelled();
             VCP_TRY_ASSIGN(auto row, StabilityCase(options, cell, origin).run(*renderer));
             rows.push_back(row);
         }

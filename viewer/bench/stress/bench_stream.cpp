@@ -58,14 +58,15 @@ private:
     /// Builds the models with cells half as large as other benchmarks take: more to load.
     Result<std::vector<std::string>> buildAnalyticModels() {
         VCP_TRY(folder_.make());
+        VCP_TRY_ASSIGN(const auto meshes, writeAnalyticModels(folder_.path()));
         std::vector<std::string> files;
-        for (const AnalyticModel& model : analyticModels()) {
+        for (const std::filesystem::path& mesh : meshes) {
             BuildOptions build;
-            build.inputs = {folder_.path() / (model.name + ".ply")};
-            build.output = folder_.path() / (model.name + ".vcp");
+            build.inputs = {mesh};
+            build.output = std::filesystem::path(mesh).replace_extension(".vcp");
             build.cell = 0.5 * kAnalyticModelCell;
-            build.progress = [&](const BuildProgress&) { return progress(fmt::format("{}: building", model.name), 0); };
-            VCP_TRY(writePly(model.mesh, build.inputs.front()));
+            const std::string name = mesh.stem().string();
+            build.progress = [&](const BuildProgress&) { return progress(fmt::format("{}: building", name), 0); };
             if (const auto built = buildOctree(build); !built) return built.error();
             files.push_back(build.output.string());
         }

@@ -148,8 +148,7 @@ private:
     }
 
     Result<void> ask(const std::string& what, double fraction) const {
-        if (o_.progress && !o_.progress(what, fraction))
-            return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+        if (o_.progress && !o_.progress(what, fraction)) return Error::cancelled();
         return {};
     }
 
@@ -201,7 +200,9 @@ private:
         }
         const auto keys = readCameras(o_.path);
         if (!keys && keys.error().code == ErrorCode::Io)
-            return Error{ErrorCode::Io, "is neither a path's name nor a file that can be read", o_.path};
+            return Error{.code = ErrorCode::Io,
+                         .message = "is neither a path's name nor a file that can be read",
+                         .file = o_.path};
         if (!keys) return keys.error();
         for (const OrbitCamera& camera : cameraPath(*keys, o_.frames)) cameras_.push_back(camera.current());
         return {};

@@ -41,7 +41,7 @@ public:
             }
             if (update.settled) break;
             if (!progress(1 - double(update.pagesMissing) / std::max(1u, update.pagesWanted)))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+                return Error::cancelled();
             renderer_->waitForPage(std::chrono::milliseconds(20));
         }
         return finish();

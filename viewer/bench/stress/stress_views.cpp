@@ -24,8 +24,7 @@ public:
     Result<StressViews> run(const std::function<bool(const std::string& what, double fraction)>& progress) {
         VCP_TRY(start());
         for (size_t frame = 0; frame < path_.size(); ++frame) {
-            if (!progress("flying together", double(frame) / double(path_.size())))
-                return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            if (!progress("flying together", double(frame) / double(path_.size()))) return Error::cancelled();
             for (size_t view = 0; view < views_.size(); ++view) {
                 VCP_TRY(update(view, frame));
                 if (auto drawn = views_[view]->render(requestOf(view, frame)); !drawn) return drawn.error();
@@ -79,7 +78,7 @@ private:
             loads = result_.loads;
             require(secondsSince(changedAt) < kHopelessSeconds, "several views: they do not settle");
             if (settled || secondsSince(changedAt) >= kHopelessSeconds) break;
-            if (!progress("settling together", 1)) return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            if (!progress("settling together", 1)) return Error::cancelled();
             views_[0]->waitForPage(std::chrono::milliseconds(20));
         }
         result_.settledSeconds = secondsSince(began);
