@@ -100,6 +100,7 @@ private:
         VCP_TRY_ASSIGN(auto error, chooseError(options_, measures_, frame));
         plan_.frame = frame;
         plan_.errorTarget = error;
+        plan_.isExact = options_.error <= 0;
         plan_.pageBytes = memory_.pageBytes;
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());

@@ -42,7 +42,7 @@ struct BuildOptions {
     std::filesystem::path output;
     bool overwrite = false;  ///< also replaces an output that is no dataset (octree/io/output_file.h); never an input
     double cell = 0;         ///< finest cell edge, world units; 0: chosen from the mesh
-    double error = 0;        ///< tolerated distance to the mesh, world units; 0: kDefaultErrorCells cells
+    double error = 0;        ///< tolerated distance to the mesh, world units; 0: the finest level is the mesh
     bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal
     unsigned threads = 0;          ///< 0: one a processor
     uint64_t memoryBytes = 0;      ///< cap on what the build allocates; 0: defaultMemoryBytes()
@@ -54,9 +54,6 @@ struct BuildOptions {
     /// then it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;
 };
-
-/// Default tolerance of the finest level, in its cells.
-inline constexpr double kDefaultErrorCells = 0.08;
 
 struct BuildFigures {
     uint64_t triangles = 0;            ///< triangles read

@@ -19,9 +19,9 @@ namespace vcp {
 
 namespace {
 
-// The default cell makes about this many surface cells a triangle: cells as long as the mesh's edges. On
-// scans finer cells buy no accuracy for their bytes, coarser ones make most leaves hard (docs/surface.md).
-constexpr double kTriangleAreaPerCellArea = 0.42;
+// The default cell holds about ten triangles, and its edge is twice as long as theirs: then most leaves are cells, and
+// a triangle is stored in the fewest bytes (docs/surface.md).
+constexpr double kTriangleAreaPerCellArea = 0.105;
 
 // Extent limit: positions are 31-bit lattice coordinates.
 constexpr double kMaxExtentCells = double(1u << 20) - 4;
@@ -204,9 +204,9 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
 Result<double> chooseError(const BuildOptions& options, const SoupMeasures& measures, const GridFrame& frame) {
     double error = options.error;
     if (options.errorIsRelative) error *= glm::length(measures.boundsMax - measures.boundsMin);
-    if (error <= 0) error = kDefaultErrorCells * frame.cell;
     // Rounding to the lattice is part of the error; below a few steps nothing could be certified.
     const double least = 8 * kLatticeRounding * frame.cell;
+    if (error <= 0) return least;
     if (error < least)
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format(

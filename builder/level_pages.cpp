@@ -13,7 +13,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/page/bin_triangles.h"
-#include "builder/page/page_builder.h"
+#include "builder/page/exact_tree.h"
 #include "builder/page/page_encoder.h"
 
 namespace vcp {
@@ -28,10 +28,14 @@ struct BuiltPage {
 /// Builds a page's bytes; what they were made of is freed before they are coded.
 EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
                           std::span<const uint32_t> triangles) {
+    if (settings.exact) {
+        PageTree tree = buildExactTree(mesh, triangles, mortonDecode(code), settings.grid.log2Cells);
+        return encodePage(tree, mesh);
+    }
     PageGeometry geometry(mesh, triangles, mortonDecode(code), settings.grid.log2Cells);
     const double tolerance = settings.finest ? settings.tolerance - geometry.stray() : settings.tolerance;
     PageTree tree = buildPageTree(geometry, tolerance);
-    return encodePage(tree, geometry, mesh);
+    return encodePage(tree, mesh);
 }
 
 Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
@@ -60,7 +64,8 @@ uint64_t bytesOf(const LatticeMesh& mesh) {
 }
 
 /// Returns the memory to build a page of these triangles.
-uint64_t workOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
+uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
+    if (settings.exact) return exactPageWorkBytes(triangles.size());
     double touched = 0;
     for (const uint32_t k : triangles) {
         glm::dvec3 p[3];
@@ -118,9 +123,10 @@ private:
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
                         PageSpool& spool, const std::function<bool(double)>& progress) {
-    const TriangleBins bins = binTriangles(mesh, settings.grid, first, end);
+    const TriangleBins bins =
+        binTriangles(mesh, settings.grid, settings.exact ? kExactMarginCells : kBinMarginCells, first, end);
     std::vector<uint64_t> work(bins.pages.size());
-    tbb::parallel_for(size_t{0}, work.size(), [&](size_t i) { work[i] = workOf(mesh, bins.of(i)); });
+    tbb::parallel_for(size_t{0}, work.size(), [&](size_t i) { work[i] = workOf(settings, mesh, bins.of(i)); });
     const uint64_t held = bytesOf(mesh) + bins.triangles.size() * sizeof(uint32_t);
     const auto left = [&](uint64_t bytes) { return bytes - std::min(held, bytes); };
     InOrder inOrder(spool);

@@ -16,6 +16,7 @@ struct LevelSettings {
     double cell = 0;       ///< world units
     double tolerance = 0;  ///< in cells, for soft leaves; the finest level's includes the stray
     bool finest = false;
+    bool exact = false;      ///< leaves hold the mesh's triangles, whatever the tolerance
     uint64_t pageBytes = 0;  ///< memory for the mesh and pages under construction
     uint64_t roomBytes = 0;  ///< memory that makeRoom frees besides, for a page that is built alone
     std::function<Result<void>()> makeRoom;

@@ -22,6 +22,7 @@ LevelSettings LevelPlan::settingsOf(int level) const {
     LevelSettings settings;
     settings.grid = gridOf(level);
     settings.finest = level + 1 == levels();
+    settings.exact = settings.finest && isExact;
     settings.cell = std::ldexp(frame.cell, levels() - 1 - level);
     settings.tolerance = settings.finest ? errorTarget / settings.cell : kCoarseErrorCells;
     settings.pageBytes = pageBytes;

@@ -14,6 +14,7 @@ struct LevelPlan {
     GridFrame frame;
     PagePartition finest;    ///< bins of the finest level
     double errorTarget = 0;  ///< tolerance of the finest level, world units
+    bool isExact = true;     ///< whether the finest level has the mesh's triangles
     uint64_t pageBytes = 0;  ///< memory for a bin's mesh and its pages
 
     [[nodiscard]] int levels() const { return int(frame.levels); }

@@ -58,8 +58,9 @@ Result<uint64_t> number(std::string_view option, std::string_view text, uint64_t
         if (factor > 0 && value <= most / factor) value *= factor, ++end;
     }
     if (problem != std::errc() || end != text.data() + text.size() || value < least || value > most)
-        return Error{ErrorCode::Usage, std::string(option) + " wants a whole number from " + std::to_string(least) +
-                                           " to " + std::to_string(most) + ", not '" + std::string(text) + "'"};
+        return Error{.code = ErrorCode::Usage,
+                     .message = std::string(option) + " wants a whole number from " + std::to_string(least) + " to " +
+                                std::to_string(most) + ", not '" + std::string(text) + "'"};
     return value;
 }
 
@@ -68,7 +69,8 @@ Result<Arguments> parse(int argc, char** argv) {
     for (int i = 1; i < argc; ++i) {
         const std::string_view option = argv[i];
         const bool takesValue = option == "--shape" || option == "--triangles" || option == "--seed" || option == "-o";
-        if (takesValue && i + 1 == argc) return Error{ErrorCode::Usage, std::string(option) + " wants a value"};
+        if (takesValue && i + 1 == argc)
+            return Error{.code = ErrorCode::Usage, .message = std::string(option) + " wants a value"};
         arguments.isStatueOnly = arguments.isStatueOnly || option == "--seed" || option == "--colour" ||
                                  option == "--utm" || option == "--parts";
         if (option == "--help" || option == "-h")
@@ -84,21 +86,24 @@ Result<Arguments> parse(int argc, char** argv) {
         else if (option == "--shape") {
             const std::string_view shape = argv[++i];
             if (shape != "statue" && shape != "dog")
-                return Error{ErrorCode::Usage, "--shape is statue or dog, not '" + std::string(shape) + "'"};
+                return Error{.code = ErrorCode::Usage,
+                             .message = "--shape is statue or dog, not '" + std::string(shape) + "'"};
             arguments.isDog = shape == "dog";
         } else if (option == "--triangles") {
             VCP_TRY_ASSIGN(arguments.scan.triangles, number(option, argv[++i], kMinTriangles, kMaxTriangles));
         } else if (option == "--seed") {
             VCP_TRY_ASSIGN(arguments.scan.seed, number(option, argv[++i], 0, UINT64_MAX));
         } else
-            return Error{ErrorCode::Usage, "unknown option '" + std::string(option) + "'; see make_scan --help"};
+            return Error{.code = ErrorCode::Usage,
+                         .message = "unknown option '" + std::string(option) + "'; see make_scan --help"};
     }
     if (!arguments.help && arguments.out.empty())
-        return Error{ErrorCode::Usage, "-o FILE is missing (or -o - for a pipe)"};
+        return Error{.code = ErrorCode::Usage, .message = "-o FILE is missing (or -o - for a pipe)"};
     if (arguments.isDog && arguments.isStatueOnly)
-        return Error{ErrorCode::Usage, "--seed, --colour, --utm and --parts are of the statue"};
+        return Error{.code = ErrorCode::Usage, .message = "--seed, --colour, --utm and --parts are of the statue"};
     if (arguments.isDog && arguments.scan.triangles > kMostDogTriangles)
-        return Error{ErrorCode::Usage, "a dog has at most " + std::to_string(kMostDogTriangles) + " triangles"};
+        return Error{.code = ErrorCode::Usage,
+                     .message = "a dog has at most " + std::to_string(kMostDogTriangles) + " triangles"};
     return arguments;
 }
 
@@ -159,10 +164,10 @@ Result<void> writeStatue(const Arguments& arguments, const Output& output) {
 Result<void> run(const Arguments& arguments) {
     const OutputKind kind = arguments.isDog ? OutputKind::Obj : OutputKind::Ply;
     if (const auto named = outputKindOf(arguments.out); named && *named != kind)
-        return Error{ErrorCode::Usage,
-                     std::string("what is written is ") +
-                         (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") +
-                         ", or be - for a pipe"};
+        return Error{.code = ErrorCode::Usage,
+                     .message = std::string("what is written is ") +
+                                (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") +
+                                ", or be - for a pipe"};
     VCP_TRY_ASSIGN(auto output, Output::open(arguments.out, kind));
     auto result = arguments.isDog
                       ? writeObj(dog(arguments.scan.triangles),

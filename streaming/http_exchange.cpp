@@ -285,7 +285,7 @@ Result<void> HttpConnection::perform(Exchange& exchange, const char* detail) {
             return failure(code == CURLE_OK ? CURLE_PARTIAL_FILE : code, detail, options_);
         }
         if (exchange.epoch != exchange.begunIn || (options_.cancelled && options_.cancelled()))
-            return Error{.code = ErrorCode::Cancelled, .message = "cancelled"};
+            return Error::cancelled();
         curl_off_t sentAfter = 0;
         curl_easy_getinfo(curl_, CURLINFO_PRETRANSFER_TIME_T, &sentAfter);
         if (auto problem = exchange.pace.problem(steadySeconds(), exchange.bytes, sentAfter > 0))

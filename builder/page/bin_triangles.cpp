@@ -9,7 +9,7 @@
 
 namespace vcp {
 
-TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first, uint64_t end) {
+TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, double margin, uint64_t first, uint64_t end) {
     struct Entry {
         uint64_t page;
         uint32_t triangle;
@@ -20,7 +20,7 @@ TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_
         for (size_t k = range.begin(); k < range.end(); ++k) {
             const auto& t = mesh.triangles[k];
             const glm::i32vec3 corner[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
-            grid.forPagesNear(corner, kBinMarginCells, [&](uint64_t page) {
+            grid.forPagesNear(corner, margin, [&](uint64_t page) {
                 if (page >= first && page < end) part.push_back({page, uint32_t(k)});
             });
         }

@@ -10,8 +10,8 @@
 
 namespace vcp {
 
-/// How far around a page, in cells, it needs triangles: its corners' closest points lie within sqrt(3) cells, and are
-/// searched in whole cells around them.
+/// How far around a page, in cells, it needs triangles for closest points: its corners' closest points lie within
+/// sqrt(3) cells, and are searched in whole cells around them.
 inline constexpr double kBinMarginCells = 2.25;
 
 /// The triangles of each page: pages in Morton order, triangles in the mesh's order.
@@ -25,9 +25,10 @@ struct TriangleBins {
     }
 };
 
-/// Bins each triangle to every page from code `first` to before `end` whose cube, widened by the margin, it overlaps.
+/// Bins each triangle to every page from code `first` to before `end` whose cube, widened by `margin` cells, it
+/// overlaps.
 /// Uses the calling arena's threads.
-TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, uint64_t first = 0,
-                          uint64_t end = ~uint64_t{0});
+TriangleBins binTriangles(const LatticeMesh& mesh, const PageGrid& grid, double margin = kBinMarginCells,
+                          uint64_t first = 0, uint64_t end = ~uint64_t{0});
 
 }  // namespace vcp

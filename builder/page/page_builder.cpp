@@ -40,6 +40,11 @@ public:
           mostLeaves_(mostSplitLeaves(geometry.triangleCount())),
           mostRecords_(mostSplitRecords(geometry.triangleCount())) {
         fillOccupancy();
+        tree_.triangles = geometry.numbers();
+        tree_.originLattice = geometry.originLattice();
+        tree_.cells = geometry.cells();
+        tree_.stray = geometry.stray();
+        tree_.occupied = occupancy_.front();
     }
 
     PageTree run() {
@@ -122,14 +127,16 @@ private:
         return first;
     }
 
+    const CornerVector& cornerOf(const NodeBox& box, int i) {
+        return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2));
+    }
+
     std::optional<Certificate> certify(const NodeBox& box, std::span<const uint32_t> around, double tolerance) {
         triangles_.clear();
         pointers_.clear();
         for (const uint32_t k : around) triangles_.push_back(geometry_.triangle(k));
         for (const CertifiedTriangle& t : triangles_) pointers_.push_back(&t);
-        const auto corner = [&](int i) -> const CornerVector& {
-            return geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2));
-        };
+        const auto corner = [&](int i) -> const CornerVector& { return cornerOf(box, i); };
         const Certificate certificate =
             certifyLeaf(box.lowerCells(), box.edgeCells(), pointers_, tolerance, corner, scratch_);
         if (!certificate.soft) return {};
@@ -139,7 +146,9 @@ private:
     void makeSoft(uint32_t index, const Certificate& certificate) {
         tree_.nodes[index].kind = Kind::Soft;
         tree_.nodes[index].index = uint32_t(tree_.soft.size());
-        tree_.soft.push_back({tree_.nodes[index].box, certificate, 0});
+        tree_.soft.push_back({tree_.nodes[index].box, certificate, {}, 0});
+        if (!geometry_.hasColour()) return;
+        for (int i = 0; i < 8; ++i) tree_.soft.back().colours[size_t(i)] = cornerOf(tree_.nodes[index].box, i).colour;
     }
 
     void makeHard(uint32_t index, std::span<const uint32_t> triangles) {
@@ -192,8 +201,7 @@ private:
     bool colourFits(const NodeBox& box, uint32_t firstChild) {
         if (!geometry_.hasColour()) return true;
         uint32_t outer[8];
-        for (int i = 0; i < 8; ++i)
-            outer[i] = geometry_.corner(box.lower + box.edge * glm::ivec3(i & 1, i >> 1 & 1, i >> 2)).colour;
+        for (int i = 0; i < 8; ++i) outer[i] = cornerOf(box, i).colour;
         for (int m = 0; m < 27; ++m) {
             const glm::ivec3 g(m % 3, m / 3 % 3, m / 9);
             if (!cornerOfLeaf(g, firstChild)) continue;

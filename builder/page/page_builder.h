@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -36,7 +37,8 @@ struct TreeNode {
 struct SoftLeaf {
     NodeBox box;
     Certificate certificate;
-    uint32_t wall = 0;  ///< wall code
+    std::array<uint32_t, 8> colours{};  ///< RGBA8 of its corners, where the mesh has colour
+    uint32_t wall = 0;                  ///< wall code
 };
 
 struct HardLeaf {
@@ -49,6 +51,11 @@ struct PageTree {
     std::vector<TreeNode> nodes;
     std::vector<SoftLeaf> soft;
     std::vector<HardLeaf> hard;
+    std::span<const uint32_t> triangles;  ///< the mesh's number of each local one
+    glm::i32vec3 originLattice{0};        ///< lowest corner of the page
+    int cells = 0;                        ///< an edge
+    double stray = 0;                     ///< the largest of the triangles that touch the page, in cells
+    std::vector<uint8_t> occupied;        ///< cells that the mesh touches, x fastest
     /// Returns the largest distance of the rendered surface from this level's mesh, in cells.
     [[nodiscard]] double certifiedError() const;
     /// Returns the triangle records of the hard leaves: a triangle has one in each leaf that it touches.

@@ -85,10 +85,9 @@ void setWalls(PageTree& tree, const LeafMap& map) {
 /// The faces array: leaves in runs along an axis, neighbours sharing the face between them.
 class FacePacker {
 public:
-    FacePacker(const PageTree& tree, const LeafMap& map, PageGeometry& geometry, bool withColour)
+    FacePacker(const PageTree& tree, const LeafMap& map, bool withColour)
         : tree_(tree),
           map_(map),
-          geometry_(geometry),
           withColour_(withColour),
           first_(tree.soft.size(), kUnset),
           axis_(tree.soft.size(), 0) {
@@ -147,11 +146,7 @@ private:
             const int corner = cornerOfFace(axis, end, c);
             const uint32_t code = leaf.certificate.codes[corner];
             face[c] = link.flip ? flipSide(code) : code;
-            if (withColour_)
-                colour[c] =
-                    geometry_
-                        .corner(leaf.box.lower + leaf.box.edge * glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2))
-                        .colour;
+            colour[c] = leaf.colours[size_t(corner)];
         }
         faces.push_back(face);
         if (withColour_) colours.push_back(colour);
@@ -159,26 +154,25 @@ private:
 
     const PageTree& tree_;
     const LeafMap& map_;
-    PageGeometry& geometry_;
     bool withColour_;
     std::vector<uint32_t> first_, axis_;
 };
 
 /// Marks the cells of the page that hold a part of the mesh.
-Clearance clearanceOf(const PageGeometry& geometry) {
-    const int n = geometry.cells();
+Clearance clearanceOf(const PageTree& tree) {
+    const int n = tree.cells;
     Clearance clearance(n);
     for (int z = 0; z < n; ++z)
         for (int y = 0; y < n; ++y)
             for (int x = 0; x < n; ++x)
-                if (geometry.occupied({x, y, z})) clearance.occupy({x, y, z}, 1);
+                if (tree.occupied[size_t(x + n * (y + n * z))] != 0) clearance.occupy({x, y, z}, 1);
     return clearance;
 }
 
 /// Packs triangle records and vertices of the hard leaves.
 class TrianglePacker {
 public:
-    TrianglePacker(const PageGeometry& geometry, const LatticeMesh& mesh) : geometry_(geometry), mesh_(mesh) {}
+    TrianglePacker(const PageTree& tree, const LatticeMesh& mesh) : tree_(tree), mesh_(mesh) {}
 
     /// Appends a leaf's triangles; returns its node word.
     uint32_t add(const HardLeaf& leaf) {
@@ -187,7 +181,7 @@ public:
         const bool isLong = count >= kHardCountLong;
         if (isLong) records.emplace_back(uint32_t(count), 0u);
         for (const uint32_t k : leaf.triangles) {
-            const auto& v = geometry_.vertices(k);
+            const auto& v = mesh_.triangles[tree_.triangles[k]];
             records.push_back(pack21(vertex(v[0]), vertex(v[1]), vertex(v[2])));
         }
         return kNodeHard << kNodeTypeShift | (isLong ? kHardCountLong : uint32_t(count)) << kHardCountShift | first;
@@ -200,7 +194,7 @@ private:
     uint32_t vertex(uint32_t global) {
         const auto [entry, isNew] = local_.try_emplace(global, uint32_t(vertices.size()));
         if (isNew) {
-            const glm::i32vec3 p = mesh_.positions[global] - geometry_.originLattice() + kLatticeBias;
+            const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
             vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
             normals.push_back(mesh_.normals[global]);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
@@ -208,7 +202,7 @@ private:
         return entry->second;
     }
 
-    const PageGeometry& geometry_;
+    const PageTree& tree_;
     const LatticeMesh& mesh_;
     std::unordered_map<uint32_t, uint32_t> local_;
 };
@@ -260,27 +254,25 @@ void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>
 
 /// Returns all that separates the page's surface from the mesh, in cells: certified leaves, the level's stray, the
 /// slack of hard leaves' triangles (1e-4 cells).
-double pageError(const PageTree& tree, const PageGeometry& geometry) {
-    return std::max(tree.certifiedError(), 2e-4) + geometry.stray();
-}
+double pageError(const PageTree& tree) { return std::max(tree.certifiedError(), 2e-4) + tree.stray; }
 
 }  // namespace
 
-EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh& mesh) {
+EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh) {
     const LeafMap map(tree.soft);
     setWalls(tree, map);
     const bool withColour = !mesh.colours.empty();
-    const FacePacker faces(tree, map, geometry, withColour);
-    TrianglePacker triangles(geometry, mesh);
-    Clearance clearance = clearanceOf(geometry);
+    const FacePacker faces(tree, map, withColour);
+    TrianglePacker triangles(tree, mesh);
+    Clearance clearance = clearanceOf(tree);
     const NodePacker nodes(tree, faces, triangles, clearance);
 
     EncodedPage page;
-    page.certifiedError = pageError(tree, geometry);
+    page.certifiedError = pageError(tree);
     page.hardLeaves = uint32_t(tree.hard.size());
     page.leaves = uint32_t(tree.soft.size()) + page.hardLeaves;
     PageHeader header;
-    header.log2Cells = uint32_t(std::countr_zero(unsigned(geometry.cells())));
+    header.log2Cells = uint32_t(std::countr_zero(unsigned(tree.cells)));
     header.root = nodes.root;
     header.groups = uint32_t(nodes.words.size() / 8);
     header.faces = uint32_t(faces.faces.size());

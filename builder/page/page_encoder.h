@@ -19,6 +19,6 @@ struct EncodedPage {
 };
 
 /// Encodes a page; sets the leaves' wall codes in `tree`.
-EncodedPage encodePage(PageTree& tree, PageGeometry& geometry, const LatticeMesh& mesh);
+EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh);
 
 }  // namespace vcp

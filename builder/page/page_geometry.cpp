@@ -53,7 +53,10 @@ private:
 
 PageGeometry::PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
                            uint32_t log2Cells)
-    : mesh_(mesh), cells_(1 << log2Cells), origin_(glm::i32vec3(page) * (kLatticePerCell << log2Cells)) {
+    : mesh_(mesh),
+      numbers_(triangles),
+      cells_(1 << log2Cells),
+      origin_(glm::i32vec3(page) * (kLatticePerCell << log2Cells)) {
     loadTriangles(triangles);
     markBadEdges();
     fillCells(triangles);

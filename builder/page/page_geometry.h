@@ -74,6 +74,8 @@ public:
     const CornerVector& corner(glm::ivec3 subcells);
 
     [[nodiscard]] bool hasColour() const { return !mesh_.colours.empty(); }
+    /// The mesh's numbers of the local triangles.
+    [[nodiscard]] std::span<const uint32_t> numbers() const { return numbers_; }
     [[nodiscard]] size_t triangleCount() const { return triangles_.size(); }
     [[nodiscard]] CertifiedTriangle triangle(uint32_t local) const {
         const Triangle& t = triangles_[local];
@@ -112,6 +114,7 @@ private:
     static constexpr int kBorder = 2;  ///< cells around the page that are searched for closest points
 
     const LatticeMesh& mesh_;
+    std::span<const uint32_t> numbers_;
     int cells_;
     glm::i32vec3 origin_;
     double stray_ = 0;

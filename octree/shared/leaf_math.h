@@ -265,6 +265,34 @@ INLINE Real firstCrossing(RayField ray, Real wallIn, Real wallOut, Real dip, int
     return a + (b - a) * (fa / (fa - fb));
 }
 
+// The planes between which a line s d is on the inner side of an edge, for the edge from p along e: x, y the least and
+// the largest s. `inward`: at right angles to the edge, in the triangle's plane.
+INLINE Real2 withinEdge(Real3 d, Real3 p, Real3 inward) {
+    Real rise = dot(d, inward), s = dot(p, inward) / rise;
+    return Real2(rise > Real(0.0) ? s : Real(-1e30), rise < Real(0.0) ? s : Real(1e30));
+}
+
+// Finds where a line s d that runs nearly in the plane of a triangle meets it: the line is cut by the triangle's edges
+// as seen from above, and of what is left the point nearest to the plane counts, where that is within `limit`. The
+// weights of the corners say nothing there. The result is that of intersectTriangle.
+INLINE Real3 intersectEdgeOn(Real3 d, Real3 va, Real3 vb, Real3 vc, Real limit) {
+    Real3 n = cross(vb - va, vc - va);
+    Real3 inA = cross(n, vc - vb), inB = cross(n, va - vc), inC = cross(n, vb - va);
+    Real2 alongA = withinEdge(d, vb, inA), alongB = withinEdge(d, vc, inB), alongC = withinEdge(d, va, inC);
+    Real first = max(alongA.x, max(alongB.x, alongC.x)), last = min(alongA.y, min(alongB.y, alongC.y));
+    Real nd = dot(n, d), height = dot(va, n);
+    // The two ends may have changed places by rounding, where the line passes a corner.
+    Real s = min(max(height / nd, min(first, last)), max(first, last));
+    Real above = height - s * nd;
+    Real3 x = d * s;
+    Real wa = max(dot(x - vb, inA), Real(0.0)), wb = max(dot(x - vc, inB), Real(0.0));
+    Real wc = max(dot(x - va, inC), Real(0.0));
+    Real scale = Real(1.0) / (wa + wb + wc);
+    Real3 off = (va * wa + vb * wb + vc * wc) * scale - x;
+    bool near = above * above <= limit * limit * dot(n, n) && dot(off, off) <= limit * limit;
+    return near ? Real3(s, wb * scale, wc * scale) : Real3(Real(1e30), Real(0.0), Real(0.0));
+}
+
 // Finds where the line q + s d (|d| about 1) meets triangle a b c, in page space: x = s, y and z the weights of
 // b and c; x = 1e30 where it does not. Vertices are taken relative to q, edges are widened by
 // `slack` cells, so that no ray slips between triangles that share an edge or an edge's point.
@@ -274,10 +302,11 @@ INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real
     Real3 n = cross(ab, c - a);
     Real nd = dot(n, d);
     Real flip = nd < Real(0.0) ? Real(-1.0) : Real(1.0);
-    // The signed volumes of d with each edge; all have the sign of nd inside.
-    Real wa = flip * dot(d, cross(vb, vc));
-    Real wb = flip * dot(d, cross(vc, va));
-    Real wc = flip * dot(d, cross(va, vb));
+    // The signed volumes of d with each edge; all have the sign of nd inside. By edges, not by corners, the rounding of
+    // a short edge's is small as the edge is, though the other corner is far.
+    Real wa = flip * dot(d, cross(vb, bc));
+    Real wb = flip * dot(d, cross(vc, ca));
+    Real wc = flip * dot(d, cross(va, ab));
     Real3 miss = Real3(Real(1e30), Real(0.0), Real(0.0));
     // Tests wa < -slack |bc| and its like, without roots.
     Real slack2 = slack * slack;
@@ -299,6 +328,6 @@ INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real
     Real s = dot(at, d);
     Real3 off = at - d * s;
     Real limit = (outside ? Real(4.0) : Real(40.0)) * slack;
-    if (dot(off, off) > limit * limit) return miss;
-    return Real3(s, wb * scale, wc * scale);
+    if (dot(off, off) <= limit * limit) return Real3(s, wb * scale, wc * scale);
+    return outside ? miss : intersectEdgeOn(d, va, vb, vc, Real(40.0) * slack);
 }

@@ -21,7 +21,7 @@ std::vector<std::string> dialectViolations(const std::string& text) {
     static const std::regex declared("^\\s*(?:const )?auto (\\w+) = .*;$");
     static const std::regex handedOn("^\\s*if \\(!(\\w+)\\) return (\\w+)\\.error\\(\\);$");
     static const std::regex unnamed("\\bError\\{\\s*[^\\s.}]");
-    static const std::regex cancelled("\\bError\\{\\.code = ErrorCode::Cancelled");
+    static const std::regex cancelled("\\bError\\{\\.code = ErrorCode::Cancelled, \\.message = \"cancelled\"\\}");
     std::vector<std::string> found;
     std::istringstream lines(text);
     std::string line, before;

@@ -18,6 +18,7 @@ protected:
         BuildOptions options;
         options.inputs = {*folder_ / "ball.ply"};
         options.output = *folder_ / "ball.vcp";
+        options.cell = 0.05;  // several pages
         const auto report = buildOctree(options);
         ASSERT_TRUE(report) << report.error().line();
     }

@@ -30,11 +30,9 @@ void addError(CLI::App& app, BuildOptions& options) {
         options.errorIsRelative = length->isRelative;
         return true;
     };
-    app.add_option(
-           "--error", take,
-           fmt::format("Tolerated distance to the mesh: world units, or a part of the bounding box's diagonal like "
-                       "0.01% [{:g} cells]",
-                       kDefaultErrorCells))
+    app.add_option("--error", take,
+                   "Tolerated distance to the mesh, for a file with fewer triangles in it: world units, or a part of "
+                   "the bounding box's diagonal like 0.01% [none: the finest level is the mesh]")
         ->type_name("LENGTH");
 }
 

@@ -397,7 +397,7 @@ typedef struct vcp_build_options {
     const char* output;        /* OUT.vcp: whole or absent */
     const char* temp_folder;   /* NULL: beside the output */
     double cell;               /* finest cell edge; 0: chosen from the mesh */
-    double error;              /* tolerated distance to the mesh; 0: 0.08 cells */
+    double error;              /* tolerated distance to the mesh; 0: the finest level is the mesh */
     uint64_t memory_bytes;     /* cap; 0: a part of what the machine has */
     uint32_t threads;          /* 0: one a processor */
     uint32_t resume;           /* 1: goes on where an interrupted build of the same output was */

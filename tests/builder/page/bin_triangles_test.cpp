@@ -85,7 +85,7 @@ TEST(BinTriangles, ARunOfPages) {
     const TriangleBins all = binTriangles(mesh, grid);
     for (const auto& [first, end] :
          {std::pair<uint64_t, uint64_t>{0, 100}, {100, 101}, {77, 400}, {400, 512}, {5, 5}}) {
-        const TriangleBins run = binTriangles(mesh, grid, first, end);
+        const TriangleBins run = binTriangles(mesh, grid, kBinMarginCells, first, end);
         std::vector<uint64_t> expected;
         for (const uint64_t page : all.pages)
             if (page >= first && page < end) expected.push_back(page);

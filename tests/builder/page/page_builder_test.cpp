@@ -307,7 +307,7 @@ TEST(PageBuilder, MixedMeshes) {
             soft += tree.soft.size();
             hard += tree.hard.size();
 
-            const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
+            const EncodedPage encoded = encodePage(tree, page.mesh);
             ASSERT_EQ(encoded.leaves, tree.soft.size() + tree.hard.size());
             std::vector<uint4> block(encoded.geometry.size() / 16);
             std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
@@ -344,7 +344,7 @@ TEST(PageEncoder, LeavesComeBack) {
         page.mesh.colours.resize(page.mesh.positions.size());
         for (size_t v = 0; v < page.mesh.colours.size(); ++v) page.mesh.colours[v] = uint32_t(v * 2654435761u);
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
-        const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
+        const EncodedPage encoded = encodePage(tree, page.mesh);
         std::vector<uint4> block(encoded.geometry.size() / 16), colour(encoded.colour.size() / 16);
         std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
         std::memcpy(colour.data(), encoded.colour.data(), encoded.colour.size());
@@ -396,7 +396,7 @@ TEST(PageBuilder, PagesAreStoredCoded) {
     for (const auto& [mesh, factor] : scenes) {
         Page page(test::onLattice(mesh), {0, 0, 0});
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
-        const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
+        const EncodedPage encoded = encodePage(tree, page.mesh);
         ASSERT_GT(encoded.leaves, 100u);
         std::vector<uint4> block(encoded.geometry.size() / 16);
         std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
@@ -440,7 +440,7 @@ TEST(PageBuilder, EmptyPage) {
     PageTree tree = buildPageTree(*page.geometry, kTolerance);
     EXPECT_EQ(tree.nodes.size(), 1u);
     EXPECT_EQ(tree.nodes[0].kind, TreeNode::Kind::Empty);
-    EXPECT_EQ(encodePage(tree, *page.geometry, page.mesh).leaves, 0u);
+    EXPECT_EQ(encodePage(tree, page.mesh).leaves, 0u);
 }
 
 TEST(PageBuilder, FlatWallCostsFewLeaves) {
@@ -479,7 +479,7 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
     // A needle crosses about 17 cells, and 5 leaves in each where they were split; without a stop it would be 500.
     EXPECT_LT(records, 120u * kNeedles);
     EXPECT_EQ(centre, kNeedles) << "the leaf with the centre has all of them: the long form";
-    const EncodedPage encoded = encodePage(tree, *page.geometry, page.mesh);
+    const EncodedPage encoded = encodePage(tree, page.mesh);
     std::vector<uint4> block(encoded.geometry.size() / 16);
     std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
     const auto view = parsePage(std::as_bytes(std::span(block)));
@@ -510,7 +510,7 @@ TEST(PageBuilder, IsDeterministic) {
     const LatticeMesh mesh = mixedMesh(4);
     Page a(mesh, {0, 1, 0}), b(mesh, {0, 1, 0});
     PageTree ta = buildPageTree(*a.geometry, kTolerance), tb = buildPageTree(*b.geometry, kTolerance);
-    EXPECT_EQ(encodePage(ta, *a.geometry, a.mesh).geometry, encodePage(tb, *b.geometry, b.mesh).geometry);
+    EXPECT_EQ(encodePage(ta, a.mesh).geometry, encodePage(tb, b.mesh).geometry);
 }
 
 }  // namespace

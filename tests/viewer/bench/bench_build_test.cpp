@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "builder/lattice/lattice_mesh.h"
 #include "tests/support/vcp_program.h"
 
 namespace vcp {
@@ -85,7 +86,7 @@ TEST_F(BenchBuild, ARowForEveryToleranceOverTheSameCells) {
     ASSERT_EQ(ran.status, 0) << ran.err;
     const Json rows = Json::parse(ran.out)["rows"];
     ASSERT_EQ(rows.size(), 3u);
-    const double tolerances[] = {0.08, 0.02, 0.5};
+    const double tolerances[] = {8 * kLatticeRounding, 0.02, 0.5};
     for (size_t i = 0; i < 3; ++i) {
         SCOPED_TRACE(i);
         expectRow(rows[i]);

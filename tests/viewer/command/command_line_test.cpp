@@ -35,11 +35,11 @@ protected:
 
     static fs::path ball() { return *folder_ / "ball.ply"; }
 
-    /// The ball's dataset, built once.
+    /// The ball's dataset, built once, with several pages.
     static fs::path dataset() {
         const fs::path file = *folder_ / "ball.vcp";
         if (!fs::exists(file)) {
-            const Ran ran = run({"build", ball().string(), "-o", file.string()});
+            const Ran ran = run({"build", ball().string(), "-o", file.string(), "--cell", "0.05"});
             EXPECT_EQ(ran.status, 0) << ran.err;
         }
         return file;

@@ -1,0 +1,34 @@
+// Builds the octree of a page whose leaves hold the mesh's own triangles: the finest level's.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "builder/lattice/lattice_mesh.h"
+#include "builder/page/page_builder.h"
+
+namespace vcp {
+
+/// A leaf is split while it has more triangles than this, down to kMaxSubcellDepth halvings of a cell.
+inline constexpr size_t kExactLeafTriangles = 16;
+/// A larger leaf, in cells, is split while it has more than kWideLeafTriangles: rays skip what is empty.
+inline constexpr int kWideLeafCells = 8;
+inline constexpr size_t kWideLeafTriangles = 4;
+/// No leaf is split where a triangle would be named more often than this: so a page's leaves name at most so many times
+/// its triangles, however they lie.
+inline constexpr double kMostRepetition = 12;
+
+/// How far around a page it needs triangles, in cells: those that only touch it count, and a step of the lattice is
+/// room for rounding.
+inline constexpr double kExactMarginCells = 1.0 / kLatticePerCell;
+
+/// Builds a page's octree. Each leaf names all triangles that touch its closed box, by tests in integers. `triangles`:
+/// numbers in `mesh`, ascending, among them all that touch the page at `page` (Morton position, in pages of 2^log2Cells
+/// cells); they must outlive the tree.
+PageTree buildExactTree(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                        uint32_t log2Cells);
+
+/// Returns the bytes that a page of so many triangles needs while it is built and coded.
+constexpr uint64_t exactPageWorkBytes(uint64_t triangles) { return (6 << 20) + 500 * triangles; }
+
+}  // namespace vcp

@@ -1,0 +1,175 @@
+// The finest level's pages: each leaf names just the triangles that touch it, and none of them too often.
+#include "builder/page/exact_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "builder/page/bin_triangles.h"
+#include "builder/page/page_encoder.h"
+#include "octree/page/page.h"
+#include "octree/surface/leaf_triangles.h"
+#include "octree/vcp_writer.h"
+#include "tests/support/lattice_meshes.h"
+#include "tests/support/test_meshes.h"
+
+namespace vcp {
+namespace {
+
+constexpr uint32_t kLog2Cells = 5;
+constexpr int kSteps = kLatticePerCell / kSubcells;
+
+struct Page {
+    LatticeMesh mesh;
+    std::vector<uint32_t> numbers;  ///< all triangles of the mesh
+    glm::u32vec3 at;
+
+    Page(const IndexedMesh& m, glm::u32vec3 position) : mesh(test::onLattice(m)), at(position) {
+        numbers.resize(mesh.triangles.size());
+        std::iota(numbers.begin(), numbers.end(), 0u);
+    }
+    [[nodiscard]] PageTree tree() const { return buildExactTree(mesh, numbers, at, kLog2Cells); }
+    [[nodiscard]] std::array<glm::i32vec3, 3> corners(uint32_t k, const PageTree& tree) const {
+        std::array<glm::i32vec3, 3> t;
+        for (size_t i = 0; i < 3; ++i) t[i] = mesh.positions[mesh.triangles[k][i]] - tree.originLattice;
+        return t;
+    }
+    /// Whether a triangle touches a closed cube, lattice steps.
+    [[nodiscard]] bool touches(uint32_t k, const PageTree& tree, glm::i32vec3 lower, int edge) const {
+        const auto t = corners(k, tree);
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto [low, high] = std::minmax({t[0][axis], t[1][axis], t[2][axis]});
+            if (high < lower[axis] || low > lower[axis] + edge) return false;
+        }
+        return CubeTest(t).touches(lower, edge);
+    }
+};
+
+/// Checks a tree against all triangles of the mesh. Returns the largest leaf's number of triangles.
+size_t expectSound(const Page& page, const PageTree& tree) {
+    size_t most = 0, hard = 0;
+    for (const TreeNode& n : tree.nodes) {
+        if (n.kind == TreeNode::Kind::Internal) continue;
+        std::vector<uint32_t> expected;
+        for (uint32_t k = 0; k < page.numbers.size(); ++k)
+            if (page.touches(k, tree, n.box.lower * kSteps, n.box.edge * kSteps)) expected.push_back(k);
+        std::vector<uint32_t> named;
+        if (n.kind == TreeNode::Kind::Hard)
+            for (const uint32_t local : tree.hard[n.index].triangles) named.push_back(tree.triangles[local]);
+        EXPECT_EQ(named, expected) << "leaf at " << n.box.lower.x << ' ' << n.box.lower.y << ' ' << n.box.lower.z;
+        hard += n.kind == TreeNode::Kind::Hard;
+        most = std::max(most, named.size());
+    }
+    EXPECT_EQ(hard, tree.hard.size());
+    EXPECT_TRUE(tree.soft.empty());
+    EXPECT_LE(double(tree.records()), kMostRepetition * double(page.numbers.size()) + 1);
+    return most;
+}
+
+/// Checks that the tree's bytes are read back as they are.
+void expectStored(const Page& page, PageTree& tree) {
+    const EncodedPage encoded = encodePage(tree, page.mesh);
+    std::vector<uint4> block(encoded.geometry.size() / 16);
+    std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
+    const auto view = parsePage(std::as_bytes(std::span(block)));
+    ASSERT_TRUE(view.ok()) << view.error().line();
+    EXPECT_EQ(view->header.hardLeaves, tree.hard.size());
+    const StoredPage stored = compressPage(std::as_bytes(std::span(block)), {});
+    EXPECT_EQ(stored.geometry[0], std::byte{1}) << "coded";
+}
+
+/// A bumpy torus through eight pages.
+IndexedMesh bumpyTorus() {
+    IndexedMesh mesh = test::torusMesh({30, 31, 32}, 16, 6, 160, 70);
+    for (glm::dvec3& p : mesh.positions) p += 0.2 * glm::dvec3(std::sin(9 * p.x), std::cos(7 * p.y), std::sin(8 * p.z));
+    return mesh;
+}
+
+TEST(ExactTree, LeavesNameWhatTouchesThem) {
+    for (const glm::u32vec3 at : {glm::u32vec3(0), glm::u32vec3(1, 0, 0), glm::u32vec3(1, 1, 1)}) {
+        const Page page(bumpyTorus(), at);
+        PageTree tree = page.tree();
+        EXPECT_LE(expectSound(page, tree), kExactLeafTriangles);
+        EXPECT_GT(tree.hard.size(), 100u);
+        expectStored(page, tree);
+    }
+}
+
+TEST(ExactTree, MarksTheCellsThatAreTouched) {
+    IndexedMesh mesh = bumpyTorus();
+    test::append(mesh, test::boxMesh({3, 3, 3}, {25, 9, 12}, 2));
+    const Page page(mesh, {0, 0, 0});
+    const PageTree tree = page.tree();
+    const int n = tree.cells;
+    for (int z = 0; z < n; ++z)
+        for (int y = 0; y < n; ++y)
+            for (int x = 0; x < n; ++x) {
+                bool touched = false;
+                for (uint32_t k = 0; k < page.numbers.size() && !touched; ++k)
+                    touched = page.touches(k, tree, glm::i32vec3(x, y, z) * kLatticePerCell, kLatticePerCell);
+                ASSERT_EQ(tree.occupied[size_t(x + n * (y + n * z))] != 0, touched) << x << ' ' << y << ' ' << z;
+            }
+}
+
+TEST(ExactTree, WallsOfLargeTrianglesHaveLargeLeaves) {
+    const Page page(test::boxMesh({3, 3, 3}, {29, 29, 29}, 1), {0, 0, 0});
+    PageTree tree = page.tree();
+    EXPECT_LE(expectSound(page, tree), kExactLeafTriangles);
+    EXPECT_LE(tree.hard.size(), 64u);
+    expectStored(page, tree);
+}
+
+TEST(ExactTree, SoupsOfNeedlesAreNotRepeatedForEver) {
+    for (const bool adversarial : {false, true}) {
+        IndexedMesh mesh = test::randomTriangles(400, 7, adversarial);
+        for (glm::dvec3& p : mesh.positions) p = glm::dvec3(1) + p * 30.0;
+        const Page page(mesh, {0, 0, 0});
+        PageTree tree = page.tree();
+        expectSound(page, tree);
+        expectStored(page, tree);
+    }
+}
+
+TEST(ExactTree, FansAndCrowdsEndAtTheSmallestLeaf) {
+    IndexedMesh fan;
+    constexpr uint32_t kNeedles = 6000;  // more than are prepared at once
+    fan.positions.push_back({16.3, 16.4, 16.2});
+    for (uint32_t i = 0; i < kNeedles; ++i) {
+        const double a = test::kTwoPi * i / kNeedles;
+        fan.positions.push_back(fan.positions[0] + 12.0 * glm::dvec3(std::cos(a), std::sin(a), 0.4 * std::sin(20 * a)));
+    }
+    for (uint32_t i = 0; i < kNeedles; ++i) fan.triangles.push_back({0, 1 + i, 1 + (i + 1) % kNeedles});
+    IndexedMesh crowd = test::randomTriangles(9000, 3, false);
+    for (glm::dvec3& p : crowd.positions) p = glm::dvec3(10.01) + p * 0.05;
+    for (const IndexedMesh& mesh : {fan, crowd}) {
+        const Page page(mesh, {0, 0, 0});
+        PageTree tree = page.tree();
+        EXPECT_GT(expectSound(page, tree), kExactLeafTriangles);
+        expectStored(page, tree);
+    }
+}
+
+TEST(ExactTree, APageWithoutTrianglesIsEmpty) {
+    const Page page(test::sphereMesh({12, 12, 12}, 6, 12), {1, 1, 1});
+    PageTree tree = page.tree();
+    ASSERT_EQ(tree.nodes.size(), 1u);
+    EXPECT_EQ(tree.nodes[0].kind, TreeNode::Kind::Empty);
+    EXPECT_EQ(encodePage(tree, page.mesh).leaves, 0u);
+}
+
+TEST(ExactTree, TrianglesAroundThePageChangeNothing) {
+    const IndexedMesh mesh = bumpyTorus();
+    const Page page(mesh, {0, 0, 0});
+    const TriangleBins bins = binTriangles(page.mesh, {kLog2Cells, 1}, kExactMarginCells, 0, 1);
+    ASSERT_EQ(bins.pages.size(), 1u);
+    ASSERT_LT(bins.triangles.size(), page.numbers.size());
+    PageTree few = buildExactTree(page.mesh, bins.of(0), page.at, kLog2Cells), all = page.tree();
+    EXPECT_EQ(encodePage(few, page.mesh).geometry, encodePage(all, page.mesh).geometry);
+}
+
+}  // namespace
+}  // namespace vcp
