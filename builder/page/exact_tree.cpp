@@ -15,8 +15,8 @@ namespace {
 
 constexpr int kSubcellSteps = kLatticePerCell / kSubcells;
 
-// A list this short gets a prepared test for each of its triangles; longer ones are dealt by bounding boxes first, so
-// that a crowded page needs little memory.
+// A list this short keeps a prepared test for each of its triangles, until its leaves are made; longer ones make each
+// test anew, so that a crowded page needs little memory.
 constexpr size_t kMostPrepared = 4096;
 
 // Pages have at most 2^7 cells an edge.
@@ -36,8 +36,9 @@ uint32_t octantsOf(const Bounds& b, glm::i32vec3 middle) {
 
 class ExactTreeBuilder {
 public:
-    ExactTreeBuilder(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::i32vec3 origin, int cells)
-        : mesh_(mesh), numbers_(triangles), origin_(origin) {
+    ExactTreeBuilder(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::i32vec3 origin, int cells,
+                     size_t mostRecords)
+        : mesh_(mesh), numbers_(triangles), origin_(origin), mostRecords_(mostRecords) {
         tree_.triangles = triangles;
         tree_.originLattice = origin;
         tree_.cells = cells;
@@ -58,6 +59,9 @@ public:
             if (within || CubeTest(t).touches(glm::i32vec3(0), edge)) inside.push_back(k);
         }
         for (const uint32_t k : inside) tree_.stray = std::max(tree_.stray, double(mesh_.stray[numbers_[k]]));
+        // Long leaves have a record more than triangles.
+        const double room = double(mostRecords_) * kHardCountLong / (kHardCountLong + 1);
+        mostRepetition_ = std::min(kMostRepetition, room / double(std::max<size_t>(inside.size(), 1)));
         tree_.nodes.emplace_back();
         build(0, whole, std::move(inside), 1);
         return std::move(tree_);
@@ -70,32 +74,43 @@ private:
     }
     static glm::i32vec3 lowerSteps(const NodeBox& box) { return box.lower * kSubcellSteps; }
 
-    /// Fills node `index`. `list`: local numbers, ascending, among them all that touch the box. `repetition`: how often
-    /// the page's triangles are named if all boxes are split as those above this one.
+    /// Fills node `index`. `list`: local numbers, ascending, of those that touch the box. `repetition`: how often the
+    /// page's triangles are named if all boxes are split as those above this one.
     void build(uint32_t index, const NodeBox& box, std::vector<uint32_t> list, double repetition) {
         tree_.nodes[index].box = box;
         if (list.size() <= kMostPrepared) return prepare(index, box, list, repetition);
         if (box.edge == 1) return makeCrowded(index, box, std::move(list));
         std::array<std::vector<uint32_t>, 8> children;
-        const glm::i32vec3 middle = lowerSteps(box) + box.edge / 2 * kSubcellSteps;
-        for (const uint32_t k : list)
-            for (uint32_t octants = octantsOf(bounds_[k], middle); octants != 0; octants &= octants - 1)
-                children[size_t(std::countr_zero(octants))].push_back(k);
+        for (const uint32_t k : list) {
+            CubeTest test(cornersOf(k));
+            deal(box, test, bounds_[k], k, children);
+        }
         size_t together = 0;
         for (const auto& child : children) together += child.size();
         const double above = repetition * double(together) / double(list.size());
-        if (above > kMostRepetition) return makeCrowded(index, box, std::move(list));
+        if (above > mostRepetition_) return makeCrowded(index, box, std::move(list));
         std::vector<uint32_t>().swap(list);
         const uint32_t first = addChildren(index);
         for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(int(i)), std::move(children[i]), above);
     }
 
+    /// Names a triangle that touches a box in the lists of the children that it touches.
+    template <class Number>
+    static void deal(const NodeBox& box, CubeTest& test, const Bounds& bounds, Number number,
+                     std::array<std::vector<Number>, 8>& children) {
+        const int half = box.edge * kSubcellSteps / 2;
+        const glm::i32vec3 lower = lowerSteps(box);
+        uint32_t octants = octantsOf(bounds, lower + half);
+        if (std::has_single_bit(octants)) return children[size_t(std::countr_zero(octants))].push_back(number);
+        for (; octants != 0; octants &= octants - 1) {
+            const int o = std::countr_zero(octants);
+            if (test.touches(lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), half))
+                children[size_t(o)].push_back(number);
+        }
+    }
+
     /// Makes a leaf of a list that is too long to prepare.
     void makeCrowded(uint32_t index, const NodeBox& box, std::vector<uint32_t> list) {
-        std::erase_if(list, [&](uint32_t k) {
-            return !CubeTest(cornersOf(k)).touches(lowerSteps(box), box.edge * kSubcellSteps);
-        });
-        if (list.empty()) return;
         tree_.nodes[index].kind = TreeNode::Kind::Hard;
         tree_.nodes[index].index = uint32_t(tree_.hard.size());
         const glm::ivec3 first = box.lower / kSubcells, last = (box.lower + box.edge - 1) / kSubcells;
@@ -108,15 +123,9 @@ private:
     /// Builds the tree below a node, with a test for each of its triangles. Short lists name tests.
     void prepare(uint32_t index, const NodeBox& box, const std::vector<uint32_t>& list, double repetition) {
         tests_.clear();
-        local_.clear();
-        for (const uint32_t k : list) {
-            const auto t = cornersOf(k);
-            CubeTest test(t);
-            if (!test.touches(lowerSteps(box), box.edge * kSubcellSteps)) continue;
-            tests_.push_back({test, bounds_[k]});
-            local_.push_back(k);
-        }
-        std::vector<uint16_t> all(local_.size());
+        for (const uint32_t k : list) tests_.push_back({CubeTest(cornersOf(k)), bounds_[k]});
+        local_ = list;
+        std::vector<uint16_t> all(list.size());
         for (size_t i = 0; i < all.size(); ++i) all[i] = uint16_t(i);
         split(index, box, all, repetition, 0);
     }
@@ -131,7 +140,7 @@ private:
         size_t together = 0;
         for (const auto& child : lists_[depth]) together += child.size();
         const double below = repetition * double(together) / double(list.size());
-        if (below > kMostRepetition) return makeLeaf(index, box, list, depth);
+        if (below > mostRepetition_) return makeLeaf(index, box, list, depth);
         const uint32_t first = addChildren(index);
         for (uint32_t i = 0; i < 8; ++i) split(first + i, box.child(int(i)), lists_[depth][i], below, depth + 1);
     }
@@ -140,20 +149,7 @@ private:
     void deal(const NodeBox& box, const std::vector<uint16_t>& list, size_t depth) {
         auto& children = lists_[depth];
         for (auto& child : children) child.clear();
-        const int half = box.edge * kSubcellSteps / 2;
-        const glm::i32vec3 lower = lowerSteps(box), middle = lower + half;
-        for (const uint16_t i : list) {
-            uint32_t octants = octantsOf(tests_[i].bounds, middle);
-            if (std::has_single_bit(octants)) {
-                children[size_t(std::countr_zero(octants))].push_back(i);
-                continue;
-            }
-            for (; octants != 0; octants &= octants - 1) {
-                const int o = std::countr_zero(octants);
-                if (tests_[i].test.touches(lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), half))
-                    children[size_t(o)].push_back(i);
-            }
-        }
+        for (const uint16_t i : list) deal(box, tests_[i].test, tests_[i].bounds, i, children);
     }
 
     void makeLeaf(uint32_t index, const NodeBox& box, const std::vector<uint16_t>& list, size_t depth) {
@@ -192,6 +188,8 @@ private:
     const LatticeMesh& mesh_;
     std::span<const uint32_t> numbers_;
     glm::i32vec3 origin_;
+    size_t mostRecords_;
+    double mostRepetition_ = kMostRepetition;
     PageTree tree_;
     std::vector<Bounds> bounds_;   ///< by local number
     std::vector<Prepared> tests_;  ///< the triangles below the box that was prepared
@@ -203,9 +201,9 @@ private:
 }  // namespace
 
 PageTree buildExactTree(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                        uint32_t log2Cells) {
+                        uint32_t log2Cells, size_t mostRecords) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
-    return ExactTreeBuilder(mesh, triangles, origin, 1 << log2Cells).run();
+    return ExactTreeBuilder(mesh, triangles, origin, 1 << log2Cells, mostRecords).run();
 }
 
 }  // namespace vcp

@@ -25,8 +25,10 @@ inline constexpr double kExactMarginCells = 1.0 / kLatticePerCell;
 /// Builds a page's octree. Each leaf names all triangles that touch its closed box, by tests in integers. `triangles`:
 /// numbers in `mesh`, ascending, among them all that touch the page at `page` (Morton position, in pages of 2^log2Cells
 /// cells); they must outlive the tree.
+/// `mostRecords`: as many records as a page can name; where there would be more, leaves are larger. With more triangles
+/// than that there is no such tree.
 PageTree buildExactTree(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                        uint32_t log2Cells);
+                        uint32_t log2Cells, size_t mostRecords = kLeafIndexMask);
 
 /// Returns the bytes that a page of so many triangles needs while it is built and coded.
 constexpr uint64_t exactPageWorkBytes(uint64_t triangles) { return (6 << 20) + 500 * triangles; }

@@ -153,6 +153,21 @@ TEST(ExactTree, FansAndCrowdsEndAtTheSmallestLeaf) {
     }
 }
 
+TEST(ExactTree, AsManyRecordsAsAPageCanName) {
+    const Page page(bumpyTorus(), {0, 0, 0});
+    const size_t free = page.tree().records(), triangles = [&] {
+        const PageTree one = buildExactTree(page.mesh, page.numbers, page.at, kLog2Cells, 0);
+        EXPECT_EQ(one.hard.size(), 1u);
+        return one.hard[0].triangles.size();
+    }();
+    for (const size_t most : {free - 1, free / 2, triangles + triangles / 254 + 2}) {
+        PageTree tree = buildExactTree(page.mesh, page.numbers, page.at, kLog2Cells, most);
+        EXPECT_LE(tree.records(), most);
+        expectSound(page, tree);
+        expectStored(page, tree);
+    }
+}
+
 TEST(ExactTree, APageWithoutTrianglesIsEmpty) {
     const Page page(test::sphereMesh({12, 12, 12}, 6, 12), {1, 1, 1});
     PageTree tree = page.tree();
