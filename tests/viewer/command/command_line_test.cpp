@@ -361,7 +361,9 @@ TEST_F(CommandLine, RenderOfAMeshBuildsItOnce) {
     const auto count = datasets();
     EXPECT_GE(count, 1);
     ASSERT_EQ(run({"render", ball().string(), "-o", second.string(), "--size", "64x64"}).status, 0);
-    ASSERT_EQ(run({"render", dataset().string(), "-o", built.string(), "--size", "64x64"}).status, 0);
+    const fs::path file = *folder_ / "as_render_builds_it.vcp";
+    ASSERT_EQ(run({"build", ball().string(), "-o", file.string()}).status, 0);
+    ASSERT_EQ(run({"render", file.string(), "-o", built.string(), "--size", "64x64"}).status, 0);
     EXPECT_EQ(datasets(), count);
     EXPECT_EQ(contentOf(first), contentOf(second));
     EXPECT_EQ(contentOf(first), contentOf(built));
