@@ -17,7 +17,7 @@ struct Hit {
     // Soft: the point in leaf space, and the side the ray came from (sideBefore). Hard: weights of the second and third
     // vertex.
     vec4 at;
-    uint triangle;  // hard: its record
+    uvec3 corners;  // hard: the triangle's vertices
 };
 
 // What is seen of a hit.
@@ -231,30 +231,80 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 
+// The entries of a page's strips, one after the other.
+struct StripReader {
+    uint strips;      // texel of the first entry
+    uint texelShift;  // log2 of entries a texel
+    uint next;        // number of the next entry
+    uint texel;       // which texel was fetched last, and what is in it
+    uvec4 words;
+};
+
+// Returns the next entry as step << kLongVertexBits | vertex.
+uint readEntry(inout StripReader reader, inout Work work) {
+    uint texel = reader.strips + (reader.next >> reader.texelShift);
+    if (texel != reader.texel) {
+        reader.words = fetchTexel(texel);
+        reader.texel = texel;
+        if (kCountSteps != 0u) work.fetches++;
+    }
+    uint i = reader.next++;
+    if (reader.texelShift == 2u) return texelWord(reader.words, i & 3u);
+    uint entry = texelWord(reader.words, i >> 1 & 3u) >> ((i & 1u) << 4) & 0xffffu;
+    uint low = (1u << kShortVertexBits) - 1u;
+    return entry & low | (entry & ~low) << (kLongVertexBits - kShortVertexBits);
+}
+
+vec3 fetchVertex(uint vertices, uint v, inout Work work) {
+    if (kCountSteps != 0u) work.fetches++;
+    uvec2 code = fetchPair(vertices, v);
+    return decodeVertex(code.x, code.y);
+}
+
 // Intersects the triangles of a hard leaf. Returns the distance, or -1.
 float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
     if (kCountSteps != 0u) work.cells++;
-    uint first = node & kLeafIndexMask;
+    // Vertices are pairs in a texel, so that their section tells how many there are.
+    bool isShort = page.sections.normals - page.sections.vertices <= kShortEntryVertices / 2u;
+    StripReader reader =
+        StripReader(page.sections.strips, isShort ? 3u : 2u, node & kHardFirstMask, 0u, uvec4(0u));
     uint count = node >> kHardCountShift & kHardCountMask;
     if (count == kHardCountLong) {
-        count = fetchPair(page.sections.triangles, first).x;
-        first++;
+        count = readEntry(reader, work);
+        count |= readEntry(reader, work) << kShortVertexBits;
     }
     float lowest = s.fromWall ? -kIntervalSlack : 0.0;
     float best = s.tauTo - s.tauFrom + kIntervalSlack;
     bool found = false;
+    uvec3 corners = uvec3(0u);
+    vec3 a = vec3(0.0), b = vec3(0.0), c = vec3(0.0);
     for (uint i = 0u; i < count; i++) {
-        uvec2 record = fetchPair(page.sections.triangles, first + i);
-        uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
-        uvec2 a = fetchPair(page.sections.vertices, v.x), b = fetchPair(page.sections.vertices, v.y),
-              c = fetchPair(page.sections.vertices, v.z);
-        if (kCountSteps != 0u) work.fetches += 4u;
-        vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y),
-                                   decodeVertex(c.x, c.y), kTriangleSlack);
+        uint entry = readEntry(reader, work);
+        uint step = entry >> kLongVertexBits;
+        while (step == kStepBegin) {
+            uint first = entry, second = readEntry(reader, work);
+            entry = readEntry(reader, work);
+            a = fetchVertex(page.sections.vertices, first, work);
+            c = fetchVertex(page.sections.vertices, second, work);
+            corners = uvec3(first, corners.y, second);
+            step = kStepOverCA;
+        }
+        uint v = entry & ((1u << kLongVertexBits) - 1u);
+        vec3 p = fetchVertex(page.sections.vertices, v, work);
+        // Over bc: (c, b, v), over ca: (a, c, v), over ab: (b, a, v).
+        uvec3 before = corners;
+        vec3 oldA = a, oldB = b, oldC = c;
+        corners.x = step == kStepOverBC ? before.z : step == kStepOverCA ? before.x : before.y;
+        corners.y = step == kStepOverBC ? before.y : step == kStepOverCA ? before.z : before.x;
+        corners.z = v;
+        a = step == kStepOverBC ? oldC : step == kStepOverCA ? oldA : oldB;
+        b = step == kStepOverBC ? oldB : step == kStepOverCA ? oldC : oldA;
+        c = p;
+        vec3 t = intersectTriangle(s.from, direction, a, b, c, kTriangleSlack);
         if (t.x >= lowest && t.x <= best) {
             best = t.x;
             hit.at.xy = t.yz;
-            hit.triangle = first + i;
+            hit.corners = corners;
             found = true;
         }
     }
@@ -284,8 +334,7 @@ Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
 }
 
 Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 direction) {
-    uvec2 record = fetchPair(sections.triangles, hit.triangle);
-    uvec3 corners = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
+    uvec3 corners = hit.corners;
     uvec2 a = fetchPair(sections.vertices, corners.x), b = fetchPair(sections.vertices, corners.y),
           c = fetchPair(sections.vertices, corners.z);
     vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
@@ -392,7 +441,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
     float last = min(minOf(planeDistances(ray, mix(ivec3(0), root, ahead))), until);
     vec3 reached = vec3(max(max(first, 0.0), from));
 
-    Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), 0u);
+    Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), uvec3(0u));
     Region before = Region(ivec3(0), kNoRegion, false, 0.0), region;
     Seam seam;
     bool inside = reached.x < last, fromNew = true, onSeam = false;
