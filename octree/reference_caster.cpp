@@ -102,8 +102,7 @@ glm::dvec3 castTriangle(const PageView& view, const Index3& v, glm::dvec3 q, glm
 
 /// Returns the blend of the vertex normals, each on the side of the triangle that the ray comes from; at a crease the
 /// triangle's own normal.
-glm::dvec3 triangleNormal(const PageView& view, const Index3& v, double weight1, double weight2,
-                          glm::dvec3 direction) {
+glm::dvec3 triangleNormal(const PageView& view, const Index3& v, double weight1, double weight2, glm::dvec3 direction) {
     glm::dvec3 p[3];
     for (int i = 0; i < 3; ++i) p[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
     glm::dvec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);
@@ -237,16 +236,11 @@ private:
         // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
         normal = glm::normalize(normal - std::max(glm::dot(normal, ray_.direction), 0.0) * ray_.direction);
         const PageEntry& entry = dataset_.pages[in.page];
-        const RayHit found{t,
-                           ray_.origin + t * ray_.direction,
-                           normal,
-                           in.page,
-                           entry.level,
-                           node,
-                           hit.onWall,
-                           lowest,
-                           edge,
-                           entry.certifiedError};
+        const RayHit found{t,           ray_.origin + t * ray_.direction,
+                           normal,      in.page,
+                           entry.level, node,
+                           hit.onWall,  lowest,
+                           edge,        entry.certifiedError};
         if (all_) all_->push_back(found);
         if (!best_ || t < best_->t) best_ = found;
     }

@@ -254,7 +254,8 @@ private:
             const std::span triangles = listOf(word & kNodePayloadMask);
             list.clear();
             for (const uint32_t t : triangles) list.push_back(triangles_[t]);
-            if (list.empty() || page_.entries.size() > kHardFirstMask || (Coder::kEncodes && !isList(source, triangles)))
+            if (list.empty() || page_.entries.size() > kHardFirstMask ||
+                (Coder::kEncodes && !isList(source, triangles)))
                 page_.wrong = true;
             else
                 word = appendHardLeaf(list, page_.entries);

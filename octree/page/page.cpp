@@ -18,7 +18,8 @@ Error broken(uint64_t byte, std::string what) {
 Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     if (h.magic != PageHeader::kMagic) return broken(0, "not a page");
     if (h.log2Cells < 1 || h.log2Cells > 7) return broken(4, "page size out of range");
-    if (h.faces > kLeafIndexMask || h.entries > kHardFirstMask + 1 || h.vertices > kField21Mask || h.groups > (1u << 27))
+    if (h.faces > kLeafIndexMask || h.entries > kHardFirstMask + 1 || h.vertices > kField21Mask ||
+        h.groups > (1u << 27))
         return broken(12, "page counts out of range");
     if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError))
         return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
@@ -82,9 +83,9 @@ private:
         while (walk.next())
             for (const uint32_t v : walk.triangle())
                 if (v >= page_.header.vertices)
-                    return broken(pageSections(page_.header).strips +
-                                      uint64_t{entryBytes(page_.header.vertices)} * walk.entry(),
-                                  "triangle names a missing vertex");
+                    return broken(
+                        pageSections(page_.header).strips + uint64_t{entryBytes(page_.header.vertices)} * walk.entry(),
+                        "triangle names a missing vertex");
         if (!walk.isWhole()) return broken(byte, "strips of a hard leaf are broken");
         // Leaves share no entries, so a small page cannot ask for endless work, here or of a ray.
         named_ += walk.entry() + 1 - first;

@@ -45,8 +45,8 @@ std::vector<std::byte> coded(RangeEncoder& coder) {
 template <class Coder>
 void codeHeader(Coder& coder, PageHeader& header) {
     NumberModel model;
-    for (uint32_t* field : {&header.log2Cells, &header.groups, &header.faces, &header.vertices, &header.softLeaves,
-                            &header.hardLeaves})
+    for (uint32_t* field :
+         {&header.log2Cells, &header.groups, &header.faces, &header.vertices, &header.softLeaves, &header.hardLeaves})
         model.code(coder, *field);
     uint32_t error = std::bit_cast<uint32_t>(header.certifiedError), low = error & 0xffffu, high = error >> 16;
     coder.raw(low, 16);

@@ -10,7 +10,8 @@
 // The numbers of children and faces and the leaves' lists and strips of triangles are derived.
 //
 // Coding loses nothing, but the page that comes back has its groups, faces, vertices, triangles and the corners of a
-// triangle in the codec's own order, and so as many entries of strips as that order asks for. A page that is not as the builder makes them is stored plainly.
+// triangle in the codec's own order, and so as many entries of strips as that order asks for. A page that is not as the
+// builder makes them is stored plainly.
 #pragma once
 
 #include <cstddef>

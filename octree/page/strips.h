@@ -62,7 +62,9 @@ public:
     [[nodiscard]] uint32_t count() const { return count_; }
     /// Goes on to the next triangle. Returns false behind the last one, or where the entries are no strip.
     bool next();
-    [[nodiscard]] const Index3& triangle() const { return triangle_; }
+    [[nodiscard]] Index3 triangle() const {
+        return isTurned_ ? Index3{corners_[0], corners_[2], corners_[1]} : corners_;
+    }
     /// Number of the entry that completed the latest triangle.
     [[nodiscard]] uint32_t entry() const { return at_ - 1; }
     /// Whether all triangles came.
@@ -71,7 +73,8 @@ public:
 private:
     const StripEntries& entries_;
     uint32_t at_, count_, done_ = 0;
-    Index3 triangle_{};
+    Index3 corners_{};  ///< a, b, c
+    bool isTurned_ = false;
 };
 
 /// Calls `visit(triangle)` for each triangle of a hard leaf of a checked page.

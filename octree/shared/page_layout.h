@@ -32,11 +32,10 @@
 //
 // Hard leaf: strips of oriented triangles, one after the other; leaves share no entries. An entry has 16 bits
 // where the page has at most kShortEntryVertices vertices, else 32. Its two top bits are a step, the rest is the
-// number of a vertex v. With (a, b, c) the triangle before, the next one is
-//   0 begin:   (v, v', v''), with the next two entries, whose steps are 0
-//   1 over bc: (c, b, v)
-//   2 over ca: (a, c, v)
-//   3 over ab: (b, a, v)
+// number of a vertex v:
+//   0 begin: a = v; the next two entries, with steps 0, are b and c
+//   1 to 3:  v takes the place of a, b or c; so the next triangle lies across the edge of the other two
+// After an even number of steps the triangle is (a, b, c), after an odd number (a, c, b).
 
 const uint kPageHeaderBytes = 64u;
 const uint kNodeTypeShift = 30u;
@@ -58,9 +57,6 @@ const uint kShortEntryVertices = 16384u;
 const uint kShortVertexBits = 14u;
 const uint kLongVertexBits = 30u;
 const uint kStepBegin = 0u;
-const uint kStepOverBC = 1u;
-const uint kStepOverCA = 2u;
-const uint kStepOverAB = 3u;
 const float kClearancePerCell = 256.0f;
 
 // Leaves may be smaller than a cell where many triangles meet: up to this many further halvings.

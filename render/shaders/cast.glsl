@@ -231,82 +231,81 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 
-// The entries of a page's strips, one after the other.
+// Reads the entries of a page's strips, one after the other.
 struct StripReader {
-    uint strips;      // texel of the first entry
-    uint texelShift;  // log2 of entries a texel
-    uint next;        // number of the next entry
-    uint texel;       // which texel was fetched last, and what is in it
+    uint strips;  // texel of the first entry
+    uint shorts;  // 1 where entries are short, two to a word; else 0
+    uint next;    // number of the next entry
+    uint texel;   // the latest texel and its words; 0: none
     uvec4 words;
 };
 
-// Returns the next entry as step << kLongVertexBits | vertex.
-uint readEntry(inout StripReader reader, inout Work work) {
-    uint texel = reader.strips + (reader.next >> reader.texelShift);
+StripReader stripReader(TableSections sections, uint first) {
+    // The size of the vertices' section tells how many there are.
+    uint shorts = sections.normals - sections.vertices <= kShortEntryVertices / 2u ? 1u : 0u;
+    return StripReader(sections.strips, shorts, first, 0u, uvec4(0u));
+}
+
+// Returns an entry's vertex number, and its step.
+uint readEntry(inout StripReader reader, out uint step, inout Work work) {
+    uint texel = reader.strips + (reader.next >> (2u + reader.shorts));
     if (texel != reader.texel) {
         reader.words = fetchTexel(texel);
         reader.texel = texel;
         if (kCountSteps != 0u) work.fetches++;
     }
-    uint i = reader.next++;
-    if (reader.texelShift == 2u) return texelWord(reader.words, i & 3u);
-    uint entry = texelWord(reader.words, i >> 1 & 3u) >> ((i & 1u) << 4) & 0xffffu;
-    uint low = (1u << kShortVertexBits) - 1u;
-    return entry & low | (entry & ~low) << (kLongVertexBits - kShortVertexBits);
+    uint word = texelWord(reader.words, reader.next >> reader.shorts & 3u);
+    uint entry = word >> ((reader.next & reader.shorts) << 4) & 0xffffffffu >> (reader.shorts << 4);
+    uint bits = reader.shorts != 0u ? kShortVertexBits : kLongVertexBits;
+    reader.next++;
+    step = entry >> bits;
+    return entry & ((1u << bits) - 1u);
 }
 
-vec3 fetchVertex(uint vertices, uint v, inout Work work) {
+vec3 fetchVertex(TableSections sections, uint v, inout Work work) {
     if (kCountSteps != 0u) work.fetches++;
-    uvec2 code = fetchPair(vertices, v);
+    uvec2 code = fetchPair(sections.vertices, v);
     return decodeVertex(code.x, code.y);
 }
 
 // Intersects the triangles of a hard leaf. Returns the distance, or -1.
 float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
     if (kCountSteps != 0u) work.cells++;
-    // Vertices are pairs in a texel, so that their section tells how many there are.
-    bool isShort = page.sections.normals - page.sections.vertices <= kShortEntryVertices / 2u;
-    StripReader reader =
-        StripReader(page.sections.strips, isShort ? 3u : 2u, node & kHardFirstMask, 0u, uvec4(0u));
-    uint count = node >> kHardCountShift & kHardCountMask;
-    if (count == kHardCountLong) {
-        count = readEntry(reader, work);
-        count |= readEntry(reader, work) << kShortVertexBits;
+    StripReader reader = stripReader(page.sections, node & kHardFirstMask);
+    uint count = node >> kHardCountShift & kHardCountMask, step;
+    bool isLong = count == kHardCountLong;
+    while (isLong) {
+        count = readEntry(reader, step, work);
+        count |= readEntry(reader, step, work) << kShortVertexBits;
+        isLong = false;
     }
     float lowest = s.fromWall ? -kIntervalSlack : 0.0;
     float best = s.tauTo - s.tauFrom + kIntervalSlack;
     bool found = false;
+    // A turn of the loop takes one vertex, so that none waits for another ray's strip to begin. Where a strip begins,
+    // two turns have no triangle yet; most leaves have one strip, and its first two vertices come before the loop.
     uvec3 corners = uvec3(0u);
-    vec3 a = vec3(0.0), b = vec3(0.0), c = vec3(0.0);
-    for (uint i = 0u; i < count; i++) {
-        uint entry = readEntry(reader, work);
-        uint step = entry >> kLongVertexBits;
-        while (step == kStepBegin) {
-            uint first = entry, second = readEntry(reader, work);
-            entry = readEntry(reader, work);
-            a = fetchVertex(page.sections.vertices, first, work);
-            c = fetchVertex(page.sections.vertices, second, work);
-            corners = uvec3(first, corners.y, second);
-            step = kStepOverCA;
-        }
-        uint v = entry & ((1u << kLongVertexBits) - 1u);
-        vec3 p = fetchVertex(page.sections.vertices, v, work);
-        // Over bc: (c, b, v), over ca: (a, c, v), over ab: (b, a, v).
-        uvec3 before = corners;
-        vec3 oldA = a, oldB = b, oldC = c;
-        corners.x = step == kStepOverBC ? before.z : step == kStepOverCA ? before.x : before.y;
-        corners.y = step == kStepOverBC ? before.y : step == kStepOverCA ? before.z : before.x;
-        corners.z = v;
-        a = step == kStepOverBC ? oldC : step == kStepOverCA ? oldA : oldB;
-        b = step == kStepOverBC ? oldB : step == kStepOverCA ? oldC : oldA;
-        c = p;
+    corners.x = readEntry(reader, step, work);
+    corners.y = readEntry(reader, step, work);
+    vec3 a = fetchVertex(page.sections, corners.x, work), b = fetchVertex(page.sections, corners.y, work), c = b;
+    uint known = 2u;  // how many of the triangle's vertices
+    while (count > 0u) {
+        uint v = readEntry(reader, step, work);
+        vec3 p = fetchVertex(page.sections, v, work);
+        known = step != kStepBegin ? 3u : known < 3u ? known + 1u : 1u;
+        bvec3 place = equal(uvec3(step != kStepBegin ? step : known), uvec3(1u, 2u, 3u));
+        corners = mix(corners, uvec3(v), place);
+        a = mix(a, p, bvec3(place.x));
+        b = mix(b, p, bvec3(place.y));
+        c = mix(c, p, bvec3(place.z));
         vec3 t = intersectTriangle(s.from, direction, a, b, c, kTriangleSlack);
-        if (t.x >= lowest && t.x <= best) {
+        if (known == 3u && t.x >= lowest && t.x <= best) {
             best = t.x;
             hit.at.xy = t.yz;
             hit.corners = corners;
             found = true;
         }
+        count -= known == 3u ? 1u : 0u;
     }
     return found ? max(s.tauFrom + best, 0.0) : -1.0;
 }
