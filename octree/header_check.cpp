@@ -46,11 +46,10 @@ private:
     /// Checks that it is a .vcp of a known version, and that the file is complete.
     [[nodiscard]] Result<void> identity() const {
         if (std::memcmp(h_.magic, FileHeader{}.magic, sizeof h_.magic) != 0) return fail(0, "not a .vcp file");
-        if (h_.version < kFileVersion || h_.version > kMethodFileVersion)
+        if (h_.version != kFileVersion)
             return fail(8,
-                        fmt::format("file version {} is not known; this program reads version {} and version {}: {}",
-                                    h_.version, kFileVersion, kMethodFileVersion,
-                                    h_.version < kFileVersion ? "build it again" : "use a newer program"),
+                        fmt::format("file version {} is not known; this program reads version {}: {}", h_.version,
+                                    kFileVersion, h_.version < kFileVersion ? "build it again" : "use a newer program"),
                         ErrorCode::Unsupported);
         std::vector<std::byte> unhashed(bytes_.begin(), bytes_.end());
         std::memset(unhashed.data() + offsetof(FileHeader, hash), 0, 8);
@@ -64,8 +63,6 @@ private:
     }
 
     [[nodiscard]] Result<void> method() const {
-        if ((h_.method != Method::Certified) != (h_.version == kMethodFileVersion))
-            return fail(140, "the method does not go with the version");
         if (h_.method != Method::Certified && !isPaper_)
             return fail(140,
                         fmt::format("it was built by method {}, which this program does not know: use a newer program",

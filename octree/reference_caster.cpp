@@ -63,7 +63,6 @@ struct PageRay {
 struct LeafHit {
     double t;  ///< cells
     glm::dvec3 normal;
-    uint32_t triangle;
     bool onWall;
 };
 
@@ -77,7 +76,7 @@ std::optional<LeafHit> castSoftF64(const PageView& view, uint32_t node, glm::dve
     if (!(u >= 0)) return {};
     const f64::LeafField leaf = f64::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
     const glm::dvec3 normal = f64::facingNormal(f64::leafNormal(leaf, p + u * d), d, f64::sideBefore(ray, u, d));
-    return LeafHit{u, normal, 0, u == 0 || u == 1};
+    return LeafHit{u, normal, u == 0 || u == 1};
 }
 
 std::optional<LeafHit> castSoftF32(const PageView& view, uint32_t node, glm::vec3 p, glm::vec3 d, float wallIn,
@@ -88,16 +87,11 @@ std::optional<LeafHit> castSoftF32(const PageView& view, uint32_t node, glm::vec
     if (!(u >= 0)) return {};
     const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], softAxis(node));
     const glm::vec3 normal = f32::facingNormal(f32::leafNormal(leaf, p + u * d), d, f32::sideBefore(ray, u, d));
-    return LeafHit{u, normal, 0, u == 0 || u == 1};
-}
-
-std::array<uint32_t, 3> triangleVertices(const PageView& view, uint32_t triangle) {
-    const glm::u32vec2 r = view.triangles[triangle];
-    return {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y), f64::decodeIndex2(r.y)};
+    return LeafHit{u, normal, u == 0 || u == 1};
 }
 
 /// Returns s as x, and the weights of the second and third vertex as y and z; x = 1e30 for a miss.
-glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dvec3 q, glm::dvec3 d, bool single) {
+glm::dvec3 castTriangle(const PageView& view, const Index3& v, glm::dvec3 q, glm::dvec3 d, bool single) {
     const glm::u32vec2 a = view.vertices[v[0]], b = view.vertices[v[1]], c = view.vertices[v[2]];
     if (single)
         return f32::intersectTriangle(glm::vec3(q), glm::vec3(d), f32::decodeVertex(a.x, a.y),
@@ -108,8 +102,7 @@ glm::dvec3 castTriangle(const PageView& view, std::array<uint32_t, 3> v, glm::dv
 
 /// Returns the blend of the vertex normals, each on the side of the triangle that the ray comes from; at a crease the
 /// triangle's own normal.
-glm::dvec3 triangleNormal(const PageView& view, std::array<uint32_t, 3> v, double weight1, double weight2,
-                          glm::dvec3 direction) {
+glm::dvec3 triangleNormal(const PageView& view, const Index3& v, double weight1, double weight2, glm::dvec3 direction) {
     glm::dvec3 p[3];
     for (int i = 0; i < 3; ++i) p[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
     glm::dvec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);
@@ -221,19 +214,17 @@ private:
 
     void castHard(const PageRay& in, uint32_t node, glm::dvec3 lowest, double edge, Interval segment) {
         if (counters_) ++counters_->hardLeaves;
-        const TriangleRange range = hardLeafTriangles(*in.view, node);
         const glm::dvec3 q = in.origin + segment.first * in.direction;
         const double length = segment.last - segment.first + f64::kIntervalSlack;
         std::optional<LeafHit> nearest;
-        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+        forEachTriangle(in.view->strips, node, [&](const Index3& vertices) {
             if (counters_) ++counters_->triangles;
-            const auto vertices = triangleVertices(*in.view, t);
             const glm::dvec3 hit = castTriangle(*in.view, vertices, q, in.direction, caster_.options_.singlePrecision);
             const double at = segment.first + hit.x;
-            if (!(hit.x >= -f64::kIntervalSlack && hit.x <= length) || (nearest && nearest->t <= at)) continue;
-            if (at * in.cell < ray_.tMin || at * in.cell > ray_.tMax) continue;
-            nearest = LeafHit{at, triangleNormal(*in.view, vertices, hit.y, hit.z, in.direction), t, false};
-        }
+            if (!(hit.x >= -f64::kIntervalSlack && hit.x <= length) || (nearest && nearest->t <= at)) return;
+            if (at * in.cell < ray_.tMin || at * in.cell > ray_.tMax) return;
+            nearest = LeafHit{at, triangleNormal(*in.view, vertices, hit.y, hit.z, in.direction), false};
+        });
         if (nearest) keep(in, node, lowest, edge, *nearest);
     }
 
@@ -245,17 +236,11 @@ private:
         // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
         normal = glm::normalize(normal - std::max(glm::dot(normal, ray_.direction), 0.0) * ray_.direction);
         const PageEntry& entry = dataset_.pages[in.page];
-        const RayHit found{t,
-                           ray_.origin + t * ray_.direction,
-                           normal,
-                           in.page,
-                           entry.level,
-                           node,
-                           hit.triangle,
-                           hit.onWall,
-                           lowest,
-                           edge,
-                           entry.certifiedError};
+        const RayHit found{t,           ray_.origin + t * ray_.direction,
+                           normal,      in.page,
+                           entry.level, node,
+                           hit.onWall,  lowest,
+                           edge,        entry.certifiedError};
         if (all_) all_->push_back(found);
         if (!best_ || t < best_->t) best_ = found;
     }

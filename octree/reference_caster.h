@@ -77,7 +77,6 @@ struct RayHit {
     uint64_t page = 0;       ///< number in the directory
     uint32_t level = 0;
     uint32_t node = 0;          ///< the leaf's node word; nodeType(node) is kNodeSoft or kNodeHard
-    uint32_t triangle = 0;      ///< in a hard leaf: number of the hit triangle's record in the page
     bool onWall = false;        ///< accepted by the wall tolerance, not by a crossing
     glm::dvec3 leafMin{0};      ///< the leaf's lowest corner, in cells from the page's
     double leafEdge = 0;        ///< in cells

@@ -25,9 +25,8 @@
 
 namespace vcp {
 
-inline constexpr uint32_t kFileVersion = 2;
-inline constexpr uint32_t kMethodFileVersion = 3;  ///< version of files whose method is not Certified
-inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
+inline constexpr uint32_t kFileVersion = 3;
+inline constexpr uint32_t kMaxLevels = 22;  ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;

@@ -19,7 +19,7 @@ StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std
     PackedPage packed = packPage(geometry, colour);
     page.geometry = std::move(packed.geometry);
     page.colour = std::move(packed.colour);
-    page.geometryBytes = uint32_t(geometry.size());
+    page.geometryBytes = uint32_t(packed.geometryBytes);
     page.colourBytes = uint32_t(colour.size());
     return page;
 }

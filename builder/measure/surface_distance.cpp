@@ -183,15 +183,11 @@ private:
                           edge / 2, best);
             return;
         }
-        const TriangleRange range = hardLeafTriangles(view, node);
-        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
-            const glm::u32vec2 r = view.triangles[t];
-            const std::array<uint32_t, 3> v = {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y),
-                                               f64::decodeIndex2(r.y)};
+        forEachTriangle(view.strips, node, [&](const Index3& v) {
             std::array<glm::dvec3, 3> triangle;
             for (int i = 0; i < 3; ++i) triangle[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);
             best = std::min(best, distanceToClipped(p, triangle, lowest, edge));
-        }
+        });
     }
 
     const PageCache& cache_;

@@ -169,25 +169,23 @@ Clearance clearanceOf(const PageTree& tree) {
     return clearance;
 }
 
-/// Packs triangle records and vertices of the hard leaves.
+/// Packs strips and vertices of the hard leaves.
 class TrianglePacker {
 public:
     TrianglePacker(const PageTree& tree, const LatticeMesh& mesh) : tree_(tree), mesh_(mesh) {}
 
     /// Appends a leaf's triangles; returns its node word.
     uint32_t add(const HardLeaf& leaf) {
-        const uint32_t first = uint32_t(records.size());
-        const size_t count = leaf.triangles.size();
-        const bool isLong = count >= kHardCountLong;
-        if (isLong) records.emplace_back(uint32_t(count), 0u);
+        list_.clear();
         for (const uint32_t k : leaf.triangles) {
             const auto& v = mesh_.triangles[tree_.triangles[k]];
-            records.push_back(pack21(vertex(v[0]), vertex(v[1]), vertex(v[2])));
+            list_.push_back({vertex(v[0]), vertex(v[1]), vertex(v[2])});
         }
-        return kNodeHard << kNodeTypeShift | (isLong ? kHardCountLong : uint32_t(count)) << kHardCountShift | first;
+        return appendHardLeaf(list_, entries);
     }
 
-    std::vector<glm::u32vec2> records, vertices;
+    std::vector<uint32_t> entries;
+    std::vector<glm::u32vec2> vertices;
     std::vector<uint32_t> normals, colours;
 
 private:
@@ -205,6 +203,7 @@ private:
     const PageTree& tree_;
     const LatticeMesh& mesh_;
     std::unordered_map<uint32_t, uint32_t> local_;
+    std::vector<Index3> list_;
 };
 
 /// Node words in breadth-first groups, so that children come after their parent.
@@ -276,7 +275,7 @@ EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh) {
     header.root = nodes.root;
     header.groups = uint32_t(nodes.words.size() / 8);
     header.faces = uint32_t(faces.faces.size());
-    header.triangles = uint32_t(triangles.records.size());
+    header.entries = uint32_t(triangles.entries.size());
     header.vertices = uint32_t(triangles.vertices.size());
     header.softLeaves = uint32_t(tree.soft.size());
     header.hardLeaves = page.hardLeaves;
@@ -286,9 +285,9 @@ EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh) {
     std::memcpy(page.geometry.data(), &header, sizeof header);
     copyTo(page.geometry, s.nodes, nodes.words);
     copyTo(page.geometry, s.faces, faces.faces);
-    copyTo(page.geometry, s.triangles, triangles.records);
     copyTo(page.geometry, s.vertices, triangles.vertices);
     copyTo(page.geometry, s.normals, triangles.normals);
+    storeEntries(triangles.entries, header.vertices, page.geometry.data() + s.strips);
     if (withColour && page.leaves > 0) {
         page.colour.resize(colourPageBytes(header));
         copyTo(page.colour, 0, faces.colours);

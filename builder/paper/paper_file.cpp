@@ -85,7 +85,6 @@ FileHeader headerOf(const PaperCaster& octree, const SoupMeasures& mesh) {
     const RootGrid& grid = octree.frame();
     const glm::ivec3 cells = grid.cells();
     FileHeader header;
-    header.version = kMethodFileVersion;
     header.method = Method::Paper;
     header.cell = grid.cell;
     header.levels = 1;

@@ -43,25 +43,35 @@ struct CodecPage {
     std::vector<uint4> block;  ///< the page
     std::span<uint32_t> nodes;
     std::span<uint4> faces;
-    std::span<glm::u32vec2> triangles, vertices;
+    std::span<glm::u32vec2> vertices;
     std::span<uint32_t> normals;
+    std::vector<uint32_t> entries;  ///< of strips (strips.h)
     std::vector<NodePlace> places;  ///< places of the nodes in `nodes`
 
     const PageView* source = nullptr;                             ///< the page that the encoder codes
     std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: which element of `source` each one is
 
-    bool wrong = false;  ///< decoder: the bytes are no page; encoder: the page needs the plain form
+    uint32_t mostEntries = kHardFirstMask;  ///< a page may not ask for more memory or work than its size allows
+    bool wrong = false;                     ///< decoder: the bytes are no page; encoder: the page needs the plain form
 
-    /// Makes room for as much as the header says.
+    /// Makes room for as much as the header says; entries come later.
     void allocate() {
         const PageSections s = pageSections(header);
         block.resize(s.end / 16);
         auto* bytes = reinterpret_cast<std::byte*>(block.data());
         nodes = {reinterpret_cast<uint32_t*>(bytes + s.nodes), size_t{8} * header.groups};
         faces = {reinterpret_cast<uint4*>(bytes + s.faces), header.faces};
-        triangles = {reinterpret_cast<glm::u32vec2*>(bytes + s.triangles), header.triangles};
         vertices = {reinterpret_cast<glm::u32vec2*>(bytes + s.vertices), header.vertices};
         normals = {reinterpret_cast<uint32_t*>(bytes + s.normals), header.vertices};
+    }
+    /// Appends the strips and writes the header.
+    void finish() {
+        header.entries = uint32_t(entries.size());
+        const PageSections s = pageSections(header);
+        block.resize(s.end / 16);
+        auto* bytes = reinterpret_cast<std::byte*>(block.data());
+        storeEntries(entries, header.vertices, bytes + s.strips);
+        std::memcpy(bytes, &header, sizeof header);
     }
     /// The word of node i in the page that the encoder codes; 0 for the decoder.
     [[nodiscard]] uint32_t sourceWord(size_t i) const {

@@ -30,7 +30,8 @@ public:
         const std::vector<NodePlace> places = placesOf(page_);
         const auto visit = [&](uint32_t word, const NodePlace& place) {
             if (nodeType(word) == kNodeSoft) codeLeaf(word, place);
-            if (nodeType(word) == kNodeHard) codeTriangles(hardLeafTriangles(page_, word));
+            if (nodeType(word) == kNodeHard)
+                forEachTriangle(page_.strips, word, [&](const Index3& triangle) { codeTriangle(triangle); });
         };
         visit(page_.header.root, {0, 0, 0, uint16_t(kSubcellsPerCell << page_.header.log2Cells)});
         for (size_t i = 0; i < places.size(); ++i) visit(page_.nodes[i], places[i]);
@@ -76,25 +77,20 @@ private:
         last_ = colour;
     }
 
-    void codeTriangles(TriangleRange range) {
-        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
-            const glm::u32vec2 record = page_.triangles[t];
-            const std::array<uint32_t, 3> v{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
-                                            f64::decodeIndex2(record.y)};
-            for (const uint32_t vertex : v) {
-                if (vertexDone_[vertex]) continue;
-                std::array<uint32_t, 4> sum{};
-                uint32_t count = 0;
-                for (const uint32_t other : v) {
-                    if (!vertexDone_[other]) continue;
-                    ++count;
-                    for (size_t i = 0; i < 4; ++i) sum[i] += vertices_[other] >> 8 * i & 255u;
-                }
-                codeColour(vertices_[vertex], count > 0 ? mean(sum, count) : last_, 2);
-                vertexDone_[vertex] = 1;
-                ++used_;
-                last_ = vertices_[vertex];
+    void codeTriangle(const Index3& triangle) {
+        for (const uint32_t vertex : triangle) {
+            if (vertexDone_[vertex]) continue;
+            std::array<uint32_t, 4> sum{};
+            uint32_t count = 0;
+            for (const uint32_t other : triangle) {
+                if (!vertexDone_[other]) continue;
+                ++count;
+                for (size_t i = 0; i < 4; ++i) sum[i] += vertices_[other] >> 8 * i & 255u;
             }
+            codeColour(vertices_[vertex], count > 0 ? mean(sum, count) : last_, 2);
+            vertexDone_[vertex] = 1;
+            ++used_;
+            last_ = vertices_[vertex];
         }
     }
 

@@ -34,9 +34,9 @@ public:
             count = source_.triangles();
         }
         count_.code(coder_, count);
-        if (count > page_.header.triangles) page_.wrong = true;
-        if (page_.header.triangles == 0 && hardLeaves_ + page_.header.vertices > 0) page_.wrong = true;
-        if (page_.wrong || page_.header.triangles == 0) return;
+        if (count > page_.mostEntries) page_.wrong = true;
+        if (count == 0 && hardLeaves_ + page_.header.vertices > 0) page_.wrong = true;
+        if (page_.wrong || count == 0) return;
         positions_.reserve(page_.header.vertices);
         triangles_.reserve(count);
         while (triangles_.size() < count && !page_.wrong) codeTriangle();
@@ -46,7 +46,6 @@ public:
     }
 
 private:
-    using Index3 = std::array<uint32_t, 3>;
     static constexpr uint32_t kNone = TriangleFront::kNone;
 
     /// Writes each hard leaf's number into its word, so that places_ tells the leaves apart.
@@ -243,78 +242,67 @@ private:
     }
     uint32_t degreeClass(uint32_t vertex) const { return std::min(front_.degree(vertex), 7u); }
 
-    /// Makes the hard leaves' records, in the order of the leaves, and their words.
+    /// Makes the hard leaves' strips, in the order of the leaves, and their words.
     void fillLeaves() {
-        std::vector<uint32_t> begin(size_t{hardLeaves_} + 1, 0);  // for each leaf
+        if (!findLists()) {
+            page_.wrong = true;
+            return;
+        }
+        std::vector<Index3> list;
+        page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace&) {
+            if (nodeType(word) != kNodeHard) return;
+            const std::span triangles = listOf(word & kNodePayloadMask);
+            list.clear();
+            for (const uint32_t t : triangles) list.push_back(triangles_[t]);
+            if (list.empty() || page_.entries.size() > kHardFirstMask ||
+                (Coder::kEncodes && !isList(source, triangles)))
+                page_.wrong = true;
+            else
+                word = appendHardLeaf(list, page_.entries);
+        });
+        if (page_.entries.size() > page_.mostEntries) page_.wrong = true;
+    }
+
+    /// Finds the triangles of each hard leaf, in ascending order. Returns false where they are more than the page has
+    /// entries.
+    bool findLists() {
         struct Entry {
             uint32_t leaf, triangle;
         };
+        uint32_t most = page_.mostEntries;
+        if constexpr (Coder::kEncodes) most = source_.inLeaves();
         std::vector<Entry> entries;
-        entries.reserve(page_.header.triangles);
-        // A page may not ask for more work than its size allows.
-        uint64_t work = uint64_t{256} * page_.header.triangles + 65536;
+        entries.reserve(2 * triangles_.size());
+        uint64_t work = uint64_t{256} * most + 65536;
         for (uint32_t t = 0; t < triangles_.size(); ++t) {
             const auto& [a, b, c] = triangles_[t];
             const uint64_t visits =
                 places_.hardLeavesOf({positions_[a], positions_[b], positions_[c]}, [&](uint32_t word) {
                     entries.push_back({word & kNodePayloadMask, t});
                 });
-            if (entries.size() > page_.header.triangles || visits > work) {
-                page_.wrong = true;
-                return;
-            }
+            if (entries.size() > most || visits > work) return false;
             work -= visits;
         }
-        for (const Entry& e : entries) ++begin[e.leaf + 1];
-        uint32_t records = 0;
-        page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace&) {
-            if (nodeType(word) != kNodeHard || page_.wrong) return;
-            uint32_t& at = begin[word & kNodePayloadMask];  // from now on the leaf's first record
-            const uint32_t count = begin[(word & kNodePayloadMask) + 1];
-            const bool isLong = count >= kHardCountLong;
-            const uint64_t end = uint64_t{records} + count + (isLong ? 1 : 0);
-            if (count == 0 || end > page_.header.triangles ||
-                (Coder::kEncodes && hardLeafTriangles(*page_.source, source).count != count)) {
-                page_.wrong = true;
-                return;
-            }
-            word = kNodeHard << kNodeTypeShift | (isLong ? kHardCountLong : count) << kHardCountShift | records;
-            if (isLong) page_.triangles[records++] = {count, 0u};
-            at = records;
-            records += count;
-        });
-        if (records != page_.header.triangles) page_.wrong = true;
-        if (page_.wrong) return;
-        for (const Entry& e : entries)
-            page_.triangles[begin[e.leaf]++] =
-                pack21(triangles_[e.triangle][0], triangles_[e.triangle][1], triangles_[e.triangle][2]);
-        if constexpr (Coder::kEncodes) verify(entries);
+        listBegin_.assign(size_t{hardLeaves_} + 1, 0);
+        for (const Entry& e : entries) ++listBegin_[e.leaf + 1];
+        for (uint32_t leaf = 0; leaf < hardLeaves_; ++leaf) listBegin_[leaf + 1] += listBegin_[leaf];
+        lists_.resize(entries.size());
+        std::vector<uint32_t> next(listBegin_.begin(), listBegin_.end() - 1);
+        for (const Entry& e : entries) lists_[next[e.leaf]++] = e.triangle;
+        return true;
     }
 
-    template <class Entries>
-    void verify(const Entries& entries) {
-        // Each leaf has as many records as in the source, so it is enough that each of them is one of the source's.
-        std::vector<uint32_t> leafOf, words;
-        page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace&) {
-            if (nodeType(word) == kNodeHard) words.push_back(source);
-        });
-        std::vector<uint32_t> inLeaf(triangles_.size(), kNone);
-        size_t at = 0;
-        std::vector<std::vector<uint32_t>> none;
-        std::vector<uint32_t> begin(words.size() + 1, 0);
-        for (const auto& e : entries) ++begin[e.leaf + 1];
-        for (size_t i = 0; i < words.size(); ++i) begin[i + 1] += begin[i];
-        std::vector<uint32_t> sorted(entries.size()), next(begin.begin(), begin.end() - 1);
-        for (const auto& e : entries) sorted[next[e.leaf]++] = e.triangle;
-        for (uint32_t leaf = 0; leaf < words.size(); ++leaf) {
-            for (; at < begin[leaf + 1]; ++at) inLeaf[sorted[at]] = leaf;
-            const TriangleRange range = hardLeafTriangles(*page_.source, words[leaf]);
-            for (uint32_t r = range.first; r < range.first + range.count; ++r) {
-                uint32_t& mark = inLeaf[source_.newNumber(r)];
-                if (mark != leaf) page_.wrong = true;
-                mark = kNone;
-            }
-        }
+    [[nodiscard]] std::span<const uint32_t> listOf(uint32_t leaf) const {
+        return std::span(lists_).subspan(listBegin_[leaf], listBegin_[leaf + 1] - listBegin_[leaf]);
+    }
+
+    /// Encoder: whether a leaf of the source has these triangles.
+    bool isList(uint32_t source, std::span<const uint32_t> triangles) {
+        std::vector<uint32_t> numbers;
+        for (StripWalk walk(page_.source->strips, source); walk.next();)
+            numbers.push_back(source_.newNumber(walk.entry()));
+        std::sort(numbers.begin(), numbers.end());
+        return std::ranges::equal(numbers, triangles);
     }
 
     void codeNormals() {
@@ -374,6 +362,7 @@ private:
     std::vector<glm::i32vec3> positions_;  ///< the vertices' positions on the lattice, from the page's lowest corner
     std::vector<uint8_t> inHard_;          ///< whether a vertex is in a hard leaf
     std::vector<Index3> triangles_;
+    std::vector<uint32_t> lists_, listBegin_;  ///< the triangles of each leaf, and where its list begins
     uint32_t lastBorder_ = 0, lastLevel_ = 0;
     NumberModel count_, known_;
     BitModel border_[4][8], fresh_[4][8][8], next_[4][8][8], previous_[4][8][8], seedFresh_[3];

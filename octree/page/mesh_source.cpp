@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "octree/surface/leaf_math.h"
+#include "octree/surface/packing.h"
 #include "octree/surface/position_map.h"
 
 namespace vcp {
@@ -15,15 +15,15 @@ MeshSource::MeshSource(const PageView& page) : positions_(page.vertices), newVer
 }
 
 void MeshSource::collect(const PageView& page) {
-    triangleOf_.assign(page.triangles.size(), kNone);
-    PositionMap<uint32_t> numbers(page.triangles.size() / 4);
+    triangleOf_.assign(page.strips.size(), kNone);
+    PositionMap<uint32_t> numbers(page.strips.size() / 4);
     const auto visit = [&](uint32_t word) {
         if (nodeType(word) != kNodeHard) return;
-        const TriangleRange range = hardLeafTriangles(page, word);
-        for (uint32_t r = range.first; r < range.first + range.count; ++r) {
-            const glm::u32vec2 record = page.triangles[r];
-            const Index3 t{f64::decodeIndex0(record.x), f64::decodeIndex1(record.x, record.y),
-                           f64::decodeIndex2(record.y)};
+        StripWalk walk(page.strips, word);
+        inLeaves_ += walk.count();
+        while (walk.next()) {
+            Index3 t = walk.triangle();
+            std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
             if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) wrong_ = true;
             const uint64_t key = uint64_t{t[0]} << 42 | uint64_t{t[1]} << 21 | t[2];
             uint32_t& number = numbers.findOrAdd(key);  // the number plus 1
@@ -31,7 +31,7 @@ void MeshSource::collect(const PageView& page) {
                 vertices_.push_back(t);
                 number = uint32_t(vertices_.size());
             }
-            triangleOf_[r] = number - 1;
+            triangleOf_[walk.entry()] = number - 1;
         }
     };
     visit(page.header.root);
@@ -69,9 +69,7 @@ uint32_t MeshSource::thirdVertex(uint32_t triangle, uint32_t from, uint32_t to) 
 glm::i32vec3 MeshSource::take(uint32_t vertex, uint32_t number) {
     newVertex_[vertex] = number;
     oldVertex_.push_back(vertex);
-    const glm::u32vec2 p = positions_[vertex];
-    return glm::i32vec3(glm::u32vec3(f64::decodeIndex0(p.x), f64::decodeIndex1(p.x, p.y), f64::decodeIndex2(p.y))) -
-           kLatticeBias;
+    return glm::i32vec3(unpack21(positions_[vertex])) - kLatticeBias;
 }
 
 uint32_t MeshSource::nextSeed() {

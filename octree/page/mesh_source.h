@@ -1,7 +1,6 @@
 // The distinct triangles of a page's hard leaves, as the encoder finds and follows them. Part of page_codec.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -15,7 +14,6 @@ namespace vcp {
 class MeshSource {
 public:
     static constexpr uint32_t kNone = 0xffffffff;
-    using Index3 = std::array<uint32_t, 3>;
 
     MeshSource() = default;
     explicit MeshSource(const PageView& page);
@@ -29,8 +27,10 @@ public:
     [[nodiscard]] uint32_t numberOf(uint32_t vertex) const { return newVertex_[vertex]; }
     /// The page's numbers of the vertices, in their new order.
     [[nodiscard]] const std::vector<uint32_t>& vertexOrder() const { return oldVertex_; }
-    /// The new number of the triangle that a record of the page stands for.
-    [[nodiscard]] uint32_t newNumber(uint32_t record) const { return newTriangle_[triangleOf_[record]]; }
+    /// The new number of the triangle that an entry of the page's strips completes.
+    [[nodiscard]] uint32_t newNumber(uint32_t entry) const { return newTriangle_[triangleOf_[entry]]; }
+    /// The number of triangles of all leaves, each counted in each of its leaves.
+    [[nodiscard]] uint32_t inLeaves() const { return inLeaves_; }
 
     /// Returns a triangle that has not been coded, at the edge between two vertices (new numbers), or kNone.
     [[nodiscard]] uint32_t across(uint32_t from, uint32_t to) const;
@@ -50,10 +50,10 @@ private:
     bool wrong_ = false;
     std::span<const glm::u32vec2> positions_;
     std::vector<Index3> vertices_;
-    std::vector<uint32_t> triangleOf_;  ///< for each record, its triangle
+    std::vector<uint32_t> triangleOf_;  ///< for each entry of a strip, the triangle that it completes
     std::vector<uint32_t> newTriangle_, newVertex_, oldVertex_;
     std::vector<uint32_t> begin_, around_;  ///< triangles around each vertex
-    uint32_t third_ = kNone, seed_ = 0;
+    uint32_t third_ = kNone, seed_ = 0, inLeaves_ = 0;
 };
 
 }  // namespace vcp

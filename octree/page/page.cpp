@@ -18,7 +18,8 @@ Error broken(uint64_t byte, std::string what) {
 Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     if (h.magic != PageHeader::kMagic) return broken(0, "not a page");
     if (h.log2Cells < 1 || h.log2Cells > 7) return broken(4, "page size out of range");
-    if (h.faces > kLeafIndexMask || h.triangles > kLeafIndexMask || h.vertices > kField21Mask || h.groups > (1u << 27))
+    if (h.faces > kLeafIndexMask || h.entries > kHardFirstMask + 1 || h.vertices > kField21Mask ||
+        h.groups > (1u << 27))
         return broken(12, "page counts out of range");
     if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError))
         return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
@@ -65,35 +66,37 @@ private:
                 if (index + 1 >= page_.header.faces || (word >> kSoftAxisShift & 3u) > 2)
                     return broken(byte, "soft leaf out of range");
                 return {};
-            case kNodeHard: {
+            case kNodeHard:
                 ++hard_;
-                if (index >= page_.header.triangles) return broken(byte, "hard leaf out of range");
-                const TriangleRange range = hardLeafTriangles(page_, word);
-                if (range.count == 0 || range.count > page_.header.triangles - range.first)
-                    return broken(byte, "hard leaf names too many triangles");
-                // Leaves share no records, so a small page cannot ask for endless work, here or of a ray.
-                named_ += range.count;
-                if (named_ > page_.header.triangles) return broken(byte, "hard leaves name too many triangles");
-                for (uint32_t t = range.first; t < range.first + range.count; ++t) VCP_TRY(triangle(t));
-                return {};
-            }
+                return hardLeaf(word, byte);
             default:
                 return {};
         }
     }
 
-    Result<void> triangle(uint32_t t) const {
-        const glm::u32vec2 r = page_.triangles[t];
-        if (f64::decodeIndex0(r.x) >= page_.header.vertices || f64::decodeIndex1(r.x, r.y) >= page_.header.vertices ||
-            f64::decodeIndex2(r.y) >= page_.header.vertices)
-            return broken(pageSections(page_.header).triangles + uint64_t{8} * t, "triangle names a missing vertex");
+    Result<void> hardLeaf(uint32_t word, uint64_t byte) {
+        const uint32_t first = word & kHardFirstMask;
+        if (first >= page_.header.entries) return broken(byte, "hard leaf out of range");
+        StripWalk walk(page_.strips, word);
+        if (walk.count() == 0 || walk.count() > page_.header.entries - first)
+            return broken(byte, "hard leaf names too many triangles");
+        while (walk.next())
+            for (const uint32_t v : walk.triangle())
+                if (v >= page_.header.vertices)
+                    return broken(
+                        pageSections(page_.header).strips + uint64_t{entryBytes(page_.header.vertices)} * walk.entry(),
+                        "triangle names a missing vertex");
+        if (!walk.isWhole()) return broken(byte, "strips of a hard leaf are broken");
+        // Leaves share no entries, so a small page cannot ask for endless work, here or of a ray.
+        named_ += walk.entry() + 1 - first;
+        if (named_ > page_.header.entries) return broken(byte, "hard leaves name too many triangles");
         return {};
     }
 
     const PageView& page_;
     std::vector<uint8_t> depth_;
     uint32_t soft_ = 0, hard_ = 0;
-    uint64_t named_ = 0;  ///< triangle records of all hard leaves so far
+    uint64_t named_ = 0;  ///< entries of all hard leaves so far
 };
 
 template <class T>
@@ -107,21 +110,14 @@ PageSections pageSections(const PageHeader& h) {
     PageSections s{};
     s.nodes = kPageHeaderBytes;
     s.faces = s.nodes + uint64_t{32} * h.groups;
-    s.triangles = s.faces + uint64_t{16} * h.faces;
-    s.vertices = align16(s.triangles + uint64_t{8} * h.triangles);
+    s.vertices = s.faces + uint64_t{16} * h.faces;
     s.normals = align16(s.vertices + uint64_t{8} * h.vertices);
-    s.end = align16(s.normals + uint64_t{4} * h.vertices);
+    s.strips = align16(s.normals + uint64_t{4} * h.vertices);
+    s.end = align16(s.strips + uint64_t{entryBytes(h.vertices)} * h.entries);
     return s;
 }
 
 uint64_t colourPageBytes(const PageHeader& h) { return align16(uint64_t{16} * h.faces + uint64_t{4} * h.vertices); }
-
-TriangleRange hardLeafTriangles(const PageView& page, uint32_t node) {
-    const uint32_t first = node & kLeafIndexMask;
-    const uint32_t count = node >> kHardCountShift & kHardCountMask;
-    if (count != kHardCountLong) return {first, count};
-    return {first + 1, page.triangles[first].x};
-}
 
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours) {
     if (bytes.size() < kPageHeaderBytes) return broken(0, "page is shorter than its header");
@@ -132,9 +128,10 @@ Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std
     const PageSections s = pageSections(h);
     page.nodes = section<uint32_t>(bytes, s.nodes, uint64_t{8} * h.groups);
     page.faces = section<uint4>(bytes, s.faces, h.faces);
-    page.triangles = section<glm::u32vec2>(bytes, s.triangles, h.triangles);
     page.vertices = section<glm::u32vec2>(bytes, s.vertices, h.vertices);
     page.normals = section<uint32_t>(bytes, s.normals, h.vertices);
+    const uint32_t bytesEach = entryBytes(h.vertices);
+    page.strips = {bytes.subspan(s.strips, size_t{bytesEach} * h.entries), bytesEach};
     if (!colours.empty()) {
         if (colours.size() != colourPageBytes(h)) return broken(0, "colour page does not match its page");
         page.faceColours = section<uint4>(colours, 0, h.faces);

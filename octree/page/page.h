@@ -10,6 +10,7 @@
 #include <glm/vec2.hpp>
 
 #include "octree/io/result.h"
+#include "octree/page/strips.h"
 #include "octree/surface/leaf_math.h"
 
 namespace vcp {
@@ -21,7 +22,7 @@ struct PageHeader {
     uint32_t root = 0;        ///< node word of the whole page
     uint32_t groups = 0;      ///< groups of 8 node words
     uint32_t faces = 0;       ///< faces of 16 bytes; at most 2^22
-    uint32_t triangles = 0;   ///< records of 8 bytes; at most 2^22
+    uint32_t entries = 0;     ///< entries of strips; at most 2^24
     uint32_t vertices = 0;    ///< at most 2^21
     uint32_t softLeaves = 0;  ///< counts, checked against the nodes
     uint32_t hardLeaves = 0;
@@ -35,7 +36,7 @@ static_assert(offsetof(PageHeader, groups) == 12 && offsetof(PageHeader, certifi
 
 /// Byte offsets of a page's sections, computed from its counts.
 struct PageSections {
-    uint64_t nodes, faces, triangles, vertices, normals, end;
+    uint64_t nodes, faces, vertices, normals, strips, end;
 };
 PageSections pageSections(const PageHeader& header);
 
@@ -47,9 +48,9 @@ struct PageView {
     PageHeader header;
     std::span<const uint32_t> nodes;
     std::span<const uint4> faces;
-    std::span<const glm::u32vec2> triangles;
     std::span<const glm::u32vec2> vertices;
     std::span<const uint32_t> normals;
+    StripEntries strips;
     std::span<const uint4> faceColours;       ///< empty without colour
     std::span<const uint32_t> vertexColours;  ///< empty without colour
 };
@@ -65,11 +66,5 @@ inline uint32_t emptyNode(double clearanceCells) {
     return kNodeEmpty << kNodeTypeShift | uint32_t(clearanceCells * double(kClearancePerCell));
 }
 inline double nodeClearance(uint32_t node) { return (node & kNodePayloadMask) / double(kClearancePerCell); }
-
-/// Where a hard leaf's triangles are: the first record and the count, with the long form resolved.
-struct TriangleRange {
-    uint32_t first, count;
-};
-TriangleRange hardLeafTriangles(const PageView& page, uint32_t node);
 
 }  // namespace vcp

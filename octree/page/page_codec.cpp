@@ -45,8 +45,8 @@ std::vector<std::byte> coded(RangeEncoder& coder) {
 template <class Coder>
 void codeHeader(Coder& coder, PageHeader& header) {
     NumberModel model;
-    for (uint32_t* field : {&header.log2Cells, &header.groups, &header.faces, &header.triangles, &header.vertices,
-                            &header.softLeaves, &header.hardLeaves})
+    for (uint32_t* field :
+         {&header.log2Cells, &header.groups, &header.faces, &header.vertices, &header.softLeaves, &header.hardLeaves})
         model.code(coder, *field);
     uint32_t error = std::bit_cast<uint32_t>(header.certifiedError), low = error & 0xffffu, high = error >> 16;
     coder.raw(low, 16);
@@ -54,11 +54,11 @@ void codeHeader(Coder& coder, PageHeader& header) {
     header.certifiedError = std::bit_cast<float>(low | high << 16);
 }
 
-/// Checks the counts of a header, before anything is allocated by them.
+/// Checks the counts of a header without entries, before anything is allocated by them.
 bool plausible(const PageHeader& h, uint64_t pageBytes) {
     return h.log2Cells >= 1 && h.log2Cells <= 7 && h.groups <= 1u << 27 && h.faces <= kLeafIndexMask &&
-           h.triangles <= kLeafIndexMask && h.vertices <= kField21Mask && h.softLeaves <= h.faces &&
-           h.hardLeaves <= h.triangles && pageSections(h).end == pageBytes;
+           h.vertices <= kField21Mask && h.softLeaves <= h.faces && h.hardLeaves <= 8 * h.groups + 1 &&
+           pageSections(h).end <= pageBytes;
 }
 
 template <class Coder>
@@ -67,7 +67,7 @@ void codePage(Coder& coder, CodecPage& page) {
     std::make_unique<NodeCodec<Coder>>(coder, page)->run();
     if (!page.wrong) std::make_unique<FaceCodec<Coder>>(coder, page)->run();
     if (!page.wrong) std::make_unique<MeshCodec<Coder>>(coder, page)->run();
-    std::memcpy(page.block.data(), &page.header, sizeof page.header);
+    if (!page.wrong) page.finish();
 }
 
 /// Returns the colour page of a page in canonical order.
@@ -98,12 +98,13 @@ bool isBlock(const Result<std::vector<uint4>>& decoded, const std::vector<uint4>
 
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
     const auto plainly = [&] {
-        return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour)};
+        return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour), geometry.size()};
     };
     const auto source = parsePage(geometry);
     if (!source.ok()) return plainly();
     CodecPage page;
     page.header = source->header;
+    page.header.entries = 0;
     page.source = &*source;
     if (!plausible(page.header, geometry.size())) return plainly();
     page.allocate();
@@ -111,9 +112,9 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
     codeHeader(coder, page.header);
     codePage(coder, page);
     if (page.wrong) return plainly();
-    PackedPage packed{coded(coder), {}};
+    PackedPage packed{coded(coder), {}, page.block.size() * sizeof(uint4)};
     // A page whose coded form does not decode to it is stored plainly: a lost page costs more than this check.
-    if (!isBlock(unpackGeometry(packed.geometry, geometry.size()), page.block)) return plainly();
+    if (!isBlock(unpackGeometry(packed.geometry, packed.geometryBytes), page.block)) return plainly();
     if (colour.empty()) return packed;
     const auto view = parsePage(std::as_bytes(std::span(page.block)));
     std::vector<uint4> block = inOrder(colour, page);
@@ -131,9 +132,12 @@ Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uin
     CodecPage page;
     codeHeader(coder, page.header);
     if (!plausible(page.header, pageBytes)) return broken("page does not decode to its size");
+    page.mostEntries = uint32_t(std::min<uint64_t>(
+        kHardFirstMask, (pageBytes - pageSections(page.header).strips) / entryBytes(page.header.vertices)));
     page.allocate();
     codePage(coder, page);
-    if (page.wrong || !coder.complete()) return broken("page does not decode to its size");
+    if (page.wrong || !coder.complete() || page.block.size() * sizeof(uint4) != pageBytes)
+        return broken("page does not decode to its size");
     return std::move(page.block);
 }
 

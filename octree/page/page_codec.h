@@ -7,10 +7,11 @@
 //              rule; normals as differences from those of the triangles
 //   colour     coded on its own: the colour of each corner and vertex once, foretold by its neighbours
 //
-// The numbers of children, faces and records and the leaves' lists of triangles are derived.
+// The numbers of children and faces and the leaves' lists and strips of triangles are derived.
 //
-// Coding loses nothing, but the page that comes back has its groups, faces, triangle records, vertices and the corners
-// of a triangle in the codec's own order. A page that is not as the builder makes them is stored plainly.
+// Coding loses nothing, but the page that comes back has its groups, faces, vertices, triangles and the corners of a
+// triangle in the codec's own order, and so as many entries of strips as that order asks for. A page that is not as the
+// builder makes them is stored plainly.
 #pragma once
 
 #include <cstddef>
@@ -26,6 +27,7 @@ namespace vcp {
 /// A page as it is stored.
 struct PackedPage {
     std::vector<std::byte> geometry, colour;
+    uint64_t geometryBytes = 0;  ///< bytes of the page that comes back
 };
 
 /// Packs `geometry`, a page, and `colour`, its colour page or nothing; both 16-byte aligned. The same page gives the

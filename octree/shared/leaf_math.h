@@ -50,11 +50,6 @@ INLINE Real3 decodeVertex(uint lo, uint hi) {
     return Real3(Real(ix), Real(iy), Real(iz)) * (Real(1.0) / Real(kLatticePerCell));
 }
 
-// The three vertex numbers of a triangle record are packed like a vertex, without bias.
-INLINE uint decodeIndex0(uint lo) { return lo & kField21Mask; }
-INLINE uint decodeIndex1(uint lo, uint hi) { return (lo >> 21) | ((hi & 0x3ffu) << 11); }
-INLINE uint decodeIndex2(uint hi) { return (hi >> 10) & kField21Mask; }
-
 // Rotates leaf space so that the leaf's axis is x and the next axes, cyclically, are y and z: for the weights only.
 INLINE Real3 rotateToAxis(Real3 x, uint axis) {
     return axis == 0u ? x : axis == 1u ? Real3(x.y, x.z, x.x) : Real3(x.z, x.x, x.y);

@@ -9,9 +9,9 @@
 //   0                 64                  PageHeader (C++ only; the renderer has it in its page table)
 //   64                32 * groups         nodes: groups of 8 child words, child i at octant x + 2y + 4z
 //   ...               16 * faces          faces: 4 packed vectors each, see "soft leaf"
-//   ...               8 * triangles       triangle records of hard leaves: 3 vertex numbers, 21 bits each
-//   ...               8 * vertices        vertices of those triangles: 3 coordinates, 21 bits each
+//   ...               8 * vertices        vertices of the hard leaves' triangles: 3 coordinates, 21 bits each
 //   ...               4 * vertices        their normals, octahedral 16 + 16 bits, and a crease flag
+//   ...               2 or 4 * entries    strips of those triangles, see "hard leaf"
 //
 // A colour page, when the dataset has colour, is parallel to it: 16 bytes a face (4 x RGBA8, the corner
 // order of the face), then 4 bytes a vertex.
@@ -21,14 +21,21 @@
 //   01 empty      bits 29..0: clearance in 1/256 cell, rounded down. The node's box, grown by it on
 //                 every side and clamped to the page, holds no surface (so a ball of it is safe too)
 //   10 soft leaf  bits 21..0: first face; 23..22: axis; 27..24: wall code; 29..28: dip code
-//   11 hard leaf  bits 21..0: first triangle record; 29..22: count, 1 to 254; 255: the first record's
-//                 low word holds the count and the triangles follow it
+//   11 hard leaf  bits 23..0: first entry of its strips; 29..24: number of triangles, 1 to 62; 63: its
+//                 first two entries hold the number, 14 bits each, low bits first, and the strips follow
 //
 // Soft leaf: two consecutive faces, perpendicular to `axis`, hold its 8 corners; neighbours along the
 // axis share the face between them. Leaf space is page space shifted to the leaf's lowest corner and
 // scaled so that the leaf is the unit cube. Corner c of a face sits at c & 1 on the next axis and at
 // c >> 1 on the one after it, cyclically. Directions are in leaf space, from the surface to the corner;
 // the sign says on which side of the leaf's surface the corner lies.
+//
+// Hard leaf: strips of oriented triangles, one after the other; leaves share no entries. An entry has 16 bits
+// where the page has at most kShortEntryVertices vertices, else 32. Its two top bits are a step, the rest is the
+// number of a vertex v:
+//   0 begin: a = v; the next two entries, with steps 0, are b and c
+//   1 to 3:  v takes the place of a, b or c; so the next triangle lies across the edge of the other two
+// After an even number of steps the triangle is (a, b, c), after an odd number (a, c, b).
 
 const uint kPageHeaderBytes = 64u;
 const uint kNodeTypeShift = 30u;
@@ -42,15 +49,20 @@ const uint kSoftAxisShift = 22u;
 const uint kSoftWallShift = 24u;
 const uint kSoftWallMask = 15u;
 const uint kSoftDipShift = 28u;
-const uint kHardCountShift = 22u;
-const uint kHardCountMask = 255u;
-const uint kHardCountLong = 255u;
+const uint kHardFirstMask = 0xffffffu;
+const uint kHardCountShift = 24u;
+const uint kHardCountMask = 63u;
+const uint kHardCountLong = 63u;
+const uint kShortEntryVertices = 16384u;
+const uint kShortVertexBits = 14u;
+const uint kLongVertexBits = 30u;
+const uint kStepBegin = 0u;
 const float kClearancePerCell = 256.0f;
 
 // Leaves may be smaller than a cell where many triangles meet: up to this many further halvings.
 const uint kMaxSubcellDepth = 3u;
 
-// 21-bit fields of triangles and vertices. Vertices sit on the level's lattice: 2048 steps a cell, from
+// 21-bit fields of vertices. They sit on the level's lattice: 2048 steps a cell, from
 // 512 cells below the page's origin to 512 cells above it.
 const uint kField21Mask = 0x1fffffu;
 const int kLatticePerCell = 2048;

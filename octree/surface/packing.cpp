@@ -63,4 +63,8 @@ glm::u32vec2 pack21(uint32_t x, uint32_t y, uint32_t z) {
     return {(x & kField21Mask) | y << 21, (y & kField21Mask) >> 11 | z << 10};
 }
 
+glm::u32vec3 unpack21(glm::u32vec2 code) {
+    return {code.x & kField21Mask, (code.x >> 21 | code.y << 11) & kField21Mask, code.y >> 10 & kField21Mask};
+}
+
 }  // namespace vcp

@@ -31,5 +31,6 @@ uint32_t packNormal(glm::dvec3 normal, bool crease);
 
 /// Three 21-bit fields, x in the lowest bits of the first word. Precondition: each below 2^21.
 glm::u32vec2 pack21(uint32_t x, uint32_t y, uint32_t z);
+glm::u32vec3 unpack21(glm::u32vec2 code);
 
 }  // namespace vcp

@@ -17,7 +17,7 @@ struct Hit {
     // Soft: the point in leaf space, and the side the ray came from (sideBefore). Hard: weights of the second and third
     // vertex.
     vec4 at;
-    uint triangle;  // hard: its record
+    uvec3 corners;  // hard: the triangle's vertices
 };
 
 // What is seen of a hit.
@@ -231,32 +231,81 @@ float castSoft(Page page, uint node, vec3 lo, float edge, LeafSegment s, inout H
     return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
 
+// Reads the entries of a page's strips, one after the other.
+struct StripReader {
+    uint strips;  // texel of the first entry
+    uint shorts;  // 1 where entries are short, two to a word; else 0
+    uint next;    // number of the next entry
+    uint texel;   // the latest texel and its words; 0: none
+    uvec4 words;
+};
+
+StripReader stripReader(TableSections sections, uint first) {
+    // The size of the vertices' section tells how many there are.
+    uint shorts = sections.normals - sections.vertices <= kShortEntryVertices / 2u ? 1u : 0u;
+    return StripReader(sections.strips, shorts, first, 0u, uvec4(0u));
+}
+
+// Returns an entry's vertex number, and its step.
+uint readEntry(inout StripReader reader, out uint step, inout Work work) {
+    uint texel = reader.strips + (reader.next >> (2u + reader.shorts));
+    if (texel != reader.texel) {
+        reader.words = fetchTexel(texel);
+        reader.texel = texel;
+        if (kCountSteps != 0u) work.fetches++;
+    }
+    uint word = texelWord(reader.words, reader.next >> reader.shorts & 3u);
+    uint entry = word >> ((reader.next & reader.shorts) << 4) & 0xffffffffu >> (reader.shorts << 4);
+    uint bits = reader.shorts != 0u ? kShortVertexBits : kLongVertexBits;
+    reader.next++;
+    step = entry >> bits;
+    return entry & ((1u << bits) - 1u);
+}
+
+vec3 fetchVertex(TableSections sections, uint v, inout Work work) {
+    if (kCountSteps != 0u) work.fetches++;
+    uvec2 code = fetchPair(sections.vertices, v);
+    return decodeVertex(code.x, code.y);
+}
+
 // Intersects the triangles of a hard leaf. Returns the distance, or -1.
 float castHard(Page page, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
     if (kCountSteps != 0u) work.cells++;
-    uint first = node & kLeafIndexMask;
-    uint count = node >> kHardCountShift & kHardCountMask;
-    if (count == kHardCountLong) {
-        count = fetchPair(page.sections.triangles, first).x;
-        first++;
+    StripReader reader = stripReader(page.sections, node & kHardFirstMask);
+    uint count = node >> kHardCountShift & kHardCountMask, step;
+    bool isLong = count == kHardCountLong;
+    while (isLong) {
+        count = readEntry(reader, step, work);
+        count |= readEntry(reader, step, work) << kShortVertexBits;
+        isLong = false;
     }
     float lowest = s.fromWall ? -kIntervalSlack : 0.0;
     float best = s.tauTo - s.tauFrom + kIntervalSlack;
     bool found = false;
-    for (uint i = 0u; i < count; i++) {
-        uvec2 record = fetchPair(page.sections.triangles, first + i);
-        uvec3 v = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
-        uvec2 a = fetchPair(page.sections.vertices, v.x), b = fetchPair(page.sections.vertices, v.y),
-              c = fetchPair(page.sections.vertices, v.z);
-        if (kCountSteps != 0u) work.fetches += 4u;
-        vec3 t = intersectTriangle(s.from, direction, decodeVertex(a.x, a.y), decodeVertex(b.x, b.y),
-                                   decodeVertex(c.x, c.y), kTriangleSlack);
-        if (t.x >= lowest && t.x <= best) {
+    // A turn of the loop takes one vertex, so that none waits for another ray's strip to begin. Where a strip begins,
+    // two turns have no triangle yet; most leaves have one strip, and its first two vertices come before the loop.
+    uvec3 corners = uvec3(0u);
+    corners.x = readEntry(reader, step, work);
+    corners.y = readEntry(reader, step, work);
+    vec3 a = fetchVertex(page.sections, corners.x, work), b = fetchVertex(page.sections, corners.y, work), c = b;
+    uint known = 2u;  // how many of the triangle's vertices
+    while (count > 0u) {
+        uint v = readEntry(reader, step, work);
+        vec3 p = fetchVertex(page.sections, v, work);
+        known = step != kStepBegin ? 3u : known < 3u ? known + 1u : 1u;
+        bvec3 place = equal(uvec3(step != kStepBegin ? step : known), uvec3(1u, 2u, 3u));
+        corners = mix(corners, uvec3(v), place);
+        a = mix(a, p, bvec3(place.x));
+        b = mix(b, p, bvec3(place.y));
+        c = mix(c, p, bvec3(place.z));
+        vec3 t = intersectTriangle(s.from, direction, a, b, c, kTriangleSlack);
+        if (known == 3u && t.x >= lowest && t.x <= best) {
             best = t.x;
             hit.at.xy = t.yz;
-            hit.triangle = first + i;
+            hit.corners = corners;
             found = true;
         }
+        count -= known == 3u ? 1u : 0u;
     }
     return found ? max(s.tauFrom + best, 0.0) : -1.0;
 }
@@ -284,8 +333,7 @@ Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
 }
 
 Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 direction) {
-    uvec2 record = fetchPair(sections.triangles, hit.triangle);
-    uvec3 corners = uvec3(decodeIndex0(record.x), decodeIndex1(record.x, record.y), decodeIndex2(record.y));
+    uvec3 corners = hit.corners;
     uvec2 a = fetchPair(sections.vertices, corners.x), b = fetchPair(sections.vertices, corners.y),
           c = fetchPair(sections.vertices, corners.z);
     vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
@@ -392,7 +440,7 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
     float last = min(minOf(planeDistances(ray, mix(ivec3(0), root, ahead))), until);
     vec3 reached = vec3(max(max(first, 0.0), from));
 
-    Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), 0u);
+    Hit hit = Hit(kNoHit, 0u, 0, 0u, vec4(0.0), uvec3(0u));
     Region before = Region(ivec3(0), kNoRegion, false, 0.0), region;
     Seam seam;
     bool inside = reached.x < last, fromNew = true, onSeam = false;

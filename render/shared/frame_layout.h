@@ -74,7 +74,7 @@ struct TableNode {
     uint pageTexel;   // of the page in the pool
 };
 struct TableSections {
-    uint faces, triangles, vertices, normals;  // texels in the pool
+    uint faces, vertices, normals, strips;  // texels in the pool
 };
 struct TableColours {
     uint faces, vertices;  // texels in the colour pool

@@ -30,7 +30,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     static_cast<void>(vcp::parsePaperPage(bytes, 20));
     const auto page = vcp::parsePage(bytes);
     if (!page.ok()) return 0;
-    const auto again = vcp::unpackGeometry(vcp::packPage(bytes, {}).geometry, bytes.size());
+    const vcp::PackedPage packedAgain = vcp::packPage(bytes, {});
+    const auto again = vcp::unpackGeometry(packedAgain.geometry, packedAgain.geometryBytes);
     require(again.ok(), "a page can be stored");
     const auto view = vcp::parsePage(std::as_bytes(std::span(*again)));
     require(view.ok(), "a stored page comes back");

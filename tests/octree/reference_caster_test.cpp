@@ -203,20 +203,17 @@ TEST(ReferenceCaster, CutIsChecked) {
 PageBytes tetrahedronPage(std::array<glm::dvec3, 4> corners) {
     PageHeader h;
     h.log2Cells = 2;
-    h.triangles = 4;
     h.vertices = 4;
     h.hardLeaves = 1;
-    h.root = kNodeHard << kNodeTypeShift | 4u << kHardCountShift;
+    std::vector<uint32_t> entries;
+    h.root = appendHardLeaf(std::array<Index3, 4>{{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}}, entries);
+    h.entries = uint32_t(entries.size());
     const PageSections s = pageSections(h);
     PageBytes bytes;
     bytes.geometry.resize(s.end / 16);
     auto* out = reinterpret_cast<std::byte*>(bytes.geometry.data());
     std::memcpy(out, &h, sizeof(h));
-    const uint32_t faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-    for (uint32_t t = 0; t < 4; ++t) {
-        const glm::u32vec2 record = pack21(faces[t][0], faces[t][1], faces[t][2]);
-        std::memcpy(out + s.triangles + 8 * t, &record, 8);
-    }
+    storeEntries(entries, h.vertices, out + s.strips);
     for (uint32_t v = 0; v < 4; ++v) {
         const glm::dvec3 lattice = corners[v] * double(kLatticePerCell) + double(kLatticeBias);
         const glm::u32vec2 record = pack21(uint32_t(lattice.x), uint32_t(lattice.y), uint32_t(lattice.z));

@@ -61,14 +61,14 @@ public:
                     node(queue[i].first + edge * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), queue[i].second + 1, queue));
             }
         header_.groups = uint32_t(nodes_.size() / 8);
-        header_.triangles = uint32_t(records_.size());
+        header_.entries = uint32_t(entries_.size());
         header_.vertices = uint32_t(numbers_.size());
         const PageSections s = pageSections(header_);
         WholePage page{Block(s.end / 16), {}};
         auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
         std::memcpy(out, &header_, sizeof header_);
         if (!nodes_.empty()) std::memcpy(out + s.nodes, nodes_.data(), nodes_.size() * 4);
-        if (!records_.empty()) std::memcpy(out + s.triangles, records_.data(), records_.size() * 8);
+        storeEntries(entries_, header_.vertices, out + s.strips);
         auto* vertices = reinterpret_cast<glm::u32vec2*>(out + s.vertices);
         auto* normals = reinterpret_cast<uint32_t*>(out + s.normals);
         for (const auto& [v, number] : numbers_) {
@@ -109,24 +109,21 @@ private:
             inside.pop_back();
             forgetATriangle = false;
         }
-        const uint32_t first = uint32_t(records_.size()), count = uint32_t(inside.size());
-        if (count >= kHardCountLong) records_.emplace_back(count, 0u);
+        std::vector<Index3> list;
         for (const uint32_t k : inside) {
-            uint32_t v[3];
+            Index3& v = list.emplace_back();
             for (size_t i = 0; i < 3; ++i)
                 v[i] = numbers_.try_emplace(triangles_[k][i], uint32_t(numbers_.size())).first->second;
-            records_.push_back(pack21(v[0], v[1], v[2]));
         }
-        return kNodeHard << kNodeTypeShift | std::min(count, kHardCountLong) << kHardCountShift | first;
+        return appendHardLeaf(list, entries_);
     }
 
     PageHeader header_;
     uint32_t depth_;
     std::vector<glm::i32vec3> positions_;
-    std::vector<std::array<uint32_t, 3>> triangles_;
+    std::vector<Index3> triangles_;
     std::vector<WideVector> sums_;
-    std::vector<uint32_t> nodes_;
-    std::vector<glm::u32vec2> records_;
+    std::vector<uint32_t> nodes_, entries_;
     std::map<uint32_t, uint32_t> numbers_;  ///< of vertices in the page
 };
 

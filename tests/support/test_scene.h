@@ -124,8 +124,9 @@ inline Scene torusScene() {
 inline Scene cubeScene(uint32_t split) {
     PageHeader header;
     header.log2Cells = 4;
-    std::vector<glm::u32vec2> vertices, triangles;
-    std::vector<uint32_t> normals;
+    std::vector<glm::u32vec2> vertices;
+    std::vector<uint32_t> normals, entries;
+    std::vector<Index3> triangles;
     for (uint32_t corner = 0; corner < 8; ++corner) {
         const auto at = [&](uint32_t bit) {
             return uint32_t(((corner >> bit & 1) != 0 ? 12 : 4) * kLatticePerCell + kLatticeBias);
@@ -136,16 +137,11 @@ inline Scene cubeScene(uint32_t split) {
     for (uint32_t axis = 0; axis < 3; ++axis)
         for (uint32_t side = 0; side < 2; ++side) {
             const uint32_t a = side << axis, u = 1u << (axis + 1) % 3, v = 1u << (axis + 2) % 3;
-            triangles.push_back(pack21(a, a | u, a | v));
-            triangles.push_back(pack21(a | u | v, a | v, a | u));
+            triangles.push_back({a, a | u, a | v});
+            triangles.push_back({a | u | v, a | v, a | u});
         }
-    // Every leaf has records of its own, as the format wants it.
-    const std::vector<glm::u32vec2> twelve = std::exchange(triangles, {});
-    const auto leaf = [&] {
-        const auto first = uint32_t(triangles.size());
-        triangles.insert(triangles.end(), twelve.begin(), twelve.end());
-        return kNodeHard << kNodeTypeShift | 12u << kHardCountShift | first;
-    };
+    // Every leaf has strips of its own, as the format wants it.
+    const auto leaf = [&] { return appendHardLeaf(triangles, entries); };
     std::vector<uint32_t> nodes;
     uint64_t leaves = 1;
     if (split == 0) {
@@ -160,7 +156,7 @@ inline Scene cubeScene(uint32_t split) {
         leaves = groupsInLayer;
     }
     header.groups = uint32_t(nodes.size() / 8);
-    header.triangles = uint32_t(triangles.size());
+    header.entries = uint32_t(entries.size());
     header.vertices = uint32_t(vertices.size());
     header.hardLeaves = uint32_t(leaves);
     const PageSections s = pageSections(header);
@@ -170,9 +166,9 @@ inline Scene cubeScene(uint32_t split) {
     auto* out = reinterpret_cast<std::byte*>(bytes.geometry.data());
     std::memcpy(out, &header, sizeof(header));
     if (!nodes.empty()) std::memcpy(out + s.nodes, nodes.data(), nodes.size() * 4);
-    std::memcpy(out + s.triangles, triangles.data(), triangles.size() * 8);
     std::memcpy(out + s.vertices, vertices.data(), vertices.size() * 8);
     std::memcpy(out + s.normals, normals.data(), normals.size() * 4);
+    storeEntries(entries, header.vertices, out + s.strips);
     FileHeader& h = made.dataset.header;
     h.cell = 1;
     h.levels = 1;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <random>
 #include <set>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -338,6 +339,9 @@ uint32_t nodeAt(const PageView& view, const NodeBox& box) {
     return node;
 }
 
+/// A vertex of a triangle, with all that belongs to it.
+using Corner = std::tuple<double, double, double, uint32_t, uint32_t>;
+
 TEST(PageEncoder, LeavesComeBack) {
     for (uint64_t seed = 0; seed < 3; ++seed) {
         Page page(mixedMesh(seed), {0, 0, 0});
@@ -367,19 +371,28 @@ TEST(PageEncoder, LeavesComeBack) {
             ASSERT_EQ(node >> kSoftWallShift & kSoftWallMask, leaf.wall);
         }
         for (const HardLeaf& leaf : tree.hard) {
-            const TriangleRange range = hardLeafTriangles(*view, nodeAt(*view, leaf.box));
-            ASSERT_EQ(range.count, leaf.triangles.size());
-            for (uint32_t i = 0; i < range.count; ++i) {
-                const glm::u32vec2 r = view->triangles[range.first + i];
-                const uint32_t v[3] = {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y), f64::decodeIndex2(r.y)};
-                for (int k = 0; k < 3; ++k) {
-                    const uint32_t global = page.geometry->vertices(leaf.triangles[i])[k];
-                    ASSERT_EQ(f64::decodeVertex(view->vertices[v[k]].x, view->vertices[v[k]].y),
-                              page.geometry->triangle(leaf.triangles[i]).corners[k]);
-                    ASSERT_EQ(view->normals[v[k]], page.mesh.normals[global]);
-                    ASSERT_EQ(view->vertexColours[v[k]], page.mesh.colours[global]);
+            // The same triangles with the same fronts, whatever their order and which vertex comes first.
+            std::vector<std::array<Corner, 3>> want, got;
+            for (const uint32_t t : leaf.triangles) {
+                std::array<Corner, 3>& corners = want.emplace_back();
+                for (size_t k = 0; k < 3; ++k) {
+                    const uint32_t global = page.geometry->vertices(t)[k];
+                    const glm::dvec3 p = page.geometry->triangle(t).corners[k];
+                    corners[k] = {p.x, p.y, p.z, page.mesh.normals[global], page.mesh.colours[global]};
                 }
             }
+            forEachTriangle(view->strips, nodeAt(*view, leaf.box), [&](const Index3& v) {
+                std::array<Corner, 3>& corners = got.emplace_back();
+                for (size_t k = 0; k < 3; ++k) {
+                    const glm::dvec3 p = f64::decodeVertex(view->vertices[v[k]].x, view->vertices[v[k]].y);
+                    corners[k] = {p.x, p.y, p.z, view->normals[v[k]], view->vertexColours[v[k]]};
+                }
+            });
+            for (auto* triangles : {&want, &got}) {
+                for (auto& t : *triangles) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+                std::sort(triangles->begin(), triangles->end());
+            }
+            ASSERT_EQ(got, want);
         }
     }
 }
@@ -485,7 +498,7 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
     const auto view = parsePage(std::as_bytes(std::span(block)));
     ASSERT_TRUE(view.ok()) << view.error().line();
     for (const HardLeaf& leaf : tree.hard)
-        EXPECT_EQ(hardLeafTriangles(*view, nodeAt(*view, leaf.box)).count, leaf.triangles.size());
+        EXPECT_EQ(StripWalk(view->strips, nodeAt(*view, leaf.box)).count(), leaf.triangles.size());
 }
 
 TEST(PageBuilder, CrowdedCellsAreSplit) {

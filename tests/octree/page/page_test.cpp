@@ -2,11 +2,13 @@
 // by the builder are parsed in tests/builder/page/page_builder_test.cpp.
 #include "octree/page/page.h"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <random>
 #include <string>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "octree/surface/packing.h"
@@ -26,14 +28,14 @@ struct PageParts {
     PageHeader header;
     std::vector<uint32_t> nodes;
     std::vector<uint4> faces;
-    std::vector<glm::u32vec2> triangles, vertices;
-    std::vector<uint32_t> normals;
+    std::vector<glm::u32vec2> vertices;
+    std::vector<uint32_t> normals, entries;
 
     /// Fills the header's counts.
     void count() {
         header.groups = uint32_t(nodes.size() / 8);
         header.faces = uint32_t(faces.size());
-        header.triangles = uint32_t(triangles.size());
+        header.entries = uint32_t(entries.size());
         header.vertices = uint32_t(vertices.size());
     }
 
@@ -42,7 +44,7 @@ struct PageParts {
         PageHeader sized = header;
         sized.groups = uint32_t(nodes.size() / 8);
         sized.faces = uint32_t(faces.size());
-        sized.triangles = uint32_t(triangles.size());
+        sized.entries = uint32_t(entries.size());
         sized.vertices = uint32_t(vertices.size());
         const PageSections s = pageSections(sized);
         std::vector<uint4> out(s.end / 16);
@@ -53,9 +55,9 @@ struct PageParts {
         std::memcpy(at, &header, sizeof header);
         copy(s.nodes, nodes);
         copy(s.faces, faces);
-        copy(s.triangles, triangles);
         copy(s.vertices, vertices);
         copy(s.normals, normals);
+        storeEntries(entries, sized.vertices, at + s.strips);
         return out;
     }
 };
@@ -71,11 +73,13 @@ PageParts smallPage() {
     p.nodes = {word(kNodeInternal, 1), softLeaf(0, 0), softLeaf(1, 0), hardLeaf(0, 2),
                emptyNode(0),           emptyNode(0.5), emptyNode(1),   emptyNode(0)};
     p.nodes.resize(15, emptyNode(0));
-    p.nodes.push_back(hardLeaf(2, kHardCountLong));
+    p.nodes.push_back(hardLeaf(4, kHardCountLong));
     for (uint32_t i = 0; i < 3; ++i)
         p.faces.emplace_back(packVector(0.3 + 0.1 * i, {0, 0, 1}, false), packVector(0.2, {0, 1, 0}, true),
                              packVector(0.7, {1, 0, 0}, false), packVector(0.1, {0, 0, -1}, true));
-    p.triangles = {pack21(0, 1, 2), pack21(0, 2, 3), {3u, 0u}, pack21(0, 1, 3), pack21(1, 2, 3), pack21(3, 2, 0)};
+    // (0, 1, 2), (0, 2, 3); three triangles: (0, 1, 3), (2, 3, 1), (2, 0, 3).
+    p.entries = {0, 1, 2, stripEntry(2, 3)};
+    p.entries.insert(p.entries.end(), {3, 0, 0, 1, 3, stripEntry(1, 2), stripEntry(2, 0)});
     for (uint32_t i = 0; i < 4; ++i) {
         const uint32_t far = kLatticeBias + 900;
         p.vertices.push_back(
@@ -116,20 +120,19 @@ private:
                 return;
             }
             case kNodeHard: {
-                const TriangleRange range = hardLeafTriangles(page_, node);
-                ASSERT_GT(range.count, 0u);
-                for (uint64_t t = range.first; t < uint64_t{range.first} + range.count; ++t)
-                    triangle(page_.triangles[t]);
+                uint32_t triangles = 0;
+                forEachTriangle(page_.strips, node, [&](const Index3& triangle) {
+                    ++triangles;
+                    for (const uint32_t v : triangle)
+                        sum += page_.vertices[v].x + page_.vertices[v].y + page_.normals[v];
+                });
+                ASSERT_GT(triangles, 0u);
+                ASSERT_EQ(triangles, StripWalk(page_.strips, node).count());
                 return;
             }
             default:
                 sum += uint64_t(nodeClearance(node));
         }
-    }
-
-    void triangle(glm::u32vec2 r) {
-        for (const uint32_t v : {f64::decodeIndex0(r.x), f64::decodeIndex1(r.x, r.y), f64::decodeIndex2(r.y)})
-            sum += page_.vertices[v].x + page_.vertices[v].y + page_.normals[v];
     }
 
     const PageView& page_;
@@ -158,6 +161,12 @@ void expectRefused(const PageParts& parts, const std::string& words) {
     EXPECT_NE(page.error().line().find(words), std::string::npos) << page.error().line();
 }
 
+std::vector<Index3> trianglesOf(const PageView& page, size_t node) {
+    std::vector<Index3> triangles;
+    forEachTriangle(page.strips, page.nodes[node], [&](const Index3& triangle) { triangles.push_back(triangle); });
+    return triangles;
+}
+
 TEST(Page, EveryKindOfNodeIsRead) {
     const std::vector<uint4> block = smallPage().bytes();
     const auto page = parsePage(asBytes(block));
@@ -166,12 +175,25 @@ TEST(Page, EveryKindOfNodeIsRead) {
     EXPECT_EQ(page->nodes.size(), 16u);
     EXPECT_EQ(page->faces.size(), 3u);
     EXPECT_EQ(page->vertices.size(), 4u);
-    const TriangleRange shortForm = hardLeafTriangles(*page, page->nodes[3]);
-    EXPECT_EQ(shortForm.first, 0u);
-    EXPECT_EQ(shortForm.count, 2u);
-    const TriangleRange longForm = hardLeafTriangles(*page, page->nodes[15]);
-    EXPECT_EQ(longForm.first, 3u);
-    EXPECT_EQ(longForm.count, 3u);
+    EXPECT_EQ(trianglesOf(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, 3}}));
+    EXPECT_EQ(trianglesOf(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
+}
+
+TEST(Page, EntriesAreLongWhereVerticesAreMany) {
+    for (const uint32_t vertices : {kShortEntryVertices, kShortEntryVertices + 1}) {
+        PageParts p = smallPage();
+        p.vertices.resize(vertices, p.vertices[0]);
+        p.normals.resize(vertices, p.normals[0]);
+        p.entries[3] = stripEntry(2, vertices - 1);
+        p.count();
+        const std::vector<uint4> block = p.bytes();
+        const auto page = parsePage(asBytes(block));
+        ASSERT_TRUE(page.ok()) << page.error().line();
+        EXPECT_EQ(trianglesOf(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, vertices - 1}}));
+        EXPECT_EQ(trianglesOf(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
+        const PageSections s = pageSections(page->header);
+        EXPECT_EQ(s.end - s.strips, vertices == kShortEntryVertices ? 32u : 48u);
+    }
 }
 
 TEST(Page, AnalyticPagesAreAccepted) {
@@ -293,7 +315,7 @@ TEST(Page, NestingIsBounded) {
 TEST(Page, LyingCountsAreRefused) {
     for (const uint32_t lie : {5u, 1u << 22, 1u << 27, 1u << 28, 1u << 29, 0x80000000u, 0xffffffffu})
         for (uint32_t PageHeader::*const field :
-             {&PageHeader::groups, &PageHeader::faces, &PageHeader::triangles, &PageHeader::vertices}) {
+             {&PageHeader::groups, &PageHeader::faces, &PageHeader::entries, &PageHeader::vertices}) {
             PageParts p = smallPage();
             p.header.*field = lie;
             const std::vector<uint4> block = p.bytes();
@@ -338,34 +360,58 @@ TEST(Page, LeavesStayInTheirSections) {
     expectRefused(axis, "soft leaf out of range");
 
     PageParts hard = smallPage();
-    hard.nodes[3] = hardLeaf(6, 1);
+    hard.nodes[3] = hardLeaf(11, 1);
     expectRefused(hard, "hard leaf out of range");
-    hard.nodes[3] = hardLeaf(5, 2);
+    hard.nodes[3] = hardLeaf(kHardFirstMask, 1);
+    expectRefused(hard, "hard leaf out of range");
+    hard.nodes[3] = hardLeaf(10, 2);
     expectRefused(hard, "too many triangles");
     hard.nodes[3] = hardLeaf(0, 0);
     expectRefused(hard, "too many triangles");
 
-    PageParts vertex = smallPage();
-    vertex.triangles[1] = pack21(0, 1, 4);
-    expectRefused(vertex, "missing vertex");
-    vertex.triangles[1] = pack21(kField21Mask, 1, 0);
-    expectRefused(vertex, "missing vertex");
+    // Triangles in the middle of a strip, at its begin and at its end.
+    for (const uint32_t entry : {0u, 1u, 2u, 3u})
+        for (const uint32_t vertex : {4u, (1u << kShortVertexBits) - 1}) {
+            PageParts p = smallPage();
+            p.entries[entry] = stripEntry(stepOf(p.entries[entry]), vertex);
+            expectRefused(p, fmt::format("byte {}: triangle names a missing vertex",
+                                         pageSections(p.header).strips + 2 * std::max(entry, 2u)));
+        }
+}
+
+TEST(Page, StripsBegin) {
+    PageParts middle = smallPage();
+    middle.nodes[3] = hardLeaf(3, 1);
+    expectRefused(middle, "byte 76: strips of a hard leaf are broken");
+    for (const uint32_t entry : {0u, 1u, 2u})
+        for (const uint32_t step : {1u, 2u, 3u}) {
+            PageParts p = smallPage();
+            p.entries[entry] = stripEntry(step, p.entries[entry]);
+            expectRefused(p, "byte 76: strips of a hard leaf are broken");
+        }
+    PageParts last = smallPage();
+    last.entries[9] = 2;  // begins, but the page ends with the second vertex
+    expectRefused(last, "strips of a hard leaf are broken");
 }
 
 TEST(Page, LongHardLeavesCannotLie) {
-    for (const uint32_t count : {0u, 4u, 5u, 0x7fffffffu, 0xfffffffdu, 0xffffffffu}) {
+    for (const uint32_t count : {0u, 8u, 0x3fffu, 0x4003u, 0xfffffffu, 0xffffffffu}) {
         PageParts p = smallPage();
-        p.triangles[2].x = count;
+        p.entries[4] = count & 0x3fffu;
+        p.entries[5] = count >> kShortVertexBits;
         expectRefused(p, "too many triangles");
     }
+    PageParts more = smallPage();
+    more.entries[4] = 4;
+    expectRefused(more, "strips of a hard leaf are broken");
     PageParts last = smallPage();
-    last.nodes[15] = hardLeaf(5, kHardCountLong);  // the record with the count is the last
-    last.triangles[5] = {1u, 0u};
+    last.nodes[15] = hardLeaf(10, kHardCountLong);  // the first entry with the count is the last
+    last.entries[10] = 1;
     expectRefused(last, "too many triangles");
 }
 
 // Else a page of a few hundred kilobytes would ask for 10^11 checks here and 10^5 triangles in every leaf.
-TEST(Page, LeavesDoNotShareRecords) {
+TEST(Page, LeavesDoNotShareEntries) {
     PageParts p = smallPage();
     p.nodes[4] = hardLeaf(0, 2);
     ++p.header.hardLeaves;

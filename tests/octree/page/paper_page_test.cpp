@@ -100,7 +100,6 @@ protected:
 
     std::filesystem::path write(const std::function<void(FileHeader&)>& change) {
         FileHeader header;
-        header.version = kMethodFileVersion;
         header.method = Method::Paper;
         header.cell = 1;
         header.levels = 1;
@@ -170,7 +169,6 @@ TEST_F(PaperFileTest, UnknownMethodsAreNamed) {
     const Error unknown = refusal(write([](FileHeader& h) { h.method = static_cast<Method>(9); }));
     EXPECT_EQ(unknown.code, ErrorCode::Unsupported);
     EXPECT_NE(unknown.line().find("method 9"), std::string::npos) << unknown.line();
-    EXPECT_EQ(refusal(write([](FileHeader& h) { h.version = kFileVersion; })).code, ErrorCode::InvalidInput);
     EXPECT_EQ(refusal(write([](FileHeader& h) { h.method = Method::Certified; })).code, ErrorCode::InvalidInput);
     EXPECT_EQ(refusal(write([](FileHeader& h) { h.log2Cells = 21; })).code, ErrorCode::InvalidInput);
     EXPECT_EQ(refusal(write([](FileHeader& h) { h.flags = kFlagColour; })).code, ErrorCode::InvalidInput);
