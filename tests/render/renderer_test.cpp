@@ -110,7 +110,9 @@ TEST_P(RendererAgainstReference, EveryCamera) {
     options.access = GetParam();
     start(options);
     const Scene scenes[] = {test::sphereScene(), test::torusScene(), test::cubeScene(0), test::cubeScene(2),
-                            test::sphereScene(2, {483920.5, 3792000.25, 1200}, 1.0 / 1024, 1)};
+                            test::sphereScene(2, {483920.5, 3792000.25, 1200}, 1.0 / 1024, 1),
+                            // Leaves of several strips; of many triangles; entries of 32 bits.
+                            test::wavesScene(9, 4), test::wavesScene(12, 0), test::wavesScene(130, 5)};
     for (const Scene& scene : scenes) {
         show(scene);
         uint64_t hits = 0;

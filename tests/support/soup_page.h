@@ -83,7 +83,8 @@ public:
         return page;
     }
 
-    bool forgetATriangle = false;  ///< in the first leaf that has two
+    bool forgetATriangle = false;     ///< in the first leaf that has two
+    double clearancePerDepth = 0.25;  ///< of empty leaves, in cells: what is to be coded, true only where it is 0
 
 private:
     [[nodiscard]] int edgeAt(uint32_t depth) const { return (kLatticePerCell << header_.log2Cells) >> depth; }
@@ -99,7 +100,7 @@ private:
                         std::max({t[0][axis], t[1][axis], t[2][axis]}) >= lower[axis];
             if (boxes && CubeTest(t).touches(lower, edgeAt(depth))) inside.push_back(k);
         }
-        if (inside.empty()) return emptyNode(0.25 * double(depth));
+        if (inside.empty()) return emptyNode(clearancePerDepth * double(depth));
         if (depth < depth_) {
             queue.emplace_back(lower, depth);
             return kNodeInternal << kNodeTypeShift | uint32_t(queue.size() - 1);

@@ -1,6 +1,7 @@
 // Datasets in memory for tests of the renderer.
 #pragma once
 
+#include <cmath>
 #include <condition_variable>
 #include <cstring>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "octree/reference_caster.h"
 #include "render/renderer.h"
 #include "tests/support/analytic_page.h"
+#include "tests/support/soup_page.h"
 
 namespace vcp::test {
 
@@ -179,6 +181,39 @@ inline Scene cubeScene(uint32_t split) {
     made.dataset.pages.push_back(entry);
     made.pages.push_back(std::move(bytes));
     return sceneOf("cube" + std::to_string(split), std::move(made));
+}
+
+/// One page of hard leaves at a depth: a sheet of n x n squares in waves, every seventh triangle turned over.
+inline Scene wavesScene(uint32_t n, uint32_t depth) {
+    SoupPage page(4, depth);
+    page.clearancePerDepth = 0;
+    for (uint32_t y = 0; y <= n; ++y)
+        for (uint32_t x = 0; x <= n; ++x) {
+            const double u = 1 + 14.0 * x / n, v = 1 + 14.0 * y / n;
+            page.vertex(glm::i32vec3(double(kLatticePerCell) * glm::dvec3(u, v, 8 + 2 * std::sin(u) * std::cos(v))));
+        }
+    uint32_t triangles = 0;
+    const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
+        triangles++ % 7 == 0 ? page.triangle(a, c, b) : page.triangle(a, b, c);
+    };
+    for (uint32_t y = 0; y < n; ++y)
+        for (uint32_t x = 0; x < n; ++x) {
+            const uint32_t a = x + (n + 1) * y, b = a + 1, c = a + n + 1, d = c + 1;
+            add(a, b, c);
+            add(b, d, c);
+        }
+    AnalyticDataset made;
+    PageBytes bytes;
+    bytes.geometry = page.build(n).geometry;
+    made.dataset.header.cell = 1;
+    made.dataset.header.levels = 1;
+    made.dataset.header.log2Cells = 4;
+    PageEntry entry;
+    entry.pageBytes = uint32_t(bytes.geometryBytes().size());
+    entry.leaves = entry.hardLeaves = parsePage(bytes.geometryBytes())->header.hardLeaves;
+    made.dataset.pages.push_back(entry);
+    made.pages.push_back(std::move(bytes));
+    return sceneOf("waves" + std::to_string(n), std::move(made));
 }
 
 /// Gives every corner of a scene's pages one colour.
