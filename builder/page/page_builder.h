@@ -56,6 +56,10 @@ struct PageTree {
     int cells = 0;                        ///< an edge
     double stray = 0;                     ///< the largest of the triangles that touch the page, in cells
     std::vector<uint8_t> occupied;        ///< cells that the mesh touches, x fastest
+    /// Makes node `index` an inner one, with eight empty children; returns the first one's number.
+    uint32_t addChildren(uint32_t index);
+    /// Makes node `index` a hard leaf. `locals`: local numbers, ascending.
+    void makeHard(uint32_t index, std::vector<uint32_t> locals);
     /// Returns the largest distance of the rendered surface from this level's mesh, in cells.
     [[nodiscard]] double certifiedError() const;
     /// Returns the triangle records of the hard leaves: a triangle has one in each leaf that it touches.
