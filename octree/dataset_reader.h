@@ -18,6 +18,7 @@ struct Dataset {
     PageDirectory pages;
 
     [[nodiscard]] bool hasColour() const { return (header.flags & kFlagColour) != 0; }
+    [[nodiscard]] bool isCovering() const { return (header.flags & kFlagCovering) != 0; }
     /// Edge of a cell of `level`, world units.
     [[nodiscard]] double cellOf(uint32_t level) const;
     /// World position of the lowest corner of a page.

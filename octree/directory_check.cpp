@@ -39,6 +39,8 @@ Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t leve
         return fail(offsetof(PageEntry, certifiedError), "certified error is larger than its level's in the header");
     if (e.hardLeaves > e.leaves)
         return fail(offsetof(PageEntry, hardLeaves), "leaf counts: more hard leaves than leaves");
+    if (e.slabLeaves > e.leaves - e.hardLeaves || (e.slabLeaves != 0 && header_.version == 3))
+        return fail(offsetof(PageEntry, slabLeaves), "leaf counts: more slab leaves than leaves");
     // The root's word stands in the page's header, the words of all other leaves among the nodes.
     if (e.leaves > e.pageBytes / sizeof(uint32_t))
         return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");

@@ -46,10 +46,11 @@ private:
     /// Checks that it is a .vcp of a known version, and that the file is complete.
     [[nodiscard]] Result<void> identity() const {
         if (std::memcmp(h_.magic, FileHeader{}.magic, sizeof h_.magic) != 0) return fail(0, "not a .vcp file");
-        if (h_.version != kFileVersion)
+        if (!isKnownVersion(h_.version))
             return fail(8,
-                        fmt::format("file version {} is not known; this program reads version {}: {}", h_.version,
-                                    kFileVersion, h_.version < kFileVersion ? "build it again" : "use a newer program"),
+                        fmt::format("file version {} is not known; this program reads versions {} to {}: {}",
+                                    h_.version, kOldestFileVersion, kFileVersion,
+                                    h_.version < kFileVersion ? "build it again" : "use a newer program"),
                         ErrorCode::Unsupported);
         std::vector<std::byte> unhashed(bytes_.begin(), bytes_.end());
         std::memset(unhashed.data() + offsetof(FileHeader, hash), 0, 8);
@@ -70,11 +71,11 @@ private:
                         ErrorCode::Unsupported);
         if (isPaper_ && (h_.levels != 1 || h_.pages != 1 || h_.flags != 0))
             return fail(128, "a file of this method has one page");
-        if ((h_.flags & ~kFlagColour) != 0)
-            return fail(
-                offsetof(FileHeader, flags),
-                fmt::format("flags {:#x} are not known to this program: use a newer program", h_.flags & ~kFlagColour),
-                ErrorCode::Unsupported);
+        const uint32_t unknown = h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0));
+        if (unknown != 0)
+            return fail(offsetof(FileHeader, flags),
+                        fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),
+                        ErrorCode::Unsupported);
         return {};
     }
 

@@ -39,10 +39,10 @@ Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset,
     const auto fail = [&](std::string message) {
         return brokenBytes(reader.name(), fmt::format("page {}", index), e.offset, std::move(message));
     };
-    const uint64_t leaves = uint64_t{page.softLeaves} + page.hardLeaves;
-    if (leaves != e.leaves || page.hardLeaves != e.hardLeaves)
-        return fail(fmt::format("has {} leaves, {} of them hard; its directory entry says {} and {}", leaves,
-                                page.hardLeaves, e.leaves, e.hardLeaves));
+    const uint64_t leaves = uint64_t{page.softLeaves} + page.slabLeaves + page.hardLeaves;
+    if (leaves != e.leaves || page.hardLeaves != e.hardLeaves || page.slabLeaves != e.slabLeaves)
+        return fail(fmt::format("has {} leaves, {} of them hard and {} slabs; its directory entry says {}, {} and {}",
+                                leaves, page.hardLeaves, page.slabLeaves, e.leaves, e.hardLeaves, e.slabLeaves));
     // Both errors were rounded up to single precision, one in cells and one in world units.
     const double error = page.certifiedError * dataset.cellOf(e.level),
                  slack = 1e-6 * error + 4 * double(std::numeric_limits<float>::denorm_min());

@@ -1,4 +1,4 @@
-// The .vcp file, version 2, and version 3 for other methods than the certified one.
+// The .vcp file, version 4. Files of version 3 are read, too: they have no slab leaves and no kFlagCovering.
 //
 //   offset   bytes        content
 //   0        4096         FileHeader: what is in the file, tables of the levels, where the directory is
@@ -25,8 +25,9 @@
 
 namespace vcp {
 
-inline constexpr uint32_t kFileVersion = 3;
-inline constexpr uint32_t kMaxLevels = 22;  ///< Morton codes have 21 bits an axis
+inline constexpr uint32_t kFileVersion = 4;
+inline constexpr uint32_t kOldestFileVersion = 3;  ///< that is read
+inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
@@ -67,16 +68,22 @@ struct FileHeader {
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
         0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< bit 0: has colour
+    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
-    uint64_t leaves = 0;      ///< soft and hard leaves of the finest level
+    uint64_t leaves = 0;      ///< soft, slab and hard leaves of the finest level
     uint64_t hardLeaves = 0;  ///< hard leaves of the finest level
     LevelRow level[kMaxLevels] = {};
     uint64_t hash = 0;      ///< XXH3-64 of the 4096 bytes with this field zero
     PaperParameters paper;  ///< zero where the method is another
 };
 inline constexpr uint32_t kFlagColour = 1;
+/// The surface of each page covers the mesh's within the page: no ray through the mesh slips between pages of two
+/// levels, so none is continued beyond its page.
+inline constexpr uint32_t kFlagCovering = 2;
+
+/// Whether a file of this version can be read.
+constexpr bool isKnownVersion(uint32_t version) { return version >= kOldestFileVersion && version <= kFileVersion; }
 static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 &&
               offsetof(FileHeader, triangles) == 144);
 static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels &&
@@ -94,14 +101,16 @@ struct PageEntry {
     uint32_t colourStoredBytes = 0;
     uint32_t colourBytes = 0;
     uint32_t firstChild = 0;  ///< entry of the first child page; children are consecutive, in octant order
-    uint32_t leaves = 0;      ///< number of soft and hard leaves
+    uint32_t leaves = 0;      ///< number of soft, slab and hard leaves
     uint32_t hardLeaves = 0;
     float certifiedError = 0;  ///< world units, rounded up
     uint8_t childMask = 0;     ///< octants that have a page on the next level
     uint8_t level = 0;
-    uint8_t reserved[6] = {};
+    uint8_t reserved[2] = {};
+    uint32_t slabLeaves = 0;
 };
-static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 && offsetof(PageEntry, childMask) == 72);
+static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 &&
+              offsetof(PageEntry, childMask) == 72 && offsetof(PageEntry, slabLeaves) == 76);
 
 /// A run of consecutive entry numbers. (std::views::iota does not compile with clang 14.)
 class EntryRange {

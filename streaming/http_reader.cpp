@@ -36,7 +36,7 @@ std::optional<ByteRange> restOfFirstView(std::span<const std::byte> head) {
     PageEntry root;
     std::memcpy(&header, head.data(), sizeof header);
     std::memcpy(&root, head.data() + kDirectoryOffset, sizeof root);
-    if (std::memcmp(header.magic, FileHeader{}.magic, sizeof header.magic) != 0 || header.version != kFileVersion)
+    if (std::memcmp(header.magic, FileHeader{}.magic, sizeof header.magic) != 0 || !isKnownVersion(header.version))
         return std::nullopt;
     const uint64_t blocks = header.pages / kEntriesPerBlock + (header.pages % kEntriesPerBlock != 0 ? 1 : 0);
     const bool isWhole = blocks <= wholeDirectoryBytes(kLeadBytes) / kBlockBytes;

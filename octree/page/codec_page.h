@@ -2,6 +2,7 @@
 // the encoder and the decoder alike, and, for the encoder, the page it codes.
 #pragma once
 
+#include <bit>
 #include <cstring>
 #include <span>
 #include <vector>
@@ -26,6 +27,14 @@ struct NodePlace {
 
 inline constexpr int kSubcellsPerCell = 1 << kMaxSubcellDepth;
 
+/// Keys of hash maps: a place in subcells, not below 0, and a node by its lowest corner and edge.
+inline uint64_t positionKey(glm::ivec3 p) {
+    return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << 16 | uint64_t(uint32_t(p.z)) << 32;
+}
+inline uint64_t leafKey(glm::ivec3 lower, int edge) {
+    return positionKey(lower) | uint64_t(std::countr_zero(unsigned(edge))) << 48;
+}
+
 /// The places of a checked page's nodes.
 inline std::vector<NodePlace> placesOf(const PageView& page) {
     std::vector<NodePlace> places(page.nodes.size());
@@ -48,8 +57,9 @@ struct CodecPage {
     std::vector<uint32_t> entries;  ///< of strips (strips.h)
     std::vector<NodePlace> places;  ///< places of the nodes in `nodes`
 
-    const PageView* source = nullptr;                             ///< the page that the encoder codes
-    std::vector<uint32_t> groupSource, faceSource, vertexSource;  ///< encoder: which element of `source` each one is
+    const PageView* source = nullptr;  ///< the page that the encoder codes
+    /// Encoder: which element of `source` each one is; faces are those of soft leaves, vectors those of slab leaves.
+    std::vector<uint32_t> groupSource, faceSource, vectorSource, vertexSource;
 
     uint32_t mostEntries = kHardFirstMask;  ///< a page may not ask for more memory or work than its size allows
     bool wrong = false;                     ///< decoder: the bytes are no page; encoder: the page needs the plain form
@@ -73,6 +83,9 @@ struct CodecPage {
         storeEntries(entries, header.vertices, bytes + s.strips);
         std::memcpy(bytes, &header, sizeof header);
     }
+    /// The number of faces that soft leaves have; the vectors of slab leaves are in the rest. The codec of nodes has
+    /// counted slab leaves.
+    [[nodiscard]] uint32_t softFaces() const { return header.faces - (header.slabLeaves + 3) / 4; }
     /// The word of node i in the page that the encoder codes; 0 for the decoder.
     [[nodiscard]] uint32_t sourceWord(size_t i) const {
         return source != nullptr ? source->nodes[size_t{8} * groupSource[i / 8] + i % 8] : 0u;

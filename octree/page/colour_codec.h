@@ -1,5 +1,5 @@
-// Codes the colours of a page: each corner's colour once, predicted from its neighbours, and each vertex' colour,
-// predicted from those of its triangle. Part of page_codec.
+// Codes the colours of a page: each corner's and each slab's colour once, predicted from its neighbours, and each
+// vertex' colour, predicted from those of its triangle. Part of page_codec.
 #pragma once
 
 #include <array>
@@ -22,6 +22,7 @@ public:
           faces_(faces),
           vertices_(vertices),
           corners_(1 << page.header.log2Cells),
+          slabs_(page.header.slabLeaves),
           faceDone_(faces.size(), 0),
           vertexDone_(vertices.size(), 0) {}
 
@@ -30,12 +31,13 @@ public:
         const std::vector<NodePlace> places = placesOf(page_);
         const auto visit = [&](uint32_t word, const NodePlace& place) {
             if (nodeType(word) == kNodeSoft) codeLeaf(word, place);
+            if (nodeType(word) == kNodeSlab) codeSlab(word, place);
             if (nodeType(word) == kNodeHard)
                 forEachTriangle(page_.strips, word, [&](const Index3& triangle) { codeTriangle(triangle); });
         };
         visit(page_.header.root, {0, 0, 0, uint16_t(kSubcellsPerCell << page_.header.log2Cells)});
         for (size_t i = 0; i < places.size(); ++i) visit(page_.nodes[i], places[i]);
-        return used_ == faces_.size() + vertices_.size();
+        return used_ + (page_.header.slabLeaves + 3) / 4 == faces_.size() + vertices_.size();
     }
 
 private:
@@ -75,6 +77,23 @@ private:
         }
         here = {colour, true};
         last_ = colour;
+    }
+
+    void codeSlab(uint32_t word, const NodePlace& place) {
+        std::array<uint32_t, 4> sum{};
+        uint32_t count = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            for (const int step : {-int{place.edge}, int{place.edge}}) {
+                glm::ivec3 lower = place.lower();
+                lower[axis] += step;
+                const uint32_t* near = lower[axis] < 0 ? nullptr : slabs_.find(leafKey(lower, place.edge));
+                if (near == nullptr) continue;
+                ++count;
+                for (size_t i = 0; i < 4; ++i) sum[i] += *near >> 8 * i & 255u;
+            }
+        uint32_t& colour = reinterpret_cast<uint32_t*>(faces_.data())[slabVector(word)];
+        codeColour(colour, count > 0 ? mean(sum, count) : last_, 3);
+        slabs_.findOrAdd(leafKey(place.lower(), place.edge)) = last_ = colour;
     }
 
     void codeTriangle(const Index3& triangle) {
@@ -131,11 +150,12 @@ private:
     std::span<uint4> faces_;
     std::span<uint32_t> vertices_;
     CornerStore<Known> corners_;
+    PositionMap<uint32_t> slabs_;  ///< colours of slab leaves that were coded
     std::vector<uint8_t> faceDone_, vertexDone_;
     size_t used_ = 0;
     uint32_t last_ = 0;
-    BitModel same_, equal_[3];
-    SmallModel channel_[3][4][3];
+    BitModel same_, equal_[4];
+    SmallModel channel_[4][4][3];
 };
 
 }  // namespace vcp

@@ -12,10 +12,6 @@
 
 namespace vcp {
 
-inline uint64_t positionKey(glm::ivec3 p) {
-    return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << 16 | uint64_t(uint32_t(p.z)) << 32;
-}
-
 /// Positions range from 0 to the page's edge. A corner that was not met before has a default `Value`.
 template <class Value>
 class CornerStore {

@@ -7,6 +7,7 @@
 
 #include "octree/page/codec_page.h"
 #include "octree/page/corner_store.h"
+#include "octree/page/octahedral_grid.h"
 #include "octree/page/range_coder.h"
 #include "octree/surface/position_map.h"
 
@@ -40,10 +41,11 @@ public:
         done_.assign(order.size(), 0);
         for (uint32_t i = 0; i < order.size() && !page_.wrong; ++i)
             if (!done_[i]) codeRun(order, i);
-        if (nextFace_ != page_.header.faces) page_.wrong = true;
+        if (nextFace_ != page_.softFaces()) page_.wrong = true;
     }
 
 private:
+    static constexpr uint32_t kDirectionMask = 0xfffffu;
     struct Leaf {
         uint32_t* word;
         uint32_t source;
@@ -54,12 +56,6 @@ private:
         int edge = 0;            ///< edge of the leaf that it was coded for; 0: not coded
         glm::i16vec3 normal{0};  ///< direction of `code` in 1/4096, on the side of the corner or the other
     };
-    /// A direction; its unit is 1/4096.
-    using Direction = glm::ivec3;
-
-    static uint64_t leafKey(glm::ivec3 lower, int edge) {
-        return positionKey(lower) | uint64_t(std::countr_zero(unsigned(edge))) << 48;
-    }
 
     void codeRun(std::vector<Leaf>& order, uint32_t first) {
         uint32_t axis = order[first].source >> kSoftAxisShift & 3u;
@@ -151,7 +147,7 @@ private:
     /// What the neighbours say about a corner: its oriented normal (of any length) and its signed distance, in steps of
     /// the packed distance.
     struct Foretold {
-        Direction normal{0};
+        GridDirection normal{0};
         int distance = 0;
         int neighbours = 0;
         int along = 0;         ///< sum, over the neighbours, of the distance without the corner's own normal
@@ -171,7 +167,7 @@ private:
                 const int along = end != 0 ? -1 : 1;  // direction from the neighbour to the corner
                 const int d = signedDistance(rescaled(corner, edge)), slope = steps(along * corner.normal[axis]);
                 ++f.neighbours;
-                f.normal += Direction(corner.normal);
+                f.normal += GridDirection(corner.normal);
                 sum += d + slope;
                 f.along += d + slope / 2;
                 f.offset[axis] += along;
@@ -189,10 +185,11 @@ private:
         const bool negative = (side ^ flip_) != 0;
         const int have = std::min(f.neighbours, 3);
         const int context = f.same ? 4 : have;
-        uint32_t u = code >> 11 & 1023u, v = code >> 21 & 1023u;
-        const uint32_t sizes = codeDirection(u, v, negative ? -f.normal : f.normal, context);
+        uint32_t direction = code >> 11 & kDirectionMask;
+        const uint32_t sizes =
+            direction_[context].code(coder_, direction, negative ? -f.normal : f.normal, page_.wrong);
         int foretold = f.distance;
-        const Direction n = oriented(u << 11 | v << 21 | (negative ? 0x80000000u : 0u));
+        const GridDirection n = oriented(direction << 11 | (negative ? 0x80000000u : 0u));
         if (f.neighbours > 0 && !f.same) {
             foretold = (f.along + (steps(n.x) * f.offset.x + steps(n.y) * f.offset.y + steps(n.z) * f.offset.z) / 2) /
                        f.neighbours;
@@ -203,7 +200,7 @@ private:
         distance_[context][sizes].code(coder_, more);
         const int distance = foretold + more;
         if (distance < 0 || distance > int(kPackedDistanceMax)) page_.wrong = true;
-        code = (uint32_t(distance) & kPackedDistanceMax) | u << 11 | v << 21 | side << 31;
+        code = (uint32_t(distance) & kPackedDistanceMax) | direction << 11 | side << 31;
         corners_.at(position) = {code ^ flip_ << 31, edge, glm::i16vec3(n)};
     }
 
@@ -218,45 +215,6 @@ private:
         if (known && other) flip_ ^= 1u;
     }
 
-    /// Returns how well it was foretold, 0 (best) to 3.
-    uint32_t codeDirection(uint32_t& u, uint32_t& v, Direction normal, int context) {
-        const glm::ivec2 foretold = gridPoint(normal);
-        int32_t du = int32_t(u) - foretold.x, dv = int32_t(v) - foretold.y;
-        if (Coder::kEncodes) unfold(int32_t(u), int32_t(v), foretold, du, dv);
-        direction_[context][0].code(coder_, du);
-        const uint32_t size = std::min(3, int(std::bit_width(unsigned(std::abs(du)))) / 2);
-        direction_[context][1 + size].code(coder_, dv);
-        const glm::ivec2 point = folded(foretold + glm::ivec2(du, dv));
-        if (std::min(point.x, point.y) < 0 || std::max(point.x, point.y) > 1023) page_.wrong = true;
-        u = uint32_t(point.x) & 1023u;
-        v = uint32_t(point.y) & 1023u;
-        return std::max(size, uint32_t(std::min(3, int(std::bit_width(unsigned(std::abs(dv)))) / 2)));
-    }
-
-    // Points beyond an edge of the octahedron's square lie on the other half of that edge.
-    static glm::ivec2 folded(glm::ivec2 p) {
-        if (p.x < 0)
-            p = {-p.x, 1023 - p.y};
-        else if (p.x > 1023)
-            p = {2046 - p.x, 1023 - p.y};
-        if (p.y < 0)
-            p = {1023 - p.x, -p.y};
-        else if (p.y > 1023)
-            p = {1023 - p.x, 2046 - p.y};
-        return p;
-    }
-    /// Finds the nearest of a point's places beyond the edges.
-    static void unfold(int32_t u, int32_t v, glm::ivec2 from, int32_t& du, int32_t& dv) {
-        const glm::ivec2 images[] = {{-u, 1023 - v}, {2046 - u, 1023 - v}, {1023 - u, -v}, {1023 - u, 2046 - v}};
-        for (const glm::ivec2 image : images) {
-            const glm::ivec2 d = image - from;
-            if (folded(image) == glm::ivec2(u, v) && std::abs(d.x) + std::abs(d.y) < std::abs(du) + std::abs(dv)) {
-                du = d.x;
-                dv = d.y;
-            }
-        }
-    }
-
     /// A slope in 1/4096 as steps of the packed distance over one leaf edge: 2047 / sqrt(3) steps.
     static int steps(int slope) { return slope * 1182 / 4096; }
 
@@ -264,32 +222,9 @@ private:
         const int d = int(code & kPackedDistanceMax);
         return code >> 31 ? -d : d;
     }
-    static Direction oriented(uint32_t code) {
-        const Direction n = unpacked(code);
+    static GridDirection oriented(uint32_t code) {
+        const GridDirection n = gridDirection(code >> 11);
         return code >> 31 ? -n : n;
-    }
-    /// Decodes the direction of a code. Square root, division and product are correctly rounded wherever doubles are,
-    /// and no product can be fused with a sum.
-    static Direction unpacked(uint32_t code) {
-        int x = 2 * int(code >> 11 & 1023u) - 1023, y = 2 * int(code >> 21 & 1023u) - 1023;
-        const int z = 1023 - std::abs(x) - std::abs(y);
-        const int fold = std::max(-z, 0);
-        x += x >= 0 ? -fold : fold;
-        y += y >= 0 ? -fold : fold;
-        const double scale = 4096.0 / std::sqrt(double(x * x + y * y + z * z));
-        return {int(x * scale), int(y * scale), int(z * scale)};
-    }
-    static glm::ivec2 gridPoint(Direction n) {
-        const int norm = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-        if (norm == 0) return {512, 512};
-        const double scale = 1023.0 / norm;
-        int x = int(n.x * scale), y = int(n.y * scale);
-        if (n.z < 0) {
-            const int before = x;
-            x = (1023 - std::abs(y)) * (x >= 0 ? 1 : -1);
-            y = (1023 - std::abs(before)) * (y >= 0 ? 1 : -1);
-        }
-        return {(x + 1023) / 2, (y + 1023) / 2};
     }
     /// Converts a corner's vector to the unit of another leaf.
     static uint32_t rescaled(const Corner& corner, int edge) {
@@ -306,7 +241,8 @@ private:
     uint32_t nextFace_ = 0, flip_ = 0;
     SymbolModel axis_;
     BitModel goesOn_, asExpected_, same_[2], sideKnown_, sideNew_[5];
-    SmallModel direction_[5][5], distance_[5][4];
+    DirectionModel direction_[5];
+    SmallModel distance_[5][4];
 };
 
 }  // namespace vcp

@@ -15,22 +15,23 @@ public:
     NodeCodec(Coder& coder, CodecPage& page) : coder_(coder), page_(page), depth_(page.header.groups, 0) {}
 
     /// Codes types breadth first, so that what is known of a node's surroundings predicts it; then clearances.
-    /// Soft leaves' words still lack axis and faces, hard leaves' words their triangles.
+    /// Soft leaves' words still lack axis and faces, slab leaves' words octants and vector, hard leaves' words their
+    /// triangles. Counts slab leaves.
     void run() {
         const int log2Cells = int(page_.header.log2Cells);
         grid_.resize(size_t(log2Cells) + 1);
         for (int d = 0; d <= log2Cells; ++d) grid_[size_t(d)].assign(size_t{1} << (3 * d), kNodeEmpty);
         page_.places.resize(page_.nodes.size());
         const NodePlace root{0, 0, 0, uint16_t(kSubcellsPerCell << log2Cells)};
+        page_.header.slabLeaves = 0;
         page_.header.root = node(page_.source != nullptr ? page_.source->header.root : 0, root, 0, 0);
         for (uint32_t g = 0; g < page_.header.groups && !page_.wrong; ++g) group(g);
         if (groupsMade_ != page_.header.groups) page_.wrong = true;
+        if (page_.header.slabLeaves > uint64_t{4} * page_.header.faces) page_.wrong = true;
         if (!page_.wrong) clearances();
     }
 
 private:
-    static constexpr uint32_t kTypes = 4;
-
     void group(uint32_t g) {
         if (g >= groupsMade_) {
             page_.wrong = true;
@@ -80,12 +81,18 @@ private:
         bool occupied = nodeType(source) != kNodeEmpty;
         coder_.bit(occupied_[scale][context], occupied);
         if (!occupied) return kNodeEmpty << kNodeTypeShift;
-        uint32_t type = nodeType(source);
-        coder_.symbol(typeModel_[scale][context & 3u][last_], type);
-        if (type == kNodeEmpty || type > kNodeHard) page_.wrong = true;
-        type &= 3u;
-        last_ = (last_ << 2 | type) & 15u;
-        uint32_t word = type << kNodeTypeShift;
+        // A slab leaf has the number in its word, which an empty node would have.
+        uint32_t symbol = source >> kNodeTypeShift;
+        coder_.symbol(typeModel_[scale][context & 3u][last_], symbol);
+        if (symbol > kNodeHard) page_.wrong = true;
+        symbol &= 3u;
+        last_ = (last_ << 2 | symbol) & 15u;
+        const uint32_t type = symbol == kNodeEmpty ? kNodeSlab : symbol;
+        uint32_t word = symbol << kNodeTypeShift;
+        if (type == kNodeSlab) {
+            word |= kNodeSlabBit;
+            ++page_.header.slabLeaves;
+        }
         if (type == kNodeInternal) {
             if (depth >= cellDepth + int(kMaxSubcellDepth) || groupsMade_ >= page_.header.groups) {
                 page_.wrong = true;
@@ -132,8 +139,7 @@ private:
         const bool foretold = cells <= 64;
         if (foretold)
             page_.forEachNode([&](uint32_t word, uint32_t, const NodePlace& place) {
-                const bool leaf = nodeType(word) == kNodeSoft || nodeType(word) == kNodeHard;
-                if (leaf)
+                if (nodeType(word) != kNodeInternal && nodeType(word) != kNodeEmpty)
                     clearance.occupy(place.lower() / kSubcellsPerCell, std::max(1, place.edge / kSubcellsPerCell));
             });
         page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace& place) {
@@ -146,8 +152,8 @@ private:
             const size_t size = place.edge >= kSubcellsPerCell ? 0 : 1;
             clearance_[size][std::min(least, 3)].code(coder_, more);
             const int64_t value = int64_t{foretoldValue} + more;
-            if (value < 0 || value > int64_t{kNodePayloadMask}) page_.wrong = true;
-            word |= uint32_t(value) & kNodePayloadMask;
+            if (value < 0 || value >= int64_t{kNodeSlabBit}) page_.wrong = true;
+            word |= uint32_t(value) & (kNodeSlabBit - 1);
         });
     }
 

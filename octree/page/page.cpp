@@ -21,6 +21,8 @@ Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
     if (h.faces > kLeafIndexMask || h.entries > kHardFirstMask + 1 || h.vertices > kField21Mask ||
         h.groups > (1u << 27))
         return broken(12, "page counts out of range");
+    if (h.slabLeaves > uint64_t{4} * h.faces)
+        return broken(offsetof(PageHeader, slabLeaves), "fewer vectors than slab leaves");
     if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError))
         return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
     for (size_t i = 0; i < std::size(h.reserved); ++i)
@@ -33,7 +35,10 @@ Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
 /// Walks the node groups in order. Each group may be named only once, by an earlier group; so the nodes form a tree.
 class NodeCheck {
 public:
-    explicit NodeCheck(const PageView& page) : page_(page), depth_(page.header.groups, 0xff) {}
+    explicit NodeCheck(const PageView& page)
+        : page_(page),
+          depth_(page.header.groups, 0xff),
+          vectorTaken_(page.header.slabLeaves > 0 ? size_t{4} * page.header.faces : 0) {}
 
     Result<void> run() {
         const uint32_t maxDepth = page_.header.log2Cells + kMaxSubcellDepth;
@@ -44,7 +49,7 @@ public:
             for (uint32_t i = 0; i < 8; ++i)
                 VCP_TRY(node(page_.nodes[8 * g + i], g, depth_[g], maxDepth, byte + 4 * i));
         }
-        if (soft_ != page_.header.softLeaves || hard_ != page_.header.hardLeaves)
+        if (soft_ != page_.header.softLeaves || hard_ != page_.header.hardLeaves || slabs_ != page_.header.slabLeaves)
             return broken(28, "leaf counts do not match the nodes");
         return {};
     }
@@ -69,9 +74,21 @@ private:
             case kNodeHard:
                 ++hard_;
                 return hardLeaf(word, byte);
+            case kNodeSlab:
+                return slabLeaf(word, byte);
             default:
                 return {};
         }
+    }
+
+    Result<void> slabLeaf(uint32_t word, uint64_t byte) {
+        ++slabs_;
+        const uint32_t vector = slabVector(word);
+        if (vector >= vectorTaken_.size()) return broken(byte, "slab leaf out of range");
+        if (slabOctants(word) == 0) return broken(byte, "slab leaf has no octants");
+        if (vectorTaken_[vector]) return broken(byte, "slab leaf has another's vector");
+        vectorTaken_[vector] = true;
+        return {};
     }
 
     Result<void> hardLeaf(uint32_t word, uint64_t byte) {
@@ -95,7 +112,8 @@ private:
 
     const PageView& page_;
     std::vector<uint8_t> depth_;
-    uint32_t soft_ = 0, hard_ = 0;
+    std::vector<bool> vectorTaken_;
+    uint32_t soft_ = 0, hard_ = 0, slabs_ = 0;
     uint64_t named_ = 0;  ///< entries of all hard leaves so far
 };
 

@@ -27,12 +27,14 @@ struct PageHeader {
     uint32_t softLeaves = 0;  ///< counts, checked against the nodes
     uint32_t hardLeaves = 0;
     float certifiedError = 0;  ///< in cells of this page's level, rounded up
-    uint32_t reserved[6] = {};
+    uint32_t slabLeaves = 0;   ///< checked against the nodes; at most 4 * faces
+    uint32_t reserved[5] = {};
 
     static constexpr uint32_t kMagic = 0x47504356;  // "VCPG"
 };
 static_assert(sizeof(PageHeader) == kPageHeaderBytes);
-static_assert(offsetof(PageHeader, groups) == 12 && offsetof(PageHeader, certifiedError) == 36);
+static_assert(offsetof(PageHeader, groups) == 12 && offsetof(PageHeader, certifiedError) == 36 &&
+              offsetof(PageHeader, slabLeaves) == 40);
 
 /// Byte offsets of a page's sections, computed from its counts.
 struct PageSections {
@@ -60,11 +62,17 @@ struct PageView {
 /// hostile. `colours` is empty or a colour page. Errors: InvalidInput, with the byte within the page.
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
 
-/// The parts of a node word.
-inline uint32_t nodeType(uint32_t node) { return node >> kNodeTypeShift; }
+/// The parts of a node word; nodeType() is in octree/shared/page_layout.h.
 inline uint32_t emptyNode(double clearanceCells) {
     return kNodeEmpty << kNodeTypeShift | uint32_t(clearanceCells * double(kClearancePerCell));
 }
 inline double nodeClearance(uint32_t node) { return (node & kNodePayloadMask) / double(kClearancePerCell); }
+/// Which octants of a slab leaf hold surface, as bits, and the number of its vector.
+inline uint32_t slabOctants(uint32_t node) { return node >> kSlabOctantsShift & kSlabOctantsMask; }
+inline uint32_t slabVector(uint32_t node) { return node & kSlabVectorMask; }
+/// The word of a vector in the section of faces, or of its colour in the colours of faces.
+inline const uint32_t& vectorWord(std::span<const uint4> faces, uint32_t vector) {
+    return reinterpret_cast<const uint32_t*>(faces.data())[vector];
+}
 
 }  // namespace vcp

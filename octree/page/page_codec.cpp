@@ -10,6 +10,7 @@
 #include "octree/page/face_codec.h"
 #include "octree/page/mesh_codec.h"
 #include "octree/page/node_codec.h"
+#include "octree/page/slab_codec.h"
 
 namespace vcp {
 
@@ -66,6 +67,7 @@ void codePage(Coder& coder, CodecPage& page) {
     // The models take some tens of kilobytes, too much for the stack of a small thread.
     std::make_unique<NodeCodec<Coder>>(coder, page)->run();
     if (!page.wrong) std::make_unique<FaceCodec<Coder>>(coder, page)->run();
+    if (!page.wrong) std::make_unique<SlabCodec<Coder>>(coder, page)->run();
     if (!page.wrong) std::make_unique<MeshCodec<Coder>>(coder, page)->run();
     if (!page.wrong) page.finish();
 }
@@ -73,11 +75,14 @@ void codePage(Coder& coder, CodecPage& page) {
 /// Returns the colour page of a page in canonical order.
 std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& page) {
     std::vector<uint4> block(colour.size() / 16);
-    const size_t faces = page.faceSource.size();
+    const size_t faces = page.header.faces;
     const auto* oldFaces = reinterpret_cast<const uint4*>(colour.data());
     const auto* oldVertices = reinterpret_cast<const uint32_t*>(oldFaces + faces);
     auto* vertices = reinterpret_cast<uint32_t*>(block.data() + faces);
-    for (size_t i = 0; i < faces; ++i) block[i] = oldFaces[page.faceSource[i]];
+    for (size_t i = 0; i < page.faceSource.size(); ++i) block[i] = oldFaces[page.faceSource[i]];
+    auto* slabs = reinterpret_cast<uint32_t*>(block.data() + page.softFaces());
+    for (size_t i = 0; i < page.vectorSource.size(); ++i)
+        slabs[i] = vectorWord({oldFaces, faces}, page.vectorSource[i]);
     for (size_t i = 0; i < page.vertexSource.size(); ++i) vertices[i] = oldVertices[page.vertexSource[i]];
     return block;
 }

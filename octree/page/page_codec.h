@@ -3,11 +3,12 @@
 //   byte 0     0: plain: a zstd frame of the page follows; 1: coded, two streams (range_coder.h) follow
 //   nodes      types, breadth first; wall and dip codes; clearances as differences from what the types allow
 //   faces      runs of soft leaves; the vector of each of their corners once, foretold by its neighbours
+//   slabs      the vector of each slab leaf, foretold by the planes beside it; its octants, foretold by its plane
 //   mesh       the distinct triangles of the hard leaves, growing across their edges; vertices by the parallelogram
 //              rule; normals as differences from those of the triangles
-//   colour     coded on its own: the colour of each corner and vertex once, foretold by its neighbours
+//   colour     coded on its own: the colour of each corner, slab and vertex once, foretold by its neighbours
 //
-// The numbers of children and faces and the leaves' lists and strips of triangles are derived.
+// The numbers of children, faces and slabs and the leaves' lists and strips of triangles are derived.
 //
 // Coding loses nothing, but the page that comes back has its groups, faces, vertices, triangles and the corners of a
 // triangle in the codec's own order, and so as many entries of strips as that order asks for. A page that is not as the

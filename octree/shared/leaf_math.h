@@ -326,3 +326,40 @@ INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real
     if (dot(off, off) <= limit * limit) return Real3(s, wb * scale, wc * scale);
     return outside ? miss : intersectEdgeOn(d, va, vb, vc, Real(40.0) * slack);
 }
+
+// A slab leaf's plane and thickness, in leaf edges; its direction is decodeDirection(code >> kSlabDirectionShift).
+INLINE Real slabOffset(uint code) {
+    return Real(int(code & kSlabOffsetMask) - kSlabOffsetZero) * Real(kSlabOffsetUnit);
+}
+INLINE Real slabHalfThickness(uint code) {
+    Real k = Real(code >> kSlabThicknessShift & kSlabThicknessMask);
+    return k * k * Real(kSlabThicknessUnit);
+}
+
+// Returns where the segment p + u d, u in [0, 1], in leaf space, first meets a slab within one of the octants that are
+// named, or -1. The middle planes of the leaf part the segment; the first of its pieces that lies in such an octant and
+// meets the slab is hit, where it is nearest to the slab's middle plane. Octants are widened by kSlabSlack: a ray
+// within a middle plane meets those on both sides.
+INLINE Real intersectSlab(uint code, uint octants, Real3 p, Real3 d) {
+    Real3 n = decodeDirection(code >> kSlabDirectionShift);
+    Real slope = dot(n, d), least = Real(1e-20);
+    Real scale = Real(1.0) / (abs(slope) < least ? least : slope);
+    Real middle = (slabOffset(code) - dot(n, p - Real3(0.5))) * scale, reach = slabHalfThickness(code) * abs(scale);
+    Real first = max(middle - reach, Real(0.0)), last = min(middle + reach, Real(1.0));
+    // For each axis, where the segment is in the lower and in the upper half of the leaf.
+    Real3 inverse = Real3(1.0) / mix(d, Real3(least), lessThan(abs(d), Real3(least)));
+    Real3 halfway = (Real3(0.5) - p) * inverse, wide = abs(inverse) * Real(kSlabSlack), far = Real3(Real(1e30));
+    bvec3 ahead = greaterThan(inverse, Real3(0.0));
+    Real3 lowFirst = mix(halfway - wide, -far, ahead), lowLast = mix(far, halfway + wide, ahead);
+    Real3 highFirst = mix(-far, halfway - wide, ahead), highLast = mix(halfway + wide, far, ahead);
+    Real enter = Real(2.0), leave = Real(2.0);
+    for (uint o = 0u; o < 8u; o++) {
+        bvec3 high = bvec3((o & 1u) != 0u, (o & 2u) != 0u, (o & 4u) != 0u);
+        Real3 from = mix(lowFirst, highFirst, high), to = mix(lowLast, highLast, high);
+        Real begin = max(max(from.x, from.y), max(from.z, first)), end = min(min(to.x, to.y), min(to.z, last));
+        bool nearer = (octants >> o & 1u) != 0u && begin <= end && begin < enter;
+        enter = nearer ? begin : enter;
+        leave = nearer ? end : leave;
+    }
+    return enter <= Real(1.0) ? clamp(middle, enter, leave) : Real(-1.0);
+}

@@ -8,18 +8,21 @@
 //   offset            bytes               section
 //   0                 64                  PageHeader (C++ only; the renderer has it in its page table)
 //   64                32 * groups         nodes: groups of 8 child words, child i at octant x + 2y + 4z
-//   ...               16 * faces          faces: 4 packed vectors each, see "soft leaf"
+//   ...               16 * faces          faces: 4 packed vectors each, see "soft leaf"; then the vectors of slab
+//                                         leaves, four to a face, see "slab leaf"
 //   ...               8 * vertices        vertices of the hard leaves' triangles: 3 coordinates, 21 bits each
 //   ...               4 * vertices        their normals, octahedral 16 + 16 bits, and a crease flag
 //   ...               2 or 4 * entries    strips of those triangles, see "hard leaf"
 //
-// A colour page, when the dataset has colour, is parallel to it: 16 bytes a face (4 x RGBA8, the corner
-// order of the face), then 4 bytes a vertex.
+// A colour page, when the dataset has colour, is parallel to it: 16 bytes a face (4 x RGBA8, one for each
+// vector of the face), then 4 bytes a vertex.
 //
 // Node word, bits 31..30:
 //   00 internal   bits 29..0: number of the group of its 8 children (greater than its own group)
-//   01 empty      bits 29..0: clearance in 1/256 cell, rounded down. The node's box, grown by it on
+//   01 empty      bit 29: 0; bits 28..0: clearance in 1/256 cell, rounded down. The node's box, grown by it on
 //                 every side and clamped to the page, holds no surface (so a ball of it is safe too)
+//   01 slab leaf  bit 29: 1; bits 28..21: the octants that hold surface, octant x + 2y + 4z at bit 21 + octant,
+//                 at least one; bits 20..0: number of its vector
 //   10 soft leaf  bits 21..0: first face; 23..22: axis; 27..24: wall code; 29..28: dip code
 //   11 hard leaf  bits 23..0: first entry of its strips; 29..24: number of triangles, 1 to 62; 63: its
 //                 first two entries hold the number, 14 bits each, low bits first, and the strips follow
@@ -29,6 +32,13 @@
 // scaled so that the leaf is the unit cube. Corner c of a face sits at c & 1 on the next axis and at
 // c >> 1 on the one after it, cyclically. Directions are in leaf space, from the surface to the corner;
 // the sign says on which side of the leaf's surface the corner lies.
+//
+// Slab leaf: all of the mesh's surface in it lies between two parallel planes and in the octants that are named. Its
+// vector is word v & 3 of face v >> 2; words behind the last vector are zero; no two leaves have the same. In leaf
+// space, with the unit direction n, x is in the slab where |n . (x - c) - offset| <= half thickness; c: the centre.
+//   bits 6..0     offset: kSlabOffsetUnit * (code - 64) leaf edges
+//   bits 11..7    half thickness: kSlabThicknessUnit * code^2 leaf edges
+//   bits 31..12   direction, octahedral, 10 + 10 bits; n and -n mean the same
 //
 // Hard leaf: strips of oriented triangles, one after the other; leaves share no entries. An entry has 16 bits
 // where the page has at most kShortEntryVertices vertices, else 32. Its two top bits are a step, the rest is the
@@ -43,12 +53,20 @@ const uint kNodeInternal = 0u;
 const uint kNodeEmpty = 1u;
 const uint kNodeSoft = 2u;
 const uint kNodeHard = 3u;
+const uint kNodeSlab = 4u;  // by nodeType(): in the word, an empty node with kNodeSlabBit
+const uint kNodeSlabBit = 0x20000000u;
 const uint kNodePayloadMask = 0x3fffffffu;
+
+INLINE uint nodeType(uint node) { return node >> 29 == 3u ? kNodeSlab : node >> kNodeTypeShift; }
+
 const uint kLeafIndexMask = 0x3fffffu;
 const uint kSoftAxisShift = 22u;
 const uint kSoftWallShift = 24u;
 const uint kSoftWallMask = 15u;
 const uint kSoftDipShift = 28u;
+const uint kSlabVectorMask = 0x1fffffu;
+const uint kSlabOctantsShift = 21u;
+const uint kSlabOctantsMask = 255u;
 const uint kHardFirstMask = 0xffffffu;
 const uint kHardCountShift = 24u;
 const uint kHardCountMask = 63u;
@@ -75,6 +93,19 @@ const uint kNormalCreaseBit = 1u;
 // The vector to the closest point is -distance * direction, whatever the sign.
 const float kPackedDistanceRange = 1.7320509f;  // sqrt(3) leaf edges, rounded up
 const uint kPackedDistanceMax = 2047u;
+
+// Packed vector of a slab leaf. The offset reaches a leaf's corners; the thickest slab about the centre holds the whole
+// leaf, with room for rounding.
+const uint kSlabOffsetMask = 127u;
+const int kSlabOffsetZero = 64;
+const float kSlabOffsetUnit = 0.8660255f / 63.0f;
+const uint kSlabThicknessShift = 7u;
+const uint kSlabThicknessMask = 31u;
+const float kSlabThicknessUnit = 0.8663f / 961.0f;
+const uint kSlabDirectionShift = 12u;
+// What slabs and octants are widened by against rounding, in leaf edges: slabs as they are packed, octants as rays are
+// intersected with them.
+const float kSlabSlack = 1e-4f;
 
 // Wall code: |f| on a leaf's wall up to which a ray is taken to have hit there, in leaf edges.
 // Code 0: only rounding is bridged. Code k: kWallUnit * k^2 leaf edges.

@@ -16,9 +16,9 @@ namespace vcp {
 using uint = uint32_t;
 using uint4 = glm::u32vec4;
 
+#define INLINE inline
 #include "octree/shared/page_layout.h"
 
-#define INLINE inline
 #define DONT_UNROLL
 namespace f32 {
 using namespace glm;

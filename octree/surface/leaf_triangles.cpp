@@ -68,10 +68,10 @@ NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t 
 
 void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge) {
     const int edge = 1 << log2Edge;
-    if (word >> kNodeTypeShift == kNodeInternal && log2Edge > 0) {
+    if (nodeType(word) == kNodeInternal && log2Edge > 0) {
         const uint32_t* child = &nodes_[size_t{8} * (word & kNodePayloadMask)];
         for (int o = 0; o < 8; ++o)
-            if (child[o] >> kNodeTypeShift != kNodeEmpty)
+            if (nodeType(child[o]) != kNodeEmpty)
                 fillCells(child[o], lower + edge / 2 * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), log2Edge - 1);
         return;
     }
@@ -89,11 +89,11 @@ uint32_t NodePlaces::typeAt(glm::i32vec3 p) const {
     const glm::i32vec3 c = p >> kCellShift;
     if (std::min(c.x, std::min(c.y, c.z)) < 0 || std::max(c.x, std::max(c.y, c.z)) >= cells_) return kNodeEmpty;
     uint32_t word = word_[cell(c.x, c.y, c.z)];
-    for (int half = kLatticePerCell / 2; word >> kNodeTypeShift == kNodeInternal; half /= 2) {
+    for (int half = kLatticePerCell / 2; nodeType(word) == kNodeInternal; half /= 2) {
         const uint32_t octant = (p.x & half ? 1u : 0u) | (p.y & half ? 2u : 0u) | (p.z & half ? 4u : 0u);
         word = nodes_[size_t{8} * (word & kNodePayloadMask) + octant];
     }
-    return word >> kNodeTypeShift;
+    return nodeType(word);
 }
 
 }  // namespace vcp

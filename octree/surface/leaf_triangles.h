@@ -98,7 +98,7 @@ uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& 
         for (int y = first.y; y <= last.y; ++y)
             for (int x = first.x; x <= last.x; ++x) {
                 ++visits;
-                const uint32_t word = word_[cell(x, y, z)], type = word >> kNodeTypeShift;
+                const uint32_t word = word_[cell(x, y, z)], type = nodeType(word);
                 if (type == kNodeHard) {
                     // A leaf larger than a cell is looked at only in the first of its cells that comes up.
                     const int size = size_[cell(x, y, z)], rest = (1 << size) - 1;
@@ -130,11 +130,11 @@ uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 h
     while (waiting > 0) {
         const Visit v = stack[--waiting];
         ++visits;
-        if (v.word >> kNodeTypeShift == kNodeHard) {
+        if (nodeType(v.word) == kNodeHard) {
             if (test.touches(v.lower, v.edge)) found(v.word);
             continue;
         }
-        if (v.word >> kNodeTypeShift != kNodeInternal) continue;
+        if (nodeType(v.word) != kNodeInternal) continue;
         const uint32_t group = v.word & kNodePayloadMask;
         const int half = v.edge / 2;
         for (uint32_t octants = octantsTouched(low, high, v.lower + half); octants != 0; octants &= octants - 1) {

@@ -52,6 +52,43 @@ glm::dvec3 unpackVectorSpherical(uint32_t code, double range) {
     return r * glm::dvec3(std::cos(theta) * std::cos(phi), std::cos(theta) * std::sin(phi), std::sin(theta));
 }
 
+uint32_t packSlabDirection(glm::dvec3 n) {
+    const glm::dvec3 size = glm::abs(n);
+    const int largest = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    if (n[largest] < 0) n = -n;
+    const glm::dvec2 at = (octahedral(n) * 0.5 + 0.5) * 1023.0;
+    uint32_t best = 0;
+    double most = -1;
+    for (int i = 0; i < 4; ++i) {
+        const auto corner = [&](double x, int up) { return uint32_t(std::clamp(std::floor(x) + up, 0.0, 1023.0)); };
+        const uint32_t code = corner(at.x, i & 1) | corner(at.y, i >> 1) << 10;
+        const double along = std::abs(glm::dot(n, f64::decodeDirection(code)));
+        if (along > most) best = code, most = along;
+    }
+    return best;
+}
+
+uint32_t packSlab(uint32_t direction, double first, double last) {
+    const double corner = std::sqrt(0.75);
+    const double low = std::clamp(first, -corner, corner) - double(kSlabSlack),
+                 high = std::clamp(last, -corner, corner) + double(kSlabSlack);
+    const int nearest = kSlabOffsetZero + int(std::lround((low + high) / 2 / double(kSlabOffsetUnit)));
+    const auto offset = uint32_t(std::clamp(nearest, 1, int(kSlabOffsetMask)));
+    const auto codeOf = [&](uint32_t at, uint32_t thickness) {
+        return at | thickness << kSlabThicknessShift | direction << kSlabDirectionShift;
+    };
+    for (uint32_t thickness = 0; thickness <= kSlabThicknessMask; ++thickness) {
+        const uint32_t code = codeOf(offset, thickness);
+        const double middle = f64::slabOffset(code), half = f64::slabHalfThickness(code);
+        if (middle - half <= low && high <= middle + half) return code;
+    }
+    return codeOf(kSlabOffsetZero, kSlabThicknessMask);
+}
+
+uint32_t slabNode(uint32_t octants, uint32_t vector) {
+    return kNodeEmpty << kNodeTypeShift | kNodeSlabBit | octants << kSlabOctantsShift | vector;
+}
+
 uint32_t packNormal(glm::dvec3 normal, bool crease) {
     const glm::dvec2 o = octahedral(normal);
     const uint32_t x = quantize(o.x * 0.5 + 0.5, 32767) << 1;

@@ -26,6 +26,19 @@ inline uint32_t flipSide(uint32_t code) { return code ^ 0x80000000u; }
 uint32_t packVectorSpherical(glm::dvec3 v, double range);
 glm::dvec3 unpackVectorSpherical(uint32_t code, double range);
 
+/// Packs the direction of a slab leaf's planes into 20 bits: the code whose direction (decodeDirection) or its opposite
+/// is nearest. Of n and -n, which mean the same planes, it codes the one whose component of largest magnitude, the
+/// first of these, is positive. Precondition: |n| = 1 +- 1e-6.
+uint32_t packSlabDirection(glm::dvec3 n);
+
+/// Packs the thinnest slab that holds first - kSlabSlack <= n . (x - c) <= last + kSlabSlack; n: the direction that
+/// `direction`, from packSlabDirection, decodes to; c: the leaf's centre; x in leaf space, so all in leaf edges. What
+/// lies beyond the leaf's corners is cut off. Precondition: first <= last.
+uint32_t packSlab(uint32_t direction, double first, double last);
+
+/// The node word of a slab leaf. Preconditions: octants is 1 to 255, vector at most kSlabVectorMask.
+uint32_t slabNode(uint32_t octants, uint32_t vector);
+
 /// Octahedral normal in 16 + 16 bits; `crease` goes to the lowest bit (kNormalCreaseBit).
 uint32_t packNormal(glm::dvec3 normal, bool crease);
 

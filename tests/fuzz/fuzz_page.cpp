@@ -35,7 +35,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     require(again.ok(), "a page can be stored");
     const auto view = vcp::parsePage(std::as_bytes(std::span(*again)));
     require(view.ok(), "a stored page comes back");
-    require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves,
+    require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves &&
+                view->header.slabLeaves == page->header.slabLeaves,
             "with its leaves");
     static_cast<void>(vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page));
     return 0;

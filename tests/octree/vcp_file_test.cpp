@@ -247,7 +247,7 @@ TEST(VcpFileLayout, GoldenBytes) {
     };
     ASSERT_EQ(bytes.size(), 9792u);
     EXPECT_EQ(std::memcmp(bytes.data(), "VCP\r\n\x1a\n\0", 8), 0);
-    EXPECT_EQ(u32(8), 3u);
+    EXPECT_EQ(u32(8), 4u);
     EXPECT_EQ(u32(12), 4096u);
     EXPECT_EQ(u64(16), 9792u);
     EXPECT_EQ(u64(24), 2u);
@@ -261,8 +261,14 @@ TEST(VcpFileLayout, GoldenBytes) {
     EXPECT_EQ(u64(4096 + 80), 5u);  // Morton code of the second
     EXPECT_EQ(u64(4096 + 80 + 8), 8960u);
     EXPECT_EQ(std::memcmp(&bytes[9728], "VCPcommt", 8), 0);
-    EXPECT_EQ(fmt::format("{:016x}", hashBytes(bytes)), "dbd0f29632bee815");
+    EXPECT_EQ(fmt::format("{:016x}", hashBytes(bytes)), "7d3288562ef4defc");
     EXPECT_TRUE(readDataset(MemoryFile(bytes)).ok());
+    // A file of version 3 differs in nothing else, and is read.
+    Forgery older{bytes};
+    older.header().version = 3;
+    older.seal();
+    EXPECT_EQ(fmt::format("{:016x}", hashBytes(older.bytes)), "dbd0f29632bee815");
+    EXPECT_TRUE(readDataset(MemoryFile(older.bytes)).ok());
 }
 
 TEST_F(VcpFile, EveryTruncationIsFound) {
@@ -340,14 +346,16 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     ASSERT_FALSE(future.ok());
     EXPECT_EQ(future.error().code, ErrorCode::Unsupported);
     EXPECT_NE(future.error().line().find("17"), std::string::npos) << future.error().line();
-    EXPECT_NE(future.error().line().find(fmt::format("version {}", kFileVersion)), std::string::npos);
+    EXPECT_NE(future.error().line().find(fmt::format("versions {} to {}", kOldestFileVersion, kFileVersion)),
+              std::string::npos);
 
     version[8] = std::byte{2};
     const auto past = readDataset(MemoryFile(version));
     ASSERT_FALSE(past.ok());
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
-    EXPECT_EQ(past.error().line(),
-              "memory.vcp: header: byte 8: file version 2 is not known; this program reads version 3: build it again");
+    EXPECT_EQ(
+        past.error().line(),
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 4: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
@@ -400,13 +408,24 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
     expectRefused("reserved", [](F& f) { f.header().paper.packing = 1; });
     expectRefused("rows behind the level table", [](F& f) { f.header().level[2].pages = 1; });
     Forgery flags{bytes_};
-    flags.header().flags |= 2;
+    flags.header().flags |= 4;
     flags.seal();
     const auto dataset = readDataset(MemoryFile(flags.bytes));
     ASSERT_FALSE(dataset.ok());
     EXPECT_EQ(dataset.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(dataset.error().line(),
-              "memory.vcp: header: byte 136: flags 0x2 are not known to this program: use a newer program");
+              "memory.vcp: header: byte 136: flags 0x4 are not known to this program: use a newer program");
+
+    // Version 3 knows fewer flags.
+    Forgery covering{bytes_};
+    covering.header().flags |= kFlagCovering;
+    covering.seal();
+    const auto knows = readDataset(MemoryFile(covering.bytes));
+    ASSERT_TRUE(knows.ok()) << knows.error().line();
+    EXPECT_TRUE(knows->isCovering());
+    covering.header().version = 3;
+    covering.seal();
+    EXPECT_FALSE(readDataset(MemoryFile(covering.bytes)).ok());
 }
 
 TEST_F(VcpFile, HugeCountsAllocateNothing) {
@@ -450,6 +469,8 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused("certified error", [](F& f) { f.entry(1).certifiedError = -1; });
     expectRefused("certified error", [](F& f) { f.entry(1).certifiedError = std::numeric_limits<float>::quiet_NaN(); });
     expectRefused("counts", [](F& f) { f.entry(1).hardLeaves = f.entry(1).leaves + 1; });
+    expectRefused("more slab leaves", [](F& f) { f.entry(1).slabLeaves = f.entry(1).leaves + 1; });
+    expectRefused("more slab leaves", [](F& f) { f.entry(1).slabLeaves = f.header().version = 3; });
     expectRefused("wrong child pages", [](F& f) { f.entry(0).firstChild = 2; });
     expectRefused("wrong child pages", [](F& f) { f.entry(0).firstChild = 0; });
     expectRefused("wrong child pages", [](F& f) { f.entry(4).childMask = 1; });
@@ -467,7 +488,7 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger",
                   [](F& f) { f.header().level[1].certifiedError = f.header().certifiedErrorMax = 0; });
     expectRefused(at(2, offsetof(PageEntry, leaves)) + "leaf counts", [](F& f) { f.entry(2).leaves = 0xffffffff; });
-    expectRefused(at(3, offsetof(PageEntry, reserved) + 5) + "reserved", [](F& f) { f.entry(3).reserved[5] = 1; });
+    expectRefused(at(3, offsetof(PageEntry, reserved) + 1) + "reserved", [](F& f) { f.entry(3).reserved[1] = 1; });
     expectRefused(at(0, offsetof(PageEntry, colourStoredBytes)) + "has colour", [](F& f) { f.header().flags = 0; });
     expectRefused(at(0, offsetof(PageEntry, colourOffset)) + "a place of colour", [](F& f) {
         f.header().flags = 0;
@@ -662,7 +683,7 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
         {"colourHash", 32, '8'},     {"storedBytes", 40, '4'}, {"pageBytes", 44, '4'}, {"colourStoredBytes", 48, '4'},
         {"colourBytes", 52, '4'},    {"firstChild", 56, '4'},  {"leaves", 60, '4'},    {"hardLeaves", 64, '4'},
         {"certifiedError", 68, 'f'}, {"childMask", 72, '1'},   {"level", 73, '1'},     {"reserved", 74, '1'},
-        {"reserved", 79, '1'}};
+        {"reserved", 75, '1'},       {"slabLeaves", 76, '4'}};
     const uint64_t before = test::peakBytes();
     uint64_t tried = 0;
     const auto sweep = [&](const std::vector<Field>& fields, uint64_t base) {

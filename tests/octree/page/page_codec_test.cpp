@@ -13,12 +13,14 @@
 #include "octree/io/content_hash.h"
 #include "octree/surface/leaf_triangles.h"
 #include "tests/support/analytic_page.h"
+#include "tests/support/slab_page.h"
 #include "tests/support/soup_page.h"
 
 namespace vcp {
 namespace {
 
-using test::asBytes, test::Block, test::randomColours, test::sheet, test::soup, test::SoupPage, test::WholePage;
+using test::asBytes, test::Block, test::randomColours, test::sheet, test::soup, test::SoupPage, test::WholePage,
+    test::withLeavesOfAllKinds;
 
 constexpr std::byte kPlain{0}, kCoded{1};
 
@@ -55,6 +57,14 @@ void expectSameNode(const PageView& a, uint32_t wordA, const PageView& b, uint32
     }
     if (nodeType(wordA) == kNodeEmpty) {
         ASSERT_EQ(wordA, wordB);
+        return;
+    }
+    if (nodeType(wordA) == kNodeSlab) {
+        ASSERT_EQ(slabOctants(wordA), slabOctants(wordB));
+        ASSERT_EQ(vectorWord(a.faces, slabVector(wordA)), vectorWord(b.faces, slabVector(wordB)));
+        if (!a.faceColours.empty()) {
+            ASSERT_EQ(vectorWord(a.faceColours, slabVector(wordA)), vectorWord(b.faceColours, slabVector(wordB)));
+        }
         return;
     }
     ASSERT_EQ(wordA & ~kLeafIndexMask, wordB & ~kLeafIndexMask);
@@ -140,6 +150,54 @@ TEST(PageCodec, SheetsComeBack) {
         SCOPED_TRACE(seed);
         expectRoundTrip(sheet(seed, 2, 2 + seed % 2, 4 + seed).build(seed), kCoded);
     }
+}
+
+WholePage slabPage(const test::SignedDistanceField& field, uint32_t log2Cells) {
+    return {test::SlabPageBuilder(field, glm::dvec3(0), 1, log2Cells, 0.05f).build().geometry, {}};
+}
+
+TEST(PageCodec, SlabPagesComeBack) {
+    for (uint32_t log2Cells = 1; log2Cells <= 5; ++log2Cells) {
+        SCOPED_TRACE(log2Cells);
+        const double n = std::exp2(log2Cells);
+        for (const auto& field :
+             {test::sphere(glm::dvec3(n * 0.45), n * 0.4), test::plane(glm::normalize(glm::dvec3(1, 2, 3)), n),
+              test::torus(glm::dvec3(n * 0.5), n * 0.3, n * 0.11)}) {
+            WholePage page = slabPage(field, log2Cells);
+            ASSERT_GT(page.view().header.slabLeaves, 0u);
+            expectRoundTrip(page, kCoded);
+            page.colour = randomColours(page.view(), log2Cells);
+            auto* words = reinterpret_cast<uint32_t*>(page.colour.data());
+            std::fill(words + page.view().header.slabLeaves, words + 4 * page.view().header.faces, 0u);
+            expectRoundTrip(page, kCoded);
+        }
+    }
+}
+
+TEST(PageCodec, LeavesOfAllKindsComeBack) {
+    for (uint32_t seed = 0; seed < 60; ++seed) {
+        SCOPED_TRACE(seed);
+        const WholePage page =
+            withLeavesOfAllKinds(soup(seed, 1 + seed % 3, 1 + seed % 4, 20, 1 + seed % 20).build(seed), seed);
+        const PageHeader header = page.view().header;
+        EXPECT_GT(header.hardLeaves, 0u);
+        expectRoundTrip(page, kCoded);
+    }
+    // A leaf alone is a page.
+    PageHeader header;
+    header.log2Cells = 3;
+    header.root = slabNode(0x81, 0);
+    header.slabLeaves = header.faces = 1;
+    WholePage page{Block(pageSections(header).end / 16, uint4(0)), {}};
+    std::memcpy(page.geometry.data(), &header, sizeof header);
+    page.geometry.back() = uint4(0x12345678, 0, 0, 0);
+    expectRoundTrip(page, kCoded);
+}
+
+TEST(PageCodec, SlabsOfASmoothSurfaceCostLittle) {
+    const WholePage page = slabPage(test::sphere({15.2, 16.1, 15.7}, 12), 5);
+    const size_t bytes = packPage(asBytes(page.geometry), {}).geometry.size();
+    EXPECT_LT(bytes, size_t{4} * page.view().header.slabLeaves);
 }
 
 TEST(PageCodec, LongLeavesComeBack) {
@@ -248,7 +306,8 @@ TEST(PageCodec, EveryTruncationIsRefused) {
 
 TEST(PageCodec, HostileBytesAreHarmless) {
     for (const WholePage& page :
-         {sheet(3, 2, 3, 8).build(3), soup(4, 2, 4, 20, 25).build(4), analyticPage(test::sphere({4, 4, 4}, 3), 3, 0)}) {
+         {sheet(3, 2, 3, 8).build(3), soup(4, 2, 4, 20, 25).build(4), analyticPage(test::sphere({4, 4, 4}, 3), 3, 0),
+          slabPage(test::sphere({4, 4, 4}, 3), 3), withLeavesOfAllKinds(soup(5, 2, 3, 20, 10).build(5), 5)}) {
         const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
         std::mt19937 random(11);
         for (int i = 0; i < 3000; ++i) {

@@ -62,21 +62,23 @@ struct PageParts {
     }
 };
 
-/// A page with every kind of node: two groups, two soft leaves that share a face, a hard leaf, a long one.
+/// A page with every kind of node: two groups, two soft leaves that share a face, a slab leaf, a hard leaf, a long one.
 PageParts smallPage() {
     PageParts p;
     p.header.log2Cells = 1;
     p.header.root = word(kNodeInternal, 0);
     p.header.softLeaves = 2;
     p.header.hardLeaves = 2;
+    p.header.slabLeaves = 1;
     p.header.certifiedError = 0.05f;
-    p.nodes = {word(kNodeInternal, 1), softLeaf(0, 0), softLeaf(1, 0), hardLeaf(0, 2),
-               emptyNode(0),           emptyNode(0.5), emptyNode(1),   emptyNode(0)};
+    p.nodes = {word(kNodeInternal, 1), softLeaf(0, 0),     softLeaf(1, 0), hardLeaf(0, 2),
+               emptyNode(0),           slabNode(0xa5, 12), emptyNode(1),   emptyNode(0)};
     p.nodes.resize(15, emptyNode(0));
     p.nodes.push_back(hardLeaf(4, kHardCountLong));
     for (uint32_t i = 0; i < 3; ++i)
         p.faces.emplace_back(packVector(0.3 + 0.1 * i, {0, 0, 1}, false), packVector(0.2, {0, 1, 0}, true),
                              packVector(0.7, {1, 0, 0}, false), packVector(0.1, {0, 0, -1}, true));
+    p.faces.emplace_back(packSlab(packSlabDirection({0, 0.6, 0.8}), 0.1, 0.2), 0, 0, 0);
     // (0, 1, 2), (0, 2, 3); three triangles: (0, 1, 3), (2, 3, 1), (2, 0, 3).
     p.entries = {0, 1, 2, stripEntry(2, 3)};
     p.entries.insert(p.entries.end(), {3, 0, 0, 1, 3, stripEntry(1, 2), stripEntry(2, 0)});
@@ -130,6 +132,11 @@ private:
                 ASSERT_EQ(triangles, StripWalk(page_.strips, node).count());
                 return;
             }
+            case kNodeSlab: {
+                ASSERT_NE(slabOctants(node), 0u);
+                sum += vectorWord(page_.faces, slabVector(node));
+                return;
+            }
             default:
                 sum += uint64_t(nodeClearance(node));
         }
@@ -173,7 +180,7 @@ TEST(Page, EveryKindOfNodeIsRead) {
     ASSERT_TRUE(page.ok()) << page.error().line();
     EXPECT_EQ(PageWalk(*page).run(), 17u);
     EXPECT_EQ(page->nodes.size(), 16u);
-    EXPECT_EQ(page->faces.size(), 3u);
+    EXPECT_EQ(page->faces.size(), 4u);
     EXPECT_EQ(page->vertices.size(), 4u);
     EXPECT_EQ(trianglesOf(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, 3}}));
     EXPECT_EQ(trianglesOf(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
@@ -215,6 +222,7 @@ TEST(Page, RootMayBeALeaf) {
     hard.header.root = hardLeaf(0, 2);
     hard.header.softLeaves = 0;
     hard.header.hardLeaves = 1;
+    hard.header.slabLeaves = 0;
     hard.count();
     EXPECT_TRUE(parseAndWalk(hard.bytes()));
 }
@@ -327,6 +335,16 @@ TEST(Page, LyingCountsAreRefused) {
     PageParts hard = smallPage();
     --hard.header.hardLeaves;
     expectRefused(hard, "leaf counts");
+    for (const uint32_t lie : {2u, 16u}) {
+        PageParts slab = smallPage();
+        slab.header.slabLeaves = lie;
+        expectRefused(slab, "leaf counts");
+    }
+    for (const uint32_t lie : {17u, 0xffffffffu}) {
+        PageParts slab = smallPage();
+        slab.header.slabLeaves = lie;
+        expectRefused(slab, "byte 40: fewer vectors than slab leaves");
+    }
 }
 
 TEST(Page, HeaderValuesAreChecked) {
@@ -344,13 +362,13 @@ TEST(Page, HeaderValuesAreChecked) {
         expectRefused(p, "certified error");
     }
     PageParts reserved = smallPage();
-    reserved.header.reserved[5] = 1;
+    reserved.header.reserved[4] = 1;
     expectRefused(reserved, "byte 60: reserved");
 }
 
 TEST(Page, LeavesStayInTheirSections) {
     PageParts lastFace = smallPage();
-    lastFace.nodes[1] = softLeaf(2, 0);  // its second face would be the fourth
+    lastFace.nodes[1] = softLeaf(3, 0);  // its second face would be the fifth
     expectRefused(lastFace, "soft leaf out of range");
     lastFace.nodes[1] = softLeaf(kLeafIndexMask, 0);
     expectRefused(lastFace, "soft leaf out of range");
@@ -377,6 +395,30 @@ TEST(Page, LeavesStayInTheirSections) {
             expectRefused(p, fmt::format("byte {}: triangle names a missing vertex",
                                          pageSections(p.header).strips + 2 * std::max(entry, 2u)));
         }
+}
+
+TEST(Page, SlabLeavesHaveVectorsOfTheirOwn) {
+    PageParts p = smallPage();
+    p.nodes[5] = slabNode(1, 15);
+    EXPECT_TRUE(parseAndWalk(p.bytes()));
+    p.nodes[5] = slabNode(1, 16);
+    expectRefused(p, "byte 84: slab leaf out of range");
+    p.nodes[5] = slabNode(1, kSlabVectorMask);
+    expectRefused(p, "byte 84: slab leaf out of range");
+    p.nodes[5] = slabNode(0, 12);
+    expectRefused(p, "byte 84: slab leaf has no octants");
+
+    PageParts shared = smallPage();
+    shared.nodes[6] = slabNode(3, 12);
+    shared.header.slabLeaves = 2;
+    expectRefused(shared, "byte 88: slab leaf has another's vector");
+    shared.nodes[6] = slabNode(3, 13);
+    EXPECT_TRUE(parseAndWalk(shared.bytes()));
+
+    // A page that is said to have none.
+    PageParts none = smallPage();
+    none.header.slabLeaves = 0;
+    expectRefused(none, "byte 84: slab leaf out of range");
 }
 
 TEST(Page, StripsBegin) {
@@ -424,7 +466,7 @@ TEST(Page, ColoursMatchTheirPage) {
     std::vector<uint4> colours(colourPageBytes(parts.header) / 16, uint4(1, 2, 3, 4));
     const auto page = parsePage(asBytes(block), asBytes(colours));
     ASSERT_TRUE(page.ok());
-    EXPECT_EQ(page->faceColours.size(), 3u);
+    EXPECT_EQ(page->faceColours.size(), 4u);
     EXPECT_EQ(page->vertexColours.size(), 4u);
     EXPECT_EQ(page->faceColours[2], uint4(1, 2, 3, 4));
     colours.emplace_back(0u);
