@@ -249,6 +249,12 @@ void PageTree::makeHard(uint32_t index, std::vector<uint32_t> locals) {
     hard.push_back({nodes[index].box, std::move(locals)});
 }
 
+void PageTree::makeSlab(uint32_t index, const SlabLeaf& leaf) {
+    nodes[index].kind = TreeNode::Kind::Slab;
+    nodes[index].index = uint32_t(slabs.size());
+    slabs.push_back(leaf);
+}
+
 size_t PageTree::records() const {
     size_t count = 0;
     for (const HardLeaf& leaf : hard)
@@ -267,6 +273,8 @@ PageTree buildPageTree(PageGeometry& geometry, double tolerance, size_t mostReco
 double PageTree::certifiedError() const {
     double error = 0;
     for (const SoftLeaf& leaf : soft) error = std::max(error, errorOf(leaf));
+    // A point that is drawn and a point of the mesh share an octant of the leaf, whose corners are so far apart.
+    for (const SlabLeaf& leaf : slabs) error = std::max(error, kSlabErrorEdges * leaf.box.edgeCells());
     return error;
 }
 
