@@ -90,6 +90,17 @@ std::optional<LeafHit> castSoftF32(const PageView& view, uint32_t node, glm::vec
     return LeafHit{u, normal, u == 0 || u == 1};
 }
 
+/// Casts the part p + u d, u in [0, 1], of a ray against a slab leaf. Where it begins in the leaf (`fromWall` false),
+/// what lies at its begin does not count: it may be the surface that it comes from.
+std::optional<LeafHit> castSlab(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 d, bool fromWall,
+                                bool single) {
+    const uint32_t code = vectorWord(view.faces, slabVector(node)), octants = slabOctants(node);
+    const double u = single ? double(f32::intersectSlab(code, octants, glm::vec3(p), glm::vec3(d)))
+                            : f64::intersectSlab(code, octants, p, d);
+    if (u < 0 || (u == 0 && !fromWall)) return {};
+    return LeafHit{u, f64::turnedTo(f64::decodeDirection(code >> kSlabDirectionShift), -d), false};
+}
+
 /// Returns s as x, and the weights of the second and third vertex as y and z; x = 1e30 for a miss.
 glm::dvec3 castTriangle(const PageView& view, const Index3& v, glm::dvec3 q, glm::dvec3 d, bool single) {
     const glm::u32vec2 a = view.vertices[v[0]], b = view.vertices[v[1]], c = view.vertices[v[2]];
@@ -172,6 +183,8 @@ private:
         segment.last = std::max(segment.first, segment.last);
         if (nodeType(node) == kNodeSoft)
             castSoft(in, node, lowest, edge, segment);
+        else if (nodeType(node) == kNodeSlab)
+            castSlabLeaf(in, node, lowest, edge, segment);
         else
             castHard(in, node, lowest, edge, segment);
     }
@@ -207,6 +220,17 @@ private:
         const CastOptions& o = caster_.options_;
         auto hit = o.singlePrecision ? castSoftF32(*in.view, node, p, d, float(wallIn), float(wallOut), o.steps)
                                      : castSoftF64(*in.view, node, p, d, wallIn, wallOut, o.steps);
+        if (!hit) return;
+        hit->t = segment.first + hit->t * (segment.last - segment.first);
+        keep(in, node, lowest, edge, *hit);
+    }
+
+    void castSlabLeaf(const PageRay& in, uint32_t node, glm::dvec3 lowest, double edge, Interval segment) {
+        if (counters_) ++counters_->slabLeaves;
+        const glm::dvec3 p = (in.origin - lowest + segment.first * in.direction) / edge;
+        const glm::dvec3 d = (segment.last - segment.first) * in.direction / edge;
+        const bool fromWall = segment.first > ray_.tMin / in.cell;
+        auto hit = castSlab(*in.view, node, p, d, fromWall, caster_.options_.singlePrecision);
         if (!hit) return;
         hit->t = segment.first + hit->t * (segment.last - segment.first);
         keep(in, node, lowest, edge, *hit);

@@ -76,7 +76,7 @@ struct RayHit {
     glm::dvec3 normal{0};    ///< unit, world, facing the ray's origin
     uint64_t page = 0;       ///< number in the directory
     uint32_t level = 0;
-    uint32_t node = 0;          ///< the leaf's node word; nodeType(node) is kNodeSoft or kNodeHard
+    uint32_t node = 0;          ///< the leaf's node word; nodeType(node) is kNodeSoft, kNodeSlab or kNodeHard
     bool onWall = false;        ///< accepted by the wall tolerance, not by a crossing
     glm::dvec3 leafMin{0};      ///< the leaf's lowest corner, in cells from the page's
     double leafEdge = 0;        ///< in cells
@@ -85,7 +85,7 @@ struct RayHit {
 
 /// Exact counts of the work of rays; they add up over calls.
 struct CastCounters {
-    uint64_t rays = 0, pages = 0, nodes = 0, softLeaves = 0, hardLeaves = 0, triangles = 0;
+    uint64_t rays = 0, pages = 0, nodes = 0, softLeaves = 0, slabLeaves = 0, hardLeaves = 0, triangles = 0;
 };
 
 struct CastOptions {

@@ -152,8 +152,8 @@ private:
     [[nodiscard]] double pageCells() const { return double(uint64_t{1} << cache_.dataset().header.log2Cells); }
 
     void collect(uint64_t page, uint32_t node, glm::dvec3 lowest, double edge, std::vector<LeafBox>& leaves) const {
-        if (nodeType(node) == kNodeSoft || nodeType(node) == kNodeHard) leaves.push_back({page, lowest, edge});
-        if (nodeType(node) != kNodeInternal) return;
+        if (nodeType(node) == kNodeEmpty) return;
+        if (nodeType(node) != kNodeInternal) return leaves.push_back({page, lowest, edge});
         for (uint32_t o = 0; o < 8; ++o)
             collect(page, cache_.view(page)->nodes[8 * (node & kNodePayloadMask) + o],
                     lowest + octantOffset(o) * (edge / 2), edge / 2, leaves);
@@ -176,13 +176,14 @@ private:
 
     void visitNode(const PageView& view, uint32_t node, glm::dvec3 p, glm::dvec3 lowest, double edge,
                    double& best) const {
-        if (nodeType(node) == kNodeEmpty || nodeType(node) == kNodeSoft || boxDistance(p, lowest, edge) >= best) return;
+        if (boxDistance(p, lowest, edge) >= best) return;
         if (nodeType(node) == kNodeInternal) {
             for (uint32_t o = 0; o < 8; ++o)
                 visitNode(view, view.nodes[8 * (node & kNodePayloadMask) + o], p, lowest + octantOffset(o) * (edge / 2),
                           edge / 2, best);
             return;
         }
+        if (nodeType(node) != kNodeHard) return;
         forEachTriangle(view.strips, node, [&](const Index3& v) {
             std::array<glm::dvec3, 3> triangle;
             for (int i = 0; i < 3; ++i) triangle[i] = f64::decodeVertex(view.vertices[v[i]].x, view.vertices[v[i]].y);

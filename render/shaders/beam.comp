@@ -125,7 +125,7 @@ float tileStart(Bundle bundle) {
         }
         OctantTimes times = octantTimes(bundle, corner, bits);
         bool inPage = isPage || !inTable;
-        bool internal = inPage && node >> kNodeTypeShift == kNodeInternal;
+        bool internal = inPage && nodeType(node) == kNodeInternal;
         uint group = nodesTexel + 2u * (internal ? node & kNodePayloadMask : 0u);
         uvec4 words0 = fetchTexel(group), words1 = fetchTexel(group + 1u);
         for (uint k = 0u; k < 8u; k++) {
@@ -133,7 +133,7 @@ float tileStart(Bundle bundle) {
             float first = octantStart(times, octant);
             if (first >= best) continue;
             if (internal) {
-                uint type = texelWord((octant & 4u) != 0u ? words1 : words0, octant & 3u) >> kNodeTypeShift;
+                uint type = nodeType(texelWord((octant & 4u) != 0u ? words1 : words0, octant & 3u));
                 // Below a cell there is little to gain: what is there counts as a leaf.
                 bool deep = type == kNodeInternal && bits - 1 > cellBits;
                 if (deep) open |= 1u << k;
@@ -143,7 +143,7 @@ float tileStart(Bundle bundle) {
             }
         }
         // The page is a single leaf.
-        if (inPage && !internal && node >> kNodeTypeShift != kNodeEmpty) {
+        if (inPage && !internal && nodeType(node) != kNodeEmpty) {
             float first = kTileEmpty;
             for (uint octant = 0u; octant < 8u; octant++) first = min(first, octantStart(times, octant));
             best = min(best, first);

@@ -58,7 +58,8 @@ struct FrameConstants {
     uint hasShadows;     // 0 or 1
     float paperEpsilon;  // of the method `paper`, finest cells
     float worldPerCell;  // world units a finest cell
-    float unused0, unused1;
+    uint isCovering;     // 0 or 1: the surface of each page covers the mesh's within the page (kFlagCovering)
+    float unused0;
     vec4 rotation;  // quaternion: world from the dataset's axes
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];

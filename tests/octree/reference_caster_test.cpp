@@ -1,6 +1,7 @@
 // The reference ray-caster on pages made from formulas, where the right answer is known.
 #include "octree/reference_caster.h"
 
+#include <cstring>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -63,6 +64,80 @@ TEST(ReferenceCaster, SphereOnEveryAxisAndLevel) {
             SCOPED_TRACE(testing::Message() << "axis " << axis << " level " << level);
             const double cell = o.finestCell * std::exp2(2.0 - level);
             castAtSphere(cache, casterOf(cache, level), centre, 27, 0.02 * cell, 4000, 17 * axis + level);
+        }
+    }
+}
+
+TEST(ReferenceCaster, SlabsAreHitWithinTheirThickness) {
+    AnalyticOptions o;
+    o.levels = o.slabLevels = 3;
+    const glm::dvec3 centre(32.1, 31.8, 32.3);
+    const double radius = 25.3;
+    const PageCache cache = cacheOf(test::sphere(centre, radius), o);
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (uint32_t level = 0; level < 3; ++level)
+        for (const bool single : {false, true}) {
+            const ReferenceCaster caster = casterOf(cache, level, {.singlePrecision = single});
+            CastCounters counters;
+            for (int i = 0; i < 4000; ++i) {
+                // All rays that meet the sphere, grazing ones too, and some that pass by.
+                const glm::dvec3 from = centre + randomDirection(random) * radius * (1.5 + 3 * unit(random));
+                const glm::dvec3 towards = glm::normalize(centre - from),
+                                 side = glm::normalize(glm::cross(towards, randomDirection(random)));
+                const double off = radius * 1.1 * std::sqrt(unit(random));
+                const glm::dvec3 direction = glm::normalize(centre + off * side - from);
+                const double nearest = glm::length(glm::cross(direction, centre - from));
+                const auto hit = caster.cast({from, direction}, &counters);
+                if (nearest < radius) {
+                    ASSERT_TRUE(hit) << "ray " << i << " slips through on level " << level;
+                }
+                if (!hit) continue;
+                ASSERT_EQ(nodeType(hit->node), kNodeSlab);
+                const PageView& view = *cache.view(hit->page);
+                const uint32_t code = vectorWord(view.faces, slabVector(hit->node));
+                const double cell = cache.dataset().cellOf(level),
+                             thick = f64::slabHalfThickness(code) * hit->leafEdge * cell;
+                ASSERT_NEAR(glm::distance(hit->position, centre), radius, 2 * thick + 1e-3);
+                ASSERT_LT(glm::dot(hit->normal, direction), 1e-12);
+                if (glm::dot(hit->normal, direction) < -0.3) {
+                    ASSERT_GT(glm::dot(hit->normal, (hit->position - centre) / radius), 0.95) << i;
+                }
+            }
+            EXPECT_EQ(counters.softLeaves + counters.hardLeaves, 0u);
+            EXPECT_GT(counters.slabLeaves, 3000u);
+        }
+}
+
+TEST(ReferenceCaster, RaysThatBeginInASlabMeetItsMiddleOnly) {
+    // A page of 2^3 cells that is one slab across z, its middle at 1.
+    PageHeader header;
+    header.log2Cells = 1;
+    header.faces = header.slabLeaves = 1;
+    header.root = slabNode(255, 0);
+    PageBytes page;
+    page.geometry.resize(pageSections(header).end / 16);
+    std::memcpy(page.geometry.data(), &header, sizeof header);
+    const uint32_t code = packSlab(packSlabDirection({0, 0, 1}), -0.2, 0.2);
+    ASSERT_EQ(f64::slabOffset(code), 0);
+    page.geometry.back().x = code;
+    Dataset dataset;
+    dataset.header.cell = dataset.header.levels = dataset.header.log2Cells = 1;
+    dataset.pages.push_back({.leaves = 1, .slabLeaves = 1});
+    std::vector<PageBytes> pages;
+    pages.push_back(std::move(page));
+    const auto cache = PageCache::fromPages(std::move(dataset), std::move(pages));
+    ASSERT_TRUE(cache.ok()) << cache.error().line();
+    for (const bool single : {false, true}) {
+        const ReferenceCaster caster = casterOf(*cache, 0, {.singlePrecision = single});
+        const auto cast = [&](double z, double up) { return caster.cast({{0.7, 1.1, z}, {0, 0, up}}); };
+        // From outside, from within the slab towards the middle, and away from it.
+        for (const double side : {-1.0, 1.0}) {
+            EXPECT_NEAR(cast(1 - 3 * side, side)->t, 3, 0.02);
+            EXPECT_NEAR(cast(1 - 0.25 * side, side)->t, 0.25, 0.02);
+            EXPECT_LT(cast(1 - 0.25 * side, side)->normal.z * side, -0.99);
+            EXPECT_FALSE(cast(1 + 0.25 * side, side));
+            EXPECT_FALSE(cast(1 + 0.6 * side, side));
         }
     }
 }

@@ -78,8 +78,8 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(hasShadows),
                                                                    OFFSET(paperEpsilon),
                                                                    OFFSET(worldPerCell),
+                                                                   OFFSET(isCovering),
                                                                    OFFSET(unused0),
-                                                                   OFFSET(unused1),
                                                                    OFFSET(rotation),
                                                                    OFFSET(sections)}));
 }

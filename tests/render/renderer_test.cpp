@@ -15,93 +15,21 @@
 #include <gtest/gtest.h>
 
 #include "render/frame_setup.h"
-#include "tests/support/renderer_fixture.h"
+#include "tests/support/reference_comparison.h"
 #include "tests/support/test_files.h"
 #include "tests/support/test_folder.h"
 
 namespace vcp {
 namespace {
 
+using test::cameras;
+using test::compare;
+using test::Comparison;
+using test::NamedCamera;
 using test::requestOf;
 using test::Scene;
 
 class RendererTest : public test::RendererFixture {};
-
-struct NamedCamera {
-    const char* name;
-    Camera camera;
-};
-
-/// Around, along the axes, close, from inside the box and the body, with parallel rays.
-std::vector<NamedCamera> cameras(const Scene& scene) {
-    const glm::dvec3 lo = scene.boxMin, hi = scene.boxMax, middle = (lo + hi) * 0.5;
-    const double edge = hi.x - lo.x;
-    const auto fit = [&](glm::dvec3 forward) { return fitCamera(lo, hi, forward, {0.1, 1, 0.2}, 0.6, 4.0 / 3); };
-    std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})},
-                                     {"along -z", fit({0, 0, -1})},
-                                     {"along +x", fit({1, 0, 0})},
-                                     {"along -y", fit({0, -1, 0})},
-                                     {"diagonal", fit({1, 1, 1})}};
-    Camera parallel = fit({0.5, -0.3, 0.7});
-    parallel.projection = Projection::Orthographic;
-    list.push_back({"parallel", parallel});
-    Camera straight = fit({0, 0, 1});
-    straight.projection = Projection::Orthographic;
-    list.push_back({"parallel along +z", straight});
-    Camera close = fit({-0.3, -0.5, -1});
-    close.eye = middle + (close.eye - middle) * 0.45;
-    list.push_back({"close", close});
-    Camera inside = fit({0.7, 0.1, -0.3});
-    inside.eye = middle + glm::dvec3(0.013, 0.021, 0.017) * edge;
-    list.push_back({"from the middle", inside});
-    Camera corner = fit({1, 0.8, 0.9});
-    corner.eye = lo + 0.02 * edge;
-    list.push_back({"from a corner of the box", corner});
-    Camera far = fit({-0.2, -0.3, -1});
-    far.eye = middle - glm::normalize(far.forward) * (edge * 300);
-    far.verticalFov = 0.005;
-    list.push_back({"from far away", far});
-    return list;
-}
-
-struct Comparison {
-    uint64_t hit = 0, miss = 0, missed = 0, wrong = 0;
-    double depthMax = 0, depthSum = 0, normalMax = 0;  // cells, radians
-};
-
-/// Every pixel against the reference on the same cut. Hits that differ by more than two cells are `wrong`.
-Comparison compare(Renderer& renderer, const Scene& scene, const FrameRequest& request) {
-    const std::vector<uint64_t> ones(scene.dataset->pages.size(), 1);
-    const std::vector<uint8_t> all(ones.size(), 1), none(ones.size(), 0);
-    const Selection selection = selectPages(*scene.dataset, selectionView(request), UINT64_MAX, ones, all, none);
-    const auto caster = ReferenceCaster::create(*scene.cache, selection.cut);
-    EXPECT_TRUE(caster);
-    const auto depth = renderer.readDepth();
-    const auto normals = renderer.readNormals();
-    EXPECT_TRUE(depth && normals);
-    Comparison c;
-    for (uint32_t y = 0; y < request.height; ++y)
-        for (uint32_t x = 0; x < request.width; ++x) {
-            const CameraRay ray = cameraRay(request.camera, request.width, request.height, x + 0.5, y + 0.5);
-            const auto expected = caster->cast({ray.origin, ray.direction});
-            const size_t at = size_t{y} * request.width + x;
-            const bool found = std::isfinite((*depth)[at]);
-            if (!expected && !found) ++c.miss;
-            if (expected.has_value() != found) ++c.missed;
-            if (!expected || !found) continue;
-            const double error = std::abs(double((*depth)[at]) - expected->t) / scene.dataset->cellOf(expected->level);
-            if (error > 2) {
-                ++c.wrong;
-                continue;
-            }
-            ++c.hit;
-            c.depthSum += error;
-            c.depthMax = std::max(c.depthMax, error);
-            c.normalMax =
-                std::max(c.normalMax, std::acos(std::min(1.0, glm::dot(glm::dvec3((*normals)[at]), expected->normal))));
-        }
-    return c;
-}
 
 class RendererAgainstReference : public RendererTest, public testing::WithParamInterface<PageAccess> {};
 

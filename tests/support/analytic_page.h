@@ -1,5 +1,5 @@
 // Pages made from a formula, for tests that must not depend on the builder: every cell that a signed distance
-// function passes through is a soft leaf, everything else is empty with an honest clearance.
+// function passes through is a soft leaf or a slab leaf, everything else is empty with an honest clearance.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <functional>
 #include <map>
 #include <utility>
 #include <vector>
@@ -16,42 +15,14 @@
 #include "octree/page_reader.h"
 #include "octree/surface/morton.h"
 #include "octree/surface/packing.h"
+#include "tests/support/signed_distance.h"
+#include "tests/support/slab_page.h"
 
 namespace vcp::test {
 
-/// A surface with a signed distance, in world space.
-struct SignedDistance {
-    double distance = 0;    ///< negative inside
-    glm::dvec3 outward{0};  ///< unit gradient of the distance
-};
-using SignedDistanceField = std::function<SignedDistance(glm::dvec3)>;
-
-inline SignedDistanceField sphere(glm::dvec3 centre, double radius) {
-    return [=](glm::dvec3 p) -> SignedDistance {
-        const glm::dvec3 v = p - centre;
-        const double r = glm::length(v);
-        return {r - radius, r > 0 ? v / r : glm::dvec3(0, 0, 1)};
-    };
-}
-
-/// `normal` of length 1; inside is where dot(p, normal) < offset.
-inline SignedDistanceField plane(glm::dvec3 normal, double offset) {
-    return [=](glm::dvec3 p) -> SignedDistance { return {glm::dot(p, normal) - offset, normal}; };
-}
-
-inline SignedDistanceField torus(glm::dvec3 centre, double ring, double tube) {
-    return [=](glm::dvec3 p) -> SignedDistance {
-        const glm::dvec3 v = p - centre;
-        const double around = std::max(std::hypot(v.x, v.y), 1e-12);
-        const glm::dvec3 spine = glm::dvec3(v.x, v.y, 0) * (ring / around);
-        const double r = std::max(glm::length(v - spine), 1e-12);
-        return {r - tube, (v - spine) / r};
-    };
-}
-
 struct AnalyticPage {
     PageBytes bytes;
-    uint32_t softLeaves = 0;
+    uint32_t softLeaves = 0, slabLeaves = 0;
 };
 
 // Builds one page; `axis` is the axis along which its leaves share faces.
@@ -160,6 +131,7 @@ struct AnalyticOptions {
     uint32_t axis = 0;
     uint32_t wallCode = 1;
     double errorCells = 0.05;  ///< certified error of every page, in its cells
+    uint32_t slabLevels = 0;   ///< so many of the coarsest levels have slab leaves, the others soft leaves
 };
 
 struct AnalyticDataset {
@@ -181,6 +153,11 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
     const auto makePage = [&](uint32_t level, glm::u32vec3 at, AnalyticPage& page) {
         const double cell = o.finestCell * std::exp2(double(o.levels - 1 - level));
         const glm::dvec3 origin = o.origin + glm::dvec3(at) * cell * std::exp2(double(o.log2Cells));
+        if (level < o.slabLevels) {
+            page.bytes.geometry = SlabPageBuilder(field, origin, cell, o.log2Cells, float(o.errorCells)).build();
+            page.slabLeaves = parsePage(page.bytes.geometryBytes())->header.slabLeaves;
+            return page.slabLeaves > 0;
+        }
         page = AnalyticPageBuilder(field, origin, cell, o.log2Cells, o.axis, float(o.errorCells), o.wallCode).build();
         return page.softLeaves > 0;
     };
@@ -188,7 +165,8 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
         PageEntry entry;
         entry.morton = mortonEncode(at);
         entry.level = uint8_t(level);
-        entry.leaves = page.softLeaves;
+        entry.leaves = page.softLeaves + page.slabLeaves;
+        entry.slabLeaves = page.slabLeaves;
         entry.pageBytes = uint32_t(page.bytes.geometryBytes().size());
         entry.certifiedError = float(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
         result.dataset.pages.push_back(entry);

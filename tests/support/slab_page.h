@@ -1,16 +1,14 @@
-// Pages with slab leaves, for tests that must not depend on the builder: around the surface of a signed distance, and
-// any at all among other leaves.
+// Pages of slab leaves around the surface of a signed distance, for tests that must not depend on the builder.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <random>
 #include <vector>
 
+#include "octree/page/page.h"
 #include "octree/surface/packing.h"
-#include "tests/support/analytic_page.h"
-#include "tests/support/soup_page.h"
+#include "tests/support/signed_distance.h"
 
 namespace vcp::test {
 
@@ -25,7 +23,7 @@ public:
         header_.certifiedError = certifiedErrorCells;
     }
 
-    PageBytes build() {
+    std::vector<uint4> build() {
         // Breadth first, as the builder's pages and the codec's.
         std::vector<Box> queue;
         header_.root = node({glm::ivec3(0), 1 << header_.log2Cells}, queue);
@@ -38,9 +36,8 @@ public:
         header_.slabLeaves = uint32_t(vectors_.size());
         header_.faces = (header_.slabLeaves + 3) / 4;
         const PageSections s = pageSections(header_);
-        PageBytes page;
-        page.geometry.resize(s.end / 16);
-        auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
+        std::vector<uint4> page(s.end / 16);
+        auto* out = reinterpret_cast<std::byte*>(page.data());
         std::memcpy(out, &header_, sizeof header_);
         if (!nodes_.empty()) std::memcpy(out + s.nodes, nodes_.data(), nodes_.size() * 4);
         if (!vectors_.empty()) std::memcpy(out + s.faces, vectors_.data(), vectors_.size() * 4);
@@ -102,47 +99,5 @@ private:
     PageHeader header_;
     std::vector<uint32_t> nodes_, vectors_;
 };
-
-/// Returns a page in which most empty leaves of `page` have become slab leaves and soft leaves of any content; with
-/// colours where `page` has them. Vectors are in a random order.
-inline WholePage withLeavesOfAllKinds(const WholePage& page, uint32_t seed) {
-    std::mt19937 random(seed);
-    const PageView view = page.view();
-    PageHeader header = view.header;
-    std::vector<uint32_t> nodes(view.nodes.begin(), view.nodes.end());
-    std::vector<uint32_t*> slabs;
-    uint32_t soft = 0;
-    for (uint32_t& word : nodes) {
-        if (nodeType(word) != kNodeEmpty) continue;
-        const auto kind = random() % 4;
-        if (kind < 2) slabs.push_back(&word);
-        if (kind == 2) {
-            word = kNodeSoft << kNodeTypeShift | (2 * soft++) | uint32_t(random() % 3) << kSoftAxisShift |
-                   uint32_t(random() % 64) << kSoftWallShift;
-        }
-    }
-    header.softLeaves = soft;
-    header.slabLeaves = uint32_t(slabs.size());
-    header.faces = 2 * soft + (header.slabLeaves + 3) / 4;
-    std::shuffle(slabs.begin(), slabs.end(), random);
-    for (uint32_t i = 0; i < slabs.size(); ++i) *slabs[i] = slabNode(1 + uint32_t(random() % 255), 8 * soft + i);
-    const PageSections from = pageSections(view.header), to = pageSections(header);
-    WholePage mixed{Block(to.end / 16, uint4(0)), {}};
-    auto* out = reinterpret_cast<std::byte*>(mixed.geometry.data());
-    const auto* in = reinterpret_cast<const std::byte*>(page.geometry.data());
-    std::memcpy(out, &header, sizeof header);
-    if (!nodes.empty()) std::memcpy(out + to.nodes, nodes.data(), nodes.size() * 4);
-    for (size_t i = 0; i < 8 * soft + slabs.size(); ++i) {
-        const auto word = uint32_t(random());
-        std::memcpy(out + to.faces + 4 * i, &word, 4);
-    }
-    std::memcpy(out + to.vertices, in + from.vertices, from.end - from.vertices);
-    if (page.colour.empty()) return mixed;
-    // Words behind the last vector are zero.
-    mixed.colour = randomColours(mixed.view(), seed);
-    auto* words = reinterpret_cast<uint32_t*>(mixed.colour.data());
-    std::fill(words + 8 * soft + slabs.size(), words + 4 * size_t{header.faces}, 0u);
-    return mixed;
-}
 
 }  // namespace vcp::test

@@ -13,7 +13,7 @@
 #include "octree/io/content_hash.h"
 #include "octree/surface/leaf_triangles.h"
 #include "tests/support/analytic_page.h"
-#include "tests/support/slab_page.h"
+#include "tests/support/mixed_page.h"
 #include "tests/support/soup_page.h"
 
 namespace vcp {
@@ -153,7 +153,7 @@ TEST(PageCodec, SheetsComeBack) {
 }
 
 WholePage slabPage(const test::SignedDistanceField& field, uint32_t log2Cells) {
-    return {test::SlabPageBuilder(field, glm::dvec3(0), 1, log2Cells, 0.05f).build().geometry, {}};
+    return {test::SlabPageBuilder(field, glm::dvec3(0), 1, log2Cells, 0.05f).build(), {}};
 }
 
 TEST(PageCodec, SlabPagesComeBack) {

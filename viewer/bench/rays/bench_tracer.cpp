@@ -37,8 +37,9 @@ public:
                 const CameraRay ray = cameraRay(camera, uint32_t(size.x), uint32_t(size.y), x + 0.5, y + 0.5);
                 const auto hit = caster_.cast({ray.origin, ray.direction}, &counters);
                 if (hit) picture.hits[size_t(y) * size.x + x] = SurfaceHit{hit->t, hit->normal, hit->certifiedError};
-                work.add(uint32_t(counters.nodes), uint32_t(counters.softLeaves + counters.hardLeaves),
-                         uint32_t(counters.softLeaves + counters.triangles));
+                work.add(uint32_t(counters.nodes),
+                         uint32_t(counters.softLeaves + counters.slabLeaves + counters.hardLeaves),
+                         uint32_t(counters.softLeaves + counters.slabLeaves + counters.triangles));
             }
             const std::lock_guard lock(mutex);
             picture.work.merge(work);

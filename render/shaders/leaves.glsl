@@ -1,0 +1,217 @@
+// Casts a ray against the leaves of a page, and finds what is seen of a hit.
+#include "octree/shared/leaf_math.h"
+#include "render/shaders/page_walk.glsl"
+
+const int kIllinoisSteps = 8;
+
+struct Hit {
+    float depth;   // finest cells; kNoHit
+    uint record;   // record of the hit page in the table
+    int pageBits;  // log2 of the page's edge on the lattice
+    uint leaf;     // its node
+    // Soft: the point in leaf space, and the side the ray came from (sideBefore). Hard: weights of the second and third
+    // vertex.
+    vec4 at;
+    uvec3 corners;  // hard: the triangle's vertices
+};
+
+// What is seen of a hit.
+struct Surface {
+    vec3 normal;  // towards the ray's origin, not normalized
+    vec4 colour;
+};
+
+// The work of a ray; counted with kCountSteps only.
+struct Work {
+    uint steps, cells, fetches;
+};
+
+// Returns the distance along the page's ray of the crossing in a soft leaf, or -1.
+float castSoft(uint faces, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
+    uint face = faces + (node & kLeafIndexMask);
+    uvec4 face0 = fetchTexel(face), face1 = fetchTexel(face + 1u);
+    if (kCountSteps != 0u) {
+        work.cells++;
+        work.fetches += 2u;
+    }
+    float scale = 1.0 / edge;  // a power of two: exact
+    vec3 p = (s.from - lo) * scale;
+    vec3 d = (s.to - s.from) * scale;
+    float wall = wallTolerance(node);
+    RayField ray = restrictToRay(face0, face1, node >> kSoftAxisShift & 3u, p, d);
+    float u = firstCrossing(ray, s.fromWall ? wall : 0.0, wall, dipBound(node), kIllinoisSteps);
+    hit.at = vec4(p + u * d, sideBefore(ray, u, d));
+    return u >= 0.0 ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
+}
+
+// Returns the distance along the page's ray of the hit in a slab leaf, or -1. Where the ray begins in the leaf, what
+// lies at its begin does not count: it may be the surface that it comes from.
+float castSlab(uint faces, uint node, vec3 lo, float edge, LeafSegment s, inout Work work) {
+    if (kCountSteps != 0u) {
+        work.cells++;
+        work.fetches++;
+    }
+    uint code = fetchWord(faces, node & kSlabVectorMask);
+    float scale = 1.0 / edge;  // a power of two: exact
+    float u = intersectSlab(code, node >> kSlabOctantsShift & kSlabOctantsMask, (s.from - lo) * scale,
+                            (s.to - s.from) * scale);
+    bool counts = u > 0.0 || (u == 0.0 && s.fromWall);
+    return counts ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
+}
+
+// Reads the entries of a page's strips, one after the other.
+struct StripReader {
+    uint strips;  // texel of the first entry
+    uint shorts;  // 1 where entries are short, two to a word; else 0
+    uint next;    // number of the next entry
+    uint texel;   // the latest texel and its words; 0: none
+    uvec4 words;
+};
+
+StripReader stripReader(TableSections sections, uint first) {
+    // The size of the vertices' section tells how many there are.
+    uint shorts = sections.normals - sections.vertices <= kShortEntryVertices / 2u ? 1u : 0u;
+    return StripReader(sections.strips, shorts, first, 0u, uvec4(0u));
+}
+
+// Returns an entry's vertex number, and its step.
+uint readEntry(inout StripReader reader, out uint step, inout Work work) {
+    uint texel = reader.strips + (reader.next >> (2u + reader.shorts));
+    if (texel != reader.texel) {
+        reader.words = fetchTexel(texel);
+        reader.texel = texel;
+        if (kCountSteps != 0u) work.fetches++;
+    }
+    uint word = texelWord(reader.words, reader.next >> reader.shorts & 3u);
+    uint entry = word >> ((reader.next & reader.shorts) << 4) & 0xffffffffu >> (reader.shorts << 4);
+    uint bits = reader.shorts != 0u ? kShortVertexBits : kLongVertexBits;
+    reader.next++;
+    step = entry >> bits;
+    return entry & ((1u << bits) - 1u);
+}
+
+vec3 fetchVertex(TableSections sections, uint v, inout Work work) {
+    if (kCountSteps != 0u) work.fetches++;
+    uvec2 code = fetchPair(sections.vertices, v);
+    return decodeVertex(code.x, code.y);
+}
+
+// Intersects the triangles of a hard leaf. Returns the distance, or -1.
+float castHard(TableSections sections, uint node, LeafSegment s, vec3 direction, inout Hit hit, inout Work work) {
+    if (kCountSteps != 0u) work.cells++;
+    StripReader reader = stripReader(sections, node & kHardFirstMask);
+    uint count = node >> kHardCountShift & kHardCountMask, step;
+    bool isLong = count == kHardCountLong;
+    while (isLong) {
+        count = readEntry(reader, step, work);
+        count |= readEntry(reader, step, work) << kShortVertexBits;
+        isLong = false;
+    }
+    float lowest = s.fromWall ? -kIntervalSlack : 0.0;
+    float best = s.tauTo - s.tauFrom + kIntervalSlack;
+    bool found = false;
+    // A turn of the loop takes one vertex, so that none waits for another ray's strip to begin. Where a strip begins,
+    // two turns have no triangle yet; most leaves have one strip, and its first two vertices come before the loop.
+    uvec3 corners = uvec3(0u);
+    corners.x = readEntry(reader, step, work);
+    corners.y = readEntry(reader, step, work);
+    vec3 a = fetchVertex(sections, corners.x, work), b = fetchVertex(sections, corners.y, work), c = b;
+    uint known = 2u;  // how many of the triangle's vertices
+    while (count > 0u) {
+        uint v = readEntry(reader, step, work);
+        vec3 p = fetchVertex(sections, v, work);
+        known = step != kStepBegin ? 3u : known < 3u ? known + 1u : 1u;
+        bvec3 place = equal(uvec3(step != kStepBegin ? step : known), uvec3(1u, 2u, 3u));
+        corners = mix(corners, uvec3(v), place);
+        a = mix(a, p, bvec3(place.x));
+        b = mix(b, p, bvec3(place.y));
+        c = mix(c, p, bvec3(place.z));
+        vec3 t = intersectTriangle(s.from, direction, a, b, c, kTriangleSlack);
+        if (known == 3u && t.x >= lowest && t.x <= best) {
+            best = t.x;
+            hit.at.xy = t.yz;
+            hit.corners = corners;
+            found = true;
+        }
+        count -= known == 3u ? 1u : 0u;
+    }
+    return found ? max(s.tauFrom + best, 0.0) : -1.0;
+}
+
+vec4 blendColours(uvec4 face0, uvec4 face1, vec3 x) {
+    vec4 w = faceWeights(x.y, x.z);
+    vec4 c0 = w.x * unpackUnorm4x8(face0.x) + w.y * unpackUnorm4x8(face0.y) + w.z * unpackUnorm4x8(face0.z) +
+              w.w * unpackUnorm4x8(face0.w);
+    vec4 c1 = w.x * unpackUnorm4x8(face1.x) + w.y * unpackUnorm4x8(face1.y) + w.z * unpackUnorm4x8(face1.z) +
+              w.w * unpackUnorm4x8(face1.w);
+    return mix(c0, c1, x.x);
+}
+
+Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
+    uint axis = hit.leaf >> kSoftAxisShift & 3u;
+    uint face = hit.leaf & kLeafIndexMask;
+    LeafField leaf = decodeLeaf(fetchTexel(faces + face), fetchTexel(faces + face + 1u), axis);
+    Surface surface;
+    surface.normal = facingNormal(leafNormal(leaf, hit.at.xyz), direction, hit.at.w);
+    surface.colour = vec4(0.0);
+    if (kColour != 0u)
+        surface.colour = blendColours(fetchColour(colourFaces + face), fetchColour(colourFaces + face + 1u),
+                                      rotateToAxis(hit.at.xyz, axis));
+    return surface;
+}
+
+Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
+    uint vector = hit.leaf & kSlabVectorMask;
+    vec3 n = decodeDirection(fetchWord(faces, vector) >> kSlabDirectionShift);
+    Surface surface = Surface(turnedTo(n, -direction), vec4(0.0));
+    if (kColour != 0u)
+        surface.colour = unpackUnorm4x8(texelWord(fetchColour(colourFaces + (vector >> 2)), vector & 3u));
+    return surface;
+}
+
+Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 direction) {
+    uvec3 corners = hit.corners;
+    uvec2 a = fetchPair(sections.vertices, corners.x), b = fetchPair(sections.vertices, corners.y),
+          c = fetchPair(sections.vertices, corners.z);
+    vec3 pa = decodeVertex(a.x, a.y), pb = decodeVertex(b.x, b.y), pc = decodeVertex(c.x, c.y);
+    vec3 flatNormal = cross(pb - pa, pc - pa);
+    flatNormal *= inversesqrt(max(dot(flatNormal, flatNormal), 1e-30));
+    flatNormal = turnedTo(flatNormal, -direction);
+    vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
+    Surface surface = Surface(vec3(0.0), vec4(0.0));
+    for (int i = 0; i < 3; i++) {
+        uint code = fetchWord(sections.normals, corners[i]);
+        surface.normal +=
+            w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
+        if (kColour != 0u)
+            surface.colour +=
+                w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (corners[i] >> 2)), corners[i] & 3u));
+    }
+    return surface;
+}
+
+// Finds the normal and colour of a hit. The page is looked up again: see descend() on what is loaded in a loop. A kind
+// of leaf that none of the rays in lock step has hit is skipped; only a loop does that on every device.
+Surface surfaceAt(Hit hit, vec3 direction) {
+    Surface surface = Surface(vec3(0.0, 0.0, 1.0), vec4(0.0));
+    bool found = hit.depth < kNoHit;
+    TableSections sections = fetchTableSections(hit.record);
+    TableColours colours = TableColours(0u, 0u, 0u, 0u);
+    if (kColour != 0u) colours = fetchTableColours(hit.record);
+    bool soft = found && nodeType(hit.leaf) == kNodeSoft;
+    while (soft) {
+        surface = softSurface(hit, sections.faces, colours.faces, direction);
+        soft = false;
+    }
+    bool slab = found && nodeType(hit.leaf) == kNodeSlab;
+    while (slab) {
+        surface = slabSurface(hit, sections.faces, colours.faces, direction);
+        slab = false;
+    }
+    bool hard = found && nodeType(hit.leaf) == kNodeHard;
+    while (hard) {
+        surface = hardSurface(hit, sections, colours.vertices, direction);
+        hard = false;
+    }
+    return surface;
+}
