@@ -273,8 +273,7 @@ PageTree buildPageTree(PageGeometry& geometry, double tolerance, size_t mostReco
 double PageTree::certifiedError() const {
     double error = 0;
     for (const SoftLeaf& leaf : soft) error = std::max(error, errorOf(leaf));
-    // A point that is drawn and a point of the mesh share an octant of the leaf, whose corners are so far apart.
-    for (const SlabLeaf& leaf : slabs) error = std::max(error, kSlabErrorEdges * leaf.box.edgeCells());
+    for (const SlabLeaf& leaf : slabs) error = std::max(error, leaf.error * leaf.box.edgeCells());
     return error;
 }
 

@@ -26,9 +26,6 @@ constexpr uint64_t mostSplitRecords(uint64_t triangles) { return 65536 + triangl
 /// The largest soft leaf, in cells: beyond it the closest points of its corners are not certainly the mesh's.
 inline constexpr int kMaxSoftCells = 8;
 
-/// Certified error of a slab leaf, in leaf edges: half its diagonal, and room for rounding.
-inline constexpr double kSlabErrorEdges = 0.8664;
-
 /// A node of the octree under construction.
 struct TreeNode {
     enum class Kind : uint8_t { Empty, Soft, Hard, Slab, Internal };
@@ -53,6 +50,7 @@ struct SlabLeaf {
     NodeBox box;
     uint32_t code = 0;              ///< packed slab (octree/shared/page_layout.h)
     uint32_t octants = 0;           ///< those that hold surface
+    double error = 0;               ///< in its edges
     uint32_t colour = 0xffffffffu;  ///< RGBA8
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "builder/slab/slab_error.h"
 #include "octree/surface/morton.h"
 #include "octree/surface/packing.h"
 
@@ -52,7 +53,6 @@ private:
 
     /// Returns the eighths of a cell, as a run of the next list.
     [[nodiscard]] Run eighthsOf(size_t level, size_t cell) const {
-        if (level + 1 == levels_.size()) return {0, 0};
         const std::vector<uint32_t>& codes = levels_[level + 1]->codes;
         const uint32_t first = levels_[level]->codes[cell] << 3;
         const auto begin = std::lower_bound(codes.begin(), codes.end(), first);
@@ -61,49 +61,49 @@ private:
     }
 
     void buildCell(uint32_t node, size_t level, size_t index) {
-        const CellSurface& cell = levels_[level]->cells[index];
         const Run eighths = eighthsOf(level, index);
-        if (eighths.first == eighths.end || normalSpread(cell) <= kMostNormalSpread)
-            return makeLeaf(node, level, index, eighths);
+        SlabLeaf leaf = leafOf(tree_.nodes[node].box, level, index, eighths);
+        // Halves of cells are never parted: their error is small enough whatever lies in them.
+        if (level > 0 || isGood(leaf, index, eighths)) return tree_.makeSlab(node, leaf);
         const uint32_t children = tree_.addChildren(node);
         for (size_t i = eighths.first; i < eighths.end; ++i)
             buildCell(children + (levels_[level + 1]->codes[i] & 7u), level + 1, i);
     }
 
-    void makeLeaf(uint32_t node, size_t level, size_t index, Run eighths) {
-        const CellSurface& cell = levels_[level]->cells[index];
-        SlabLeaf leaf{.box = tree_.nodes[node].box, .colour = meanColour(cell)};
-        const uint32_t direction = packSlabDirection(glm::dvec3(cell.axis));
-        const glm::dvec3 n = f64::decodeDirection(direction);
-        Extent extent = extentAlong(cell, n);
-        if (eighths.first < eighths.end) {
-            octants_.clear();
-            for (size_t i = eighths.first; i < eighths.end; ++i) octants_.push_back(levels_[level + 1]->codes[i] & 7u);
-            extent =
-                extentAlong(std::span(levels_[level + 1]->cells).subspan(eighths.first, octants_.size()), octants_, n);
-            for (const uint32_t o : octants_) leaf.octants |= 1u << o;
-        } else {
-            leaf.octants = octantsInBox(cell);
+    /// Whether a cell needs no finer leaves. Sets the leaf's error.
+    bool isGood(SlabLeaf& leaf, size_t index, Run eighths) {
+        if (normalSpread(levels_[0]->cells[index]) > kMostNormalSpread) return false;
+        quarters_.clear();
+        for (size_t i = eighths.first; i < eighths.end; ++i) {
+            const Run inside = eighthsOf(1, i);
+            for (size_t k = inside.first; k < inside.end; ++k)
+                quarters_.push_back({levels_[2]->codes[k] & 63u, &levels_[2]->cells[k]});
         }
-        leaf.code = packSlab(direction, extent.first, extent.last);
-        tree_.makeSlab(node, leaf);
+        const double middle = f64::slabOffset(leaf.code), half = f64::slabHalfThickness(leaf.code);
+        leaf.error = slabError(f64::decodeDirection(leaf.code >> kSlabDirectionShift), {middle - half, middle + half},
+                               quarters_);
+        return leaf.error <= kMostSlabError;
     }
 
-    static uint32_t octantsInBox(const CellSurface& cell) {
-        constexpr float kMargin = 1e-5f;
-        uint32_t octants = 0xffu;
-        constexpr std::array<uint32_t, 3> kUpper = {0xaau, 0xccu, 0xf0u};
-        for (size_t axis = 0; axis < 3; ++axis) {
-            if (cell.lower[int(axis)] > kMargin) octants &= kUpper[axis];
-            if (cell.upper[int(axis)] < -kMargin) octants &= ~kUpper[axis];
-        }
-        return octants & 0xffu;
+    SlabLeaf leafOf(const NodeBox& box, size_t level, size_t index, Run eighths) {
+        const CellSurface& cell = levels_[level]->cells[index];
+        SlabLeaf leaf{.box = box, .error = kAnySlabError, .colour = meanColour(cell)};
+        const uint32_t direction = packSlabDirection(glm::dvec3(cell.axis));
+        const glm::dvec3 n = f64::decodeDirection(direction);
+        octants_.clear();
+        for (size_t i = eighths.first; i < eighths.end; ++i) octants_.push_back(levels_[level + 1]->codes[i] & 7u);
+        for (const uint32_t o : octants_) leaf.octants |= 1u << o;
+        const auto parts = std::span(levels_[level + 1]->cells).subspan(eighths.first, octants_.size());
+        const Extent extent = extentAlong(parts, octants_, n);
+        leaf.code = packSlab(direction, extent.first, extent.last);
+        return leaf;
     }
 
     std::array<const SurfaceCells*, 3> levels_;  ///< cells, halves, quarters
     uint32_t log2Cells_;
     PageTree tree_;
     std::vector<uint32_t> octants_;
+    std::vector<SurfaceQuarter> quarters_;
 };
 
 }  // namespace

@@ -10,10 +10,12 @@ namespace vcp {
 
 /// A cell is parted into eight where its surface folds: where the mean of its normals' squared sines to their axis is
 /// larger than this.
-inline constexpr double kMostNormalSpread = 0.1;
+inline constexpr double kMostNormalSpread = 0.03;
+/// Also where a slab's error would be larger than this, in cells.
+inline constexpr double kMostSlabError = 0.45;
 
-/// Builds a page's octree from its surface. Leaves are as large as a cell, or a half or a quarter of one where the
-/// surface folds.
+/// Builds a page's octree from its surface. Leaves are cells, or halves of them where a whole one would not do.
+/// Precondition: each cell has halves, and each half quarters, as foldPages makes them.
 PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells);
 
 }  // namespace vcp

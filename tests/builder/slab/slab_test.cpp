@@ -2,11 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include "builder/measure/mesh_bvh.h"
+#include "builder/slab/slab_error.h"
 #include "builder/slab/slab_tree.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/morton.h"
@@ -152,14 +155,45 @@ TEST(Slabs, CellsHaveTheAreaOfTheMesh) {
     }
 }
 
-TEST(Slabs, TheLevelAboveHasSlabsNoLargerThanACell) {
+/// Returns a random point of what is drawn of a leaf, page space, or nothing where the one tried is not drawn.
+std::optional<glm::dvec3> drawnPoint(const SlabLeaf& leaf, std::mt19937& random) {
+    std::uniform_real_distribution<double> unit(-0.5, 0.5);
+    const glm::dvec3 n = f64::decodeDirection(leaf.code >> kSlabDirectionShift);
+    glm::dvec3 x(unit(random), unit(random), unit(random));
+    const double middle = f64::slabOffset(leaf.code), half = f64::slabHalfThickness(leaf.code);
+    x += (middle + 2 * half * unit(random) - glm::dot(n, x)) * n;
+    if (std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}) > 0.5) return std::nullopt;
+    const uint32_t octant = (x.x > 0 ? 1u : 0u) | (x.y > 0 ? 2u : 0u) | (x.z > 0 ? 4u : 0u);
+    if ((leaf.octants >> octant & 1) == 0) return std::nullopt;
+    return leaf.box.centreCells() + leaf.box.edgeCells() * x;
+}
+
+TEST(Slabs, WhatIsDrawnIsWithinTheCertifiedErrorOfTheMesh) {
     for (const auto& [name, mesh] : scenes()) {
         SCOPED_TRACE(name);
         const Pages pages = pagesOf(mesh);
         const PageTree tree = buildSlabTree(pages.above, kLog2Cells);
-        EXPECT_LE(tree.certifiedError(), kSlabErrorEdges);
-        EXPECT_GE(tree.slabs.size(), pages.above.cells.size());
+        EXPECT_LE(tree.certifiedError(), std::max(kMostSlabError, kAnySlabError / 2));
         EXPECT_TRUE(tree.hard.empty() && tree.soft.empty());
+        const IndexedMesh inCells = test::inCells(mesh, 0.5);
+        const MeshBvh bvh(inCells);
+        std::mt19937 random(3);
+        int drawn = 0, whole = 0;
+        double most = 0;
+        for (const SlabLeaf& leaf : tree.slabs) {
+            whole += leaf.box.edge == kSubcells;
+            for (int i = 0; i < 20; ++i) {
+                const auto p = drawnPoint(leaf, random);
+                if (!p) continue;
+                const double distance = bvh.nearestPoint(*p)->distance;
+                ASSERT_LE(distance, leaf.error * leaf.box.edgeCells() + 1e-9);
+                most = std::max(most, distance);
+                ++drawn;
+            }
+        }
+        EXPECT_GT(drawn, 1000);
+        EXPECT_GT(most, tree.certifiedError() / 8) << "the bound says nothing";
+        if (std::string_view(name) == "sphere") EXPECT_GT(whole, 100) << "flat enough for whole cells";
     }
 }
 

@@ -1,0 +1,96 @@
+#include "builder/slab/slab_error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "octree/surface/morton.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr int kSide = 4;  // quarters an edge
+
+/// Coordinates count from the leaf's centre, in its edges.
+struct Box {
+    glm::dvec3 lower, upper;
+};
+
+/// The boxes of the surface in the quarters, by place.
+class QuarterBoxes {
+public:
+    explicit QuarterBoxes(std::span<const SurfaceQuarter> quarters) {
+        for (const auto& [code, surface] : quarters) {
+            const glm::ivec3 at(mortonDecode(code));
+            const glm::dvec3 centre = (glm::dvec3(at) + 0.5) / double(kSide) - 0.5;
+            box_[indexOf(at)] = {centre + glm::dvec3(surface->lower) / double(kSide),
+                                 centre + glm::dvec3(surface->upper) / double(kSide)};
+            isFull_[indexOf(at)] = true;
+            const glm::ivec3 octant = at / 2;
+            octants_ |= 1u << (octant.x + 2 * octant.y + 4 * octant.z);
+        }
+    }
+    [[nodiscard]] bool isDrawn(glm::ivec3 at) const {
+        const glm::ivec3 octant = at / 2;
+        return (octants_ >> (octant.x + 2 * octant.y + 4 * octant.z) & 1u) != 0;
+    }
+    /// Returns how far a point in a box is at most from the mesh: from any point of what a quarter around `at` holds.
+    [[nodiscard]] double farthest(const Box& points, glm::ivec3 at) const {
+        double least = std::numeric_limits<double>::infinity();
+        const glm::ivec3 first = glm::max(at - 1, 0), last = glm::min(at + 1, kSide - 1);
+        for (int z = first.z; z <= last.z; ++z)
+            for (int y = first.y; y <= last.y; ++y)
+                for (int x = first.x; x <= last.x; ++x) {
+                    const size_t i = indexOf({x, y, z});
+                    if (!isFull_[i]) continue;
+                    const glm::dvec3 apart = glm::max(points.upper - box_[i].lower, box_[i].upper - points.lower);
+                    least = std::min(least, glm::length(apart));
+                }
+        return least;
+    }
+
+private:
+    static size_t indexOf(glm::ivec3 at) { return size_t(at.x + kSide * (at.y + kSide * at.z)); }
+
+    std::array<Box, size_t{kSide} * kSide * kSide> box_{};
+    std::array<bool, size_t{kSide} * kSide * kSide> isFull_{};
+    uint32_t octants_ = 0;
+};
+
+}  // namespace
+
+double slabError(glm::dvec3 direction, Extent slab, std::span<const SurfaceQuarter> quarters) {
+    const QuarterBoxes boxes(quarters);
+    const double reach = (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z)) / (2 * kSide);
+    double error = slab.last - slab.first;
+    CellSurface cut;  // a quarter, cut by the slab
+    cut.axis = glm::vec3(direction);
+    cut.first = float(slab.first);
+    cut.last = float(slab.last);
+    for (int i = 0; i < kSide * kSide * kSide; ++i) {
+        const glm::ivec3 at(i % kSide, i / kSide % kSide, i / kSide / kSide);
+        const glm::dvec3 lower = glm::dvec3(at) / double(kSide) - 0.5;
+        const double along = glm::dot(direction, lower + 0.5 / kSide);
+        if (!boxes.isDrawn(at) || along - reach > slab.last || along + reach < slab.first) continue;
+        cut.lower = glm::vec3(lower);
+        cut.upper = glm::vec3(lower + 1.0 / kSide);
+        Box box;
+        for (int axis = 0; axis < 3; ++axis) {
+            glm::dvec3 unit(0);
+            unit[axis] = 1;
+            const Extent extent = extentAlong(cut, unit);
+            box.lower[axis] = extent.first;
+            box.upper[axis] = extent.last;
+        }
+        error = std::max(error, boxes.farthest(box, at));
+    }
+    constexpr double kRounding = 1e-4;
+    return error + kRounding;
+}
+
+}  // namespace vcp
