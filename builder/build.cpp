@@ -21,6 +21,7 @@
 #include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
 #include "builder/progress_meter.h"
+#include "builder/slab_pages.h"
 #include "builder/spill/journal.h"
 #include "octree/io/output_file.h"
 
@@ -29,6 +30,7 @@ namespace vcp {
 namespace {
 
 // Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
+constexpr size_t kSlabPagesPerBin = 256;
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
 
 class Builder {
@@ -53,7 +55,7 @@ public:
         }
         Error error = built.error();
         const bool mayPass = error.code == ErrorCode::Cancelled || error.code == ErrorCode::Io,
-                   needsMore = error.code == ErrorCode::Limit && files_.current;
+                   needsMore = error.code == ErrorCode::Limit && (files_.current || !files_.surfaces.empty());
         const bool hasWork = journal_.active() || isResumed_;
         if (hasWork && isOfTempFiles(error)) {
             // Once the disk is repaired, it may give back what was written after all.
@@ -101,6 +103,7 @@ private:
         plan_.frame = frame;
         plan_.errorTarget = error;
         plan_.isExact = options_.error <= 0;
+        plan_.hasSlabs = options_.coarseLeaves == CoarseLeaves::Slabs;
         plan_.pageBytes = memory_.pageBytes;
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());
@@ -208,7 +211,7 @@ private:
         firstBin_ = done_.bin;
         if (pass_ >= 0) openPass();
         VCP_TRY(files_.reopen(done_, space_));
-        if (pass_ >= 0 && firstBin_ >= plan_.partitionOf(plan_.levelOf(pass_)).bins())
+        if (pass_ >= 0 && firstBin_ >= std::max<size_t>(binsOfPass(), 1))
             return Error{.code = ErrorCode::InvalidInput,
                          .message = "names a bin that there is not; build again from the start",
                          .file = (space_.folder().path() / kJournalName).string()};
@@ -266,7 +269,10 @@ private:
     [[nodiscard]] bool hasColour() const { return usesVertexColours() || usesMaterials(); }
 
     void setUpLevels() {
-        for (uint32_t level = 0; level < plan_.frame.levels; ++level) files_.spools.emplace_back(space_, level);
+        for (uint32_t level = 0; level < plan_.frame.levels; ++level) {
+            files_.spools.emplace_back(space_, level);
+            if (plan_.hasSlabs) files_.surfaces.emplace_back(space_, level, "surfaces");
+        }
     }
 
     Result<void> dealSoup() {
@@ -306,8 +312,9 @@ private:
                                                                  plan_.partitionOf(plan_.levelOf(pass)).bins(),
                                                                  memory_.bufferBytes);
         };
+        if (plan_.isOfSlabs(pass_)) return;
         if (!files_.current) files_.current = bins(pass_);
-        if (pass_ == 0) return;
+        if (!plan_.steps(pass_)) return;
         files_.next = bins(pass_ - 1);
         files_.waiting = std::make_unique<RecordBins<WaitingTriangle>>(space_, fmt::format("waiting{}", pass_),
                                                                        plan_.partitionOf(plan_.levelOf(pass_)).bins(),
@@ -317,6 +324,7 @@ private:
     /// Returns the settings of the pass's pages.
     [[nodiscard]] LevelSettings settings() {
         LevelSettings settings = plan_.settingsOf(pass_);
+        settings.withColour = hasColour();
         settings.roomBytes = memory_.tempBytes;
         settings.makeRoom = [this] { return space_.spill(); };
         return settings;
@@ -329,19 +337,54 @@ private:
         return first + kVerticesShare + (1 - first - kVerticesShare - kWritingShare) * plan_.timeBefore(pass);
     }
 
+    [[nodiscard]] double passEnds(int pass) const { return pass == 0 ? 1 - kWritingShare : passBegins(pass - 1); }
+
+    [[nodiscard]] std::string stageOf(int pass) const {
+        if (pass == plan_.levels()) return "sorting";
+        return fmt::format("level {} of {}", plan_.levels() - pass, plan_.frame.levels);
+    }
+
+    /// Returns in how many parts the pass is worked on, with checkpoints between them.
+    [[nodiscard]] size_t binsOfPass() const {
+        if (!plan_.isOfSlabs(pass_)) return plan_.partitionOf(plan_.levelOf(pass_)).bins();
+        return (parentsOf(files_.surfaces[size_t(pass_) + 1]) + kSlabPagesPerBin - 1) / kSlabPagesPerBin;
+    }
+
+    /// Makes the pages of a level from the surface in those below.
+    Result<void> runSlabPass() {
+        const size_t level = size_t(pass_), bins = binsOfPass();
+        const size_t parents = parentsOf(files_.surfaces[level + 1]);
+        const double begins = passBegins(pass_), share = passEnds(pass_) - begins;
+        for (size_t bin = firstBin_; bin < bins; ++bin) {
+            const size_t first = bin * kSlabPagesPerBin, end = std::min(parents, first + kSlabPagesPerBin);
+            Result<void> result;
+            arena_.execute([&] {
+                result = buildSlabPages(settings(), files_.surfaces[level + 1], first, end, files_.spools[level],
+                                        files_.surfaces[level], [&](double part) {
+                                            const double done = double(first) + part * double(end - first);
+                                            return progress(stageOf(pass_), begins + share * done / double(parents));
+                                        });
+            });
+            VCP_TRY(result);
+            if (bin + 1 < bins) VCP_TRY(checkpoint("levels", bin + 1));
+        }
+        return endPass();
+    }
+
     Result<void> runPass() {
-        if (!files_.next && pass_ > 0) openPass();
+        if (plan_.isOfSlabs(pass_)) return runSlabPass();
+        if (!files_.next && plan_.steps(pass_)) openPass();
         const int level = plan_.levelOf(pass_);
         const PagePartition partition = plan_.partitionOf(level);
         const PageGrid grid = plan_.gridOf(level), coarser = plan_.gridOf(std::max(pass_ - 1, 0));
         const PagePartition nextPartition = plan_.partitionOf(std::max(pass_ - 1, 0));
         std::optional<LevelSink> sink;
         std::optional<LevelStep> step;
-        if (pass_ > 0) {
+        if (plan_.steps(pass_)) {
             sink.emplace(coarser, nextPartition, *files_.next);
             step.emplace(pass_ > level, grid, partition, *files_.waiting, *sink);
         }
-        const double begins = passBegins(pass_), ends = pass_ == 0 ? 1 - kWritingShare : passBegins(pass_ - 1);
+        const double begins = passBegins(pass_), ends = passEnds(pass_);
         const uint64_t total = std::max<uint64_t>(files_.current->raw().total(), 1);
         uint64_t done = 0;
         for (size_t bin = 0; bin < partition.bins(); ++bin) {
@@ -363,8 +406,7 @@ private:
     template <class At>
     Result<void> runBin(size_t bin, uint64_t first, uint64_t end, LevelStep* step, At&& at) {
         const bool vertices = pass_ == plan_.levels();
-        const std::string stage = vertices ? std::string("sorting")
-                                           : fmt::format("level {} of {}", plan_.levels() - pass_, plan_.frame.levels);
+        const std::string stage = stageOf(pass_);
         if (!progress(stage, at(0))) return cancelled();
         VCP_TRY_ASSIGN(auto soup, files_.current->load(bin));
         // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
@@ -377,6 +419,7 @@ private:
             if (vertices) computeNormals(mesh);
             if (!vertices)
                 result = buildPages(settings(), mesh, first, end, files_.spools[size_t(pass_)],
+                                    plan_.hasSlabs ? &files_.surfaces[size_t(pass_)] : nullptr,
                                     [&](double part) { return progress(stage, at(part)); });
             if (result && step) result = step->run(bin, mesh);
         });
@@ -400,8 +443,9 @@ private:
         --pass_;
         VCP_TRY(checkpoint("levels", 0, journal_.active()));
         ++pass_;
-        finished->raw().remove();
+        if (finished) finished->raw().remove();
         if (waited) waited->raw().remove();
+        if (plan_.isOfSlabs(pass_)) files_.surfaces[size_t(pass_) + 1].remove();
         return {};
     }
 
@@ -416,6 +460,7 @@ private:
 
     Result<void> write() {
         FileHeader header = headerOf(measures_, plan_.frame, plan_.errorTarget, hasColour());
+        if (plan_.hasSlabs) header.flags |= kFlagCovering;
         VCP_TRY_ASSIGN(report_.fileBytes,
                        assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
                            return progress("writing", 1 - kWritingShare + kWritingShare * part);

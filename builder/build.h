@@ -27,6 +27,10 @@ namespace vcp {
 /// Auto: all colours there are. Texture: materials and their images, not the vertices' colours.
 enum class ColourChoice { Auto, Vertex, Texture, None };
 
+/// What the levels above the finest are made of. Slabs: a plane with a thickness for each cell (slab/slab_tree.h).
+/// Mesh: soft and hard leaves over triangles whose vertices are clustered (level/).
+enum class CoarseLeaves { Slabs, Mesh };
+
 struct BuildProgress {
     std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
     double fraction = 0;     ///< fraction of the whole build, 0 to 1, never decreasing; 1: done
@@ -50,6 +54,7 @@ struct BuildOptions {
     bool resume = false;           ///< go on where an interrupted build of the same output was
     double checkpointSeconds = 5;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
+    CoarseLeaves coarseLeaves = CoarseLeaves::Mesh;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;
     /// then it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 4;
+constexpr int kTempVersion = 5;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -107,14 +107,21 @@ std::vector<SideFile> sideFilesFrom(Fields& all) {
     return files;
 }
 
+std::vector<std::pair<uint64_t, uint64_t>> spoolsFrom(Fields& all, const char* name) {
+    std::vector<std::pair<uint64_t, uint64_t>> spools;
+    for (const json& pages : all.list(name)) {
+        const bool isPair = pages.is_array() && pages.size() == 2;
+        all.require(isPair);
+        if (isPair) spools.emplace_back(all.countOf(pages[0]), all.countOf(pages[1]));
+    }
+    return spools;
+}
+
 Recorded::Files filesFrom(Fields& all) {
     Recorded::Files files;
     for (const auto& [name, bytes] : all.object("files").items()) files.bins[name] = all.countOf(bytes);
-    for (const json& pages : all.list("spools")) {
-        const bool isPair = pages.is_array() && pages.size() == 2;
-        all.require(isPair);
-        if (isPair) files.spools.emplace_back(all.countOf(pages[0]), all.countOf(pages[1]));
-    }
+    files.spools = spoolsFrom(all, "spools");
+    files.surfaces = spoolsFrom(all, "surfaces");
     return files;
 }
 
@@ -129,7 +136,6 @@ void readLevels(Fields& all, Recorded& recorded) {
     all.require(isPass);
     recorded.pass = isPass ? pass.get<int>() : 0;
     recorded.bin = all.count("bin");
-    all.require(recorded.bin < bins.size());
 }
 
 /// Lists the bins that exist, by the names that the journal gives them.
@@ -142,11 +148,36 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
     return bins;
 }
 
+/// Makes spools durable; returns their lengths, in bytes and entries.
+Result<json> syncSpools(std::deque<PageSpool>& spools) {
+    json lengths = json::array();
+    for (PageSpool& spool : spools) {
+        if (spool.bytes() > 0) VCP_TRY(spool.sync());
+        lengths.push_back({spool.bytes(), spool.entries().size()});
+    }
+    return lengths;
+}
+
+using SpoolLengths = std::vector<std::pair<uint64_t, uint64_t>>;
+
+/// Appends the names of the files of spools that are not empty.
+void keepSpools(const std::deque<PageSpool>& spools, const SpoolLengths& lengths, std::vector<std::string>& kept) {
+    for (size_t i = 0; i < spools.size(); ++i)
+        if (lengths[i].first > 0) kept.insert(kept.end(), {spools[i].pagesFile(), spools[i].directoryFile()});
+}
+
+Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& lengths) {
+    for (size_t i = 0; i < spools.size(); ++i)
+        if (const auto& [bytes, entries] = lengths[i]; bytes > 0) VCP_TRY(spools[i].reopen(bytes, entries));
+    return {};
+}
+
 }  // namespace
 
 std::string buildFingerprint(const BuildOptions& options) {
-    std::string text = fmt::format("{} {} {:a} {:a} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
-                                   options.errorIsRelative, int(options.colour), options.format);
+    std::string text =
+        fmt::format("{} {} {:a} {:a} {} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
+                    options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);
@@ -196,16 +227,14 @@ Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& 
 }
 
 Result<json> WorkFiles::sync() {
-    json files = json::object(), pages = json::array();
+    json files = json::object();
     for (const auto& [name, bins] : binsOf(*this)) {
         VCP_TRY(bins->sync());
         files[name] = bins->bytes();
     }
-    for (PageSpool& spool : spools) {
-        if (spool.bytes() > 0) VCP_TRY(spool.sync());
-        pages.push_back({spool.bytes(), spool.entries().size()});
-    }
-    return json{{"files", files}, {"spools", pages}};
+    VCP_TRY_ASSIGN(const auto pages, syncSpools(spools));
+    VCP_TRY_ASSIGN(const auto cells, syncSpools(surfaces));
+    return json{{"files", files}, {"spools", pages}, {"surfaces", cells}};
 }
 
 Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
@@ -227,16 +256,14 @@ Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
         bins.emplace_back(raw, found->second);
         kept.push_back(raw->fileName());
     }
-    if (recorded.files.spools.size() != spools.size()) return unlike("is of another number of levels");
-    for (size_t i = 0; i < spools.size(); ++i)
-        if (recorded.files.spools[i].first > 0)
-            kept.insert(kept.end(), {spools[i].pagesFile(), spools[i].directoryFile()});
+    if (recorded.files.spools.size() != spools.size() || recorded.files.surfaces.size() != surfaces.size())
+        return unlike("is of another number of levels");
+    keepSpools(spools, recorded.files.spools, kept);
+    keepSpools(surfaces, recorded.files.surfaces, kept);
     space.folder().clear(kept);
     for (const auto& [raw, bytes] : bins) VCP_TRY(raw->reopen(bytes));
-    for (size_t i = 0; i < spools.size(); ++i)
-        if (const auto& [bytes, entries] = recorded.files.spools[i]; bytes > 0)
-            VCP_TRY(spools[i].reopen(bytes, entries));
-    return {};
+    VCP_TRY(reopenSpools(spools, recorded.files.spools));
+    return reopenSpools(surfaces, recorded.files.surfaces);
 }
 
 }  // namespace vcp

@@ -28,10 +28,10 @@ nlohmann::json jsonOf(const std::vector<SideFile>& files);
 
 /// What the journal's lines say together.
 struct Recorded {
-    /// Lengths of the files of bins, and of each level's pages in bytes and entries.
+    /// Lengths of the files of bins, and of each level's pages and surfaces in bytes and entries.
     struct Files {
         std::map<std::string, uint64_t> bins;
-        std::vector<std::pair<uint64_t, uint64_t>> spools;
+        std::vector<std::pair<uint64_t, uint64_t>> spools, surfaces;
     };
 
     std::string stage;  ///< "": nothing is recorded; "read", "levels"
@@ -53,7 +53,8 @@ struct WorkFiles {
     std::unique_ptr<Soup> soup;
     std::unique_ptr<RecordBins<LatticeTriangle>> current, next;  ///< bins of this pass and of the pass after it
     std::unique_ptr<RecordBins<WaitingTriangle>> waiting;
-    std::deque<PageSpool> spools;  ///< finished pages of each level, coarse first
+    std::deque<PageSpool> spools;    ///< finished pages of each level, coarse first
+    std::deque<PageSpool> surfaces;  ///< the surface in them, where levels are made from that (slab_pages.h)
 
     /// Makes all of them durable. Returns the fields to record. Errors: Io.
     Result<nlohmann::json> sync();

@@ -16,6 +16,7 @@ struct LevelSettings {
     double cell = 0;       ///< world units
     double tolerance = 0;  ///< in cells, for soft leaves; the finest level's includes the stray
     bool finest = false;
+    bool withColour = false;
     bool exact = false;      ///< leaves hold the mesh's triangles, whatever the tolerance
     uint64_t pageBytes = 0;  ///< memory for the mesh and pages under construction
     uint64_t roomBytes = 0;  ///< memory that makeRoom frees besides, for a page that is built alone
@@ -23,10 +24,11 @@ struct LevelSettings {
 };
 
 /// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface to
-/// `spool`. `progress` is given the part done; false stops. Uses the calling arena's threads. Errors: Limit (a
+/// `spool`; where `surfaces` is not null, it takes the surface in each page, from which the level above is made
+/// (slab_pages.h). `progress` is given the part done; false stops. Uses the calling arena's threads. Errors: Limit (a
 /// single page needs more memory than pageBytes and roomBytes, or holds more than a page can name), Io,
 /// Cancelled.
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
-                        PageSpool& spool, const std::function<bool(double)>& progress);
+                        PageSpool& spool, PageSpool* surfaces, const std::function<bool(double)>& progress);
 
 }  // namespace vcp

@@ -15,9 +15,14 @@ struct LevelPlan {
     PagePartition finest;    ///< bins of the finest level
     double errorTarget = 0;  ///< tolerance of the finest level, world units
     bool isExact = true;     ///< whether the finest level has the mesh's triangles
+    bool hasSlabs = false;   ///< whether coarser levels are slabs, made from the pages below and not from bins
     uint64_t pageBytes = 0;  ///< memory for a bin's mesh and its pages
 
     [[nodiscard]] int levels() const { return int(frame.levels); }
+    /// Whether a pass steps to the next coarser level's bins.
+    [[nodiscard]] bool steps(int pass) const { return pass > 0 && (!hasSlabs || pass == levels()); }
+    /// Whether a pass makes its pages from those below.
+    [[nodiscard]] bool isOfSlabs(int pass) const { return hasSlabs && pass + 1 < levels(); }
     /// Returns the level whose grid and bins a pass works on.
     [[nodiscard]] int levelOf(int pass) const { return pass < levels() ? pass : levels() - 1; }
     [[nodiscard]] PageGrid gridOf(int level) const { return {frame.log2Cells, uint32_t(level)}; }

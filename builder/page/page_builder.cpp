@@ -95,7 +95,7 @@ private:
             const PageGeometry::CellTriangles triangles = geometry_.trianglesOf(box.lower / kSubcells);
             return fillCell(index, box, triangles.around, triangles.inside, 0);
         }
-        const uint32_t first = addChildren(index);
+        const uint32_t first = tree_.addChildren(index);
         for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(int(i)));
         merge(index);
     }
@@ -113,18 +113,9 @@ private:
         size_t together = 0;
         for (const auto& list : children.inside) together += list.size();
         if (double(together) > kMaxRepetition * double(inside.size())) return makeHard(index, inside);
-        const uint32_t first = addChildren(index);
+        const uint32_t first = tree_.addChildren(index);
         for (uint32_t i = 0; i < 8; ++i)
             fillCell(first + i, box.child(int(i)), children.around[i], children.inside[i], depth + 1);
-    }
-
-    uint32_t addChildren(uint32_t index) {
-        const uint32_t first = uint32_t(tree_.nodes.size());
-        const NodeBox box = tree_.nodes[index].box;
-        for (uint32_t i = 0; i < 8; ++i) tree_.nodes.push_back({.box = box.child(int(i))});
-        tree_.nodes[index].kind = Kind::Internal;
-        tree_.nodes[index].index = first;
-        return first;
     }
 
     const CornerVector& cornerOf(const NodeBox& box, int i) {
@@ -152,9 +143,7 @@ private:
     }
 
     void makeHard(uint32_t index, std::span<const uint32_t> triangles) {
-        tree_.nodes[index].kind = Kind::Hard;
-        tree_.nodes[index].index = uint32_t(tree_.hard.size());
-        tree_.hard.push_back({tree_.nodes[index].box, {triangles.begin(), triangles.end()}});
+        tree_.makeHard(index, {triangles.begin(), triangles.end()});
         records_ += triangles.size();
     }
 
@@ -245,6 +234,27 @@ private:
 
 }  // namespace
 
+uint32_t PageTree::addChildren(uint32_t index) {
+    const uint32_t first = uint32_t(nodes.size());
+    const NodeBox box = nodes[index].box;
+    for (int i = 0; i < 8; ++i) nodes.push_back({.box = box.child(i)});
+    nodes[index].kind = TreeNode::Kind::Internal;
+    nodes[index].index = first;
+    return first;
+}
+
+void PageTree::makeHard(uint32_t index, std::vector<uint32_t> locals) {
+    nodes[index].kind = TreeNode::Kind::Hard;
+    nodes[index].index = uint32_t(hard.size());
+    hard.push_back({nodes[index].box, std::move(locals)});
+}
+
+void PageTree::makeSlab(uint32_t index, const SlabLeaf& leaf) {
+    nodes[index].kind = TreeNode::Kind::Slab;
+    nodes[index].index = uint32_t(slabs.size());
+    slabs.push_back(leaf);
+}
+
 size_t PageTree::records() const {
     size_t count = 0;
     for (const HardLeaf& leaf : hard)
@@ -263,6 +273,8 @@ PageTree buildPageTree(PageGeometry& geometry, double tolerance, size_t mostReco
 double PageTree::certifiedError() const {
     double error = 0;
     for (const SoftLeaf& leaf : soft) error = std::max(error, errorOf(leaf));
+    // A point that is drawn and a point of the mesh share an octant of the leaf, whose corners are so far apart.
+    for (const SlabLeaf& leaf : slabs) error = std::max(error, kSlabErrorEdges * leaf.box.edgeCells());
     return error;
 }
 

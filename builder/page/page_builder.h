@@ -26,12 +26,15 @@ constexpr uint64_t mostSplitRecords(uint64_t triangles) { return 65536 + triangl
 /// The largest soft leaf, in cells: beyond it the closest points of its corners are not certainly the mesh's.
 inline constexpr int kMaxSoftCells = 8;
 
+/// Certified error of a slab leaf, in leaf edges: half its diagonal, and room for rounding.
+inline constexpr double kSlabErrorEdges = 0.8664;
+
 /// A node of the octree under construction.
 struct TreeNode {
-    enum class Kind : uint8_t { Empty, Soft, Hard, Internal };
+    enum class Kind : uint8_t { Empty, Soft, Hard, Slab, Internal };
     Kind kind = Kind::Empty;
     NodeBox box;
-    uint32_t index = 0;  ///< number among the soft or hard leaves; in an inner node that of its first child of 8
+    uint32_t index = 0;  ///< number among the soft, hard or slab leaves; in an inner node that of its first child of 8
 };
 
 struct SoftLeaf {
@@ -46,16 +49,29 @@ struct HardLeaf {
     std::vector<uint32_t> triangles;  ///< local numbers, ascending
 };
 
+struct SlabLeaf {
+    NodeBox box;
+    uint32_t code = 0;              ///< packed slab (octree/shared/page_layout.h)
+    uint32_t octants = 0;           ///< those that hold surface
+    uint32_t colour = 0xffffffffu;  ///< RGBA8
+};
+
 /// The octree of a page, before it is encoded. Node 0 is the root.
 struct PageTree {
     std::vector<TreeNode> nodes;
     std::vector<SoftLeaf> soft;
     std::vector<HardLeaf> hard;
+    std::vector<SlabLeaf> slabs;
     std::span<const uint32_t> triangles;  ///< the mesh's number of each local one
     glm::i32vec3 originLattice{0};        ///< lowest corner of the page
     int cells = 0;                        ///< an edge
     double stray = 0;                     ///< the largest of the triangles that touch the page, in cells
     std::vector<uint8_t> occupied;        ///< cells that the mesh touches, x fastest
+    /// Makes node `index` an inner one, with eight empty children; returns the first one's number.
+    uint32_t addChildren(uint32_t index);
+    /// Makes node `index` a hard leaf. `locals`: local numbers, ascending.
+    void makeHard(uint32_t index, std::vector<uint32_t> locals);
+    void makeSlab(uint32_t index, const SlabLeaf& leaf);
     /// Returns the largest distance of the rendered surface from this level's mesh, in cells.
     [[nodiscard]] double certifiedError() const;
     /// Returns the triangle records of the hard leaves: a triangle has one in each leaf that it touches.

@@ -234,6 +234,8 @@ private:
             }
             case TreeNode::Kind::Hard:
                 return triangles_.add(tree_.hard[n.index]);
+            case TreeNode::Kind::Slab:
+                return slabNode(tree_.slabs[n.index].octants, uint32_t(4 * faces_.faces.size()) + n.index);
             default:
                 return emptyNode(
                     n.box.edge >= kSubcells ? clearance_.of(n.box.lower / kSubcells, n.box.edge / kSubcells) : 0);
@@ -255,13 +257,22 @@ void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>
 /// slack of hard leaves' triangles (1e-4 cells).
 double pageError(const PageTree& tree) { return std::max(tree.certifiedError(), 2e-4) + tree.stray; }
 
-}  // namespace
+/// The vectors of the slab leaves and their colours, four to a face.
+struct SlabVectors {
+    explicit SlabVectors(const PageTree& tree) {
+        for (const SlabLeaf& leaf : tree.slabs) {
+            vectors.push_back(leaf.code);
+            colours.push_back(leaf.colour);
+        }
+    }
+    std::vector<uint32_t> vectors, colours;
+};
 
-EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh) {
+EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     const LeafMap map(tree.soft);
     setWalls(tree, map);
-    const bool withColour = !mesh.colours.empty();
     const FacePacker faces(tree, map, withColour);
+    const SlabVectors slabs(tree);
     TrianglePacker triangles(tree, mesh);
     Clearance clearance = clearanceOf(tree);
     const NodePacker nodes(tree, faces, triangles, clearance);
@@ -269,31 +280,40 @@ EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh) {
     EncodedPage page;
     page.certifiedError = pageError(tree);
     page.hardLeaves = uint32_t(tree.hard.size());
-    page.leaves = uint32_t(tree.soft.size()) + page.hardLeaves;
+    page.leaves = uint32_t(tree.soft.size() + tree.slabs.size()) + page.hardLeaves;
     PageHeader header;
     header.log2Cells = uint32_t(std::countr_zero(unsigned(tree.cells)));
     header.root = nodes.root;
     header.groups = uint32_t(nodes.words.size() / 8);
-    header.faces = uint32_t(faces.faces.size());
+    header.faces = uint32_t(faces.faces.size() + (tree.slabs.size() + 3) / 4);
     header.entries = uint32_t(triangles.entries.size());
     header.vertices = uint32_t(triangles.vertices.size());
     header.softLeaves = uint32_t(tree.soft.size());
     header.hardLeaves = page.hardLeaves;
+    header.slabLeaves = uint32_t(tree.slabs.size());
     header.certifiedError = std::nextafter(float(page.certifiedError), std::numeric_limits<float>::infinity());
     const PageSections s = pageSections(header);
     page.geometry.resize(s.end);
     std::memcpy(page.geometry.data(), &header, sizeof header);
     copyTo(page.geometry, s.nodes, nodes.words);
     copyTo(page.geometry, s.faces, faces.faces);
+    copyTo(page.geometry, s.faces + 16 * faces.faces.size(), slabs.vectors);
     copyTo(page.geometry, s.vertices, triangles.vertices);
     copyTo(page.geometry, s.normals, triangles.normals);
     storeEntries(triangles.entries, header.vertices, page.geometry.data() + s.strips);
     if (withColour && page.leaves > 0) {
         page.colour.resize(colourPageBytes(header));
         copyTo(page.colour, 0, faces.colours);
+        copyTo(page.colour, 16 * faces.faces.size(), slabs.colours);
         copyTo(page.colour, uint64_t{16} * header.faces, triangles.colours);
     }
     return page;
 }
+
+}  // namespace
+
+EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh) { return encode(tree, mesh, !mesh.colours.empty()); }
+
+EncodedPage encodeSlabPage(PageTree& tree, bool withColour) { return encode(tree, LatticeMesh(), withColour); }
 
 }  // namespace vcp

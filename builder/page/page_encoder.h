@@ -13,12 +13,15 @@ namespace vcp {
 struct EncodedPage {
     std::vector<std::byte> geometry;
     std::vector<std::byte> colour;  ///< empty when the mesh has no colour
-    uint32_t leaves = 0;            ///< soft and hard leaves
+    uint32_t leaves = 0;            ///< leaves of all kinds with surface
     uint32_t hardLeaves = 0;
     double certifiedError = 0;  ///< in cells: error of the leaves, stray of the level's mesh, and rounding
 };
 
 /// Encodes a page; sets the leaves' wall codes in `tree`.
 EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh);
+
+/// Encodes a page that has slab leaves only.
+EncodedPage encodeSlabPage(PageTree& tree, bool withColour);
 
 }  // namespace vcp

@@ -57,15 +57,15 @@ PageGeometry::PageGeometry(const LatticeMesh& mesh, std::span<const uint32_t> tr
       numbers_(triangles),
       cells_(1 << log2Cells),
       origin_(glm::i32vec3(page) * (kLatticePerCell << log2Cells)) {
-    loadTriangles(triangles);
+    loadTriangles();
     markBadEdges();
-    fillCells(triangles);
+    fillCells();
 }
 
-void PageGeometry::loadTriangles(std::span<const uint32_t> triangles) {
-    triangles_.reserve(triangles.size());
-    vertices_.reserve(triangles.size());
-    for (const uint32_t k : triangles) {
+void PageGeometry::loadTriangles() {
+    triangles_.reserve(numbers_.size());
+    vertices_.reserve(numbers_.size());
+    for (const uint32_t k : numbers_) {
         Triangle t{};
         for (int i = 0; i < 3; ++i)
             t.corners[i] = glm::vec3(mesh_.positions[mesh_.triangles[k][i]] - origin_) / float(kLatticePerCell);
@@ -103,7 +103,7 @@ void PageGeometry::markBadEdges() {
         for (int i = 0; i < 3; ++i) triangles_[k].badEdges |= uint8_t((table[slots[k][i]].good ? 0u : 1u) << i);
 }
 
-void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
+void PageGeometry::fillCells() {
     const int side = cells_ + 2 * kBorder;
     const size_t cellCount = size_t(side) * side * side;
     struct Entry {
@@ -131,7 +131,7 @@ void PageGeometry::fillCells(std::span<const uint32_t> numbers) {
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x, ++how)
                     if (*how) touchesPage |= add({x, y, z}, k, *how == CellOverlap::kTouches);
-        if (touchesPage) stray_ = std::max(stray_, double(mesh_.stray[numbers[k]]));
+        if (touchesPage) stray_ = std::max(stray_, double(mesh_.stray[numbers_[k]]));
     }
     // Counts are two places further on: after the sums, place list + 1 holds where the list's next entry goes.
     for (size_t i = 2; i < listBegin_.size(); ++i) listBegin_[i] += listBegin_[i - 1];

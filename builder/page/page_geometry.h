@@ -99,9 +99,9 @@ private:
         return {glm::dvec3(t.corners[0]), glm::dvec3(t.corners[1]), glm::dvec3(t.corners[2])};
     }
 
-    void loadTriangles(std::span<const uint32_t> triangles);
+    void loadTriangles();
     void markBadEdges();
-    void fillCells(std::span<const uint32_t> numbers);
+    void fillCells();
     CornerVector searchCorner(glm::dvec3 p);
     /// Measures the triangles from number `first` in found_, except those that cannot be closest; `least` is the least
     /// squared distance so far; returns the new one.

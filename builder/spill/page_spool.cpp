@@ -24,10 +24,10 @@ constexpr uint64_t kBatchEntries = 4096;
 
 }  // namespace
 
-PageSpool::PageSpool(TempSpace& space, uint32_t level)
+PageSpool::PageSpool(TempSpace& space, uint32_t level, std::string_view content)
     : level_(level),
-      pages_(space, fmt::format("pages{}.spill", level)),
-      directory_(space, fmt::format("entries{}.spill", level)) {}
+      pages_(space, fmt::format("{}{}.spill", content, level)),
+      directory_(space, fmt::format("{}{}-entries.spill", content, level)) {}
 
 uint64_t PageSpool::hashOf(const PageEntry& entry, uint64_t number) const {
     return XXH3_64bits_withSeed(&entry, sizeof entry, number << 8 | level_);
@@ -92,6 +92,7 @@ Result<StoredPage> PageSpool::read(const PageEntry& entry) const {
 void PageSpool::remove() {
     pages_.remove();
     directory_.remove();
+    entries_.clear();
 }
 
 }  // namespace vcp

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <deque>
+#include <string_view>
 #include <vector>
 
 #include "builder/spill/temp_space.h"
@@ -15,7 +16,8 @@ namespace vcp {
 /// The pages of a level: directory entries, and where the bytes are (offsets of the entries point into the spool).
 class PageSpool {
 public:
-    PageSpool(TempSpace& space, uint32_t level);
+    /// `content`: what the pages are, for the files' names.
+    PageSpool(TempSpace& space, uint32_t level, std::string_view content = "pages");
 
     /// Appends a page; pages come in Morton order. One thread.
     Result<void> append(PageEntry entry, const StoredPage& page);

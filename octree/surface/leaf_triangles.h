@@ -38,6 +38,14 @@ private:
     double along_[3][kAxes], least_[kAxes], most_[kAxes], size_[kAxes];
 };
 
+/// Returns the octants of a cube that closed bounds touch, as bits: octant x + 2 y + 4 z. `middle`: the cube's.
+inline uint32_t octantsTouched(glm::i32vec3 low, glm::i32vec3 high, glm::i32vec3 middle) {
+    const uint32_t x = (low.x <= middle.x ? 0x55u : 0u) | (high.x >= middle.x ? 0xaau : 0u);
+    const uint32_t y = (low.y <= middle.y ? 0x33u : 0u) | (high.y >= middle.y ? 0xccu : 0u);
+    const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);
+    return x & y & z;
+}
+
 /// Longest edge of a triangle in a page, along an axis: 256 cells. The limit keeps products within 64 bits.
 inline constexpr int kMaxEdgeSteps = 256 * kLatticePerCell;
 
@@ -129,12 +137,7 @@ uint64_t NodePlaces::withinCell(CubeTest& test, glm::i32vec3 low, glm::i32vec3 h
         if (nodeType(v.word) != kNodeInternal) continue;
         const uint32_t group = v.word & kNodePayloadMask;
         const int half = v.edge / 2;
-        const glm::i32vec3 middle = v.lower + half;
-        // The octants whose boxes the bounding box touches, as bits: octant x + 2 y + 4 z.
-        const uint32_t x = (low.x <= middle.x ? 0x55u : 0u) | (high.x >= middle.x ? 0xaau : 0u);
-        const uint32_t y = (low.y <= middle.y ? 0x33u : 0u) | (high.y >= middle.y ? 0xccu : 0u);
-        const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);
-        for (uint32_t octants = x & y & z; octants != 0; octants &= octants - 1) {
+        for (uint32_t octants = octantsTouched(low, high, v.lower + half); octants != 0; octants &= octants - 1) {
             const int o = std::countr_zero(octants);
             stack[waiting++] = {nodes_[size_t{8} * group + uint32_t(o)], half,
                                 v.lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2)};

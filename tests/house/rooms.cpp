@@ -19,11 +19,12 @@ const std::vector<Room>& rooms() {
         {"builder/spill", {"octree/"}},
         {"builder/lattice", {"octree/"}},
         {"builder/page", {"octree/", "builder/lattice"}},
+        {"builder/slab", {"octree/", "builder/lattice", "builder/page"}},
         {"builder/level", {"octree/", "builder/lattice", "builder/spill"}},
         {"builder/measure", {"octree/", "builder/stream", "builder/mesh"}},
         {"builder",
          {"octree/", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice",
-          "builder/page", "builder/level"}},
+          "builder/page", "builder/slab", "builder/level"}},
         {"builder/paper", {"octree/", "builder", "builder/mesh", "builder/measure"}},
 
         {"mesostructure", {"octree/"}},

@@ -22,6 +22,12 @@ std::optional<ColourChoice> colourNamed(const std::string& name) {
     return std::nullopt;
 }
 
+std::optional<CoarseLeaves> leavesNamed(const std::string& name) {
+    if (name == "slabs") return CoarseLeaves::Slabs;
+    if (name == "mesh") return CoarseLeaves::Mesh;
+    return std::nullopt;
+}
+
 void addError(CLI::App& app, BuildOptions& options) {
     const auto take = [&options](const CLI::results_t& texts) {
         const auto length = parseLength(texts.back());
@@ -45,6 +51,11 @@ void addBuildSettings(CLI::App& app, BuildOptions& options) {
               "Colour to keep: auto (all there is), vertex, texture or none")
         ->type_name("WHICH")
         ->default_str("auto");
+    addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
+              "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
+              "vectors at corners where they suffice)")
+        ->type_name("KIND")
+        ->default_str(options.coarseLeaves == CoarseLeaves::Slabs ? "slabs" : "mesh");
     app.add_option("--threads", options.threads, "Threads that build [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));

@@ -56,8 +56,9 @@ Result<std::string> identity(const fs::path& mesh) {
 
 /// Returns a hash of what is known of a dataset before it is built.
 Result<std::string> keyOf(const BuildOptions& options) {
-    std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell,
-                                   options.error, options.errorIsRelative, int(options.colour), options.format);
+    std::string text =
+        fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell, options.error,
+                    options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.format);
     for (const fs::path& mesh : options.inputs) {
         VCP_TRY_ASSIGN(auto id, identity(mesh));
         text += id;

@@ -1,0 +1,109 @@
+#include "builder/slab/cell_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+
+namespace vcp {
+
+namespace {
+
+/// Returns the largest of dot(n, x) in a box.
+double supportOfBox(const CellSurface& cell, glm::dvec3 n) {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) sum += std::max(n[i] * double(cell.lower[i]), n[i] * double(cell.upper[i]));
+    return sum;
+}
+
+/// Returns the largest of dot(n, x) where the box and the slab meet. For every m, the sum of the box's support along
+/// n - m axis and of the slab's along m axis is a bound; the least of them, which is the maximum itself (duality of
+/// linear programs), is at m = 0 or where an entry of n - m axis is 0.
+double support(const CellSurface& cell, glm::dvec3 n) {
+    const glm::dvec3 axis(cell.axis);
+    double least = supportOfBox(cell, n);
+    for (int i = 0; i < 3; ++i) {
+        if (axis[i] == 0) continue;
+        const double m = n[i] / axis[i];
+        const double along = m * double(m > 0 ? cell.last : cell.first);
+        least = std::min(least, supportOfBox(cell, n - m * axis) + along);
+    }
+    return least;
+}
+
+glm::dmat3 matrixOf(const std::array<float, 6>& m) {
+    const double xx = double(m[0]), yy = double(m[1]), zz = double(m[2]);
+    const double yz = double(m[3]), zx = double(m[4]), xy = double(m[5]);
+    return {glm::dvec3(xx, xy, zx), glm::dvec3(xy, yy, yz), glm::dvec3(zx, yz, zz)};
+}
+
+}  // namespace
+
+Extent extentAlong(const CellSurface& cell, glm::dvec3 n) { return {-support(cell, -n), support(cell, n)}; }
+
+Extent extentAlong(std::span<const CellSurface> eighths, std::span<const uint32_t> octants, glm::dvec3 n) {
+    Extent all{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+    for (size_t i = 0; i < eighths.size(); ++i) {
+        const Extent one = extentAlong(eighths[i], n);
+        const double at = glm::dot(n, octantCentre(octants[i]));
+        all.first = std::min(all.first, at + one.first / 2);
+        all.last = std::max(all.last, at + one.last / 2);
+    }
+    return all;
+}
+
+void chooseAxis(CellSurface& cell) {
+    glm::dmat3 m = matrixOf(cell.moment);
+    cell.axis = {0, 0, 1};
+    // Squared often enough, the matrix has columns along its main direction only.
+    constexpr int kSquarings = 6;
+    for (int i = 0; i < kSquarings; ++i) {
+        const double trace = m[0][0] + m[1][1] + m[2][2];
+        if (!(trace > 0)) return;
+        m /= trace;
+        m = m * m;
+    }
+    const int longest = m[0][0] >= m[1][1] && m[0][0] >= m[2][2] ? 0 : m[1][1] >= m[2][2] ? 1 : 2;
+    const double length = glm::length(m[longest]);
+    if (length > 0) cell.axis = glm::vec3(m[longest] / length);
+}
+
+CellSurface foldEighths(std::span<const CellSurface> eighths, std::span<const uint32_t> octants) {
+    CellSurface cell;
+    cell.lower = glm::vec3(1);
+    cell.upper = glm::vec3(-1);
+    for (size_t i = 0; i < eighths.size(); ++i) {
+        const CellSurface& e = eighths[i];
+        const glm::vec3 centre(octantCentre(octants[i]));
+        cell.lower = glm::min(cell.lower, centre + e.lower / 2.0f);
+        cell.upper = glm::max(cell.upper, centre + e.upper / 2.0f);
+        cell.area += e.area / 4;
+        for (size_t k = 0; k < 6; ++k) cell.moment[k] += e.moment[k] / 4;
+        cell.colour += e.colour / 4.0f;
+    }
+    chooseAxis(cell);
+    const Extent extent = extentAlong(eighths, octants, glm::dvec3(cell.axis));
+    cell.first = float(extent.first);
+    cell.last = float(extent.last);
+    return cell;
+}
+
+double normalSpread(const CellSurface& cell) {
+    const double trace = double(cell.moment[0]) + double(cell.moment[1]) + double(cell.moment[2]);
+    if (!(trace > 0)) return 0;
+    const glm::dvec3 axis(cell.axis);
+    return std::max(0.0, 1 - glm::dot(axis, matrixOf(cell.moment) * axis) / trace);
+}
+
+uint32_t meanColour(const CellSurface& cell) {
+    uint32_t packed = 0;
+    for (int i = 0; i < 4; ++i) {
+        const float mean = cell.area > 0 ? cell.colour[i] / cell.area : 1.0f;
+        packed |= uint32_t(std::clamp(std::lround(mean * 255.0f), 0l, 255l)) << 8 * i;
+    }
+    return packed;
+}
+
+}  // namespace vcp

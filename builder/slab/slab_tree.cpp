@@ -1,0 +1,115 @@
+#include "builder/slab/slab_tree.h"
+
+#include <algorithm>
+#include <array>
+
+#include "octree/surface/morton.h"
+#include "octree/surface/packing.h"
+
+namespace vcp {
+
+namespace {
+
+class SlabTreeBuilder {
+public:
+    SlabTreeBuilder(const PageSurface& surface, uint32_t log2Cells)
+        : levels_{&surface.cells, &surface.halves, &surface.quarters}, log2Cells_(log2Cells) {
+        tree_.cells = 1 << log2Cells;
+        tree_.occupied.assign(size_t{1} << 3 * log2Cells, 0);
+    }
+
+    PageTree run() {
+        tree_.nodes.emplace_back();
+        tree_.nodes[0].box = {glm::ivec3(0), tree_.cells * kSubcells};
+        const SurfaceCells& cells = *levels_[0];
+        if (cells.size() > 0) build(0, {0, cells.size()}, log2Cells_);
+        for (const uint32_t code : cells.codes) {
+            const glm::ivec3 at(mortonDecode(code));
+            tree_.occupied[size_t(at.x + tree_.cells * (at.y + tree_.cells * at.z))] = 1;
+        }
+        return std::move(tree_);
+    }
+
+private:
+    /// A run of a list of cells.
+    struct Run {
+        size_t first, end;
+    };
+
+    /// Fills node `node` from a run of cells that is not empty; the node's edge is 2^bits cells.
+    void build(uint32_t node, Run run, uint32_t bits) {
+        if (bits == 0) return buildCell(node, 0, run.first);
+        const std::vector<uint32_t>& codes = levels_[0]->codes;
+        const uint32_t children = tree_.addChildren(node);
+        while (run.first < run.end) {
+            const uint32_t octant = codes[run.first] >> 3 * (bits - 1) & 7u;
+            size_t end = run.first;
+            while (end < run.end && (codes[end] >> 3 * (bits - 1) & 7u) == octant) ++end;
+            build(children + octant, {run.first, end}, bits - 1);
+            run.first = end;
+        }
+    }
+
+    /// Returns the eighths of a cell, as a run of the next list.
+    [[nodiscard]] Run eighthsOf(size_t level, size_t cell) const {
+        if (level + 1 == levels_.size()) return {0, 0};
+        const std::vector<uint32_t>& codes = levels_[level + 1]->codes;
+        const uint32_t first = levels_[level]->codes[cell] << 3;
+        const auto begin = std::lower_bound(codes.begin(), codes.end(), first);
+        const auto end = std::lower_bound(begin, codes.end(), first + 8);
+        return {size_t(begin - codes.begin()), size_t(end - codes.begin())};
+    }
+
+    void buildCell(uint32_t node, size_t level, size_t index) {
+        const CellSurface& cell = levels_[level]->cells[index];
+        const Run eighths = eighthsOf(level, index);
+        if (eighths.first == eighths.end || normalSpread(cell) <= kMostNormalSpread)
+            return makeLeaf(node, level, index, eighths);
+        const uint32_t children = tree_.addChildren(node);
+        for (size_t i = eighths.first; i < eighths.end; ++i)
+            buildCell(children + (levels_[level + 1]->codes[i] & 7u), level + 1, i);
+    }
+
+    void makeLeaf(uint32_t node, size_t level, size_t index, Run eighths) {
+        const CellSurface& cell = levels_[level]->cells[index];
+        SlabLeaf leaf{.box = tree_.nodes[node].box, .colour = meanColour(cell)};
+        const uint32_t direction = packSlabDirection(glm::dvec3(cell.axis));
+        const glm::dvec3 n = f64::decodeDirection(direction);
+        Extent extent = extentAlong(cell, n);
+        if (eighths.first < eighths.end) {
+            octants_.clear();
+            for (size_t i = eighths.first; i < eighths.end; ++i) octants_.push_back(levels_[level + 1]->codes[i] & 7u);
+            extent =
+                extentAlong(std::span(levels_[level + 1]->cells).subspan(eighths.first, octants_.size()), octants_, n);
+            for (const uint32_t o : octants_) leaf.octants |= 1u << o;
+        } else {
+            leaf.octants = octantsInBox(cell);
+        }
+        leaf.code = packSlab(direction, extent.first, extent.last);
+        tree_.makeSlab(node, leaf);
+    }
+
+    static uint32_t octantsInBox(const CellSurface& cell) {
+        constexpr float kMargin = 1e-5f;
+        uint32_t octants = 0xffu;
+        constexpr std::array<uint32_t, 3> kUpper = {0xaau, 0xccu, 0xf0u};
+        for (size_t axis = 0; axis < 3; ++axis) {
+            if (cell.lower[int(axis)] > kMargin) octants &= kUpper[axis];
+            if (cell.upper[int(axis)] < -kMargin) octants &= ~kUpper[axis];
+        }
+        return octants & 0xffu;
+    }
+
+    std::array<const SurfaceCells*, 3> levels_;  ///< cells, halves, quarters
+    uint32_t log2Cells_;
+    PageTree tree_;
+    std::vector<uint32_t> octants_;
+};
+
+}  // namespace
+
+PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells) {
+    return SlabTreeBuilder(surface, log2Cells).run();
+}
+
+}  // namespace vcp

@@ -1,0 +1,19 @@
+// Builds the octree of a page whose leaves are slabs: planes with a thickness, one for each cell that has surface.
+#pragma once
+
+#include <cstdint>
+
+#include "builder/page/page_builder.h"
+#include "builder/slab/page_surface.h"
+
+namespace vcp {
+
+/// A cell is parted into eight where its surface folds: where the mean of its normals' squared sines to their axis is
+/// larger than this.
+inline constexpr double kMostNormalSpread = 0.1;
+
+/// Builds a page's octree from its surface. Leaves are as large as a cell, or a half or a quarter of one where the
+/// surface folds.
+PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells);
+
+}  // namespace vcp
