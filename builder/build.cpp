@@ -271,7 +271,7 @@ private:
     void setUpLevels() {
         for (uint32_t level = 0; level < plan_.frame.levels; ++level) {
             files_.spools.emplace_back(space_, level);
-            if (plan_.hasSlabs) files_.surfaces.emplace_back(space_, level, "surfaces");
+            if (plan_.hasSlabs) files_.surfaces.emplace_back(space_, level, "surface");
         }
     }
 

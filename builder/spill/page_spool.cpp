@@ -24,10 +24,10 @@ constexpr uint64_t kBatchEntries = 4096;
 
 }  // namespace
 
-PageSpool::PageSpool(TempSpace& space, uint32_t level, std::string_view content)
+PageSpool::PageSpool(TempSpace& space, uint32_t level, std::string_view prefix)
     : level_(level),
-      pages_(space, fmt::format("{}{}.spill", content, level)),
-      directory_(space, fmt::format("{}{}-entries.spill", content, level)) {}
+      pages_(space, fmt::format("{}pages{}.spill", prefix, level)),
+      directory_(space, fmt::format("{}entries{}.spill", prefix, level)) {}
 
 uint64_t PageSpool::hashOf(const PageEntry& entry, uint64_t number) const {
     return XXH3_64bits_withSeed(&entry, sizeof entry, number << 8 | level_);

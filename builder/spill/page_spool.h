@@ -16,8 +16,8 @@ namespace vcp {
 /// The pages of a level: directory entries, and where the bytes are (offsets of the entries point into the spool).
 class PageSpool {
 public:
-    /// `content`: what the pages are, for the files' names.
-    PageSpool(TempSpace& space, uint32_t level, std::string_view content = "pages");
+    /// `prefix`: of the files' names (temp_folder.cpp lists them).
+    PageSpool(TempSpace& space, uint32_t level, std::string_view prefix = "");
 
     /// Appends a page; pages come in Morton order. One thread.
     Result<void> append(PageEntry entry, const StoredPage& page);

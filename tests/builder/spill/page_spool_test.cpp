@@ -115,11 +115,11 @@ TEST_F(Pages, DamageAfterAnInterruptionIsNamed) {
         return reopened ? readAll(spool) : reopened;
     };
     EXPECT_TRUE(again(bytes, kPages).ok());
-    const uint64_t entryBits = fs::file_size(temp() / "pages2-entries.spill") * 8;
+    const uint64_t entryBits = fs::file_size(temp() / "entries2.spill") * 8;
     for (uint64_t i = 0; i < 600; ++i) {
         const bool isEntry = i % 2 == 0;
         const uint64_t bit = std::mt19937_64(i)() % (isEntry ? entryBits : bytes * 8);
-        const std::string name = isEntry ? "pages2-entries.spill" : "pages2.spill";
+        const std::string name = isEntry ? "entries2.spill" : "pages2.spill";
         flip(name, bit);
         const auto read = again(bytes, kPages);
         flip(name, bit);
