@@ -54,7 +54,7 @@ struct BuildOptions {
     bool resume = false;           ///< go on where an interrupted build of the same output was
     double checkpointSeconds = 5;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
-    CoarseLeaves coarseLeaves = CoarseLeaves::Mesh;
+    CoarseLeaves coarseLeaves = CoarseLeaves::Slabs;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;
     /// then it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;

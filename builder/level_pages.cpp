@@ -43,6 +43,7 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
     page.entry.morton = code;
     page.entry.level = uint8_t(settings.grid.level);
     page.entry.leaves = encoded.leaves;
+    page.entry.slabLeaves = encoded.slabLeaves;
     page.entry.hardLeaves = encoded.hardLeaves;
     page.entry.certifiedError =
         std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());

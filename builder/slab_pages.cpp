@@ -48,7 +48,7 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& belo
     page.entry.morton = below.entries()[siblings.first].morton >> 3;
     page.entry.level = uint8_t(settings.grid.level);
     page.entry.leaves = encoded.leaves;
-    page.entry.slabLeaves = encoded.leaves;
+    page.entry.slabLeaves = encoded.slabLeaves;
     page.entry.certifiedError =
         std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
     page.stored = compressPage(encoded.geometry, encoded.colour);

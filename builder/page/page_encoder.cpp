@@ -280,7 +280,8 @@ EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     EncodedPage page;
     page.certifiedError = pageError(tree);
     page.hardLeaves = uint32_t(tree.hard.size());
-    page.leaves = uint32_t(tree.soft.size() + tree.slabs.size()) + page.hardLeaves;
+    page.slabLeaves = uint32_t(tree.slabs.size());
+    page.leaves = uint32_t(tree.soft.size()) + page.slabLeaves + page.hardLeaves;
     PageHeader header;
     header.log2Cells = uint32_t(std::countr_zero(unsigned(tree.cells)));
     header.root = nodes.root;
@@ -290,7 +291,7 @@ EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     header.vertices = uint32_t(triangles.vertices.size());
     header.softLeaves = uint32_t(tree.soft.size());
     header.hardLeaves = page.hardLeaves;
-    header.slabLeaves = uint32_t(tree.slabs.size());
+    header.slabLeaves = page.slabLeaves;
     header.certifiedError = std::nextafter(float(page.certifiedError), std::numeric_limits<float>::infinity());
     const PageSections s = pageSections(header);
     page.geometry.resize(s.end);

@@ -14,6 +14,7 @@ struct EncodedPage {
     std::vector<std::byte> geometry;
     std::vector<std::byte> colour;  ///< empty when the mesh has no colour
     uint32_t leaves = 0;            ///< leaves of all kinds with surface
+    uint32_t slabLeaves = 0;
     uint32_t hardLeaves = 0;
     double certifiedError = 0;  ///< in cells: error of the leaves, stray of the level's mesh, and rounding
 };

@@ -18,7 +18,7 @@ struct InfoCommand {
 
 /// Sums over the pages of a level.
 struct LevelSums {
-    uint64_t storedBytes = 0, pageBytes = 0, leaves = 0, hardLeaves = 0;
+    uint64_t storedBytes = 0, pageBytes = 0, leaves = 0, slabLeaves = 0, hardLeaves = 0;
 };
 
 LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
@@ -29,6 +29,7 @@ LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
         sums.storedBytes += uint64_t(page.storedBytes) + page.colourStoredBytes;
         sums.pageBytes += uint64_t(page.pageBytes) + page.colourBytes;
         sums.leaves += page.leaves;
+        sums.slabLeaves += page.slabLeaves;
         sums.hardLeaves += page.hardLeaves;
     }
     return sums;
@@ -47,6 +48,7 @@ Json toJson(const std::string& file, const Dataset& dataset) {
                           {"stored_bytes", sums.storedBytes},
                           {"page_bytes", sums.pageBytes},
                           {"leaves", sums.leaves},
+                          {"slab_leaves", sums.slabLeaves},
                           {"hard_leaves", sums.hardLeaves},
                           {"certified_error_max", h.level[level].certifiedError}});
     }
@@ -97,14 +99,15 @@ std::string summary(const std::string& file, const Dataset& dataset) {
         text +=
             fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
                         h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
-    text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>15}\n", "level", "cell", "subvolumes",
-                        "stored", "in memory", "leaves", "hard", "certified error");
+    text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>13} {:>15}\n", "level", "cell",
+                        "subvolumes", "stored", "in memory", "leaves", "slabs", "hard", "certified error");
     for (uint32_t level = 0; level < h.levels; ++level) {
         const LevelSums sums = sumsOf(dataset, level);
-        text += fmt::format("  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>15}\n", level,
+        text += fmt::format("  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>13} {:>15}\n", level,
                             formatLength(dataset.cellOf(level)), formatCount(h.level[level].pages),
                             formatBytes(sums.storedBytes), formatBytes(sums.pageBytes), formatCount(sums.leaves),
-                            formatCount(sums.hardLeaves), formatLength(h.level[level].certifiedError));
+                            formatCount(sums.slabLeaves), formatCount(sums.hardLeaves),
+                            formatLength(h.level[level].certifiedError));
     }
     text.pop_back();
     return text;

@@ -275,6 +275,7 @@ TEST_F(CommandLine, BuildReportsWhatProgramsRelyOn) {
         EXPECT_EQ(info[field], json[field]) << field;
     EXPECT_EQ(info["level"].size(), json["levels"].get<size_t>());
     EXPECT_EQ(info["level"].back()["certified_error_max"], json["certified_error_max"]);
+    EXPECT_EQ(info["level"].back()["slab_leaves"], 0) << "the finest level is the mesh";
 
     const Json verified = Json::parse(run({"verify", file.string(), "--json"}).out);
     EXPECT_EQ(verified["ok"], true);
