@@ -273,6 +273,7 @@ private:
             files_.spools.emplace_back(space_, level);
             if (plan_.hasSlabs) files_.surfaces.emplace_back(space_, level, "surface");
         }
+        files_.neededSurfaces = files_.surfaces.size();
     }
 
     Result<void> dealSoup() {
@@ -440,6 +441,7 @@ private:
         auto finished = std::move(files_.current);
         auto waited = std::move(files_.waiting);
         files_.current = std::move(files_.next);
+        if (plan_.isOfSlabs(pass_)) files_.neededSurfaces = size_t(pass_) + 1;
         --pass_;
         VCP_TRY(checkpoint("levels", 0, journal_.active()));
         ++pass_;

@@ -148,12 +148,14 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
     return bins;
 }
 
-/// Makes spools durable; returns their lengths, in bytes and entries.
-Result<json> syncSpools(std::deque<PageSpool>& spools) {
+/// Makes the first spools durable; returns the lengths of all, in bytes and entries. Those that are not needed count as
+/// empty: they may be gone at any time.
+Result<json> syncSpools(std::deque<PageSpool>& spools, size_t needed) {
     json lengths = json::array();
-    for (PageSpool& spool : spools) {
-        if (spool.bytes() > 0) VCP_TRY(spool.sync());
-        lengths.push_back({spool.bytes(), spool.entries().size()});
+    for (size_t i = 0; i < spools.size(); ++i) {
+        const bool isNeeded = i < needed && spools[i].bytes() > 0;
+        if (isNeeded) VCP_TRY(spools[i].sync());
+        lengths.push_back({isNeeded ? spools[i].bytes() : 0, isNeeded ? spools[i].entries().size() : 0});
     }
     return lengths;
 }
@@ -232,8 +234,8 @@ Result<json> WorkFiles::sync() {
         VCP_TRY(bins->sync());
         files[name] = bins->bytes();
     }
-    VCP_TRY_ASSIGN(const auto pages, syncSpools(spools));
-    VCP_TRY_ASSIGN(const auto cells, syncSpools(surfaces));
+    VCP_TRY_ASSIGN(const auto pages, syncSpools(spools, spools.size()));
+    VCP_TRY_ASSIGN(const auto cells, syncSpools(surfaces, neededSurfaces));
     return json{{"files", files}, {"spools", pages}, {"surfaces", cells}};
 }
 

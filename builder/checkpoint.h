@@ -55,6 +55,7 @@ struct WorkFiles {
     std::unique_ptr<RecordBins<WaitingTriangle>> waiting;
     std::deque<PageSpool> spools;    ///< finished pages of each level, coarse first
     std::deque<PageSpool> surfaces;  ///< the surface in them, where levels are made from that (slab_pages.h)
+    size_t neededSurfaces = 0;       ///< how many of them, coarse first, are still needed
 
     /// Makes all of them durable. Returns the fields to record. Errors: Io.
     Result<nlohmann::json> sync();

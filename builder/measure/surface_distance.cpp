@@ -248,13 +248,21 @@ double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leave
                          double cell, double certifiedError) {
     double best = kInfinity;
     glm::dvec3 surfaceNormal{0};
+    const auto take = [&](double distance, const RayHit& hit) {
+        if (distance >= best) return;
+        best = distance;
+        surfaceNormal = hit.normal;
+    };
     const auto tryAlong = [&](glm::dvec3 direction, double reach) {
-        for (const double sign : {1.0, -1.0}) {
-            const auto hit = caster.cast({sample.position, sign * direction, 0, std::min(best, reach)});
-            if (!hit || hit->t >= best) continue;
-            best = hit->t;
-            surfaceNormal = hit->normal;
+        if (reach < kInfinity) {
+            // A ray that begins in the surface itself would not meet it.
+            const double r = std::min(best, reach);
+            for (const RayHit& hit : caster.castAll({sample.position - r * direction, direction, 0, 2 * r}))
+                take(std::abs(hit.t - r), hit);
+            return;
         }
+        for (const double sign : {1.0, -1.0})
+            if (const auto hit = caster.cast({sample.position, sign * direction, 0, best})) take(hit->t, *hit);
     };
     tryAlong(sample.normal, cell);
     if (best < kInfinity) tryAlong(surfaceNormal, cell);

@@ -7,7 +7,7 @@
 // directions N_i and trilinear weights w_i; exact where the surface is a quadric's level set.
 
 // The triangles of hard leaves are widened by so many cells of the page's level.
-const Real kTriangleSlack = Real(1e-5);
+const Real kTriangleSlack = Real(1e-4);
 // How far outside of its leaf a hit with a triangle may lie along the ray, in cells of the page's level.
 const Real kIntervalSlack = Real(1e-4);
 

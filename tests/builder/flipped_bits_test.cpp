@@ -61,7 +61,7 @@ TEST(FlippedBits, AllOfASmallFile) {
 }
 
 TEST(FlippedBits, RandomOnesOfALargerFile) {
-    const std::string bytes = built(test::torusMesh({1, 2, 3}, 2, 0.7, 140, 70), 0.08);
+    const std::string bytes = built(test::torusMesh({1, 2, 3}, 2, 0.7, 180, 90), 0.08);
     ASSERT_TRUE(verifyFile(FlippedFile(bytes, FlippedFile::kIntact)).ok());
     ASSERT_GT(bytes.size(), 64u << 10);
     const uint64_t bits = bytes.size() * 8;
