@@ -91,6 +91,8 @@ struct Lane4 {
 HWY_INLINE Lane2 operator-(Lane2 a, Lane2 b) { return {a.x - b.x, a.y - b.y}; }
 HWY_INLINE Lane3 operator+(Lane3 a, Lane3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 HWY_INLINE Lane3 operator-(Lane3 a, Lane3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+HWY_INLINE Lane3 operator-(Lane3 a) { return {-a.x, -a.y, -a.z}; }
+HWY_INLINE Lane3 operator*(Lane a, Lane3 b) { return {a * b.x, a * b.y, a * b.z}; }
 HWY_INLINE Lane4 operator+(Lane4 a, Lane4 b) { return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w}; }
 HWY_INLINE Lane4 operator-(Lane4 a, Lane4 b) { return {a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w}; }
 HWY_INLINE Lane4 operator*(Lane4 a, Lane4 b) { return {a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w}; }

@@ -21,8 +21,18 @@ struct RayGroup {
     Mask alive;                // rays of the picture without a hit
     // Of a hit: its distance in finest cells, multiplied with the direction, and what TileHits keeps.
     Lane t, x, y, z, side;
+    Lane3 normal;
     LaneWords leaf;
 };
+
+/// unfoldOctahedron of leaf_math.h, times `length`.
+HWY_INLINE Lane3 unfoldOctahedron(Lane x, Lane y, Lane length) {
+    const Lane z = Lane(1.0f) - abs(x) - abs(y), fold = max(-z, Lane(0.0f));
+    x = x - Lane(hn::CopySign(fold.v, x.v));
+    y = y - Lane(hn::CopySign(fold.v, y.v));
+    const Lane scale = length / sqrt(dot(Lane3(x, y, z), Lane3(x, y, z)));
+    return {x * scale, y * scale, z * scale};
+}
 
 /// Returns 1 / x, x being moved away from 0 first.
 HWY_INLINE Lane invert(Lane& x) {
@@ -53,8 +63,14 @@ HWY_INLINE RayGroup rayGroup(const TileRays& rays, glm::ivec2 size, int index) {
     group.inverse.z = invert(group.direction.z);
     group.t = Lane(hwy::HighestValue<float>());
     group.x = group.y = group.z = group.side = Lane(0.0f);
+    group.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
     group.leaf = hn::Zero(Words());
     return group;
+}
+
+/// What rays cannot miss by more than half a group: the reach of a number that is linear in the pixel's place.
+HWY_INLINE Lane reachInGroup(Lane perX, Lane perY) {
+    return mulAdd(abs(perX), Lane(0.5f * (kGroupWidth - 1)), abs(perY) * Lane(0.5f * (kGroupHeight - 1)));
 }
 
 /// The rays of a group in a leaf: `start` in leaf space, and the part that is inside, in leaf edges.

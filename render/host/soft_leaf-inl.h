@@ -35,15 +35,6 @@ struct SoftLeaf {
     float wall, dip;
 };
 
-/// unfoldOctahedron of leaf_math.h, times `length`.
-HWY_INLINE Lane3 unfoldOctahedron(Lane x, Lane y, Lane length) {
-    const Lane z = Lane(1.0f) - abs(x) - abs(y), fold = max(-z, Lane(0.0f));
-    x = x - Lane(hn::CopySign(fold.v, x.v));
-    y = y - Lane(hn::CopySign(fold.v, y.v));
-    const Lane scale = length / sqrt(dot(Lane3(x, y, z), Lane3(x, y, z)));
-    return {x * scale, y * scale, z * scale};
-}
-
 HWY_INLINE Lane3 decodeDirection(LaneWords code, Lane length) {
     const LaneWords ten = hn::Set(Words(), 1023u);
     const Lane step(2.0f / 1023.0f), below(-1.0f);
@@ -158,6 +149,20 @@ HWY_INLINE Lane sideBefore(const field::RayField& ray, Lane u, Lane3 d) {
     return select(u > Lane(0.0f), ray.c.x, field::rayValue(ray, before));
 }
 
+/// leafNormal and facingNormal of leaf_math.h, at x in leaf space.
+HWY_INLINE Lane3 softNormal(const SoftLeaf& leaf, Lane3 x, Lane3 direction, Lane side) {
+    const Lane3 r = rotateToAxis(x, leaf.axis);
+    const Lane4 w = field::faceWeights(r.y, r.z);
+    const Lane low = Lane(1.0f) - r.x;
+    const Lane weights[8] = {w.x * low, w.y * low, w.z * low, w.w * low, w.x * r.x, w.y * r.x, w.z * r.x, w.w * r.x};
+    Lane3 n(Lane(0.0f), Lane(0.0f), Lane(0.0f));
+    for (int i = 0; i < 8; ++i) n = mulAdd(weights[i], Lane3(Lane(leaf.gx[i]), Lane(leaf.gy[i]), Lane(leaf.gz[i])), n);
+    const Lane along = dot(n, direction);
+    const Mask grazing = along * along < Lane(0.09f) * dot(n, n) * dot(direction, direction);
+    const Mask away = (grazing & (side < Lane(0.0f))) | without(along > Lane(0.0f), grazing);
+    return select(away, -n, n);
+}
+
 HWY_INLINE Lane clamp01(Lane x) { return min(max(x, Lane(0.0f)), Lane(1.0f)); }
 
 /// Casts the rays of a group through a soft leaf. Returns those that hit, with their hits in the group.
@@ -175,10 +180,13 @@ HWY_INLINE Mask castSoftLeaf(const SoftLeaf& soft, const LeafRays& leaf, RayGrou
     if (!any(crossing.hit)) return crossing.hit;
     const Lane tau = mulAdd(crossing.u, s.last - s.first, s.first);
     group.t = select(crossing.hit, mulAdd(tau, Lane(leaf.edge), Lane(leaf.distance)), group.t);
-    group.x = select(crossing.hit, mulAdd(crossing.u, d.x, p.x), group.x);
-    group.y = select(crossing.hit, mulAdd(crossing.u, d.y, p.y), group.y);
-    group.z = select(crossing.hit, mulAdd(crossing.u, d.z, p.z), group.z);
-    group.side = select(crossing.hit, sideBefore(ray, crossing.u, d), group.side);
+    const Lane3 at = mulAdd(crossing.u, d, p);
+    const Lane side = sideBefore(ray, crossing.u, d);
+    group.x = select(crossing.hit, at.x, group.x);
+    group.y = select(crossing.hit, at.y, group.y);
+    group.z = select(crossing.hit, at.z, group.z);
+    group.side = select(crossing.hit, side, group.side);
+    group.normal = select(crossing.hit, softNormal(soft, at, group.direction, side), group.normal);
     return crossing.hit;
 }
 

@@ -216,7 +216,8 @@ private:
         Triangles triangles;
         for (StripWalk walk(page.view->strips, at.word); nextTriangles(walk, triangles);) {
             setUpTriangles(*page.view, hard, triangles);
-            for (int t = 0; t < triangles.count; ++t) castAt(at, hard, triangles, t, active);
+            for (uint32_t rest = active; rest != 0; rest &= rest - 1)
+                castAtTriangles(at, hard, triangles, std::countr_zero(rest));
         }
         for (; active != 0; active &= active - 1) takeHits(std::countr_zero(active), leaf, page.cell);
     }
@@ -227,14 +228,19 @@ private:
         return triangles.count > 0;
     }
 
-    void castAt(const Entry& at, const HardLeaf& hard, const Triangles& triangles, int t, uint32_t active) {
-        const auto number = uint32_t(hits_.leaves.size());
-        bool found = false;
-        for (; active != 0; active &= active - 1) {
-            const int i = std::countr_zero(active);
-            found |= any(castTriangle(hard, triangles, t, groups_[i], number, inLeaf_[i]));
+    void castAtTriangles(const Entry& at, const HardLeaf& hard, Triangles& triangles, int i) {
+        const RayGroup& group = groups_[i];
+        for (uint32_t met = trianglesMet(triangles, i); met != 0; met &= met - 1) {
+            const int t = std::countr_zero(met);
+            const Mask taken = castTriangle(hard, triangles, t, group, inLeaf_[i]);
+            if (!any(taken)) continue;
+            if (!triangles.haveNormals) setUpNormals(*scene_.page(at.page).view, triangles);
+            if (triangles.number[t] == Triangles::kNoNumber) {
+                triangles.number[t] = uint32_t(hits_.leaves.size());
+                hits_.leaves.push_back({at.page, at.word, triangles.corners[t]});
+            }
+            takeTriangle(triangles, t, group, taken, inLeaf_[i]);
         }
-        if (found) hits_.leaves.push_back({at.page, at.word, triangles.corners[t]});
     }
 
     void takeHits(int i, const LeafRays& leaf, float cell) {
@@ -244,6 +250,7 @@ private:
         group.t = select(in.hit, max(mulAdd(in.tau, Lane(cell), Lane(leaf.distance)), Lane(0.0f)), group.t);
         group.x = select(in.hit, in.weightB, group.x);
         group.y = select(in.hit, in.weightC, group.y);
+        group.normal = select(in.hit, in.normal, group.normal);
         finish(i, in.hit, in.triangle);
     }
 
@@ -259,6 +266,9 @@ private:
             writeRows(group.y, hits_.y + at);
             writeRows(group.z, hits_.z + at);
             writeRows(group.side, hits_.side + at);
+            writeRows(group.normal.x, hits_.normalX + at);
+            writeRows(group.normal.y, hits_.normalY + at);
+            writeRows(group.normal.z, hits_.normalZ + at);
             writeRows(Lane(hn::BitCast(Floats(), group.leaf)), reinterpret_cast<float*>(hits_.leaf) + at);
         }
     }

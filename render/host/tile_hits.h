@@ -32,6 +32,9 @@ struct TileHits {
     alignas(32) float x[kTilePixels], y[kTilePixels], z[kTilePixels];
     /// Of a soft leaf a number with the sign of the side that the ray came from (sideBefore in shared/leaf_math.h).
     alignas(32) float side[kTilePixels];
+    /// The surface's normal: of any length, on the side that the ray comes from, or near a silhouette leaning away a
+    /// bit.
+    alignas(32) float normalX[kTilePixels], normalY[kTilePixels], normalZ[kTilePixels];
     std::vector<HitLeaf> leaves;
 };
 

@@ -31,7 +31,9 @@ std::vector<HostPixel> castHost(const HostScene& scene, const PictureRays& rays)
             const glm::ivec2 in(i % kTileWidth, i / kTileWidth), at = hits.corner + in;
             if (in.x >= hits.size.x || in.y >= hits.size.y || std::isinf(hits.depth[i])) continue;
             const glm::dvec3 direction = glm::normalize(rays.directionAt(at.x + 0.5, at.y + 0.5));
-            glm::dvec3 normal = glm::normalize(glm::dvec3(surfaceAt(scene, hits, i, direction).normal));
+            const glm::vec3 alone = glm::normalize(surfaceAt(scene, hits, i, direction).normal);
+            glm::dvec3 normal = glm::normalize(glm::dvec3(hits.normalX[i], hits.normalY[i], hits.normalZ[i]));
+            EXPECT_LT(glm::distance(glm::vec3(normal), alone), 1e-3f);
             // The reference bends normals back that lean away from the ray.
             normal = glm::normalize(normal - std::max(glm::dot(normal, direction), 0.0) * direction);
             pixels[size_t(at.y) * rays.size.x + at.x] = {hits.depth[i],

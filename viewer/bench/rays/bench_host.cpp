@@ -7,7 +7,6 @@
 
 #include "builder/measure/quantile.h"
 #include "render/frame_setup.h"
-#include "render/host/hit_surface.h"
 #include "render/host/host_caster.h"
 #include "viewer/bench/rays/bench_tracer.h"
 
@@ -40,7 +39,7 @@ public:
         for (int repetition = 0; repetition <= repetitions; ++repetition) {
             const auto start = Clock::now();
             VCP_TRY(castPicture(scene, rays, {.threads = threads_},
-                                [&](const TileHits& hits) { take(scene, rays, hits, pixels); }));
+                                [&](const TileHits& hits) { take(rays, hits, pixels); }));
             if (repetition > 0) seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
         }
         TracedPicture picture;
@@ -73,8 +72,7 @@ private:
         return HostScene::create(cache_, selection.cut);
     }
 
-    static void take(const HostScene& scene, const PictureRays& rays, const TileHits& hits,
-                     std::vector<HostPixel>& pixels) {
+    static void take(const PictureRays& rays, const TileHits& hits, std::vector<HostPixel>& pixels) {
         for (int y = 0; y < hits.size.y; ++y)
             for (int x = 0; x < hits.size.x; ++x) {
                 const int i = y * kTileWidth + x;
@@ -82,8 +80,8 @@ private:
                 HostPixel& pixel = pixels[size_t(at.y) * rays.size.x + at.x];
                 pixel = {};
                 if (!hits.any || std::isinf(hits.depth[i])) continue;
-                const glm::vec3 direction(rays.directionAt(at.x + 0.5, at.y + 0.5));
-                pixel = {hits.depth[i], surfaceAt(scene, hits, i, direction).normal, hits.leaves[hits.leaf[i]].page};
+                pixel = {
+                    hits.depth[i], {hits.normalX[i], hits.normalY[i], hits.normalZ[i]}, hits.leaves[hits.leaf[i]].page};
             }
     }
 
