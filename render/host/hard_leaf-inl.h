@@ -24,9 +24,8 @@ struct GroupInHardLeaf {
     LaneWords triangle;  // what HitLeaf numbers
 };
 
-HWY_INLINE GroupInHardLeaf enterHardLeaf(const RayGroup& group, const LeafRays& leaf, float edge) {
+HWY_INLINE void enterHardLeaf(const RayGroup& group, const LeafRays& leaf, float edge, GroupInHardLeaf& in) {
     const GroupSegment s = segmentIn(group, leaf);
-    GroupInHardLeaf in;
     const Lane cells(edge), slack(f32::kIntervalSlack);
     in.from = s.first * cells;
     in.first = max(in.from - slack, Lane(leaf.tauMin) * cells);
@@ -36,7 +35,6 @@ HWY_INLINE GroupInHardLeaf enterHardLeaf(const RayGroup& group, const LeafRays& 
     in.inside = s.inside;
     in.hit = maskOf(0);
     in.triangle = hn::Zero(Words());
-    return in;
 }
 
 /// Takes hits where they are nearer than those before. Returns those that are.

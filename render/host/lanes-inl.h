@@ -49,10 +49,15 @@ HWY_INLINE Lane abs(Lane a) { return hn::Abs(a.v); }
 HWY_INLINE Lane sqrt(Lane a) { return hn::Sqrt(a.v); }
 /// Returns a b + c, rounded once where the machine can.
 HWY_INLINE Lane mulAdd(Lane a, Lane b, Lane c) { return hn::MulAdd(a.v, b.v, c.v); }
+/// Returns a b - c.
+HWY_INLINE Lane mulSub(Lane a, Lane b, Lane c) { return hn::MulSub(a.v, b.v, c.v); }
 HWY_INLINE Lane select(Mask mask, Lane yes, Lane no) { return hn::IfThenElse(mask, yes.v, no.v); }
 
 HWY_INLINE Lane load(const float* aligned) { return hn::Load(Floats(), aligned); }
 HWY_INLINE void store(Lane a, float* aligned) { hn::Store(a.v, Floats(), aligned); }
+HWY_INLINE LaneWords gather(const uint32_t* words, LaneWords index) {
+    return hn::GatherIndex(Words(), words, hn::BitCast(Integers(), index));
+}
 /// Converts integers with a sign.
 HWY_INLINE Lane toFloats(LaneWords words) { return hn::ConvertTo(Floats(), hn::BitCast(Integers(), words)); }
 
@@ -102,7 +107,7 @@ HWY_INLINE Lane3 mulAdd(Lane a, Lane3 b, Lane3 c) {
     return {mulAdd(a, b.x, c.x), mulAdd(a, b.y, c.y), mulAdd(a, b.z, c.z)};
 }
 HWY_INLINE Lane3 cross(Lane3 a, Lane3 b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    return {mulSub(a.y, b.z, a.z * b.y), mulSub(a.z, b.x, a.x * b.z), mulSub(a.x, b.y, a.y * b.x)};
 }
 HWY_INLINE Lane3 select(Mask mask, Lane3 yes, Lane3 no) {
     return {select(mask, yes.x, no.x), select(mask, yes.y, no.y), select(mask, yes.z, no.z)};

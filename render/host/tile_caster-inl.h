@@ -205,7 +205,7 @@ private:
         uint32_t active = 0;
         for (groups &= open_; groups != 0; groups &= groups - 1) {
             const int i = std::countr_zero(groups);
-            inLeaf_[i] = enterHardLeaf(groups_[i], leaf, edge);
+            enterHardLeaf(groups_[i], leaf, edge, inLeaf_[i]);
             if (any(inLeaf_[i].inside)) active |= 1u << i;
         }
         if (active == 0) return;
@@ -222,12 +222,6 @@ private:
         for (; active != 0; active &= active - 1) takeHits(std::countr_zero(active), leaf, page.cell);
     }
 
-    static bool nextTriangles(StripWalk& walk, Triangles& triangles) {
-        triangles.count = 0;
-        while (triangles.count < kLanes && walk.next()) triangles.corners[triangles.count++] = walk.triangle();
-        return triangles.count > 0;
-    }
-
     void castAtTriangles(const Entry& at, const HardLeaf& hard, Triangles& triangles, int i) {
         const RayGroup& group = groups_[i];
         for (uint32_t met = trianglesMet(triangles, i); met != 0; met &= met - 1) {
@@ -237,7 +231,8 @@ private:
             if (!triangles.haveNormals) setUpNormals(*scene_.page(at.page).view, triangles);
             if (triangles.number[t] == Triangles::kNoNumber) {
                 triangles.number[t] = uint32_t(hits_.leaves.size());
-                hits_.leaves.push_back({at.page, at.word, triangles.corners[t]});
+                const auto& corners = triangles.corners;
+                hits_.leaves.push_back({at.page, at.word, {corners[0][t], corners[1][t], corners[2][t]}});
             }
             takeTriangle(triangles, t, group, taken, inLeaf_[i]);
         }

@@ -66,7 +66,7 @@ struct Triangles {
     static constexpr uint32_t kNoNumber = ~0u;
 
     int count;
-    Index3 corners[8];
+    alignas(32) uint32_t corners[3][8];           // vertices a, b and c in the page
     uint32_t number[8];                           // of the triangle's HitLeaf, once a ray has hit
     alignas(32) float x[3][8], y[3][8], z[3][8];  // vertices, as in HardLeaf
     LinearSums volume[3], along, height;
@@ -82,8 +82,7 @@ struct Triangles {
 HWY_INLINE LaneWords field21(LaneWords word) { return hn::And(word, hn::Set(Words(), kField21Mask)); }
 
 /// decodeVertex of leaf_math.h, from a corner of the leaf: exact.
-HWY_INLINE Lane3 decodeVertices(const uint32_t* low, const uint32_t* high, glm::ivec3 corner) {
-    const LaneWords lo = hn::Load(Words(), low), hi = hn::Load(Words(), high);
+HWY_INLINE Lane3 decodeVertices(LaneWords lo, LaneWords hi, glm::ivec3 corner) {
     const LaneWords y = hn::Or(hn::ShiftRight<21>(lo), hn::ShiftLeft<11>(hn::And(hi, hn::Set(Words(), 0x3ffu))));
     const glm::uvec3 from = glm::uvec3(corner + kLatticeBias);
     const Lane cell(1.0f / float(kLatticePerCell));
@@ -92,28 +91,31 @@ HWY_INLINE Lane3 decodeVertices(const uint32_t* low, const uint32_t* high, glm::
             toFloats(hn::Sub(field21(hn::ShiftRight<10>(hi)), hn::Set(Words(), from.z))) * cell};
 }
 
-/// Loads the vertices of triangles whose corners are known.
-HWY_INLINE void loadVertices(const PageView& view, glm::ivec3 corner, Triangles& t) {
-    for (int k = 0; k < 3; ++k) {
-        alignas(32) uint32_t low[8], high[8];
-        for (int i = 0; i < kLanes; ++i) {
-            const glm::u32vec2 vertex = view.vertices[t.corners[std::min(i, t.count - 1)][size_t(k)]];
-            low[i] = vertex.x;
-            high[i] = vertex.y;
-        }
-        const Lane3 p = decodeVertices(low, high, corner);
-        store(p.x, t.x[k]);
-        store(p.y, t.y[k]);
-        store(p.z, t.z[k]);
+/// Takes the next triangles of a leaf. Returns false where there are none left.
+HWY_INLINE bool nextTriangles(StripWalk& walk, Triangles& t) {
+    t.count = 0;
+    for (Index3 corners{}; t.count < kLanes && walk.next(); ++t.count) {
+        corners = walk.triangle();
+        for (size_t k = 0; k < 3; ++k) t.corners[k][t.count] = corners[k];
     }
+    if (t.count == 0) return false;
+    for (int k = 0; k < 3; ++k) std::fill(t.corners[k] + t.count, t.corners[k] + kLanes, t.corners[k][t.count - 1]);
+    return true;
 }
 
 HWY_INLINE Lane3 vertexOf(const Triangles& t, int k) { return {load(t.x[k]), load(t.y[k]), load(t.z[k])}; }
 
 /// Finds the sums of triangles whose corners are known.
 HWY_INLINE void setUpTriangles(const PageView& view, const HardLeaf& leaf, Triangles& t) {
-    loadVertices(view, leaf.corner, t);
-    const Lane3 p[3] = {vertexOf(t, 0), vertexOf(t, 1), vertexOf(t, 2)};
+    Lane3 p[3];
+    for (int k = 0; k < 3; ++k) {
+        const LaneWords twice = hn::ShiftLeft<1>(hn::Load(Words(), t.corners[k]));
+        const uint32_t* words = &view.vertices.data()->x;
+        p[k] = decodeVertices(gather(words, twice), gather(words + 1, twice), leaf.corner);
+        store(p[k].x, t.x[k]);
+        store(p[k].y, t.y[k]);
+        store(p[k].z, t.z[k]);
+    }
     Lane length[3];
     for (int k = 0; k < 3; ++k) {
         const Lane3 from = p[(k + 1) % 3] - leaf.start, e = p[(k + 2) % 3] - p[(k + 1) % 3], moment = cross(from, e);
@@ -149,9 +151,8 @@ HWY_NOINLINE void setUpNormals(const PageView& view, Triangles& t) {
     flat = (Lane(1.0f) / sqrt(max(dot(flat, flat), Lane(1e-30f)))) * flat;
     Lane3 first = flat;
     for (int k = 0; k < 3; ++k) {
-        alignas(32) uint32_t codes[8];
-        for (int i = 0; i < kLanes; ++i) codes[i] = view.normals[t.corners[std::min(i, t.count - 1)][size_t(k)]];
-        const LaneWords code = hn::Load(Words(), codes), bit = hn::Set(Words(), kNormalCreaseBit);
+        const LaneWords code = gather(view.normals.data(), hn::Load(Words(), t.corners[k]));
+        const LaneWords bit = hn::Set(Words(), kNormalCreaseBit);
         const Mask isCrease = hn::RebindMask(Floats(), hn::Eq(hn::And(code, bit), bit));
         const Lane3 smooth = decodeNormals(code);
         const Lane3 turned = select(dot(smooth, flat) < Lane(0.0f), -smooth, smooth);
