@@ -48,7 +48,8 @@ HWY_INLINE Mask takeHits(GroupInHardLeaf& in, Mask candidates, Lane tau, Lane we
     return taken;
 }
 
-/// Decides the rays in `doubtful` one by one.
+/// Decides the rays in `doubtful` one by one, in double precision: along a triangle seen nearly edge-on, single
+/// precision says little about where it is hit.
 HWY_NOINLINE Mask castDoubtful(const HardLeaf& leaf, const Triangles& t, int i, const RayGroup& group, Mask doubtful,
                                GroupInHardLeaf& in) {
     const Lane3 starts = mulAdd(in.from, group.direction,
@@ -57,17 +58,18 @@ HWY_NOINLINE Mask castDoubtful(const HardLeaf& leaf, const Triangles& t, int i, 
     store(starts.x, qx), store(starts.y, qy), store(starts.z, qz);
     store(group.direction.x, dx), store(group.direction.y, dy), store(group.direction.z, dz);
     store(in.from, from);
+    const auto vertex = [&](int k) { return glm::dvec3(t.x[k][i], t.y[k][i], t.z[k][i]); };
     uint32_t hits = 0;
     for (uint32_t rest = bitsOf(doubtful); rest != 0; rest &= rest - 1) {
         const int lane = std::countr_zero(rest);
-        const auto vertex = [&](int k) { return glm::vec3(t.x[k][i], t.y[k][i], t.z[k][i]); };
-        const glm::vec3 hit =
-            f32::intersectTriangle(glm::vec3(qx[lane], qy[lane], qz[lane]), glm::vec3(dx[lane], dy[lane], dz[lane]),
-                                   vertex(0), vertex(1), vertex(2), leaf.slack);
-        if (hit.x >= 1e30f) continue;
-        tau[lane] = from[lane] + hit.x;
-        b[lane] = hit.y;
-        c[lane] = hit.z;
+        const glm::dvec3 start(qx[lane], qy[lane], qz[lane]), direction(dx[lane], dy[lane], dz[lane]);
+        const double length = glm::length(direction);
+        const glm::dvec3 hit =
+            f64::intersectTriangle(start, direction / length, vertex(0), vertex(1), vertex(2), double(leaf.slack));
+        if (hit.x >= 1e30) continue;
+        tau[lane] = from[lane] + float(hit.x / length);
+        b[lane] = float(hit.y);
+        c[lane] = float(hit.z);
         hits |= 1u << lane;
     }
     return takeHits(in, maskOf(hits), load(tau), load(b), load(c));

@@ -250,12 +250,13 @@ private:
     }
 
     void writeHits() {
-        const Lane cell{float(scene_.grid().cell)};
+        // The edge of a cell in two parts, so that depths are rounded once.
+        const Lane cell{float(scene_.grid().cell)}, rest{scene_.grid().cell - double(float(scene_.grid().cell))};
         for (int i = 0; i < kGroups; ++i) {
             const RayGroup& group = groups_[i];
             const int at = i / kGroupColumns * kGroupHeight * kTileWidth + i % kGroupColumns * kGroupWidth;
             const Mask missed = group.t >= Lane(hwy::HighestValue<float>());
-            const Lane depth = group.t * cell * sqrt(dot(group.direction, group.direction));
+            const Lane depth = mulAdd(group.t, cell, group.t * mulAdd(cell, lengthAboveOne(group), rest));
             writeRows(select(missed, Lane(std::numeric_limits<float>::infinity()), depth), hits_.depth + at);
             writeRows(group.x, hits_.x + at);
             writeRows(group.y, hits_.y + at);
@@ -266,6 +267,16 @@ private:
             writeRows(group.normal.z, hits_.normalZ + at);
             writeRows(Lane(hn::BitCast(Floats(), group.leaf)), reinterpret_cast<float*>(hits_.leaf) + at);
         }
+    }
+
+    /// Returns by how much a group's directions are longer than the tile's middle one, which has unit length.
+    [[nodiscard]] Lane lengthAboveOne(const RayGroup& group) const {
+        const glm::dvec3 &d = rays_.direction, &x = rays_.directionPerX, &y = rays_.directionPerY;
+        const Lane i = group.column, j = group.row;
+        const Lane ofX = mulAdd(i, Lane(glm::dot(x, x)), Lane(2 * glm::dot(d, x)));
+        const Lane ofY = mulAdd(j, Lane(glm::dot(y, y)), mulAdd(i, Lane(2 * glm::dot(x, y)), Lane(2 * glm::dot(d, y))));
+        const Lane square = mulAdd(i, ofX, j * ofY);
+        return square / (Lane(1.0f) + sqrt(Lane(1.0f) + square));
     }
 
     static void writeRows(Lane lanes, float* first) {

@@ -130,6 +130,9 @@ std::vector<NamedCamera> cameras(glm::dvec3 lo, glm::dvec3 hi) {
     Camera close = fit({-0.3, -0.5, -1});
     close.eye = middle + (close.eye - middle) * 0.45;
     list.push_back({"close", close});
+    Camera wide = close;
+    wide.verticalFov = 2;
+    list.push_back({"wide", wide});
     Camera inside = fit({0.7, 0.1, -0.3});
     inside.eye = middle + glm::dvec3(0.013, 0.021, 0.017) * (hi.x - lo.x);
     list.push_back({"from the middle", inside});

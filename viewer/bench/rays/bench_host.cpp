@@ -48,8 +48,10 @@ public:
         for (size_t i = 0; i < pixels.size(); ++i) {
             if (std::isinf(pixels[i].t)) continue;
             const uint64_t page = scene.page(pixels[i].page).number;
+            // The depth is rounded to single precision.
+            const double rounding = 2e-7 * double(pixels[i].t);
             picture.hits[i] = SurfaceHit{pixels[i].t, glm::normalize(glm::dvec3(pixels[i].normal)),
-                                         cache_.dataset().pages[page].certifiedError};
+                                         cache_.dataset().pages[page].certifiedError + rounding};
         }
         return picture;
     }
