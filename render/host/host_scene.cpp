@@ -68,7 +68,7 @@ Result<void> HostScene::add(const HostPage& page) {
         at = (*parent)[octant];
     }
     const uint32_t bits = rootBits() - level;
-    pages_.push_back({page.view, page.number, page.place << bits, bits, float(1u << (grid_.levels - 1 - level))});
+    pages_.push_back({page.view, page.number, page.place << bits, bits, grid_.levels - 1 - level});
     return {};
 }
 

@@ -45,7 +45,7 @@ public:
         uint64_t number;
         glm::uvec3 corner;  ///< subcells
         uint32_t edgeBits;  ///< log2 of its edge in subcells
-        float cell;         ///< edge of a cell of its level, finest cells
+        uint32_t cellBits;  ///< log2 of the edge of a cell of its level in finest cells
     };
     /// A child of the tree: nothing, another node, or a page.
     struct Child {

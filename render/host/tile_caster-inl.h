@@ -201,7 +201,7 @@ private:
 
     void castHard(const Entry& at, const LeafRays& leaf, uint32_t groups) {
         const HostScene::Page& page = scene_.page(at.page);
-        const float edge = leaf.edge / page.cell;
+        const float cell = float(1u << page.cellBits), edge = leaf.edge / cell;
         uint32_t active = 0;
         for (groups &= open_; groups != 0; groups &= groups - 1) {
             const int i = std::countr_zero(groups);
@@ -211,7 +211,7 @@ private:
         if (active == 0) return;
         // An eighth of the page's cell is so many of its lattice's steps.
         constexpr int kSteps = kLatticePerCell >> kMaxSubcellDepth;
-        const glm::uvec3 inPage = (at.corner - page.corner) / uint32_t(page.cell);
+        const glm::uvec3 inPage = (at.corner - page.corner) >> page.cellBits;
         const HardLeaf hard = hardLeaf(rays_, leaf, glm::ivec3(inPage) * kSteps, edge);
         Triangles triangles;
         for (StripWalk walk(page.view->strips, at.word); nextTriangles(walk, triangles);) {
@@ -219,7 +219,7 @@ private:
             for (uint32_t rest = active; rest != 0; rest &= rest - 1)
                 castAtTriangles(at, hard, triangles, std::countr_zero(rest));
         }
-        for (; active != 0; active &= active - 1) takeHits(std::countr_zero(active), leaf, page.cell);
+        for (; active != 0; active &= active - 1) takeHits(std::countr_zero(active), leaf, cell);
     }
 
     void castAtTriangles(const Entry& at, const HardLeaf& hard, Triangles& triangles, int i) {
