@@ -1,8 +1,7 @@
 // Hard leaves for groups of rays, a lane a ray.
 //
 // Lanes decide what is clear: rays that miss a triangle by more than the slack, and those that are inside and cross its
-// plane steeply. All others, some in ten thousand, are decided by intersectTriangle of octree/shared/leaf_math.h
-// itself.
+// plane steeply. The few others are decided by intersectTriangle of octree/shared/leaf_math.h itself.
 #if defined(VCP_RENDER_HOST_HARD_LEAF_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef VCP_RENDER_HOST_HARD_LEAF_INL_H
 #undef VCP_RENDER_HOST_HARD_LEAF_INL_H
