@@ -26,6 +26,24 @@ CameraRay cameraRay(const Camera& camera, uint32_t width, uint32_t height, doubl
     return {camera.eye, glm::normalize(basis.forward + aside)};
 }
 
+PictureRays pictureRays(const Camera& camera, uint32_t width, uint32_t height) {
+    const CameraBasis basis = cameraBasis(camera, width, height);
+    const glm::dvec3 corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth;
+    const glm::dvec3 perX = basis.right * (2 * basis.halfWidth / width),
+                     perY = basis.up * (-2 * basis.halfHeight / height);
+    PictureRays rays{.origin = camera.eye, .direction = basis.forward, .size = {int(width), int(height)}};
+    if (camera.projection == Projection::Orthographic) {
+        rays.origin += corner;
+        rays.originPerX = perX;
+        rays.originPerY = perY;
+    } else {
+        rays.direction += corner;
+        rays.directionPerX = perX;
+        rays.directionPerY = perY;
+    }
+    return rays;
+}
+
 Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::dvec3 up, double verticalFov,
                  double aspect) {
     Camera camera;

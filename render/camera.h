@@ -6,6 +6,8 @@
 
 #include <glm/vec3.hpp>
 
+#include "render/host/picture_rays.h"
+
 namespace vcp {
 
 enum class Projection { Perspective, Orthographic };
@@ -36,6 +38,9 @@ struct CameraRay {
     glm::dvec3 origin, direction;
 };
 CameraRay cameraRay(const Camera& camera, uint32_t width, uint32_t height, double x, double y);
+
+/// The same rays as the host casts them (render/host/host_caster.h).
+PictureRays pictureRays(const Camera& camera, uint32_t width, uint32_t height);
 
 /// Returns a camera that looks along `forward` at the middle of a box, from where all of the box is in the picture.
 Camera fitCamera(glm::dvec3 boxMin, glm::dvec3 boxMax, glm::dvec3 forward, glm::dvec3 up, double verticalFov,

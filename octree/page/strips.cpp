@@ -133,33 +133,4 @@ void storeEntries(std::span<const uint32_t> entries, uint32_t vertices, std::byt
     }
 }
 
-StripWalk::StripWalk(const StripEntries& entries, uint32_t leaf)
-    : entries_(entries), at_(leaf & kHardFirstMask), count_(leaf >> kHardCountShift & kHardCountMask) {
-    if (count_ != kHardCountLong) return;
-    if (entries.size() < 2 || at_ > entries.size() - 2) {
-        count_ = 0;
-        return;
-    }
-    count_ = entries[at_] | entries[at_ + 1] << kShortVertexBits;
-    at_ += 2;
-}
-
-bool StripWalk::next() {
-    if (done_ == count_ || at_ >= entries_.size()) return false;
-    const uint32_t entry = entries_[at_], step = stepOf(entry);
-    if (step != kStepBegin) {
-        if (done_ == 0) return false;
-        corners_[step - 1] = vertexOf(entry);
-        isTurned_ = !isTurned_;
-        ++at_;
-    } else {
-        if (entries_.size() - at_ < 3 || stepOf(entries_[at_ + 1] | entries_[at_ + 2]) != kStepBegin) return false;
-        corners_ = {entry, entries_[at_ + 1], entries_[at_ + 2]};
-        isTurned_ = false;
-        at_ += 3;
-    }
-    ++done_;
-    return true;
-}
-
 }  // namespace vcp

@@ -34,8 +34,9 @@ const std::vector<Outside>& outsideRules() {
         {std::regex("CLI/.*"), {"viewer/command"}, "CLI11 belongs to viewer/command/"},
         {std::regex("thread|mutex|shared_mutex|condition_variable|future|stop_token|semaphore|latch|barrier|execution|"
                     "pthread\\.h|tbb/.*|oneapi/.*"),
-         {"builder", "streaming", "viewer"},
-         "threads belong to builder/, streaming/ and viewer/"},
+         {"builder", "streaming", "render/host", "viewer"},
+         "threads belong to builder/, streaming/, render/host/ and viewer/"},
+        {std::regex("hwy/.*"), {"render/host"}, "Highway belongs to render/host/"},
     };
     return rules;
 }

@@ -30,7 +30,8 @@ const std::vector<Room>& rooms() {
         {"mesostructure", {"octree/"}},
         {"mesostructure/base", {"octree/", "mesostructure"}},
         {"streaming", {"octree/"}},
-        {"render", {"octree/", "mesostructure", "streaming"}},
+        {"render/host", {"octree/"}},
+        {"render", {"octree/", "mesostructure", "streaming", "render/host"}},
 
         {"viewer/camera", {"octree/", "render"}},
         {"viewer/scene", {"octree/", "builder/", "mesostructure/", "streaming", "render", "viewer/camera"}},
@@ -44,7 +45,7 @@ const std::vector<Room>& rooms() {
         {"viewer/bench/report", {"octree/"}},
         {"viewer/bench/peers", {"octree/", "builder/", "streaming", "render"}},
         {"viewer/bench/rays",
-         {"octree/", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/peers"}},
+         {"octree/", "builder/", "streaming", "render", "render/host", "viewer/bench/report", "viewer/bench/peers"}},
         {"viewer/bench/picture",
          {"octree/", "builder/", "streaming", "render", "viewer/bench/report", "viewer/bench/rays"}},
         {"viewer/bench/stress",

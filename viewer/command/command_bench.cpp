@@ -286,8 +286,8 @@ RunCommand addBenchRays(CLI::App& bench) {
         ->delimiter(',')
         ->allow_extra_args(false);
     app->add_flag("--sweep", command->sweep,
-                  "Each method at several values of its knob: error-pixels of certified, eps of paper, cell of the "
-                  "other octrees");
+                  "Each method at several values of its knob: error-pixels of certified and host, eps of paper, cell "
+                  "of the other octrees");
     app->add_flag("--stability", command->stability,
                   "Also what single precision costs, on the processor and on the device, with cells from 1e-6 to 1e6 "
                   "and origins to 1e7 cells");

@@ -20,6 +20,7 @@ struct RayMethod {
 };
 
 const std::vector<RayMethod> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
+                                         {"host", 0.5, {0.5, 1, 2, 4}},
                                          {"reference"},
                                          {"paper", 0.25, {0.5, 0.25, 0.1}},
                                          {"paper-gpu", 0.25, {0.5, 0.25, 0.1}},
@@ -89,6 +90,7 @@ const MeshSides& RayMethods::sides() {
 
 Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, double knob) {
     if (method == "certified") return makeCertifiedTracer(in_.vcp, in_.device, knob);
+    if (method == "host") return makeHostTracer(in_.vcp, in_.threads, knob);
     if (method == "reference") return makeReferenceTracer(in_.cache, in_.threads);
     PaperOptions paper = in_.paper;
     if (method == "paper-rules") {

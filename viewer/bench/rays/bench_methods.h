@@ -2,6 +2,7 @@
 //
 //   name           what                                                    knob
 //   certified      the renderer on a Vulkan device                         error-pixels  0.5; swept 0.5, 1, 2, 4
+//   host           the renderer's rays on the processor (render/host/)     error-pixels  0.5; swept 0.5, 1, 2, 4
 //   reference      the reference ray-caster in double, finest level
 //   paper          Demir and Westermann 2015 (builder/paper/paper_octree.h)        eps  0.25; swept 0.5, 0.25, 0.1
 //   paper-gpu      the same march over the same octree on a Vulkan device   eps, as paper

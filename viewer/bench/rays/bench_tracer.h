@@ -44,6 +44,11 @@ Result<std::unique_ptr<RayTracer>> makeReferenceTracer(const PageCache& cache, u
 Result<std::unique_ptr<RayTracer>> makeCertifiedTracer(const std::filesystem::path& file, const std::string& device,
                                                        double errorPixels = 0.5);
 
+/// The host's caster (render/host/host_caster.h) over the pages that the renderer would draw at `errorPixels`, with
+/// normals. The file is opened again. Errors: what opening a dataset and reading pages report.
+Result<std::unique_ptr<RayTracer>> makeHostTracer(const std::filesystem::path& file, unsigned threads,
+                                                  double errorPixels = 0.5);
+
 /// The renderer over a dataset of the method `paper` (viewer/bench/peers/paper_dataset.h). Errors: Device.
 Result<std::unique_ptr<RayTracer>> makePaperGpuTracer(std::shared_ptr<const Dataset> dataset,
                                                       std::shared_ptr<const PageSource> source,

@@ -263,6 +263,21 @@ TEST_F(BenchRays, NothingLeaksWherePagesAndLevelsMeet) {
     }
 }
 
+TEST_F(BenchRays, TheHostHitsWhatTheReferenceHits) {
+    const Ran ran = run(ball_ + " --cameras whole,close,lattice,grazing --methods host,reference" + kQuick);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    std::map<std::string, Json> rows;
+    const Json report = Json::parse(ran.out);
+    for (const Json& row : report["rows"]) {
+        EXPECT_EQ(row["holes"], 0) << row;
+        EXPECT_EQ(row["beyond_certified"], 0) << row;
+        rows[row["method"].get<std::string>() + row["camera"].get<std::string>()] = row;
+    }
+    for (const std::string camera : {"close", "lattice", "grazing"})
+        EXPECT_NEAR(rows["host" + camera]["hit"], rows["reference" + camera]["hit"].get<double>(), 0.001) << camera;
+    EXPECT_GT(rows["hostwhole"]["hit"], 0.3);
+}
+
 TEST_F(BenchRays, UnknownMethodsAndCamerasAreNamed) {
     const Ran method = run(ball_ + " --methods magic" + kQuick);
     EXPECT_EQ(method.status, 2);

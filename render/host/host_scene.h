@@ -1,0 +1,72 @@
+// The pages of a cut, placed in space: what the host casts rays through.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "octree/page/page.h"
+#include "octree/reference_caster.h"
+
+namespace vcp {
+
+/// Where the grid of a dataset lies, and how fine it is.
+struct HostGrid {
+    glm::dvec3 origin{0};  ///< world position of the lowest corner of the root page
+    double cell = 1;       ///< edge of a cell of the finest level, world units
+    uint32_t levels = 1;
+    uint32_t log2Cells = 1;  ///< cells an edge of a page: 2^log2Cells
+};
+
+/// A page of a cut. The view must outlive the scene.
+struct HostPage {
+    const PageView* view = nullptr;
+    uint64_t number = 0;  ///< in the directory
+    glm::uvec3 place{0};  ///< among the subvolumes of its level
+    uint32_t level = 0;   ///< 0 is the coarsest
+};
+
+/// An immutable tree down to the pages of a cut. Any thread may read it.
+///
+/// Places inside are whole subcells: eighths of a finest cell, which no leaf is smaller than.
+class HostScene {
+public:
+    /// Errors: Usage where a page lies outside of the grid, or in another page.
+    static Result<HostScene> create(const HostGrid& grid, std::span<const HostPage> cut);
+    /// `cut`: pages that `cache` has loaded; it must outlive the scene. Errors: Usage as above, or where one is not
+    /// loaded.
+    static Result<HostScene> create(const PageCache& cache, std::span<const uint64_t> cut);
+
+    struct Page {
+        const PageView* view;
+        uint64_t number;
+        glm::uvec3 corner;  ///< subcells
+        uint32_t edgeBits;  ///< log2 of its edge in subcells
+        uint32_t cellBits;  ///< log2 of the edge of a cell of its level in finest cells
+    };
+    /// A child of the tree: nothing, another node, or a page.
+    struct Child {
+        enum class Kind : uint8_t { None, Node, Page } kind = Kind::None;
+        uint32_t index = 0;
+    };
+    using Node = std::array<Child, 8>;  ///< child i at octant x + 2y + 4z
+
+    [[nodiscard]] const HostGrid& grid() const { return grid_; }
+    [[nodiscard]] Child root() const { return root_; }
+    [[nodiscard]] uint32_t rootBits() const;  ///< log2 of the root's edge in subcells
+    [[nodiscard]] const Node& node(uint32_t index) const { return nodes_[index]; }
+    [[nodiscard]] const Page& page(uint32_t index) const { return pages_[index]; }
+
+private:
+    Result<void> add(const HostPage& page);
+
+    HostGrid grid_;
+    Child root_;
+    std::vector<Node> nodes_;
+    std::vector<Page> pages_;
+};
+
+}  // namespace vcp

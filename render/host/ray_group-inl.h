@@ -1,0 +1,101 @@
+// Rays side by side, one a lane: a group of 4 x 2 or 4 x 1 pixels of a tile, with their hits so far.
+#if defined(VCP_RENDER_HOST_RAY_GROUP_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef VCP_RENDER_HOST_RAY_GROUP_INL_H
+#undef VCP_RENDER_HOST_RAY_GROUP_INL_H
+#else
+#define VCP_RENDER_HOST_RAY_GROUP_INL_H
+#endif
+
+#include "render/host/lanes-inl.h"
+#include "render/host/tile_rays.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace vcp::HWY_NAMESPACE {
+
+constexpr int kGroupHeight = kLanes / kGroupWidth, kGroupRows = kTileHeight / kGroupHeight;
+constexpr int kGroups = kGroupColumns * kGroupRows;
+
+struct RayGroup {
+    Lane column, row;          // pixels from the tile's middle
+    Lane3 direction, inverse;  // no component is 0
+    Mask alive;                // rays of the picture without a hit
+    // Of a hit: its distance in finest cells, multiplied with the direction, and what TileHits keeps.
+    Lane t, x, y, z, side;
+    Lane3 normal;
+    LaneWords leaf;
+};
+
+/// unfoldOctahedron of leaf_math.h, times `length`.
+HWY_INLINE Lane3 unfoldOctahedron(Lane x, Lane y, Lane length) {
+    const Lane z = Lane(1.0f) - abs(x) - abs(y), fold = max(-z, Lane(0.0f));
+    x = x - Lane(hn::CopySign(fold.v, x.v));
+    y = y - Lane(hn::CopySign(fold.v, y.v));
+    const Lane scale = length / sqrt(dot(Lane3(x, y, z), Lane3(x, y, z)));
+    return {x * scale, y * scale, z * scale};
+}
+
+/// Returns 1 / x, x being moved away from 0 first.
+HWY_INLINE Lane invert(Lane& x) {
+    x = select(abs(x) < Lane(1e-18f), Lane(1e-18f), x);
+    return Lane(1.0f) / x;
+}
+
+HWY_INLINE Lane3 spread(glm::dvec3 v) { return {Lane(float(v.x)), Lane(float(v.y)), Lane(float(v.z))}; }
+HWY_INLINE Lane3 spread(glm::vec3 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
+
+/// Group `index` of a tile, its groups counted row by row. `size`: pixels of the tile that are in the picture.
+HWY_INLINE RayGroup rayGroup(const TileRays& rays, glm::ivec2 size, int index) {
+    const int x = index % kGroupColumns * kGroupWidth, y = index / kGroupColumns * kGroupHeight;
+    alignas(32) float columns[8], rows[8];
+    for (int lane = 0; lane < kLanes; ++lane) {
+        columns[lane] = float(x + lane % kGroupWidth);
+        rows[lane] = float(y + lane / kGroupWidth);
+    }
+    RayGroup group;
+    const Lane column = load(columns), row = load(rows);
+    group.alive = (column < Lane(float(size.x))) & (row < Lane(float(size.y)));
+    group.column = column + Lane(kFirstColumn);
+    group.row = row + Lane(kFirstRow);
+    group.direction = mulAdd(group.column, spread(rays.directionPerX),
+                             mulAdd(group.row, spread(rays.directionPerY), spread(rays.direction)));
+    group.inverse.x = invert(group.direction.x);
+    group.inverse.y = invert(group.direction.y);
+    group.inverse.z = invert(group.direction.z);
+    group.t = Lane(hwy::HighestValue<float>());
+    group.x = group.y = group.z = group.side = Lane(0.0f);
+    group.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
+    group.leaf = hn::Zero(Words());
+    return group;
+}
+
+/// What rays cannot miss by more than half a group: the reach of a number that is linear in the pixel's place.
+HWY_INLINE Lane reachInGroup(Lane perX, Lane perY) {
+    return mulAdd(abs(perX), Lane(0.5f * (kGroupWidth - 1)), abs(perY) * Lane(0.5f * (kGroupHeight - 1)));
+}
+
+/// The rays of a group in a leaf: `start` in leaf space, and the part that is inside, in leaf edges.
+struct GroupSegment {
+    Lane3 start;
+    Lane first, last;
+    Mask inside;
+};
+
+/// The leaf's box is wider by what its rays are rounded by, so that a ray along a wall is in both leaves beside it.
+HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
+    GroupSegment s;
+    s.start =
+        mulAdd(group.column, spread(leaf.startPerX), mulAdd(group.row, spread(leaf.startPerY), spread(leaf.start)));
+    const Lane low(-leaf.rounding), high(1.0f + leaf.rounding);
+    const Lane x0 = (low - s.start.x) * group.inverse.x, x1 = (high - s.start.x) * group.inverse.x;
+    const Lane y0 = (low - s.start.y) * group.inverse.y, y1 = (high - s.start.y) * group.inverse.y;
+    const Lane z0 = (low - s.start.z) * group.inverse.z, z1 = (high - s.start.z) * group.inverse.z;
+    s.first = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), Lane(leaf.tauMin)));
+    s.last = min(min(max(x0, x1), max(y0, y1)), max(z0, z1));
+    s.inside = group.alive & (s.first <= s.last);
+    return s;
+}
+
+}  // namespace vcp::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,41 @@
+// What the rays of one tile hit.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "octree/page/strips.h"
+
+namespace vcp {
+
+inline constexpr int kTileWidth = 16, kTileHeight = 8, kTilePixels = kTileWidth * kTileHeight;
+
+/// A soft leaf, or a triangle of a hard leaf, that rays of the tile hit.
+struct HitLeaf {
+    uint32_t page;   ///< of the scene (HostScene::page)
+    uint32_t node;   ///< the leaf's node word
+    Index3 corners;  ///< the triangle's vertices in the page; of hard leaves only
+};
+
+/// The first hits of a tile's rays. Element y * kTileWidth + x of an array belongs to pixel corner + (x, y); those
+/// outside of the picture say nothing.
+struct TileHits {
+    glm::ivec2 corner{0};
+    glm::ivec2 size{0};                      ///< pixels of the tile that are in the picture
+    bool any = false;                        ///< false: no ray hit, and nothing below is written
+    alignas(32) float depth[kTilePixels];    ///< world units; infinite where a ray hit nothing
+    alignas(32) uint32_t leaf[kTilePixels];  ///< element of `leaves`; undefined where a ray hit nothing
+    /// Of a soft leaf the hit in leaf space, of a triangle the weights of its second and third vertex and nothing.
+    alignas(32) float x[kTilePixels], y[kTilePixels], z[kTilePixels];
+    /// Of a soft leaf a number with the sign of the side that the ray came from (sideBefore in shared/leaf_math.h).
+    alignas(32) float side[kTilePixels];
+    /// The surface's normal: of any length, on the side that the ray comes from, or near a silhouette leaning away a
+    /// bit.
+    alignas(32) float normalX[kTilePixels], normalY[kTilePixels], normalZ[kTilePixels];
+    std::vector<HitLeaf> leaves;
+};
+
+}  // namespace vcp

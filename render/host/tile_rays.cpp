@@ -1,0 +1,79 @@
+#include "render/host/tile_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace vcp {
+
+namespace {
+
+/// How far beyond its outermost rays a group of rays reaches, in pixels. It bridges rounding.
+constexpr double kMargin = 1.0 / 64;
+
+double sumOf(glm::dvec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+
+/// The plane through the rays `at` steps along `step` from the middle. `across`: the other step.
+void setPlane(TilePlanes& planes, int index, const TileRays& rays, double at, bool alongX) {
+    const glm::dvec3 originStep = alongX ? rays.originPerX : rays.originPerY;
+    const glm::dvec3 directionStep = alongX ? rays.directionPerX : rays.directionPerY;
+    const glm::dvec3 across = alongX ? rays.originPerY + rays.directionPerY : rays.originPerX + rays.directionPerX;
+    glm::dvec3 n = glm::normalize(glm::cross(rays.direction + at * directionStep, across));
+    if (glm::dot(n, originStep + directionStep) < 0) n = -n;
+    planes.x[index] = float(n.x);
+    planes.y[index] = float(n.y);
+    planes.z[index] = float(n.z);
+    planes.w[index] = float(-at * glm::dot(n, originStep));
+    planes.sum[index] = float(sumOf(n));
+}
+
+}  // namespace
+
+TileRays tileRays(const PictureRays& rays, const HostGrid& grid, glm::ivec2 corner) {
+    const double x = corner.x + 0.5 * kTileWidth, y = corner.y + 0.5 * kTileHeight;
+    const glm::dvec3 direction = rays.directionAt(x, y);
+    const double perCell = 1 / grid.cell, perLength = 1 / glm::length(direction);
+    return {(rays.originAt(x, y) - grid.origin) * perCell,
+            rays.originPerX * perCell,
+            rays.originPerY * perCell,
+            direction * perLength,
+            rays.directionPerX * perLength,
+            rays.directionPerY * perLength,
+            rays.directionPerX == glm::dvec3(0) && rays.directionPerY == glm::dvec3(0)};
+}
+
+TileSides tileSides(const TileRays& rays, int groupHeight) {
+    TileSides sides{};
+    const int rows = kTileHeight / groupHeight;
+    for (int i = 0; i < kGroupColumns; ++i) {
+        const double at = double(kFirstColumn) + i * kGroupWidth;
+        setPlane(sides.first, i, rays, at - kMargin, true);
+        setPlane(sides.last, i, rays, at + kGroupWidth - 1 + kMargin, true);
+    }
+    for (int j = 0; j < rows; ++j) {
+        const double at = double(kFirstRow) + j * groupHeight;
+        setPlane(sides.first, kGroupColumns + j, rays, at - kMargin, false);
+        setPlane(sides.last, kGroupColumns + j, rays, at + groupHeight - 1 + kMargin, false);
+    }
+    return sides;
+}
+
+LeafRays leafRays(const TileRays& rays, glm::dvec3 lowest, double edge) {
+    const double perEdge = 1 / edge;
+    LeafRays leaf;
+    leaf.distance = std::max(0.0f, float(glm::dot(lowest + 0.5 * edge, rays.direction)));
+    const double distance = leaf.distance;
+    leaf.start = glm::vec3((distance * rays.direction - lowest) * perEdge);
+    leaf.startPerX = glm::vec3((distance * rays.directionPerX + rays.originPerX) * perEdge);
+    leaf.startPerY = glm::vec3((distance * rays.directionPerY + rays.originPerY) * perEdge);
+    leaf.tauMin = float(-distance * perEdge);
+    leaf.edge = float(edge);
+    const auto largest = [](glm::vec3 v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
+    const float reach =
+        1 + largest(leaf.start) - kFirstColumn * largest(leaf.startPerX) - kFirstRow * largest(leaf.startPerY);
+    leaf.rounding = 0x1p-22f * reach;
+    return leaf;
+}
+
+}  // namespace vcp

@@ -1,0 +1,265 @@
+// The host's caster against the reference, ray by ray, on every instruction set that this processor has.
+#include "render/host/host_caster.h"
+
+#include <atomic>
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include "render/camera.h"
+#include "render/host/hit_surface.h"
+#include "tests/support/built_mesh.h"
+#include "tests/support/test_scene.h"
+
+namespace vcp {
+namespace {
+
+constexpr uint32_t kWidth = 250, kHeight = 187;  // no whole number of tiles
+
+struct HostPixel {
+    float depth = std::numeric_limits<float>::infinity();
+    uint64_t page = 0;
+    glm::dvec3 normal{0};
+};
+
+std::vector<HostPixel> castHost(const HostScene& scene, const PictureRays& rays) {
+    std::vector<HostPixel> pixels(size_t(rays.size.x) * rays.size.y);
+    const auto take = [&](const TileHits& hits) {
+        for (int i = 0; hits.any && i < kTilePixels; ++i) {
+            const glm::ivec2 in(i % kTileWidth, i / kTileWidth), at = hits.corner + in;
+            if (in.x >= hits.size.x || in.y >= hits.size.y || std::isinf(hits.depth[i])) continue;
+            const glm::dvec3 direction = glm::normalize(rays.directionAt(at.x + 0.5, at.y + 0.5));
+            const glm::vec3 alone = glm::normalize(surfaceAt(scene, hits, i, direction).normal);
+            glm::dvec3 normal = glm::normalize(glm::dvec3(hits.normalX[i], hits.normalY[i], hits.normalZ[i]));
+            EXPECT_LT(glm::distance(glm::vec3(normal), alone), 1e-3f);
+            // The reference bends normals back that lean away from the ray.
+            normal = glm::normalize(normal - std::max(glm::dot(normal, direction), 0.0) * direction);
+            pixels[size_t(at.y) * rays.size.x + at.x] = {hits.depth[i],
+                                                         scene.page(hits.leaves[hits.leaf[i]].page).number, normal};
+        }
+    };
+    EXPECT_TRUE(castPicture(scene, rays, {.threads = 2}, take));
+    return pixels;
+}
+
+struct Comparison {
+    uint64_t hit = 0, miss = 0;
+    uint64_t silhouette = 0;  ///< rays that hit or miss, or hit another sheet, depending on a ten-thousandth of a cell
+    uint64_t wrong = 0;
+    double depthMax = 0, normalMax = 0;  ///< cells, over all other hits; radians
+};
+
+class Comparer {
+public:
+    Comparer(const PageCache& cache, const std::vector<uint64_t>& cut)
+        : cache_(cache), scene_(*HostScene::create(cache, cut)), reference_(*ReferenceCaster::create(cache, cut)) {}
+
+    Comparison compare(const Camera& camera) const {
+        const std::vector<HostPixel> pixels = castHost(scene_, pictureRays(camera, kWidth, kHeight));
+        Comparison c;
+        for (uint32_t y = 0; y < kHeight; ++y)
+            for (uint32_t x = 0; x < kWidth; ++x) {
+                const CameraRay ray = cameraRay(camera, kWidth, kHeight, x + 0.5, y + 0.5);
+                add(ray, pixels[size_t(y) * kWidth + x], c);
+            }
+        return c;
+    }
+
+private:
+    void add(const CameraRay& ray, const HostPixel& pixel, Comparison& c) const {
+        const auto expected = reference_.cast({ray.origin, ray.direction});
+        const bool found = std::isfinite(pixel.depth);
+        if (!expected && !found) {
+            ++c.miss;
+            return;
+        }
+        const double cell = cache_.dataset().cellOf(expected ? expected->level : cache_.dataset().header.levels - 1);
+        const double error = expected && found ? std::abs(double(pixel.depth) - expected->t) / cell : 1e30;
+        const double rounding = 4e-7 * double(pixel.depth) / cell;
+        // At a slant the depth follows the place: by the tangent of the angle.
+        const double cosine = expected ? std::max(1e-3, -glm::dot(expected->normal, ray.direction)) : 1;
+        if (error <= rounding + 4e-4 / cosine) {
+            ++c.hit;
+            c.depthMax = std::max(c.depthMax, error);
+            c.normalMax = std::max(c.normalMax, std::acos(std::min(1.0, glm::dot(pixel.normal, expected->normal))));
+            return;
+        }
+        ++(isSilhouette(ray, pixel, cell) ? c.silhouette : c.wrong);
+    }
+
+    /// Whether rays next to this one find in the reference what the host found here.
+    [[nodiscard]] bool isSilhouette(const CameraRay& ray, const HostPixel& pixel, double cell) const {
+        const glm::dvec3 aside = glm::normalize(glm::cross(ray.direction, glm::dvec3(0.31, 0.57, 0.83)));
+        const glm::dvec3 up = glm::cross(ray.direction, aside);
+        for (int i = 0; i < 16; ++i) {
+            const double angle = i * 0.3927, reach = 3e-4 * cell;
+            const auto hit =
+                reference_.cast({ray.origin + (std::cos(angle) * aside + std::sin(angle) * up) * reach, ray.direction});
+            if (hit.has_value() != std::isfinite(pixel.depth)) continue;
+            if (!hit || std::abs(hit->t - double(pixel.depth)) < 0.1 * cell) return true;
+        }
+        return false;
+    }
+
+    const PageCache& cache_;
+    HostScene scene_;
+    ReferenceCaster reference_;
+};
+
+struct NamedCamera {
+    std::string name;
+    Camera camera;
+};
+
+std::vector<NamedCamera> cameras(glm::dvec3 lo, glm::dvec3 hi) {
+    const glm::dvec3 middle = (lo + hi) * 0.5;
+    const auto fit = [&](glm::dvec3 forward) { return fitCamera(lo, hi, forward, {0.1, 1, 0.2}, 0.6, 4.0 / 3); };
+    std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})},
+                                     {"along -z", fit({0, 0, -1})},
+                                     {"along +x", fit({1, 0, 0})},
+                                     {"along -y", fit({0, -1, 0})},
+                                     {"diagonal", fit({1, 1, 1})}};
+    for (const auto& [name, forward] :
+         {std::pair("parallel", glm::dvec3(0.5, -0.3, 0.7)), {"parallel +z", {0, 0, 1}}}) {
+        Camera parallel = fit(forward);
+        parallel.projection = Projection::Orthographic;
+        list.push_back({name, parallel});
+    }
+    Camera close = fit({-0.3, -0.5, -1});
+    close.eye = middle + (close.eye - middle) * 0.45;
+    list.push_back({"close", close});
+    Camera wide = close;
+    wide.verticalFov = 2;
+    list.push_back({"wide", wide});
+    Camera inside = fit({0.7, 0.1, -0.3});
+    inside.eye = middle + glm::dvec3(0.013, 0.021, 0.017) * (hi.x - lo.x);
+    list.push_back({"from the middle", inside});
+    Camera far = fit({-0.2, -0.3, -1});
+    far.eye = middle - glm::normalize(far.forward) * ((hi.x - lo.x) * 300);
+    far.verticalFov = 0.005;
+    list.push_back({"from far away", far});
+    return list;
+}
+
+void expectSame(const PageCache& cache, const std::vector<uint64_t>& cut, glm::dvec3 lo, glm::dvec3 hi) {
+    const Comparer comparer(cache, cut);
+    for (const NamedCamera& named : cameras(lo, hi)) {
+        SCOPED_TRACE(named.name);
+        const Comparison c = comparer.compare(named.camera);
+        EXPECT_EQ(c.wrong, 0u);
+        EXPECT_GT(c.hit, 1000u);
+        EXPECT_LE(c.silhouette * 500, c.hit);
+    }
+}
+
+/// Runs a test once for each instruction set that the processor has and the caster is compiled for.
+template <class Test>
+void onEveryInstructionSet(const Test& test) {
+    std::set<std::string> done;
+    for (int64_t sets = hwy::SupportedTargets(); sets != 0; sets &= sets - 1) {
+        hwy::SetSupportedTargetsForTest(sets & -sets);
+        if (!done.insert(hostInstructionSet()).second) continue;
+        SCOPED_TRACE(hostInstructionSet());
+        test();
+    }
+    hwy::SetSupportedTargetsForTest(0);
+}
+
+void expectSame(const test::Scene& scene, uint32_t level) {
+    expectSame(*scene.cache, cutAtLevel(scene.cache->dataset(), level), scene.boxMin, scene.boxMax);
+}
+
+TEST(HostCaster, SoftLeavesOnEveryAxisAndLevel) {
+    for (uint32_t i = 0; i < 3; ++i) {
+        SCOPED_TRACE(i);
+        expectSame(test::sphereScene(3, glm::dvec3(0), 1, i), i);
+    }
+}
+
+TEST(HostCaster, EveryInstructionSet) {
+    onEveryInstructionSet([] {
+        expectSame(test::torusScene(), 2);
+        expectSame(test::wavesScene(12, 3), 0);
+    });
+}
+
+TEST(HostCaster, OriginFarAway) {
+    const double cell = 1.0 / 1024;
+    expectSame(test::sphereScene(3, {483920.0, 3792000.0, 1200.0}, cell), 2);
+}
+
+TEST(HostCaster, TrianglesInWallsOfTheGrid) {
+    for (uint32_t split = 0; split < 3; ++split) {
+        SCOPED_TRACE(split);
+        expectSame(test::cubeScene(split), 0);
+    }
+}
+
+/// Every second page is replaced by its children, down to the finest level.
+std::vector<uint64_t> mixedCut(const Dataset& dataset) {
+    std::vector<uint64_t> cut, open = {0};
+    for (size_t i = 0; i < open.size(); ++i) {
+        const PageEntry& page = dataset.pages[open[i]];
+        if (page.childMask == 0 || (i % 2 == 1 && page.level > 0)) {
+            cut.push_back(open[i]);
+            continue;
+        }
+        for (const uint64_t child : childrenOf(page)) open.push_back(child);
+    }
+    return cut;
+}
+
+TEST(HostCaster, BuiltMeshOnEveryLevelAndInAMixedCut) {
+    IndexedMesh mesh = test::torusMesh({0.1, 0.2, 0.3}, 1, 0.4, 90, 45);
+    test::append(mesh, test::boxMesh({-0.3, -0.3, -0.3}, {0.35, 0.25, 0.3}, 4));
+    const test::BuiltMesh built(mesh, 0.03);
+    ASSERT_TRUE(built.ok());
+    const Dataset& dataset = built.cache().dataset();
+    ASSERT_GE(built.levels(), 2u);
+    for (uint32_t level = 0; level < built.levels(); ++level) {
+        SCOPED_TRACE(level);
+        expectSame(built.cache(), cutAtLevel(dataset, level), {-1.4, -1.3, -1.2}, {1.6, 1.7, 1.8});
+    }
+    expectSame(built.cache(), mixedCut(dataset), {-1.4, -1.3, -1.2}, {1.6, 1.7, 1.8});
+}
+
+TEST(HostCaster, NarrowTrianglesAndPoints) {
+    const test::BuiltMesh built(test::randomTriangles(3000, 11, true), 0.05);
+    ASSERT_TRUE(built.ok());
+    expectSame(built.cache(), cutAtLevel(built.cache().dataset(), 99), glm::dvec3(0), glm::dvec3(1));
+}
+
+TEST(HostCaster, StopsBetweenTiles) {
+    const auto scene = test::torusScene();
+    const auto host = HostScene::create(*scene.cache, cutAtLevel(*scene.dataset, 2));
+    ASSERT_TRUE(host);
+    const PictureRays rays =
+        pictureRays(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 1), 640, 640);
+    std::stop_source stop;
+    std::atomic<int> tiles = 0;
+    const auto cast = castPicture(*host, rays, {.threads = 1, .stop = stop.get_token()}, [&](const TileHits&) {
+        if (++tiles == 3) stop.request_stop();
+    });
+    ASSERT_FALSE(cast);
+    EXPECT_EQ(cast.error().code, ErrorCode::Cancelled);
+    EXPECT_EQ(tiles, 3);
+}
+
+TEST(HostScene, RefusesWhatIsNoCut) {
+    const auto scene = test::torusScene();
+    std::vector<uint64_t> cut = cutAtLevel(*scene.dataset, 2);
+    cut.push_back(0);
+    EXPECT_FALSE(HostScene::create(*scene.cache, cut));
+    EXPECT_FALSE(HostScene::create(*scene.cache, std::vector<uint64_t>{0, 1}));
+    EXPECT_FALSE(HostScene::create(*scene.cache, std::vector<uint64_t>{1, 1}));
+    const auto view = scene.cache->view(1);
+    const HostGrid grid{.levels = 3, .log2Cells = view->header.log2Cells};
+    EXPECT_TRUE(HostScene::create(grid, std::vector<HostPage>{{.view = view, .place = {1, 0, 1}, .level = 1}}));
+    EXPECT_FALSE(HostScene::create(grid, std::vector<HostPage>{{.view = view, .place = {2, 0, 0}, .level = 1}}));
+    EXPECT_FALSE(HostScene::create(grid, std::vector<HostPage>{{.view = view, .level = 3}}));
+}
+
+}  // namespace
+}  // namespace vcp

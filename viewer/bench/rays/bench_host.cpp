@@ -1,0 +1,104 @@
+// The host's caster as a method of the ray benchmark: over the cut that the renderer would draw.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "builder/measure/quantile.h"
+#include "render/frame_setup.h"
+#include "render/host/host_caster.h"
+#include "viewer/bench/rays/bench_tracer.h"
+
+namespace vcp {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct HostPixel {
+    float t = std::numeric_limits<float>::infinity();
+    glm::vec3 normal{0};
+    uint32_t page = 0;  // of the scene
+};
+
+class HostTracer final : public RayTracer {
+public:
+    HostTracer(PageCache cache, unsigned threads, double errorPixels)
+        : cache_(std::move(cache)), threads_(threads), errorPixels_(errorPixels) {}
+
+    [[nodiscard]] std::string device() const override { return "CPU, " + hostInstructionSet(); }
+    [[nodiscard]] std::string knob() const override { return fmt::format("error-pixels {:g}", errorPixels_); }
+    [[nodiscard]] uint64_t bytes() const override { return bytes_; }
+
+    Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
+        VCP_TRY_ASSIGN(const auto scene, sceneFor(camera, size));
+        const PictureRays rays = pictureRays(camera, uint32_t(size.x), uint32_t(size.y));
+        std::vector<HostPixel> pixels(size_t(size.x) * size.y);
+        std::vector<double> seconds;
+        for (int repetition = 0; repetition <= repetitions; ++repetition) {
+            const auto start = Clock::now();
+            VCP_TRY(castPicture(scene, rays, {.threads = threads_},
+                                [&](const TileHits& hits) { take(rays, hits, pixels); }));
+            if (repetition > 0) seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
+        }
+        TracedPicture picture;
+        picture.seconds = upperQuantile(seconds, 0.5);
+        picture.hits.resize(pixels.size());
+        for (size_t i = 0; i < pixels.size(); ++i) {
+            if (std::isinf(pixels[i].t)) continue;
+            const uint64_t page = scene.page(pixels[i].page).number;
+            // The depth is rounded to single precision.
+            const double rounding = 2e-7 * double(pixels[i].t);
+            picture.hits[i] = SurfaceHit{pixels[i].t, glm::normalize(glm::dvec3(pixels[i].normal)),
+                                         cache_.dataset().pages[page].certifiedError + rounding};
+        }
+        return picture;
+    }
+
+private:
+    Result<HostScene> sceneFor(const Camera& camera, glm::ivec2 size) {
+        FrameRequest request;
+        request.camera = camera;
+        request.width = uint32_t(size.x);
+        request.height = uint32_t(size.y);
+        request.errorPixels = errorPixels_;
+        const Dataset& dataset = cache_.dataset();
+        const std::vector<uint64_t> ones(dataset.pages.size(), 1);
+        const std::vector<uint8_t> all(ones.size(), 1), available(ones.size(), kAvailable);
+        const Selection selection =
+            selectPages(dataset, selectionView(request), std::numeric_limits<uint64_t>::max(), ones, all, available);
+        VCP_TRY(cache_.load(selection.cut));
+        bytes_ = 0;
+        for (const uint64_t page : selection.cut) bytes_ += dataset.pages[page].pageBytes;
+        return HostScene::create(cache_, selection.cut);
+    }
+
+    static void take(const PictureRays& rays, const TileHits& hits, std::vector<HostPixel>& pixels) {
+        for (int y = 0; y < hits.size.y; ++y)
+            for (int x = 0; x < hits.size.x; ++x) {
+                const int i = y * kTileWidth + x;
+                const glm::ivec2 at = hits.corner + glm::ivec2(x, y);
+                HostPixel& pixel = pixels[size_t(at.y) * rays.size.x + at.x];
+                pixel = {};
+                if (!hits.any || std::isinf(hits.depth[i])) continue;
+                pixel = {
+                    hits.depth[i], {hits.normalX[i], hits.normalY[i], hits.normalZ[i]}, hits.leaves[hits.leaf[i]].page};
+            }
+    }
+
+    PageCache cache_;
+    unsigned threads_;
+    double errorPixels_;
+    uint64_t bytes_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<RayTracer>> makeHostTracer(const std::filesystem::path& file, unsigned threads,
+                                                  double errorPixels) {
+    VCP_TRY_ASSIGN(auto cache, PageCache::open(file));
+    return std::unique_ptr<RayTracer>(std::make_unique<HostTracer>(std::move(cache), threads, errorPixels));
+}
+
+}  // namespace vcp
