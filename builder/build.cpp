@@ -103,7 +103,8 @@ private:
         plan_.frame = frame;
         plan_.errorTarget = error;
         plan_.isExact = options_.error <= 0;
-        plan_.hasSlabs = options_.coarseLeaves == CoarseLeaves::Slabs;
+        // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
+        plan_.hasSlabs = plan_.isExact && options_.coarseLeaves == CoarseLeaves::Slabs;
         plan_.pageBytes = memory_.pageBytes;
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());

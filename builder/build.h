@@ -27,8 +27,9 @@ namespace vcp {
 /// Auto: all colours there are. Texture: materials and their images, not the vertices' colours.
 enum class ColourChoice { Auto, Vertex, Texture, None };
 
-/// What the levels above the finest are made of. Slabs: a plane with a thickness for each cell (slab/slab_tree.h).
-/// Mesh: soft and hard leaves over triangles whose vertices are clustered (level/).
+/// What the levels above the finest are made of. Slabs: a plane with a thickness for each cell (slab/slab_tree.h),
+/// where the finest level is the mesh. Mesh: soft and hard leaves over triangles whose vertices are clustered (level/);
+/// always where there is an `error`.
 enum class CoarseLeaves { Slabs, Mesh };
 
 struct BuildProgress {

@@ -160,10 +160,14 @@ Surface softSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
     return surface;
 }
 
+// Returns the direction of a slab leaf's planes, to either side.
+vec3 slabDirection(uint node, uint faces) {
+    return decodeDirection(fetchWord(faces, node & kSlabVectorMask) >> kSlabDirectionShift);
+}
+
 Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
     uint vector = hit.leaf & kSlabVectorMask;
-    vec3 n = decodeDirection(fetchWord(faces, vector) >> kSlabDirectionShift);
-    Surface surface = Surface(turnedTo(n, -direction), vec4(0.0));
+    Surface surface = Surface(turnedTo(slabDirection(hit.leaf, faces), -direction), vec4(0.0));
     if (kColour != 0u)
         surface.colour = unpackUnorm4x8(texelWord(fetchColour(colourFaces + (vector >> 2)), vector & 3u));
     return surface;

@@ -18,6 +18,31 @@ const uint kMostCrossings = 64u;
 // A ray goes on so far past a hit, in cells of its page: more than leaf walls bridge, less than the thinnest parts.
 const float kPastHit = 0.15;
 
+// Slabs whose normals are this near to each other, as a cosine, and of which the second begins so near to the first
+// one's plane, in cells, are of one sheet: a ray may cross several where the sheet passes from cell to cell.
+const float kOneSheetCosine = 0.6;
+const float kOneSheetCells = 0.6;
+
+// A wall that a ray has passed.
+struct Wall {
+    vec3 normal;  // of a slab; else 0
+    float gap;    // how far the ray has come since; finest cells
+};
+
+// Returns whether a hit is not of the same sheet as the wall before it, and makes it the wall before the next.
+bool isNewWall(Hit hit, float cell, vec3 direction, inout Wall before) {
+    vec3 normal = vec3(0.0);
+    bool slab = hit.depth < kNoHit && nodeType(hit.leaf) == kNodeSlab;
+    while (slab) {
+        normal = slabDirection(hit.leaf, fetchTableSections(hit.record).faces);
+        slab = false;
+    }
+    bool isSame = abs(dot(normal, before.normal)) > kOneSheetCosine &&
+                  abs(dot(direction, before.normal)) * (before.gap + hit.depth) < kOneSheetCells * cell;
+    before = Wall(normal, kPastHit * cell);
+    return !isSame;
+}
+
 // Whether a point in a section plane, the ray's origin, is inside of the solid: an odd number of walls lies
 // behind. Two of three rays decide, for one may graze a wall.
 bool isInside(Ray ray, inout Work work) {
@@ -30,11 +55,12 @@ bool isInside(Ray ray, inout Work work) {
         onward.inverse = 1.0 / onward.direction;
         uint crossings = 0u;
         bool open = true;
-        while (open && crossings < kMostCrossings) {
+        Wall before = Wall(vec3(0.0), 0.0);
+        for (uint turn = 0u; open && turn < kMostCrossings; turn++) {
             Hit wall = castRay(onward, 0.0, kNoHit, work);
             open = wall.depth < kNoHit;
-            crossings += open ? 1u : 0u;
             float cell = powerOfTwo(int(frame.finestLevel) + wall.pageBits - int(kLatticeBits));
+            crossings += open && isNewWall(wall, cell, onward.direction, before) ? 1u : 0u;
             onward = movedAlong(onward, open ? wall.depth + kPastHit * cell : 0.0);
         }
         inside += crossings & 1u;

@@ -53,7 +53,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options) {
         ->default_str("auto");
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
-              "vectors at corners where they suffice)")
+              "vectors at corners where they suffice; always with --error)")
         ->type_name("KIND")
         ->default_str(options.coarseLeaves == CoarseLeaves::Slabs ? "slabs" : "mesh");
     app.add_option("--threads", options.threads, "Threads that build [one a processor]")
