@@ -35,6 +35,17 @@ inline uint64_t leafKey(glm::ivec3 lower, int edge) {
     return positionKey(lower) | uint64_t(std::countr_zero(unsigned(edge))) << 48;
 }
 
+/// Calls visit(axis, end, key) for the nodes beside one, of its size: those of them that are not below 0.
+template <class Visit>
+void forEachBeside(const NodePlace& place, Visit&& visit) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (int end = 0; end < 2; ++end) {
+            glm::ivec3 lower = place.lower();
+            lower[axis] += end != 0 ? int{place.edge} : -int{place.edge};
+            if (lower[axis] >= 0) visit(axis, end, leafKey(lower, place.edge));
+        }
+}
+
 /// The places of a checked page's nodes.
 inline std::vector<NodePlace> placesOf(const PageView& page) {
     std::vector<NodePlace> places(page.nodes.size());

@@ -82,15 +82,12 @@ private:
     void codeSlab(uint32_t word, const NodePlace& place) {
         std::array<uint32_t, 4> sum{};
         uint32_t count = 0;
-        for (int axis = 0; axis < 3; ++axis)
-            for (const int step : {-int{place.edge}, int{place.edge}}) {
-                glm::ivec3 lower = place.lower();
-                lower[axis] += step;
-                const uint32_t* near = lower[axis] < 0 ? nullptr : slabs_.find(leafKey(lower, place.edge));
-                if (near == nullptr) continue;
-                ++count;
-                for (size_t i = 0; i < 4; ++i) sum[i] += *near >> 8 * i & 255u;
-            }
+        forEachBeside(place, [&](int, int, uint64_t key) {
+            const uint32_t* near = slabs_.find(key);
+            if (near == nullptr) return;
+            ++count;
+            for (size_t i = 0; i < 4; ++i) sum[i] += *near >> 8 * i & 255u;
+        });
         uint32_t& colour = reinterpret_cast<uint32_t*>(faces_.data())[slabVector(word)];
         codeColour(colour, count > 0 ? mean(sum, count) : last_, 3);
         slabs_.findOrAdd(leafKey(place.lower(), place.edge)) = last_ = colour;

@@ -63,14 +63,12 @@ private:
 
     void findNeighbours(const NodePlace& place) {
         count_ = 0;
-        for (int axis = 0; axis < 3; ++axis)
-            for (int end = 0; end < 2; ++end) {
-                glm::ivec3 lower = place.lower();
-                lower[axis] += end != 0 ? place.edge : -int{place.edge};
-                const Leaf* beside = lower[axis] < 0 ? nullptr : leaves_.find(leafKey(lower, place.edge));
-                beside_[axis][end] = beside;
-                if (beside != nullptr) neighbours_[count_++] = {beside, axis, end != 0 ? 1 : -1};
-            }
+        for (auto& ends : beside_) ends[0] = ends[1] = nullptr;
+        forEachBeside(place, [&](int axis, int end, uint64_t key) {
+            const Leaf* beside = leaves_.find(key);
+            beside_[axis][end] = beside;
+            if (beside != nullptr) neighbours_[count_++] = {beside, axis, end != 0 ? 1 : -1};
+        });
     }
 
     /// Codes a vector: thickness, direction, offset; each helps to foretell the next.
