@@ -122,10 +122,7 @@ glm::dvec3 triangleNormal(const PageView& view, const Index3& v, double weight1,
     flat = f64::turnedTo(flat, -direction);
     const double weights[3] = {1 - weight1 - weight2, weight1, weight2};
     glm::dvec3 normal{0};
-    for (int i = 0; i < 3; ++i) {
-        const uint32_t code = view.normals[v[i]];
-        normal += weights[i] * ((code & kNormalCreaseBit) != 0 ? flat : f64::turnedTo(f64::decodeNormal(code), flat));
-    }
+    for (int i = 0; i < 3; ++i) normal += weights[i] * f64::cornerNormal(view.normals[v[i]], flat);
     return normal;
 }
 

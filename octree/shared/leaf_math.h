@@ -121,6 +121,12 @@ INLINE Real3 leafNormal(LeafField leaf, Real3 x) {
 // Returns n or -n, whichever is on the side of `reference`.
 INLINE Real3 turnedTo(Real3 n, Real3 reference) { return dot(n, reference) < Real(0.0) ? -n : n; }
 
+// Returns what a vertex adds to the normal within a triangle, on the side of the triangle's own normal: that one itself
+// at a crease, else the vertex'. `code`: the vertex' packed normal.
+INLINE Real3 cornerNormal(uint code, Real3 ofTriangle) {
+    return (code & kNormalCreaseBit) != 0u ? ofTriangle : turnedTo(decodeNormal(code), ofTriangle);
+}
+
 // Turns a soft leaf's normal (leafNormal) to the side that a ray along d comes from. Where the ray grazes the surface,
 // `side` decides (sideBefore): a normal a little past the silhouette must not turn over.
 INLINE Real3 facingNormal(Real3 n, Real3 d, Real side) {

@@ -35,9 +35,8 @@ HitSurface triangleSurface(const PageView& view, const Index3& corners, glm::vec
     flat = f32::turnedTo(flat, -direction);
     HitSurface surface{glm::vec3(0), glm::vec4(0)};
     for (int i = 0; i < 3; ++i) {
-        const uint32_t vertex = corners[size_t(i)], code = view.normals[vertex];
-        const bool isCrease = (code & kNormalCreaseBit) != 0;
-        surface.normal += weights[i] * (isCrease ? flat : f32::turnedTo(f32::decodeNormal(code), flat));
+        const uint32_t vertex = corners[size_t(i)];
+        surface.normal += weights[i] * f32::cornerNormal(view.normals[vertex], flat);
         if (!view.vertexColours.empty()) surface.colour += weights[i] * glm::unpackUnorm4x8(view.vertexColours[vertex]);
     }
     return surface;

@@ -184,9 +184,7 @@ Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 d
     vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
     Surface surface = Surface(vec3(0.0), vec4(0.0));
     for (int i = 0; i < 3; i++) {
-        uint code = fetchWord(sections.normals, corners[i]);
-        surface.normal +=
-            w[i] * ((code & kNormalCreaseBit) != 0u ? flatNormal : turnedTo(decodeNormal(code), flatNormal));
+        surface.normal += w[i] * cornerNormal(fetchWord(sections.normals, corners[i]), flatNormal);
         if (kColour != 0u)
             surface.colour +=
                 w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (corners[i] >> 2)), corners[i] & 3u));
