@@ -162,7 +162,7 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.lightPlane = hitPlanes(request, colour) - 1;
     c.paperEpsilon = request.march.epsilon;
     c.worldPerCell = float(header.cell * placement.scale);
-    c.isCovering = (header.flags & kFlagCovering) != 0 ? 1 : 0;
+    c.isCovering = dataset != nullptr && dataset->isCovering() ? 1 : 0;
     const glm::dquat& q = placement.rotation;
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     setSections(c, request, header);

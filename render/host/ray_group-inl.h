@@ -95,6 +95,31 @@ HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     return s;
 }
 
+HWY_INLINE Lane clamp01(Lane x) { return min(max(x, Lane(0.0f)), Lane(1.0f)); }
+
+/// The part of rays that is in a leaf: from p over p + d, in leaf space.
+struct LeafPart {
+    Lane3 p, d;
+};
+
+HWY_INLINE LeafPart partInLeaf(const RayGroup& group, const GroupSegment& s) {
+    const Lane3 from = mulAdd(s.first, group.direction, s.start), to = mulAdd(s.last, group.direction, s.start);
+    const Lane3 p(clamp01(from.x), clamp01(from.y), clamp01(from.z));
+    return {p, Lane3(clamp01(to.x), clamp01(to.y), clamp01(to.z)) - p};
+}
+
+/// Keeps the hits at p + u d of the rays in `hit`; returns where they are, in leaf space.
+HWY_INLINE Lane3 keepHits(RayGroup& group, const LeafRays& leaf, const GroupSegment& s, const LeafPart& part, Mask hit,
+                          Lane u) {
+    const Lane tau = mulAdd(u, s.last - s.first, s.first);
+    group.t = select(hit, mulAdd(tau, Lane(leaf.edge), Lane(leaf.distance)), group.t);
+    const Lane3 at = mulAdd(u, part.d, part.p);
+    group.x = select(hit, at.x, group.x);
+    group.y = select(hit, at.y, group.y);
+    group.z = select(hit, at.z, group.z);
+    return at;
+}
+
 }  // namespace vcp::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -8,7 +8,7 @@
 #endif
 
 #include "octree/surface/leaf_math.h"
-#include "render/host/soft_leaf-inl.h"
+#include "render/host/ray_group-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
@@ -44,9 +44,8 @@ HWY_INLINE HalfSpan halfSpan(Lane p, Lane d, bool isUpper) {
 HWY_INLINE Mask castSlabLeaf(const SlabLeaf& slab, const LeafRays& leaf, RayGroup& group) {
     const GroupSegment s = segmentIn(group, leaf);
     if (!any(s.inside)) return s.inside;
-    const Lane3 from = mulAdd(s.first, group.direction, s.start), to = mulAdd(s.last, group.direction, s.start);
-    const Lane3 p(clamp01(from.x), clamp01(from.y), clamp01(from.z));
-    const Lane3 d = Lane3(clamp01(to.x), clamp01(to.y), clamp01(to.z)) - p;
+    const LeafPart part = partInLeaf(group, s);
+    const auto& [p, d] = part;
     const Lane3 n = spread(slab.normal);
     const Lane slope = dot(n, d), least(1e-20f);
     const Lane scale = Lane(1.0f) / select(abs(slope) < least, least, slope);
@@ -71,12 +70,7 @@ HWY_INLINE Mask castSlabLeaf(const SlabLeaf& slab, const LeafRays& leaf, RayGrou
     const Mask fromWall = s.first > Lane(leaf.tauMin);
     const Mask hit = s.inside & (enter <= Lane(1.0f)) & (fromWall | (u > Lane(0.0f)));
     if (!any(hit)) return hit;
-    const Lane tau = mulAdd(u, s.last - s.first, s.first);
-    group.t = select(hit, mulAdd(tau, Lane(leaf.edge), Lane(leaf.distance)), group.t);
-    const Lane3 at = mulAdd(u, d, p);
-    group.x = select(hit, at.x, group.x);
-    group.y = select(hit, at.y, group.y);
-    group.z = select(hit, at.z, group.z);
+    keepHits(group, leaf, s, part, hit, u);
     group.normal = select(hit, select(dot(n, group.direction) > Lane(0.0f), -n, n), group.normal);
     return hit;
 }

@@ -163,28 +163,19 @@ HWY_INLINE Lane3 softNormal(const SoftLeaf& leaf, Lane3 x, Lane3 direction, Lane
     return select(away, -n, n);
 }
 
-HWY_INLINE Lane clamp01(Lane x) { return min(max(x, Lane(0.0f)), Lane(1.0f)); }
-
 /// Casts the rays of a group through a soft leaf. Returns those that hit, with their hits in the group.
 HWY_INLINE Mask castSoftLeaf(const SoftLeaf& soft, const LeafRays& leaf, RayGroup& group) {
     const GroupSegment s = segmentIn(group, leaf);
     if (!any(s.inside)) return s.inside;
-    const Lane3 from = mulAdd(s.first, group.direction, s.start), to = mulAdd(s.last, group.direction, s.start);
-    const Lane3 p(clamp01(from.x), clamp01(from.y), clamp01(from.z));
-    const Lane3 d = Lane3(clamp01(to.x), clamp01(to.y), clamp01(to.z)) - p;
-    const field::RayField ray = restrictToRay(soft, p, d);
+    const LeafPart part = partInLeaf(group, s);
+    const field::RayField ray = restrictToRay(soft, part.p, part.d);
     // Where a ray begins inside the leaf, that end is no wall.
     const Lane wall(max(Lane(soft.wall), Lane(leaf.rounding)));
     const Lane wallIn = select(s.first > Lane(leaf.tauMin), wall, Lane(0.0f));
     const Crossing crossing = firstCrossing(ray, s.inside, wallIn, wall, soft.dip);
     if (!any(crossing.hit)) return crossing.hit;
-    const Lane tau = mulAdd(crossing.u, s.last - s.first, s.first);
-    group.t = select(crossing.hit, mulAdd(tau, Lane(leaf.edge), Lane(leaf.distance)), group.t);
-    const Lane3 at = mulAdd(crossing.u, d, p);
-    const Lane side = sideBefore(ray, crossing.u, d);
-    group.x = select(crossing.hit, at.x, group.x);
-    group.y = select(crossing.hit, at.y, group.y);
-    group.z = select(crossing.hit, at.z, group.z);
+    const Lane3 at = keepHits(group, leaf, s, part, crossing.hit, crossing.u);
+    const Lane side = sideBefore(ray, crossing.u, part.d);
     group.side = select(crossing.hit, side, group.side);
     group.normal = select(crossing.hit, softNormal(soft, at, group.direction, side), group.normal);
     return crossing.hit;
