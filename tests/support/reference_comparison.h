@@ -15,9 +15,9 @@ struct NamedCamera {
     Camera camera;
 };
 
-/// Around, along the axes, close, from inside the box and the body, with parallel rays.
-inline std::vector<NamedCamera> cameras(const Scene& scene) {
-    const glm::dvec3 lo = scene.boxMin, hi = scene.boxMax, middle = (lo + hi) * 0.5;
+/// Around a box, along the axes, close, from inside the box and the body, with parallel rays.
+inline std::vector<NamedCamera> cameras(glm::dvec3 lo, glm::dvec3 hi) {
+    const glm::dvec3 middle = (lo + hi) * 0.5;
     const double edge = hi.x - lo.x;
     const auto fit = [&](glm::dvec3 forward) { return fitCamera(lo, hi, forward, {0.1, 1, 0.2}, 0.6, 4.0 / 3); };
     std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})},
@@ -46,6 +46,8 @@ inline std::vector<NamedCamera> cameras(const Scene& scene) {
     list.push_back({"from far away", far});
     return list;
 }
+
+inline std::vector<NamedCamera> cameras(const Scene& scene) { return cameras(scene.boxMin, scene.boxMax); }
 
 struct Comparison {
     uint64_t hit = 0, miss = 0, missed = 0, wrong = 0;

@@ -11,6 +11,7 @@
 #include "render/camera.h"
 #include "render/host/hit_surface.h"
 #include "tests/support/built_mesh.h"
+#include "tests/support/reference_comparison.h"
 #include "tests/support/test_scene.h"
 
 namespace vcp {
@@ -108,44 +109,18 @@ private:
     ReferenceCaster reference_;
 };
 
-struct NamedCamera {
-    std::string name;
-    Camera camera;
-};
-
-std::vector<NamedCamera> cameras(glm::dvec3 lo, glm::dvec3 hi) {
-    const glm::dvec3 middle = (lo + hi) * 0.5;
-    const auto fit = [&](glm::dvec3 forward) { return fitCamera(lo, hi, forward, {0.1, 1, 0.2}, 0.6, 4.0 / 3); };
-    std::vector<NamedCamera> list = {{"slanted", fit({-0.3, -0.5, -1})},
-                                     {"along -z", fit({0, 0, -1})},
-                                     {"along +x", fit({1, 0, 0})},
-                                     {"along -y", fit({0, -1, 0})},
-                                     {"diagonal", fit({1, 1, 1})}};
-    for (const auto& [name, forward] :
-         {std::pair("parallel", glm::dvec3(0.5, -0.3, 0.7)), {"parallel +z", {0, 0, 1}}}) {
-        Camera parallel = fit(forward);
-        parallel.projection = Projection::Orthographic;
-        list.push_back({name, parallel});
-    }
-    Camera close = fit({-0.3, -0.5, -1});
-    close.eye = middle + (close.eye - middle) * 0.45;
-    list.push_back({"close", close});
-    Camera wide = close;
+std::vector<test::NamedCamera> camerasOf(glm::dvec3 lo, glm::dvec3 hi) {
+    std::vector<test::NamedCamera> list = test::cameras(lo, hi);
+    Camera wide = list.front().camera;
+    wide.eye = (lo + hi) * 0.5 + (wide.eye - (lo + hi) * 0.5) * 0.45;
     wide.verticalFov = 2;
     list.push_back({"wide", wide});
-    Camera inside = fit({0.7, 0.1, -0.3});
-    inside.eye = middle + glm::dvec3(0.013, 0.021, 0.017) * (hi.x - lo.x);
-    list.push_back({"from the middle", inside});
-    Camera far = fit({-0.2, -0.3, -1});
-    far.eye = middle - glm::normalize(far.forward) * ((hi.x - lo.x) * 300);
-    far.verticalFov = 0.005;
-    list.push_back({"from far away", far});
     return list;
 }
 
 void expectSame(const PageCache& cache, const std::vector<uint64_t>& cut, glm::dvec3 lo, glm::dvec3 hi) {
     const Comparer comparer(cache, cut);
-    for (const NamedCamera& named : cameras(lo, hi)) {
+    for (const test::NamedCamera& named : camerasOf(lo, hi)) {
         SCOPED_TRACE(named.name);
         const Comparison c = comparer.compare(named.camera);
         EXPECT_EQ(c.wrong, 0u);
