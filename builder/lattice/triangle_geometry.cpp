@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <glm/common.hpp>
 
@@ -139,6 +140,34 @@ bool segmentMeetsBox(glm::dvec3 a, glm::dvec3 b, glm::dvec3 centre, double half)
         if (t0 > t1) return false;
     }
     return true;
+}
+
+std::pair<double, double> extentOf(const Polygon& polygon, int axis) {
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const glm::dvec3& p : polygon) {
+        least = std::min(least, p[axis]);
+        most = std::max(most, p[axis]);
+    }
+    return {least, most};
+}
+
+PolygonSides partAt(const Polygon& polygon, int axis, double at, Polygon& below, Polygon& above) {
+    const auto [least, most] = extentOf(polygon, axis);
+    if (most <= at || least >= at) return {most <= at ? &polygon : nullptr, least >= at ? &polygon : nullptr};
+    below.clear();
+    above.clear();
+    for (size_t i = 0; i < polygon.size(); ++i) {
+        const glm::dvec3 &a = polygon[i], &b = polygon[i + 1 < polygon.size() ? i + 1 : 0];
+        const double da = a[axis] - at, db = b[axis] - at;
+        if (da <= 0) below.add(a);
+        if (da >= 0) above.add(a);
+        if ((da < 0) == (db < 0) || da == 0 || db == 0) continue;
+        glm::dvec3 crossing = a + da / (da - db) * (b - a);
+        crossing[axis] = at;
+        below.add(crossing);
+        above.add(crossing);
+    }
+    return {&below, &above};
 }
 
 void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Polygon& polygon) {

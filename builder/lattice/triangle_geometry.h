@@ -5,6 +5,7 @@
 #include <array>
 #include <cassert>
 #include <cstddef>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -69,6 +70,18 @@ private:
     std::array<glm::dvec3, kMaxCorners> corners_;
     size_t size_ = 0;
 };
+
+/// Returns the least and the largest coordinate of a polygon along an axis.
+std::pair<double, double> extentOf(const Polygon& polygon, int axis);
+
+/// The parts of a polygon on both sides of a plane; null where there is none.
+struct PolygonSides {
+    const Polygon *below, *above;
+};
+
+/// Parts a polygon at the plane where coordinate `axis` is `at`. A part is the polygon itself, or made in `below` or
+/// `above`; a polygon in the plane is on both sides.
+PolygonSides partAt(const Polygon& polygon, int axis, double at, Polygon& below, Polygon& above);
 
 /// Clips a triangle to a box; `polygon` receives its corners in order (none: outside).
 void clipToBox(const Triangle3& triangle, glm::dvec3 lower, glm::dvec3 upper, Polygon& polygon);

@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <glm/packing.hpp>
 
 namespace vcp {
 
@@ -98,12 +99,7 @@ double normalSpread(const CellSurface& cell) {
 }
 
 uint32_t meanColour(const CellSurface& cell) {
-    uint32_t packed = 0;
-    for (int i = 0; i < 4; ++i) {
-        const float mean = cell.area > 0 ? cell.colour[i] / cell.area : 1.0f;
-        packed |= uint32_t(std::clamp(std::lround(mean * 255.0f), 0l, 255l)) << 8 * i;
-    }
-    return packed;
+    return glm::packUnorm4x8(cell.area > 0 ? cell.colour / cell.area : glm::vec4(1));
 }
 
 }  // namespace vcp

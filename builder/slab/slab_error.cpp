@@ -31,14 +31,10 @@ public:
             box_[indexOf(at)] = {centre + glm::dvec3(surface->lower) / double(kSide),
                                  centre + glm::dvec3(surface->upper) / double(kSide)};
             isFull_[indexOf(at)] = true;
-            const glm::ivec3 octant = at / 2;
-            octants_ |= 1u << (octant.x + 2 * octant.y + 4 * octant.z);
+            octants_ |= octantOf(at);
         }
     }
-    [[nodiscard]] bool isDrawn(glm::ivec3 at) const {
-        const glm::ivec3 octant = at / 2;
-        return (octants_ >> (octant.x + 2 * octant.y + 4 * octant.z) & 1u) != 0;
-    }
+    [[nodiscard]] bool isDrawn(glm::ivec3 at) const { return (octants_ & octantOf(at)) != 0; }
     /// Returns how far a point in a box is at most from the mesh: from any point of what a quarter around `at` holds.
     [[nodiscard]] double farthest(const Box& points, glm::ivec3 at) const {
         double least = std::numeric_limits<double>::infinity();
@@ -55,6 +51,8 @@ public:
     }
 
 private:
+    /// Returns the octant of a quarter, as a bit.
+    static uint32_t octantOf(glm::ivec3 at) { return 1u << (at.x / 2 + at.y / 2 * 2 + at.z / 2 * 4); }
     static size_t indexOf(glm::ivec3 at) { return size_t(at.x + kSide * (at.y + kSide * at.z)); }
 
     std::array<Box, size_t{kSide} * kSide * kSide> box_{};

@@ -7,23 +7,10 @@
 #include <vector>
 
 #include "builder/lattice/lattice_mesh.h"
+#include "builder/lattice/triangle_geometry.h"
 #include "builder/slab/page_surface.h"
 
 namespace vcp {
-
-/// A piece of a triangle: a convex polygon in the triangle's plane. A triangle that six walls cut has at most 9
-/// corners.
-struct TrianglePiece {
-    struct Corner {
-        glm::dvec3 p;        ///< in the cutter's cells, from the page's lowest corner
-        glm::dvec2 weights;  ///< of the triangle's second and third corner
-    };
-    std::array<Corner, 12> corners;
-    uint32_t count = 0;
-
-    [[nodiscard]] std::span<const Corner> all() const { return std::span(corners).first(count); }
-    void add(const Corner& corner) { corners[count++] = corner; }
-};
 
 class TriangleCutter {
 public:
@@ -38,10 +25,14 @@ public:
     SurfaceCells take();
 
 private:
-    /// The triangle that is being cut: what is blended over it.
-    struct Attributes {
+    /// The triangle that is being cut, in the cutter's cells from the page's lowest corner, and what is blended over
+    /// it.
+    struct Source {
+        Triangle3 corners;
         std::array<glm::dvec3, 3> normal;
         std::array<glm::dvec4, 3> colour;
+        /// Returns the weights of the corners at a point of the triangle.
+        [[nodiscard]] glm::dvec3 weightsAt(glm::dvec3 p) const;
     };
     /// A piece that lies in one cell.
     struct CellPiece {
@@ -50,16 +41,15 @@ private:
         glm::vec3 normal;  ///< unit
         glm::vec4 colour;
     };
-    [[nodiscard]] Attributes attributesOf(uint32_t triangle) const;
-    void clipToPage(TrianglePiece& piece) const;
-    void split(const TrianglePiece& piece, glm::ivec3 lower, int log2Edge);
-    void keep(const TrianglePiece& piece, glm::ivec3 cell);
+    [[nodiscard]] Source sourceOf(uint32_t triangle) const;
+    void split(const Polygon& piece, glm::ivec3 lower, int log2Edge);
+    void keep(const Polygon& piece, glm::ivec3 cell);
     [[nodiscard]] CellSurface sum(std::span<const CellPiece> pieces) const;
 
     const LatticeMesh& mesh_;
     glm::i32vec3 origin_;
     int depth_;
-    Attributes attributes_;
+    Source source_;
     std::vector<CellPiece> pieces_;
     std::vector<glm::vec3> corners_;  ///< from the centres of the pieces' cells
 };
