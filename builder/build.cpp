@@ -29,8 +29,10 @@ namespace vcp {
 
 namespace {
 
-// Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
+// A level of slabs is built in runs of so many pages, with checkpoints between them.
 constexpr size_t kSlabPagesPerBin = 256;
+
+// Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
 
 class Builder {
@@ -212,7 +214,7 @@ private:
         firstBin_ = done_.bin;
         if (pass_ >= 0) openPass();
         VCP_TRY(files_.reopen(done_, space_));
-        if (pass_ >= 0 && firstBin_ >= std::max<size_t>(binsOfPass(), 1))
+        if (firstBin_ >= std::max<size_t>(binsOfPass(), 1))
             return Error{.code = ErrorCode::InvalidInput,
                          .message = "names a bin that there is not; build again from the start",
                          .file = (space_.folder().path() / kJournalName).string()};
@@ -348,24 +350,35 @@ private:
 
     /// Returns in how many parts the pass is worked on, with checkpoints between them.
     [[nodiscard]] size_t binsOfPass() const {
-        if (!plan_.isOfSlabs(pass_)) return plan_.partitionOf(plan_.levelOf(pass_)).bins();
-        return (parentsOf(files_.surfaces[size_t(pass_) + 1]) + kSlabPagesPerBin - 1) / kSlabPagesPerBin;
+        if (pass_ < 0) return 0;
+        if (plan_.isOfSlabs(pass_)) return binsOf(siblingsIn(files_.surfaces[size_t(pass_) + 1]));
+        return plan_.partitionOf(plan_.levelOf(pass_)).bins();
+    }
+    static size_t binsOf(const std::vector<Siblings>& parents) {
+        return (parents.size() + kSlabPagesPerBin - 1) / kSlabPagesPerBin;
+    }
+
+    /// Returns what takes the surface in the pass's pages; null where no level is made from it.
+    [[nodiscard]] PageSpool* surfacesOfPass() {
+        return plan_.hasSlabs && pass_ > 0 ? &files_.surfaces[size_t(pass_)] : nullptr;
     }
 
     /// Makes the pages of a level from the surface in those below.
     Result<void> runSlabPass() {
-        const size_t level = size_t(pass_), bins = binsOfPass();
-        const size_t parents = parentsOf(files_.surfaces[level + 1]);
+        const PageSpool& below = files_.surfaces[size_t(pass_) + 1];
+        const std::vector<Siblings> parents = siblingsIn(below);
+        const size_t bins = binsOf(parents);
         const double begins = passBegins(pass_), share = passEnds(pass_) - begins;
         for (size_t bin = firstBin_; bin < bins; ++bin) {
-            const size_t first = bin * kSlabPagesPerBin, end = std::min(parents, first + kSlabPagesPerBin);
+            const size_t first = bin * kSlabPagesPerBin, end = std::min(parents.size(), first + kSlabPagesPerBin);
             Result<void> result;
             arena_.execute([&] {
-                result = buildSlabPages(settings(), files_.surfaces[level + 1], first, end, files_.spools[level],
-                                        files_.surfaces[level], [&](double part) {
-                                            const double done = double(first) + part * double(end - first);
-                                            return progress(stageOf(pass_), begins + share * done / double(parents));
-                                        });
+                result =
+                    buildSlabPages(settings(), below, std::span(parents).subspan(first, end - first),
+                                   files_.spools[size_t(pass_)], surfacesOfPass(), [&](double part) {
+                                       const double done = double(first) + part * double(end - first);
+                                       return progress(stageOf(pass_), begins + share * done / double(parents.size()));
+                                   });
             });
             VCP_TRY(result);
             if (bin + 1 < bins) VCP_TRY(checkpoint("levels", bin + 1));
@@ -420,8 +433,7 @@ private:
             std::vector<LatticeTriangle>().swap(soup);
             if (vertices) computeNormals(mesh);
             if (!vertices)
-                result = buildPages(settings(), mesh, first, end, files_.spools[size_t(pass_)],
-                                    plan_.hasSlabs ? &files_.surfaces[size_t(pass_)] : nullptr,
+                result = buildPages(settings(), mesh, first, end, files_.spools[size_t(pass_)], surfacesOfPass(),
                                     [&](double part) { return progress(stage, at(part)); });
             if (result && step) result = step->run(bin, mesh);
         });

@@ -7,11 +7,9 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "builder/ordered_pages.h"
 #include "builder/page/bin_triangles.h"
 #include "builder/page/exact_tree.h"
-#include "builder/page/page_encoder.h"
-#include "builder/slab_pages.h"
+#include "builder/slab/page_surface.h"
 
 namespace vcp {
 
@@ -39,15 +37,7 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
                      .message = fmt::format(
                          "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller cell edge",
                          triangles.size(), encoded.leaves)};
-    BuiltPage page;
-    page.entry.morton = code;
-    page.entry.level = uint8_t(settings.grid.level);
-    page.entry.leaves = encoded.leaves;
-    page.entry.slabLeaves = encoded.slabLeaves;
-    page.entry.hardLeaves = encoded.hardLeaves;
-    page.entry.certifiedError =
-        std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
-    if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
+    BuiltPage page = builtPage(settings, code, encoded);
     if (withSurface)
         page.surface = storedSurface(surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells));
     return page;
@@ -87,6 +77,19 @@ uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::spa
 }
 
 }  // namespace
+
+BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded) {
+    BuiltPage page;
+    page.entry.morton = code;
+    page.entry.level = uint8_t(settings.grid.level);
+    page.entry.leaves = encoded.leaves;
+    page.entry.slabLeaves = encoded.slabLeaves;
+    page.entry.hardLeaves = encoded.hardLeaves;
+    page.entry.certifiedError =
+        std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
+    if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
+    return page;
+}
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
                         PageSpool& spool, PageSpool* surfaces, const std::function<bool(double)>& progress) {

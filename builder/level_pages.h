@@ -6,7 +6,8 @@
 #include "builder/ingest.h"
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/lattice/page_partition.h"
-#include "builder/spill/page_spool.h"
+#include "builder/ordered_pages.h"
+#include "builder/page/page_encoder.h"
 
 namespace vcp {
 
@@ -22,6 +23,9 @@ struct LevelSettings {
     uint64_t roomBytes = 0;  ///< memory that makeRoom frees besides, for a page that is built alone
     std::function<Result<void>()> makeRoom;
 };
+
+/// Returns a page of the level at a Morton code, coded, with its entry; without its surface.
+BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded);
 
 /// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface to
 /// `spool`; where `surfaces` is not null, it takes the surface in each page, from which the level above is made

@@ -10,8 +10,7 @@
 
 namespace vcp {
 
-/// A page that is built, and the surface in it from which the page above is made (slab/page_surface.h): its cells as
-/// `geometry`, their halves as `colour`.
+/// A page that is built, and the surface in it from which the page above is made (storedSurface).
 struct BuiltPage {
     PageEntry entry;
     StoredPage stored;

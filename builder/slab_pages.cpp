@@ -1,10 +1,6 @@
 #include "builder/slab_pages.h"
 
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <fmt/format.h>
+#include <string>
 
 #include "builder/ordered_pages.h"
 #include "builder/page/page_encoder.h"
@@ -14,45 +10,25 @@ namespace vcp {
 
 namespace {
 
-/// A run of entries with one parent.
-struct Siblings {
-    size_t first, end;
-};
-
-std::vector<Siblings> siblingsOf(const std::vector<PageEntry>& entries) {
-    std::vector<Siblings> runs;
-    for (size_t i = 0; i < entries.size(); ++i) {
-        if (i == 0 || entries[i].morton >> 3 != entries[i - 1].morton >> 3) runs.push_back({i, i});
-        runs.back().end = i + 1;
-    }
-    return runs;
-}
-
 Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint32_t log2Cells) {
     std::vector<PageSurface> pages;
     std::vector<uint32_t> octants;
     for (size_t i = siblings.first; i < siblings.end; ++i) {
         const PageEntry& entry = below.entries()[i];
         VCP_TRY_ASSIGN(const auto stored, below.read(entry));
-        pages.push_back({.cells = surfaceCellsFrom(stored.geometry), .halves = surfaceCellsFrom(stored.colour)});
+        pages.push_back(surfaceFrom(stored));
         octants.push_back(uint32_t(entry.morton & 7));
     }
     return foldPages(pages, octants, log2Cells);
 }
 
-Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& below, Siblings siblings) {
+Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& below, Siblings siblings,
+                            bool withSurface) {
     VCP_TRY_ASSIGN(const auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
     PageTree tree = buildSlabTree(surface, settings.grid.log2Cells);
-    const EncodedPage encoded = encodeSlabPage(tree, settings.withColour);
-    BuiltPage page;
-    page.entry.morton = below.entries()[siblings.first].morton >> 3;
-    page.entry.level = uint8_t(settings.grid.level);
-    page.entry.leaves = encoded.leaves;
-    page.entry.slabLeaves = encoded.slabLeaves;
-    page.entry.certifiedError =
-        std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
-    page.stored = compressPage(encoded.geometry, encoded.colour);
-    page.surface = storedSurface(surface);
+    BuiltPage page =
+        builtPage(settings, below.entries()[siblings.first].morton >> 3, encodeSlabPage(tree, settings.withColour));
+    if (withSurface) page.surface = storedSurface(surface);
     return page;
 }
 
@@ -69,26 +45,28 @@ uint64_t workOf(const PageSpool& below, Siblings siblings) {
 
 }  // namespace
 
-StoredPage storedSurface(const PageSurface& surface) {
-    return {.geometry = bytesOf(surface.cells), .colour = bytesOf(surface.halves)};
+std::vector<Siblings> siblingsIn(const PageSpool& spool) {
+    const std::vector<PageEntry>& entries = spool.entries();
+    std::vector<Siblings> runs;
+    for (size_t i = 0; i < entries.size(); ++i) {
+        if (i == 0 || entries[i].morton >> 3 != entries[i - 1].morton >> 3) runs.push_back({i, i});
+        runs.back().end = i + 1;
+    }
+    return runs;
 }
 
-size_t parentsOf(const PageSpool& below) { return siblingsOf(below.entries()).size(); }
-
-Result<void> buildSlabPages(const LevelSettings& settings, const PageSpool& below, size_t first, size_t end,
-                            PageSpool& pages, PageSpool& surfaces, const std::function<bool(double)>& progress) {
-    const std::vector<Siblings> all = siblingsOf(below.entries());
-    const auto parents = std::span(all).subspan(first, end - first);
+Result<void> buildSlabPages(const LevelSettings& settings, const PageSpool& below, std::span<const Siblings> parents,
+                            PageSpool& pages, PageSpool* surfaces, const std::function<bool(double)>& progress) {
     std::vector<uint64_t> work;
     for (const Siblings& each : parents) work.push_back(workOf(below, each));
     return buildInOrder({.work = work,
                          .pageBytes = settings.pageBytes,
                          .roomBytes = settings.roomBytes,
                          .makeRoom = settings.makeRoom,
-                         .build = [&](size_t i) { return buildPage(settings, below, parents[i]); },
+                         .build = [&](size_t i) { return buildPage(settings, below, parents[i], surfaces != nullptr); },
                          .description = [&](size_t) { return std::string("a subvolume holds too much surface"); },
                          .pages = pages,
-                         .surfaces = &surfaces,
+                         .surfaces = surfaces,
                          .progress = progress});
 }
 

@@ -2,22 +2,25 @@
 #pragma once
 
 #include <functional>
+#include <span>
+#include <vector>
 
 #include "builder/level_pages.h"
-#include "builder/slab/page_surface.h"
 
 namespace vcp {
 
-/// Returns a page's surface as its spool takes it: cells as `geometry`, halves as `colour`.
-StoredPage storedSurface(const PageSurface& surface);
+/// A run of entries, numbers `first` to before `end`, of pages with one parent.
+struct Siblings {
+    size_t first, end;
+};
 
-/// Builds the pages of a level above those whose surfaces are in `below`, from number `first` to before `end` among the
-/// parents that there are, in Morton order. Appends pages to `pages` and their surfaces to `surfaces`. `progress`,
-/// threads and errors are those of buildPages.
-Result<void> buildSlabPages(const LevelSettings& settings, const PageSpool& below, size_t first, size_t end,
-                            PageSpool& pages, PageSpool& surfaces, const std::function<bool(double)>& progress);
+/// Returns the pages of a spool by their parents, in Morton order.
+std::vector<Siblings> siblingsIn(const PageSpool& spool);
 
-/// Returns how many pages have one of these below them.
-size_t parentsOf(const PageSpool& below);
+/// Builds the pages above those whose surfaces are in `below`. `parents`: some of siblingsIn(below). Appends pages to
+/// `pages` and, where that is not null, their surfaces to `surfaces`. `progress`, threads and errors are those of
+/// buildPages.
+Result<void> buildSlabPages(const LevelSettings& settings, const PageSpool& below, std::span<const Siblings> parents,
+                            PageSpool& pages, PageSpool* surfaces, const std::function<bool(double)>& progress);
 
 }  // namespace vcp

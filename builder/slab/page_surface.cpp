@@ -73,4 +73,12 @@ SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes) {
     return cells;
 }
 
+StoredPage storedSurface(const PageSurface& surface) {
+    return {.geometry = bytesOf(surface.cells), .colour = bytesOf(surface.halves)};
+}
+
+PageSurface surfaceFrom(const StoredPage& stored) {
+    return {.cells = surfaceCellsFrom(stored.geometry), .halves = surfaceCellsFrom(stored.colour)};
+}
+
 }  // namespace vcp

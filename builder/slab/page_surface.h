@@ -9,6 +9,7 @@
 
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/slab/cell_surface.h"
+#include "octree/vcp_writer.h"
 
 namespace vcp {
 
@@ -39,6 +40,11 @@ SurfaceCells foldCells(const SurfaceCells& eighths);
 /// Returns cells as bytes, and the cells in such bytes.
 std::vector<std::byte> bytesOf(const SurfaceCells& cells);
 SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes);
+
+/// Returns a page's surface as it is stored on temporary files, cells as `geometry` and halves as `colour`, and the
+/// surface in what was stored; quarters are left out.
+StoredPage storedSurface(const PageSurface& surface);
+PageSurface surfaceFrom(const StoredPage& stored);
 
 /// Returns the bytes that surfaceOf needs for triangles with so large areas and perimeters together, in cells: a piece
 /// for each half cell that a triangle touches.
