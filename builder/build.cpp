@@ -102,7 +102,7 @@ private:
             VCP_TRY(resumeMeasures());
         VCP_TRY_ASSIGN(auto frame, chooseFrame(options_, measures_));
         VCP_TRY_ASSIGN(auto error, chooseError(options_, measures_, frame));
-        plan_.frame = frame;
+        plan_.setPages(frame, FinestPages({frame.log2Cells, frame.levels - 1}));
         plan_.errorTarget = error;
         plan_.isExact = options_.error <= 0;
         // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
@@ -187,6 +187,7 @@ private:
                            {"side files", jsonOf(report_.sideFiles)}});
         if (!partitionRecorded_ && files_.current) {
             fields["partition"] = plan_.finest.first();
+            fields["parted"] = plan_.pages.parted();
             partitionRecorded_ = true;
         }
         VCP_TRY(journal_.record(space_.folder(), fields));
@@ -207,6 +208,7 @@ private:
     Result<void> reactivate() { return journal_.record(space_.folder(), {{"resumed", true}}); }
 
     Result<void> resumeBins() {
+        plan_.setPages(plan_.frame, FinestPages(plan_.gridOf(plan_.levels() - 1), done_.parted));
         setUpLevels();
         plan_.finest = PagePartition(done_.partition);
         partitionRecorded_ = true;
@@ -279,15 +281,29 @@ private:
         files_.neededSurfaces = files_.surfaces.size();
     }
 
+    /// Chooses the pages that hold the mesh, and the bins.
+    Result<void> choosePlan() {
+        // Pages of soft leaves must be of one level: their levels come from each other by clustering.
+        const PageChoosing choosing{
+            .soup = *files_.soup,
+            .frame = plan_.frame,
+            .mostLevelsBelow = plan_.hasSlabs ? mostLevelsBelow(plan_.frame, measures_) : 0,
+            .marginCells = plan_.marginCells(),
+            .uncounted = memory_.binTriangles,
+            .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
+        VCP_TRY_ASSIGN(auto choice, arena_.execute([&] { return choosePages(choosing); }));
+        plan_.finest = PagePartition(choice.counts, memory_.binTriangles);
+        plan_.setPages(plan_.frame, std::move(choice.pages));
+        return {};
+    }
+
     Result<void> dealSoup() {
         std::optional<MaterialColours> colours;
         if (usesMaterials()) colours.emplace(files_.soup->materials, memory_.vertexBytes);
-        const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, usesVertexColours());
-        double begins = kReadingShare;
+        const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, usesVertexColours(), plan_.pages);
+        const double begins = kReadingShare + kDealingShare / 2;
         const Dealing dealing{*files_.soup, snapper, plan_.gridOf(pass_ - 1),
                               [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
-        VCP_TRY_ASSIGN(plan_.finest, arena_.execute([&] { return choosePartition(dealing, memory_.binTriangles); }));
-        begins += kDealingShare / 2;
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
         if (colours)
@@ -296,6 +312,7 @@ private:
     }
 
     Result<void> deal() {
+        VCP_TRY(choosePlan());
         setUpLevels();
         pass_ = plan_.levels();
         VCP_TRY(dealSoup());
@@ -325,9 +342,9 @@ private:
                                                                        memory_.bufferBytes / 4);
     }
 
-    /// Returns the settings of the pass's pages.
-    [[nodiscard]] LevelSettings settings() {
-        LevelSettings settings = plan_.settingsOf(pass_);
+    /// Returns the settings of a level's pages in this pass.
+    [[nodiscard]] LevelSettings settingsOf(int level) {
+        LevelSettings settings = plan_.settingsOf(level, pass_ + 1 == plan_.levels());
         settings.withColour = hasColour();
         settings.roomBytes = memory_.tempBytes;
         settings.makeRoom = [this] { return space_.spill(); };
@@ -349,24 +366,31 @@ private:
     }
 
     /// Returns in how many parts the pass is worked on, with checkpoints between them.
-    [[nodiscard]] size_t binsOfPass() const {
+    [[nodiscard]] size_t binsOfPass() {
         if (pass_ < 0) return 0;
-        if (plan_.isOfSlabs(pass_)) return binsOf(siblingsIn(files_.surfaces[size_t(pass_) + 1]));
+        if (plan_.isOfSlabs(pass_)) return binsOf(siblingsBelow());
         return plan_.partitionOf(plan_.levelOf(pass_)).bins();
     }
     static size_t binsOf(const std::vector<Siblings>& parents) {
         return (parents.size() + kSlabPagesPerBin - 1) / kSlabPagesPerBin;
     }
 
-    /// Returns what takes the surface in the pass's pages; null where no level is made from it.
-    [[nodiscard]] PageSpool* surfacesOfPass() {
-        return plan_.hasSlabs && pass_ > 0 ? &files_.surfaces[size_t(pass_)] : nullptr;
+    /// Returns the pages below the pass's, which hold the mesh or have been made from those that do, by their parents.
+    std::vector<Siblings> siblingsBelow() {
+        PageSpool& below = files_.surfaces[size_t(pass_) + 1];
+        below.sortEntries();
+        return siblingsIn(below);
+    }
+
+    /// Returns what takes the surface in a level's pages; null where no level is made from it.
+    [[nodiscard]] PageSpool* surfacesOf(int level) {
+        return plan_.hasSlabs && level > 0 ? &files_.surfaces[size_t(level)] : nullptr;
     }
 
     /// Makes the pages of a level from the surface in those below.
     Result<void> runSlabPass() {
+        const std::vector<Siblings> parents = siblingsBelow();
         const PageSpool& below = files_.surfaces[size_t(pass_) + 1];
-        const std::vector<Siblings> parents = siblingsIn(below);
         const size_t bins = binsOf(parents);
         const double begins = passBegins(pass_), share = passEnds(pass_) - begins;
         for (size_t bin = firstBin_; bin < bins; ++bin) {
@@ -374,8 +398,8 @@ private:
             Result<void> result;
             arena_.execute([&] {
                 result =
-                    buildSlabPages(settings(), below, std::span(parents).subspan(first, end - first),
-                                   files_.spools[size_t(pass_)], surfacesOfPass(), [&](double part) {
+                    buildSlabPages(settingsOf(pass_), below, std::span(parents).subspan(first, end - first),
+                                   files_.spools[size_t(pass_)], surfacesOf(pass_), [&](double part) {
                                        const double done = double(first) + part * double(end - first);
                                        return progress(stageOf(pass_), begins + share * done / double(parents.size()));
                                    });
@@ -396,7 +420,8 @@ private:
         std::optional<LevelSink> sink;
         std::optional<LevelStep> step;
         if (plan_.steps(pass_)) {
-            sink.emplace(coarser, nextPartition, *files_.next);
+            sink.emplace(pass_ > level ? plan_.pages : FinestPages(coarser), nextPartition, *files_.next,
+                         plan_.marginCells());
             step.emplace(pass_ > level, grid, partition, *files_.waiting, *sink);
         }
         const double begins = passBegins(pass_), ends = passEnds(pass_);
@@ -432,12 +457,30 @@ private:
             LatticeMesh mesh = meshOf(soup, hasColour());
             std::vector<LatticeTriangle>().swap(soup);
             if (vertices) computeNormals(mesh);
-            if (!vertices)
-                result = buildPages(settings(), mesh, first, end, files_.spools[size_t(pass_)], surfacesOfPass(),
-                                    [&](double part) { return progress(stage, at(part)); });
+            if (!vertices) result = buildBin(mesh, first, end, [&](double part) { return progress(stage, at(part)); });
             if (result && step) result = step->run(bin, mesh);
         });
         return result;
+    }
+
+    /// Builds the pass's pages from code `first` to before `end`. Leaves `mesh` on the lattice of their coarsest level.
+    Result<void> buildBin(LatticeMesh& mesh, uint64_t first, uint64_t end, const std::function<bool(double)>& report) {
+        const bool isFinest = pass_ + 1 == plan_.levels();
+        const FinestPages pages = isFinest ? plan_.pages : FinestPages(plan_.gridOf(pass_));
+        const double margin = isFinest && plan_.isExact ? kExactMarginCells : kBinMarginCells;
+        const std::vector<LevelBins> levels = binTriangles(mesh, pages, margin, first, end);
+        size_t total = 0, done = 0;
+        for (const LevelBins& level : levels) total += level.bins.triangles.size();
+        uint32_t lattice = pages.deepest();
+        for (const auto& [level, bins] : levels) {
+            for (; lattice > level; --lattice) halveLattice(mesh);
+            const size_t count = bins.triangles.size();
+            VCP_TRY(
+                buildPages(settingsOf(int(level)), mesh, bins, files_.spools[level], surfacesOf(int(level)),
+                           [&](double part) { return report((double(done) + part * double(count)) / double(total)); }));
+            done += count;
+        }
+        return {};
     }
 
     /// Keeps slivers and crumbs that would vanish on the lattice.
@@ -445,7 +488,8 @@ private:
         const PageGrid grid = plan_.gridOf(plan_.levelOf(pass_));
         keepCollapsed(
             soup, [&](glm::i32vec3 p) { return plan_.finest.binOf(grid.pageOf(p)) == bin; },
-            [&](glm::i32vec3 p, glm::i32vec3 q) { return grid.pageOf(p) == grid.pageOf(q); });
+            [&](glm::i32vec3 p, glm::i32vec3 q) { return grid.pageOf(p) == grid.pageOf(q); },
+            [&](glm::i32vec3 p) { return plan_.pages.stepAt(p); });
     }
 
     Result<void> endPass() {

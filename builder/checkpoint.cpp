@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 5;
+constexpr int kTempVersion = 6;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -130,6 +130,11 @@ void readLevels(Fields& all, Recorded& recorded) {
     for (const json& first : all.list("partition")) recorded.partition.push_back(all.countOf(first));
     const auto& bins = recorded.partition;
     all.require(!bins.empty() && bins[0] == 0 && std::is_sorted(bins.begin(), bins.end(), std::less_equal<>()));
+    for (const json& codes : all.list("parted")) {
+        all.require(codes.is_array());
+        recorded.parted.emplace_back();
+        for (const json& code : codes) recorded.parted.back().push_back(all.countOf(code));
+    }
     const json& pass = all.at("pass");
     const int levels = int(std::min<size_t>(recorded.files.spools.size(), kMaxLevels));
     const bool isPass = pass.is_number_integer() && pass >= -1 && pass <= levels;

@@ -39,7 +39,8 @@ struct Recorded {
     SoupMeasures measures;
     std::vector<SideFile> sideFiles;  ///< as they were before they were read
     Files files;
-    std::vector<uint64_t> partition;  ///< with "levels": where the finest level's bins begin
+    std::vector<uint64_t> partition;            ///< with "levels": where the deepest level's bins begin
+    std::vector<std::vector<uint64_t>> parted;  ///< with "levels": FinestPages::parted()
     int pass = 0;
     size_t bin = 0;
 };

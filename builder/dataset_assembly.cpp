@@ -21,6 +21,7 @@ StoredPage passagePage(uint32_t log2Cells) {
 /// Gives every page a parent. The entry of a passage has no leaves.
 void addPassages(std::deque<PageSpool>& levels) {
     const auto byMorton = [](const PageEntry& a, const PageEntry& b) { return a.morton < b.morton; };
+    for (PageSpool& level : levels) level.sortEntries();
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
         std::vector<PageEntry> missing;
@@ -32,7 +33,7 @@ void addPassages(std::deque<PageSpool>& levels) {
             if (!std::binary_search(parents.begin(), parents.end(), passage, byMorton)) missing.push_back(passage);
         }
         parents.insert(parents.end(), missing.begin(), missing.end());
-        std::sort(parents.begin(), parents.end(), byMorton);
+        levels[level - 1].sortEntries();
     }
 }
 
@@ -63,11 +64,12 @@ void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
             row.certifiedError = std::max(row.certifiedError, double(page.certifiedError));
         header.pages += row.pages;
     }
-    header.certifiedErrorMax = header.level[levels.size() - 1].certifiedError;
-    for (const PageEntry& entry : levels.back().entries()) {
-        header.leaves += entry.leaves;
-        header.hardLeaves += entry.hardLeaves;
-    }
+    FinestFigures finest;
+    for (const PageSpool& level : levels)
+        for (const PageEntry& entry : level.entries()) finest.add(entry);
+    header.certifiedErrorMax = finest.certifiedError;
+    header.leaves = finest.leaves;
+    header.hardLeaves = finest.hardLeaves;
 }
 
 }  // namespace

@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <mutex>
-#include <unordered_map>
+#include <set>
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
-
-#include "builder/level/level_step.h"
 
 namespace vcp {
 
@@ -20,8 +20,9 @@ uint64_t trianglesOf(const Soup& soup) { return soup.floats.raw().total() + soup
 /// Calls visit(piece) for every triangle of the soup on the lattice, then visit.finish(), with a visit of its own
 /// for each block of the soup.
 template <class MakeVisit>
-Result<void> forLatticeTriangles(const Dealing& dealing, bool painted, MakeVisit&& makeVisit) {
-    const uint64_t total = trianglesOf(dealing.soup);
+Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper, bool painted,
+                                 const std::function<bool(double)>& progress, MakeVisit&& makeVisit) {
+    const uint64_t total = trianglesOf(soup);
     std::atomic<uint64_t> done = 0;
     std::atomic<bool> failed = false, cancelled = false;
     std::mutex mutex;
@@ -35,37 +36,124 @@ Result<void> forLatticeTriangles(const Dealing& dealing, bool painted, MakeVisit
             Result<void> here = records ? Result<void>() : Result<void>(records.error());
             if (records)
                 for (const auto& t : *records)
-                    dealing.snapper.add(
+                    snapper.add(
                         t,
                         [&](const LatticeTriangle& piece) {
                             if (here) here = visit(piece);
                         },
                         painted);
             if (here) here = visit.finish();
-            if (!dealing.progress(double(done += blocks[i].records) / double(total))) cancelled = true;
+            if (!progress(double(done += blocks[i].records) / double(total))) cancelled = true;
             if (here) return;
             const std::scoped_lock lock(mutex);
             if (!failed.exchange(true)) result = here;
         });
     };
-    all(dealing.soup.floats);
-    all(dealing.soup.doubles);
+    all(soup.floats);
+    all(soup.doubles);
     if (result && cancelled) return Error::cancelled();
     return result;
 }
 
-using PageCounts = std::unordered_map<uint64_t, uint64_t>;
+/// A page, by its level and its Morton code, and how many triangles it needs.
+using Page = std::pair<uint32_t, uint64_t>;
+using PageCounts = std::map<Page, uint64_t>;
 
-/// Counts a triangle for every page that will need it.
-struct CountVisit {
-    const PageGrid& grid;
-    PageCounts& counts;
+/// Counts a triangle, on the base level's lattice, for every page that will need it, or for the parts of some pages:
+/// near enough for a count.
+class CountVisit {
+public:
+    /// `parted`: the pages whose parts are counted; none: all pages are.
+    CountVisit(const FinestPages& pages, double marginCells, const PageCounts& parted, PageCounts& counts)
+        : pages_(pages), margin_(marginCells), parted_(parted), counts_(counts) {
+        if (!parted.empty()) low_ = glm::dvec3(std::numeric_limits<double>::infinity()), high_ = -low_;
+        for (const auto& [page, count] : parted) {
+            const double edge =
+                std::ldexp(pages.gridOf(0).edgeCells() * kLatticePerCell, int(pages.base()) - int(page.first));
+            const glm::dvec3 corner = glm::dvec3(mortonDecode(page.second)) * edge;
+            low_ = glm::min(low_, corner - marginCells * kLatticePerCell);
+            high_ = glm::max(high_, corner + edge + marginCells * kLatticePerCell);
+        }
+    }
 
     Result<void> operator()(const LatticeTriangle& t) {
-        grid.forPagesNear(t.corner, kStepMarginCells, [&](uint64_t page) { ++counts[page]; });
+        const auto& [a, b, c] = t.corner;
+        const bool isOutside = glm::any(glm::lessThan(glm::dvec3(glm::max(a, glm::max(b, c))), low_)) ||
+                               glm::any(glm::greaterThan(glm::dvec3(glm::min(a, glm::min(b, c))), high_));
+        if (isOutside) return {};
+        pages_.forPagesNear(t.corner, margin_, pages_.base(), [&](uint32_t level, uint64_t code) {
+            if (parted_.empty() || (level > pages_.base() && parted_.contains({level - 1, code >> 3})))
+                ++counts_[{level, code}];
+        });
         return {};
     }
     static Result<void> finish() { return {}; }
+
+private:
+    const FinestPages& pages_;
+    double margin_;
+    const PageCounts& parted_;
+    PageCounts& counts_;
+    glm::dvec3 low_{-std::numeric_limits<double>::infinity()};  ///< box that holds the parted pages, widened
+    glm::dvec3 high_{std::numeric_limits<double>::infinity()};
+};
+
+Result<PageCounts> countTriangles(const PageChoosing& choosing, const FinestPages& pages, const PageCounts& parted,
+                                  const std::function<bool(double)>& progress) {
+    const LatticeSnapper snapper(choosing.frame, nullptr, false);
+    tbb::enumerable_thread_specific<PageCounts> parts;
+    VCP_TRY(forLatticeTriangles(choosing.soup, snapper, false, progress,
+                                [&] { return CountVisit(pages, choosing.marginCells, parted, parts.local()); }));
+    PageCounts sums;
+    for (const PageCounts& part : parts)
+        for (const auto& [page, count] : part) sums[page] += count;
+    return sums;
+}
+
+/// Which pages are parted, found by parting those that hold too much, again and again.
+class Parting {
+public:
+    Parting(PageGrid base, uint32_t mostLevelsBelow) : base_(base), deepest_(base.level + mostLevelsBelow) {}
+
+    [[nodiscard]] FinestPages pages() const {
+        std::vector<std::vector<uint64_t>> codes(deepest_ - base_.level);
+        for (const auto& [level, code] : parted_) codes[level - base_.level].push_back(code);
+        return FinestPages(base_, std::move(codes));
+    }
+    [[nodiscard]] const PageCounts& counts() const { return counts_; }
+    /// The pages that were parted last, with their counts; their parts are to be counted next.
+    [[nodiscard]] const PageCounts& partedLast() const { return partedLast_; }
+
+    /// Takes the counts of the parts of the pages that were parted last, or at first of all pages. Puts those together
+    /// again that were parted in vain, and parts the parts that hold too much. Returns whether it parted any.
+    bool improve(const PageCounts& parts) {
+        PageCounts together;
+        for (const auto& [part, count] : parts)
+            if (part.first > base_.level) together[above(part)] += count;
+        for (const auto& [page, count] : partedLast_)
+            if (double(together[page]) > kMostGrowth * double(count)) {
+                parted_.erase(page);
+                counts_[page] = count;
+            }
+        PageCounts crowded;
+        for (const auto& [part, count] : parts) {
+            if (!partedLast_.empty() && !parted_.contains(above(part))) continue;
+            const bool isCrowded = count > kMostPageTriangles && part.first < deepest_;
+            (isCrowded ? crowded : counts_)[part] = count;
+        }
+        for (const auto& [page, count] : crowded) parted_.insert(page);
+        partedLast_ = std::move(crowded);
+        return !partedLast_.empty();
+    }
+
+private:
+    static Page above(const Page& part) { return {part.first - 1, part.second >> 3}; }
+
+    PageGrid base_;
+    uint32_t deepest_;
+    std::set<Page> parted_;
+    PageCounts counts_;  ///< of the pages that are not parted
+    PageCounts partedLast_;
 };
 
 struct DealVisit {
@@ -85,20 +173,33 @@ struct DealVisit {
 
 }  // namespace
 
-Result<PagePartition> choosePartition(const Dealing& dealing, uint64_t limit) {
-    if (trianglesOf(dealing.soup) <= limit) return PagePartition();
-    tbb::enumerable_thread_specific<PageCounts> parts;
-    VCP_TRY(forLatticeTriangles(dealing, false, [&] { return CountVisit{dealing.grid, parts.local()}; }));
-    std::map<uint64_t, uint64_t> counts;
-    for (PageCounts& part : parts) {
-        for (const auto& [page, count] : part) counts[page] += count;
-        PageCounts().swap(part);
+Result<PageChoice> choosePages(const PageChoosing& choosing) {
+    Parting parting({choosing.frame.log2Cells, choosing.frame.levels - 1}, choosing.mostLevelsBelow);
+    const uint64_t triangles = trianglesOf(choosing.soup);
+    const uint64_t uncounted =
+        choosing.mostLevelsBelow > 0 ? std::min(choosing.uncounted, kMostPageTriangles) : choosing.uncounted;
+    PageChoice choice{parting.pages(), {}};
+    if (triangles <= uncounted) return choice;
+    for (int round = 0;; ++round) {
+        // Each round takes half of what is left of the progress.
+        const double left = std::ldexp(1.0, -round);
+        VCP_TRY_ASSIGN(const auto parts, countTriangles(choosing, choice.pages, parting.partedLast(), [&](double part) {
+                           return choosing.progress(1 - left + left / 2 * part);
+                       }));
+        const bool goesOn = parting.improve(parts);
+        choice.pages = parting.pages();
+        if (!goesOn) break;
     }
-    return PagePartition({counts.begin(), counts.end()}, limit);
+    for (const auto& [page, count] : parting.counts())
+        choice.counts.emplace_back(choice.pages.firstCode(page.first, page.second), count);
+    std::sort(choice.counts.begin(), choice.counts.end());
+    return choice;
 }
 
 Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partition, RecordBins<LatticeTriangle>& bins) {
-    VCP_TRY(forLatticeTriangles(dealing, true, [&] { return DealVisit{dealing.grid, partition, BinBatch(bins)}; }));
+    VCP_TRY(forLatticeTriangles(dealing.soup, dealing.snapper, true, dealing.progress, [&] {
+        return DealVisit{dealing.grid, partition, BinBatch(bins)};
+    }));
     return bins.raw().flush();
 }
 

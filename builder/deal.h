@@ -1,28 +1,52 @@
-// Dealing: the soup's triangles, on the finest level's lattice, into bins that fit memory.
+// Dealing: the soup's triangles, on the deepest level's lattice, into bins that fit memory; and which pages hold them.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <utility>
+#include <vector>
 
 #include "builder/ingest.h"
-#include "builder/lattice/page_partition.h"
+#include "builder/lattice/finest_pages.h"
 #include "builder/lattice_soup.h"
 #include "builder/spill/record_bins.h"
 
 namespace vcp {
 
+/// A page is parted into eight while it holds more triangles than this.
+inline constexpr uint64_t kMostPageTriangles = 1 << 17;
+/// A page stays whole where its parts together would name more than this times its triangles: where these are as large
+/// as pages, parts help nobody.
+inline constexpr double kMostGrowth = 1.5;
+
+struct PageChoice {
+    FinestPages pages;
+    /// First codes of pages and how many triangles each needs, ascending; empty where there are so few triangles that
+    /// nothing was counted.
+    std::vector<std::pair<uint64_t, uint64_t>> counts;
+};
+
+/// How pages are chosen. The calling arena's threads do the work.
+struct PageChoosing {
+    const Soup& soup;
+    GridFrame frame;                       ///< frame of the base level
+    uint32_t mostLevelsBelow;              ///< 0: all pages are the base level's
+    double marginCells;                    ///< how far around it a page needs triangles
+    uint64_t uncounted;                    ///< so few triangles need no count
+    std::function<bool(double)> progress;  ///< as Dealing's
+};
+
+/// Chooses the pages that hold the mesh. Errors: Io, Cancelled.
+Result<PageChoice> choosePages(const PageChoosing& choosing);
+
 /// What is dealt. The calling arena's threads do the work.
 struct Dealing {
     const Soup& soup;
     const LatticeSnapper& snapper;
-    PageGrid grid;  ///< grid of the finest level
+    PageGrid grid;  ///< grid of the deepest level
     /// Called with the part of the soup that is read; false cancels. Any of the threads calls it.
     std::function<bool(double)> progress;
 };
-
-/// Chooses the bins: a single one where there are at most `limit` triangles, else by how many of them each page and its
-/// surroundings need. Errors: Io, Cancelled.
-Result<PagePartition> choosePartition(const Dealing& dealing, uint64_t limit);
 
 /// Deals each triangle to the bins that its corners lie in, where their normals are found. `bins` are flushed. Errors:
 /// Io, Cancelled.

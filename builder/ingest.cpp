@@ -14,6 +14,7 @@
 #include "builder/mesh/open_mesh.h"
 #include "builder/vertex_join.h"
 #include "octree/surface/leaf_math.h"
+#include "octree/vcp_file.h"
 
 namespace vcp {
 
@@ -174,17 +175,34 @@ MeshOpenOptions meshOptionsOf(const BuildOptions& options) {
     return open;
 }
 
+namespace {
+
+double longestOf(const SoupMeasures& m) {
+    const glm::dvec3 extent = m.boundsMax - m.boundsMin;
+    return std::max(extent.x, std::max(extent.y, extent.z));
+}
+
+/// Returns the smallest cell for which doubles so far from zero have digits left.
+double resolvedCell(const SoupMeasures& m) {
+    return std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon() * 1e4;
+}
+
+}  // namespace
+
+uint32_t mostLevelsBelow(const GridFrame& frame, const SoupMeasures& m) {
+    const double least = std::max(longestOf(m) / kMaxExtentCells, resolvedCell(m));
+    uint32_t count = 0;
+    while (frame.levels + count < kMaxLevels && frame.withLevelsBelow(count + 1).cell >= least) ++count;
+    return count;
+}
+
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m) {
     GridFrame frame;
     frame.log2Cells = kLog2Cells;
-    const glm::dvec3 extent = m.boundsMax - m.boundsMin;
-    const double longest = std::max(extent.x, std::max(extent.y, extent.z));
+    const double longest = longestOf(m);
     const double useful = double(m.triangles - m.degenerateTriangles);
     frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
-    // Doubles far from zero have few digits left for the cell.
-    const double resolution =
-        std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon();
-    if (options.cell <= 0) frame.cell = std::max(frame.cell, std::max(longest / kMaxExtentCells, resolution * 1e4));
+    if (options.cell <= 0) frame.cell = std::max({frame.cell, longest / kMaxExtentCells, resolvedCell(m)});
     if (longest / frame.cell > kMaxExtentCells)
         return Error{
             .code = ErrorCode::Limit,

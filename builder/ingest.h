@@ -1,6 +1,7 @@
 // Ingest: mesh files become a soup of triangles in world space, measured; and the grid that will hold it.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 
@@ -21,6 +22,14 @@ struct GridFrame {
     double cell = 0;       ///< finest cell edge, world units
     uint32_t levels = 1;
     uint32_t log2Cells = 5;  ///< cells an edge of a page
+
+    /// Returns the frame with so many levels more below.
+    [[nodiscard]] GridFrame withLevelsBelow(uint32_t count) const {
+        GridFrame frame = *this;
+        frame.cell = std::ldexp(cell, -int(count));
+        frame.levels += count;
+        return frame;
+    }
 };
 
 /// What reading found out. It does not depend on the order of the triangles.
@@ -56,6 +65,9 @@ MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 
 /// Chooses the grid; `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures);
+
+/// Returns how many levels more than the frame's the lattice and the mesh's coordinates can tell apart.
+uint32_t mostLevelsBelow(const GridFrame& frame, const SoupMeasures& measures);
 
 /// Returns the tolerance of the finest level in world units; `options.error` 0 chooses it. Errors: Limit (finer than
 /// the lattice can resolve).

@@ -15,9 +15,13 @@ namespace {
 /// Returns the middle of two colours, channel by channel.
 uint32_t middleColour(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); }
 
-glm::i32vec3 middle(glm::i32vec3 a, glm::i32vec3 b) {
-    return {(int64_t{a.x} + b.x) >> 1, (int64_t{a.y} + b.y) >> 1, (int64_t{a.z} + b.z) >> 1};
+/// Returns the multiple of a power of two that is nearest to a point.
+glm::i32vec3 roundTo(glm::dvec3 p, int step) {
+    return glm::i32vec3(std::lround(p.x / step), std::lround(p.y / step), std::lround(p.z / step)) * step;
 }
+
+// What a piece says for those beside it that are left out.
+constexpr int kRoundingsOfNeighbours = 3;
 
 /// Returns the edge of a cell in texture coordinates, from the ratio of the triangle's areas.
 float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
@@ -29,16 +33,24 @@ float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
 
 }  // namespace
 
-LatticeSnapper::LatticeSnapper(const GridFrame& frame, MaterialColours* colours, bool vertexColours)
+LatticeSnapper::LatticeSnapper(const GridFrame& frame, MaterialColours* colours, bool vertexColours, FinestPages pages)
     : origin_(frame.origin),
       scale_(double(kLatticePerCell) / frame.cell),
-      longest_((colours && colours->hasImages() ? kPaintedEdgeCells : double(kMaxEdgeCells)) * kLatticePerCell),
+      longest_(std::ldexp(colours && colours->hasImages() ? kPaintedEdgeCells : double(kMaxEdgeCells),
+                          int(PageGrid::kLog2LatticePerCell + pages.deepest() - pages.base()))),
       colours_(colours),
-      vertexColours_(vertexColours) {}
+      vertexColours_(vertexColours),
+      pages_(std::move(pages)) {}
 
 bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
     const glm::dvec3 d = glm::dvec3(a) - glm::dvec3(b);
-    return glm::dot(d, d) > longest_ * longest_;
+    return glm::dot(d, d) > longest_ * longest_ || pages_.isTooLong(a, b);
+}
+
+glm::i32vec3 LatticeSnapper::middle(glm::i32vec3 a, glm::i32vec3 b) const {
+    const glm::i32vec3 m((int64_t{a.x} + b.x) >> 1, (int64_t{a.y} + b.y) >> 1, (int64_t{a.z} + b.z) >> 1);
+    const int step = pages_.stepAt(m);
+    return step == 1 ? m : roundTo((glm::dvec3(a) + glm::dvec3(b)) / 2.0, step);
 }
 
 // Whether an edge is cut does not depend on the triangle.
@@ -56,12 +68,17 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
     // Points 0 to 2 are corners; 3 to 5 are middles of the edges from them.
     const auto add = [&](int a, int b, int c) {
         Piece& p = pieces[count++] = piece;
-        p.triangle.stray = piece.triangle.stray + float(kLatticeRounding);
+        ++p.cuts;
         const int from[3] = {a, b, c};
         for (int i = 0; i < 3; ++i) {
             const int k = (from[i] + turn) % 3, next = (k + 1) % 3;
             const bool isMiddle = from[i] >= 3;
             p.triangle.corner[i] = isMiddle ? middle(corner[k], corner[next]) : corner[k];
+            p.moved[i] = piece.moved[k];
+            if (isMiddle) {
+                const glm::dvec3 exact = (glm::dvec3(corner[k]) + glm::dvec3(corner[next])) / 2.0;
+                p.moved[i] = (piece.moved[k] + piece.moved[next]) / 2.0 + (glm::dvec3(p.triangle.corner[i]) - exact);
+            }
             p.triangle.colour[i] = isMiddle ? middleColour(piece.triangle.colour[k], piece.triangle.colour[next])
                                             : piece.triangle.colour[k];
             p.uv[i] = isMiddle ? (piece.uv[k] + piece.uv[next]) * 0.5f : piece.uv[k];
@@ -90,6 +107,18 @@ void LatticeSnapper::paint(Piece& piece) const {
     }
 }
 
+float LatticeSnapper::strayOf(const Piece& piece) const {
+    // A point of the piece has moved by a mean of its corners' ways, so by no more than the longest of them. A piece
+    // beside it that lost its area is left out: it moved by a rounding or two.
+    double longest = 0;
+    for (int i = 0; i < 3; ++i) {
+        const double rounding = kLatticeRounding * kLatticePerCell * pages_.stepAt(piece.triangle.corner[i]);
+        const double roundings = std::min(piece.cuts + 1, kRoundingsOfNeighbours) * rounding;
+        longest = std::max({longest, roundings, glm::length(piece.moved[i]) * (1 + 1e-6)});
+    }
+    return float(longest / kLatticePerCell);
+}
+
 template <class Real>
 LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) const {
     Piece piece{};
@@ -97,11 +126,12 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 q =
             glm::clamp((glm::dvec3(triangle.corner[i]) - origin_) * scale_, glm::dvec3(0), glm::dvec3(2147483647.0));
-        t.corner[i] = glm::i32vec3(std::lround(q.x), std::lround(q.y), std::lround(q.z));
+        t.corner[i] = roundTo(q, 1);
+        if (const int step = pages_.stepAt(t.corner[i]); step > 1) t.corner[i] = roundTo(q, step);
+        piece.moved[i] = glm::dvec3(t.corner[i]) - q;
         t.colour[i] = triangle.colour[i];
         piece.uv[i] = triangle.uv[i];
     }
-    t.stray = float(kLatticeRounding);
     piece.material = triangle.material;
     if (colours_ && piece.material > 0) piece.footprint = footprintOf(t, piece.uv);
     return piece;

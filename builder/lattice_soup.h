@@ -1,9 +1,11 @@
 // Brings the soup from world space to the finest level's lattice: snapped, long edges cut, colours settled.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "builder/ingest.h"
+#include "builder/lattice/finest_pages.h"
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/lattice/soup.h"
 #include "builder/texture/material_colours.h"
@@ -11,14 +13,16 @@
 
 namespace vcp {
 
-/// Where images give the colour, vertices are at most so many cells apart, since they carry it.
+/// Where images give the colour, vertices are at most so many cells of the base level apart, since they carry it.
 inline constexpr double kPaintedEdgeCells = 1.5;
 
 /// Snaps triangles to a frame's lattice. Any thread.
 class LatticeSnapper {
 public:
     /// `colours`: those of the soup's materials; null: vertices keep their own. `vertexColours`: whether these count.
-    explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true);
+    /// `pages`: the pages that vertices must suit, on the frame's lattice.
+    explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true,
+                            FinestPages pages = FinestPages());
 
     /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; some may have no area on the lattice
     /// (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no crack
@@ -32,6 +36,8 @@ private:
     /// A triangle on its way, with what its colours are computed from.
     struct Piece {
         LatticeTriangle triangle;
+        glm::dvec3 moved[3];  ///< how far each corner lies from where the mesh has it, in steps of the lattice
+        int cuts;
         glm::vec2 uv[3];
         uint32_t material;
         float footprint;  ///< edge of a cell in texture coordinates
@@ -40,25 +46,28 @@ private:
     template <class Real>
     Piece snap(const WorldTriangle<Real>& triangle) const;
     [[nodiscard]] bool tooLong(glm::i32vec3 a, glm::i32vec3 b) const;
+    [[nodiscard]] glm::i32vec3 middle(glm::i32vec3 a, glm::i32vec3 b) const;
     /// Cuts each edge that is too long in its middle. Returns the number of pieces, 0 when none is too long.
     int cut(const Piece& piece, Piece (&pieces)[4]) const;
     void paint(Piece& piece) const;
+    [[nodiscard]] float strayOf(const Piece& piece) const;
 
     template <class Sink>
     void cutInto(Piece piece, Sink& sink, bool painted) const {
         Piece pieces[4];
         const int count = cut(piece, pieces);
         for (int i = 0; i < count; ++i) cutInto(pieces[i], sink, painted);
-        const LatticeTriangle& t = piece.triangle;
         if (count > 0) return;
         if (painted) paint(piece);
-        sink(t);
+        piece.triangle.stray = strayOf(piece);
+        sink(std::as_const(piece.triangle));
     }
 
     glm::dvec3 origin_;
     double scale_, longest_;
     MaterialColours* colours_;
     bool vertexColours_;
+    FinestPages pages_;
 };
 
 }  // namespace vcp

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "builder/page/bin_triangles.h"
 #include "builder/page/exact_tree.h"
 #include "builder/slab/page_surface.h"
 
@@ -91,10 +90,8 @@ BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedP
     return page;
 }
 
-Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
+Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, const TriangleBins& bins,
                         PageSpool& spool, PageSpool* surfaces, const std::function<bool(double)>& progress) {
-    const TriangleBins bins =
-        binTriangles(mesh, settings.grid, settings.exact ? kExactMarginCells : kBinMarginCells, first, end);
     std::vector<uint64_t> work(bins.pages.size());
     tbb::parallel_for(size_t{0}, work.size(),
                       [&](size_t i) { work[i] = workOf(settings, mesh, bins.of(i), surfaces != nullptr); });

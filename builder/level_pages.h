@@ -7,6 +7,7 @@
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/lattice/page_partition.h"
 #include "builder/ordered_pages.h"
+#include "builder/page/bin_triangles.h"
 #include "builder/page/page_encoder.h"
 
 namespace vcp {
@@ -27,12 +28,11 @@ struct LevelSettings {
 /// Returns a page of the level at a Morton code, coded, with its entry; without its surface.
 BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded);
 
-/// Builds the pages with codes from `first` to before `end` from the bin's mesh and appends those with surface to
-/// `spool`; where `surfaces` is not null, it takes the surface in each page, from which the level above is made
-/// (slab_pages.h). `progress` is given the part done; false stops. Uses the calling arena's threads. Errors: Limit (a
-/// single page needs more memory than pageBytes and roomBytes, or holds more than a page can name), Io,
-/// Cancelled.
-Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t first, uint64_t end,
+/// Builds the pages of `bins`, numbers in the bin's mesh, and appends those with surface to `spool`; where `surfaces`
+/// is not null, it takes the surface in each page, from which the level above is made (slab_pages.h). `progress` is
+/// given the part done; false stops. Uses the calling arena's threads. Errors: Limit (a single page needs more memory
+/// than pageBytes and roomBytes, or holds more than a page can name), Io, Cancelled.
+Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, const TriangleBins& bins,
                         PageSpool& spool, PageSpool* surfaces, const std::function<bool(double)>& progress);
 
 }  // namespace vcp

@@ -18,10 +18,15 @@ PagePartition LevelPlan::partitionOf(int level) const {
     return partition;
 }
 
-LevelSettings LevelPlan::settingsOf(int level) const {
+void LevelPlan::setPages(const GridFrame& base, FinestPages finestPages) {
+    frame = base.withLevelsBelow(finestPages.deepest() - finestPages.base());
+    pages = std::move(finestPages);
+}
+
+LevelSettings LevelPlan::settingsOf(int level, bool isFinest) const {
     LevelSettings settings;
     settings.grid = gridOf(level);
-    settings.finest = level + 1 == levels();
+    settings.finest = isFinest;
     settings.exact = settings.finest && isExact;
     settings.cell = std::ldexp(frame.cell, levels() - 1 - level);
     settings.tolerance = settings.finest ? errorTarget / settings.cell : kCoarseErrorCells;

@@ -126,9 +126,9 @@ private:
         if (!isLength(h_.errorTarget)) return fail(offsetof(FileHeader, errorTarget), "error target is not a length");
         if (!isLength(h_.certifiedErrorMax))
             return fail(offsetof(FileHeader, certifiedErrorMax), "certified error is not a length");
-        if (h_.certifiedErrorMax != h_.level[h_.levels - 1].certifiedError)
+        if (h_.certifiedErrorMax < h_.level[h_.levels - 1].certifiedError)
             return fail(offsetof(FileHeader, certifiedErrorMax),
-                        fmt::format("certified error is {:g}, but {:g} in the row of the finest level",
+                        fmt::format("certified error is {:g}, less than the {:g} in the row of the finest level",
                                     h_.certifiedErrorMax, h_.level[h_.levels - 1].certifiedError));
         return {};
     }

@@ -323,8 +323,7 @@ Result<void> PageCache::load(std::span<const uint64_t> pages) {
 }
 
 Result<void> PageCache::loadLevel(uint32_t level) {
-    for (uint64_t page = 0; page < pages_.size(); ++page)
-        if (dataset_.pages[page].level == level) VCP_TRY(load(page));
+    for (const uint64_t page : cutAtLevel(dataset_, level)) VCP_TRY(load(page));
     return {};
 }
 
@@ -344,10 +343,11 @@ uint64_t PageCache::bytes() const {
 }
 
 std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level) {
-    const uint32_t deepest = dataset.header.levels > 0 ? dataset.header.levels - 1 : 0;
     std::vector<uint64_t> cut;
     for (uint64_t page = 0; page < dataset.pages.size(); ++page)
-        if (dataset.pages[page].level == std::min(level, deepest)) cut.push_back(page);
+        if (const PageEntry& entry = dataset.pages[page];
+            entry.level == level || (entry.level < level && entry.childMask == 0))
+            cut.push_back(page);
     return cut;
 }
 

@@ -60,7 +60,8 @@ private:
     std::vector<std::unique_ptr<const Loaded>> loaded_;
 };
 
-/// Returns all pages of a level: each level holds the whole surface. levels - 1 (or anything larger) is the finest.
+/// Returns the pages that hold the whole surface as a level has it: its pages, and those of coarser levels that have no
+/// children. levels - 1 (or anything larger) is the finest.
 std::vector<uint64_t> cutAtLevel(const Dataset& dataset, uint32_t level);
 
 struct Ray {

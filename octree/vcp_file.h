@@ -1,4 +1,8 @@
-// The .vcp file, version 4. Files of version 3 are read, too: they have no slab leaves and no kFlagCovering.
+// The .vcp file, version 5. Files of versions 3 and 4 are read, too: there, pages without children are all of the
+// finest level; those of version 3 have no slab leaves and no kFlagCovering.
+//
+// Pages without children hold the finest surface. Most are of the finest level; where triangles are few, they are of
+// coarser ones.
 //
 //   offset   bytes        content
 //   0        4096         FileHeader: what is in the file, tables of the levels, where the directory is
@@ -25,7 +29,7 @@
 
 namespace vcp {
 
-inline constexpr uint32_t kFileVersion = 4;
+inline constexpr uint32_t kFileVersion = 5;
 inline constexpr uint32_t kOldestFileVersion = 3;  ///< that is read
 inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
@@ -62,7 +66,7 @@ struct FileHeader {
     double origin[3] = {};         ///< world position of the lowest corner of the root page
     double cell = 0;               ///< edge of a cell of the finest level, world units
     double errorTarget = 0;        ///< what the builder was asked for, world units
-    double certifiedErrorMax = 0;  ///< largest certified error of the finest level, world units
+    double certifiedErrorMax = 0;  ///< largest certified error of the pages without children, world units
     double boundsMin[3] = {};      ///< lowest corner of the mesh's bounds, world units
     double boundsMax[3] = {};
     uint32_t levels = 0;  ///< 1 to kMaxLevels
@@ -71,8 +75,8 @@ struct FileHeader {
     uint32_t flags = 0;  ///< kFlagColour, kFlagCovering
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
-    uint64_t leaves = 0;      ///< soft, slab and hard leaves of the finest level
-    uint64_t hardLeaves = 0;  ///< hard leaves of the finest level
+    uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children
+    uint64_t hardLeaves = 0;  ///< hard leaves of the pages without children
     LevelRow level[kMaxLevels] = {};
     uint64_t hash = 0;      ///< XXH3-64 of the 4096 bytes with this field zero
     PaperParameters paper;  ///< zero where the method is another
@@ -111,6 +115,19 @@ struct PageEntry {
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 &&
               offsetof(PageEntry, childMask) == 72 && offsetof(PageEntry, slabLeaves) == 76);
+
+/// What the header says of the pages without children.
+struct FinestFigures {
+    double certifiedError = 0;  ///< world units
+    uint64_t leaves = 0, hardLeaves = 0;
+
+    void add(const PageEntry& page) {
+        if (page.childMask != 0) return;
+        if (page.certifiedError > certifiedError) certifiedError = page.certifiedError;
+        leaves += page.leaves;
+        hardLeaves += page.hardLeaves;
+    }
+};
 
 /// A run of consecutive entry numbers. (std::views::iota does not compile with clang 14.)
 class EntryRange {

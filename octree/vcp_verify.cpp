@@ -29,17 +29,19 @@ public:
                               fmt::format("certified error of level {} is {:g}, of its pages {:g}", l,
                                           h.level[l].certifiedError, error));
         }
-        uint64_t leaves = 0, hardLeaves = 0;
-        const LevelRow& finest = h.level[h.levels - 1];
-        for (const uint64_t page : EntryRange(finest.firstEntry, finest.pages))
-            leaves += d_.pages[page].leaves, hardLeaves += d_.pages[page].hardLeaves;
-        if (leaves != h.leaves)
+        FinestFigures finest;
+        for (uint64_t page = 0; page < d_.pages.size(); ++page) finest.add(d_.pages[page]);
+        if (finest.certifiedError != h.certifiedErrorMax)
+            return broken("header", offsetof(FileHeader, certifiedErrorMax),
+                          fmt::format("certified error is {:g}, of the pages without children {:g}",
+                                      h.certifiedErrorMax, finest.certifiedError));
+        if (finest.leaves != h.leaves)
             return broken("header", offsetof(FileHeader, leaves),
-                          fmt::format("{} leaves, but the pages of the finest level have {}", h.leaves, leaves));
-        if (hardLeaves != h.hardLeaves)
+                          fmt::format("{} leaves, but the pages without children have {}", h.leaves, finest.leaves));
+        if (finest.hardLeaves != h.hardLeaves)
             return broken(
                 "header", offsetof(FileHeader, hardLeaves),
-                fmt::format("{} hard leaves, but the pages of the finest level have {}", h.hardLeaves, hardLeaves));
+                fmt::format("{} hard leaves, but the pages without children have {}", h.hardLeaves, finest.hardLeaves));
         return bounds();
     }
 

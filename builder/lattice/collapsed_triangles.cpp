@@ -22,6 +22,7 @@ glm::i32vec3 vectorOf(const Point& p) { return {p[0], p[1], p[2]}; }
 struct Segment {
     Point a, b;
     std::array<uint32_t, 2> colour;
+    float stray;  ///< of the triangle
 
     [[nodiscard]] std::pair<Point, Point> ends() const { return {a, b}; }
     bool operator<(const Segment& o) const { return std::tie(a, b, colour) < std::tie(o.a, o.b, o.colour); }
@@ -33,7 +34,7 @@ void addSegments(const LatticeTriangle& t, std::vector<Segment>& segments) {
     for (int i = 0; i < 3; ++i) corner[i] = {pointOf(t.corner[i]), t.colour[i]};
     std::sort(corner.begin(), corner.end());
     const auto add = [&](int i, int k) {
-        segments.push_back({corner[i].first, corner[k].first, {corner[i].second, corner[k].second}});
+        segments.push_back({corner[i].first, corner[k].first, {corner[i].second, corner[k].second}, t.stray});
     };
     if (corner[0].first == corner[2].first) return add(0, 2);
     if (corner[0].first != corner[1].first) add(0, 1);
@@ -53,14 +54,18 @@ void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segme
     std::erase_if(segments, [&](const Segment& s) { return covered.contains(s.ends()); });
 }
 
+/// Whether a vertex may lie there.
+bool isVertex(glm::i32vec3 p, int step) { return ((p.x | p.y | p.z) & (step - 1)) == 0; }
+
 /// Returns a neighbour of `p` in its page that does not lie on the line from `p` to `q`.
-glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q,
-                        const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
+glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q, const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage,
+                        const std::function<int(glm::i32vec3)>& stepAt) {
+    const int distance = stepAt(p);
     for (int axis = 0; axis < 3; ++axis)
-        for (const int step : {1, -1}) {
+        for (const int step : {distance, -distance}) {
             glm::i32vec3 r = p;
             r[axis] += step;
-            if (r[axis] >= 0 && samePage(p, r) && (p == q || hasArea(p, q, r))) return r;
+            if (r[axis] >= 0 && samePage(p, r) && isVertex(r, stepAt(r)) && (p == q || hasArea(p, q, r))) return r;
         }
     return p;  // a page has more than one lattice point along each axis
 }
@@ -68,7 +73,8 @@ glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q,
 }  // namespace
 
 void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(glm::i32vec3)>& owns,
-                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage) {
+                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage,
+                   const std::function<int(glm::i32vec3)>& stepAt) {
     const auto firstCollapsed = std::partition(soup.begin(), soup.end(), [](const LatticeTriangle& t) {
         return hasArea(t.corner[0], t.corner[1], t.corner[2]);
     });
@@ -79,16 +85,24 @@ void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(
     std::erase_if(segments, [&](const Segment& s) { return !owns(vectorOf(s.a)) && !owns(vectorOf(s.b)); });
     removeCovered(soup, segments);
     std::sort(segments.begin(), segments.end());
-    segments.erase(std::unique(segments.begin(), segments.end(),
-                               [](const Segment& a, const Segment& b) { return a.ends() == b.ends(); }),
-                   segments.end());
+    // The first of several along one line stays, with the largest stray.
+    size_t kept = 0;
+    for (const Segment& s : segments) {
+        const bool isNew = kept == 0 || segments[kept - 1].ends() != s.ends();
+        if (isNew)
+            segments[kept++] = s;
+        else
+            segments[kept - 1].stray = std::max(segments[kept - 1].stray, s.stray);
+    }
+    segments.resize(kept);
     for (const Segment& s : segments) {
         LatticeTriangle t{};
         t.corner[0] = vectorOf(s.a);
-        t.corner[1] = s.a == s.b ? besideLine(t.corner[0], t.corner[0], samePage) : vectorOf(s.b);
-        t.corner[2] = besideLine(t.corner[0], t.corner[1], samePage);
+        t.corner[1] = s.a == s.b ? besideLine(t.corner[0], t.corner[0], samePage, stepAt) : vectorOf(s.b);
+        t.corner[2] = besideLine(t.corner[0], t.corner[1], samePage, stepAt);
         for (int i = 0; i < 3; ++i) t.colour[i] = s.colour[i == 1 ? 1 : 0];
-        t.stray = float(kLatticeRounding + 1.0 / kLatticePerCell);
+        const int step = std::max(stepAt(vectorOf(s.a)), stepAt(vectorOf(s.b)));
+        t.stray = std::max(s.stray, float(kLatticeRounding * step)) + float(step) / float(kLatticePerCell);
         soup.push_back(t);
     }
 }

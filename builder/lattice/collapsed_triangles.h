@@ -16,8 +16,10 @@ namespace vcp {
 
 /// Replaces the triangles without area in a bin's soup. The soup must hold all triangles at the corners that the bin
 /// `owns`; what is kept along a line is kept in the bins that own one of its ends, the same in each. `samePage(p, q)`:
-/// whether two lattice points lie in one page. The result does not depend on the soup's order.
+/// whether two lattice points lie in one page. `stepAt(p)`: vertices around a point lie on multiples of it. The result
+/// does not depend on the soup's order.
 void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(glm::i32vec3)>& owns,
-                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage);
+                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage,
+                   const std::function<int(glm::i32vec3)>& stepAt);
 
 }  // namespace vcp

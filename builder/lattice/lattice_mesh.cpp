@@ -177,6 +177,11 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
     return mesh;
 }
 
+void halveLattice(LatticeMesh& mesh) {
+    for (glm::i32vec3& p : mesh.positions) p >>= 1;
+    for (float& stray : mesh.stray) stray /= 2;
+}
+
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
     const auto named = [](glm::i32vec3 q) { return OrderedVertex{mortonEncode(glm::u32vec3(q >> 11)), q, 0}; };
     const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p),

@@ -37,6 +37,10 @@ bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 /// vertex are averaged, triangle by triangle. Uses the calling arena's threads.
 LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
 
+/// Brings a mesh to the lattice that is half as fine. Vertices that do not lie on it are rounded down; what is made of
+/// them is void.
+void halveLattice(LatticeMesh& mesh);
+
 /// Returns the number of the vertex at `p` in a mesh from meshOf, or none.
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 

@@ -19,8 +19,8 @@ Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
     if (sink_.partition_.bins() == 1) return batch_.add(0, t);
     // A triangle seldom spans more than two bins, so the list of those seen is short.
     touched_.clear();
-    sink_.grid_.forPagesNear(t.corner, kStepMarginCells, [&](uint64_t page) {
-        const size_t bin = sink_.partition_.binOf(page);
+    sink_.pages_.forPagesNear(t.corner, sink_.marginCells_, [&](uint32_t level, uint64_t page) {
+        const size_t bin = sink_.partition_.binOf(sink_.pages_.firstCode(level, page));
         if (std::find(touched_.begin(), touched_.end(), bin) == touched_.end()) touched_.push_back(bin);
     });
     for (const size_t bin : touched_) VCP_TRY(batch_.add(bin, t));

@@ -13,8 +13,8 @@
 
 #include <atomic>
 
+#include "builder/lattice/finest_pages.h"
 #include "builder/lattice/lattice_mesh.h"
-#include "builder/lattice/page_partition.h"
 #include "builder/lattice/soup.h"
 #include "builder/level/coarsen.h"
 #include "builder/spill/record_bins.h"
@@ -36,8 +36,10 @@ struct WaitingTriangle {
 /// Where the next level's triangles go: into every bin that needs them.
 class LevelSink {
 public:
-    LevelSink(const PageGrid& grid, const PagePartition& partition, RecordBins<LatticeTriangle>& bins)
-        : grid_(grid), partition_(partition), bins_(bins) {}
+    /// `partition`: by codes of the deepest of `pages`.
+    LevelSink(FinestPages pages, const PagePartition& partition, RecordBins<LatticeTriangle>& bins,
+              double marginCells = kStepMarginCells)
+        : pages_(std::move(pages)), partition_(partition), bins_(bins), marginCells_(marginCells) {}
 
     /// Collects triangles; each thread has a batch of its own, and flushes it when done.
     class Batch {
@@ -53,9 +55,10 @@ public:
     };
 
 private:
-    const PageGrid& grid_;
+    FinestPages pages_;
     const PagePartition& partition_;
     RecordBins<LatticeTriangle>& bins_;
+    double marginCells_;
 };
 
 /// Steps one level. One thread calls, in ascending order of bins; the calling arena's threads do the work.

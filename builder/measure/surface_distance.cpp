@@ -337,7 +337,9 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     const LevelLeaves leavesOfLevel(cache, cut);
     const MeshSampler sampler(mesh.mesh());
     if (sampler.empty()) return Error{.code = ErrorCode::InvalidInput, .message = "the mesh has no triangle with area"};
-    const double cell = dataset.cellOf(level), certified = dataset.header.level[level].certifiedError;
+    const double cell = dataset.cellOf(level);
+    double certified = 0;
+    for (const uint64_t page : cut) certified = std::max(certified, double(dataset.pages[page].certifiedError));
     SurfaceDistance result;
     result.cell = cell;
     result.certifiedErrorMax = certified;

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "builder/lattice/finest_pages.h"
 #include "builder/lattice/lattice_mesh.h"
-#include "builder/lattice/page_partition.h"
 
 namespace vcp {
 
@@ -24,6 +24,18 @@ struct TriangleBins {
         return std::span(triangles).subspan(begin[page], begin[page + 1] - begin[page]);
     }
 };
+
+/// The triangles of the pages of one level.
+struct LevelBins {
+    uint32_t level;
+    TriangleBins bins;
+};
+
+/// Bins each triangle to every page that holds the mesh, widened by `margin` cells, that it overlaps, of those whose
+/// first code of the deepest level is from `first` to before `end`. Returns the levels that have any, deepest first.
+/// Uses the calling arena's threads.
+std::vector<LevelBins> binTriangles(const LatticeMesh& mesh, const FinestPages& pages, double margin, uint64_t first,
+                                    uint64_t end);
 
 /// Bins each triangle to every page from code `first` to before `end` whose cube, widened by `margin` cells, it
 /// overlaps.

@@ -19,7 +19,7 @@ public:
     /// `prefix`: of the files' names (temp_folder.cpp lists them).
     PageSpool(TempSpace& space, uint32_t level, std::string_view prefix = "");
 
-    /// Appends a page; pages come in Morton order. One thread.
+    /// Appends a page. One thread.
     Result<void> append(PageEntry entry, const StoredPage& page);
     Result<void> sync();
     /// Takes over what an interrupted build had: so many bytes and entries. Errors: Io; InvalidInput (damaged).
@@ -27,6 +27,8 @@ public:
     /// Returns a page as it was appended. Errors: Io; InvalidInput (damaged).
     Result<StoredPage> read(const PageEntry& entry) const;
     void remove();
+    /// Brings the entries into Morton order, in memory; nothing may be appended after that.
+    void sortEntries();
 
     [[nodiscard]] std::vector<PageEntry>& entries() { return entries_; }
     [[nodiscard]] const std::vector<PageEntry>& entries() const { return entries_; }

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <numeric>
 #include <random>
+#include <set>
 
 #include <sys/resource.h>
 
@@ -16,6 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/dataset_reader.h"
+#include "octree/reference_caster.h"
 #include "octree/vcp_verify.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -166,6 +168,55 @@ TEST_F(Build, SameBytesForAnyMemory) {
     o.memoryBytes = 140 << 20;
     fs::remove(o.output);
     expectError(o, ErrorCode::Limit, "memory cap");
+}
+
+/// A dense ball in a wide box.
+IndexedMesh crowdedScene() {
+    IndexedMesh mesh = test::boxMesh({0, 0, 0}, {100, 110, 120}, 12);
+    test::append(mesh, test::sphereMesh({30, 40, 50}, 0.25, 280));
+    roundToFloat(mesh);
+    return mesh;
+}
+
+TEST_F(Build, CrowdedPlacesHaveFinerPages) {
+    const fs::path input = ply(crowdedScene());
+    BuildOptions o = options({input});
+    ASSERT_TRUE(buildOctree(o).ok());
+    const std::string bytes = contentOf(o.output);
+    expectIntact();
+    auto cache = PageCache::open(o.output);
+    ASSERT_TRUE(cache.ok());
+    ASSERT_TRUE(cache->loadLevel(cache->dataset().header.levels - 1).ok());
+    const Dataset& d = cache->dataset();
+    std::set<uint32_t> levels;
+    const auto cut = cutAtLevel(d, d.header.levels - 1);
+    for (const uint64_t page : cut) {
+        levels.insert(d.pages[page].level);
+        EXPECT_LT(d.pages[page].pageBytes, 8u << 20);
+    }
+    EXPECT_GT(levels.size(), 2u) << "the ball is many levels smaller than the box";
+    // The ball is as round as if it stood alone, and no ray slips through where pages of different levels meet.
+    const auto caster = ReferenceCaster::create(*cache, cut);
+    ASSERT_TRUE(caster.ok());
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    const glm::dvec3 ball(30, 40, 50), middle(50, 55, 60);
+    for (int i = 0; i < 20000; ++i) {
+        const glm::dvec3 direction = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+        const auto onBall = caster->cast({ball - direction, direction});
+        ASSERT_TRUE(onBall.has_value());
+        EXPECT_NEAR(onBall->t, 0.75, 1e-4);
+        const auto onBox = caster->cast({middle, direction});
+        ASSERT_TRUE(onBox.has_value());
+        const glm::dvec3 reach = glm::dvec3(50, 55, 60) / glm::abs(direction);
+        const double wall = std::min({reach.x, reach.y, reach.z});
+        EXPECT_TRUE(onBox->t < wall + 0.1) << onBox->t << ' ' << wall;
+    }
+    // Nothing depends on threads and memory.
+    o.threads = 3;
+    o.memoryBytes = 180 << 20;
+    ASSERT_TRUE(buildOctree(o).ok());
+    EXPECT_TRUE(contentOf(o.output) == bytes);
 }
 
 TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {

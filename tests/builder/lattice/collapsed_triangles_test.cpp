@@ -26,7 +26,7 @@ bool samePage(glm::i32vec3 p, glm::i32vec3 q) { return pageOf(p) == pageOf(q); }
 
 std::vector<LatticeTriangle> kept(std::vector<LatticeTriangle> soup, glm::i32vec3 page = {0, 0, 0}) {
     keepCollapsed(
-        soup, [&](glm::i32vec3 p) { return pageOf(p) == page; }, samePage);
+        soup, [&](glm::i32vec3 p) { return pageOf(p) == page; }, samePage, [](glm::i32vec3) { return 1; });
     return soup;
 }
 

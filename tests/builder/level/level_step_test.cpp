@@ -94,7 +94,7 @@ private:
         const PagePartition next = first ? partition_ : partition_.coarser();
         auto made = newBins("level" + std::to_string(to), next);
         RecordBins<WaitingTriangle> waiting(space_, "waiting", partition_.bins(), 1 << 16);
-        LevelSink sink(coarser, next, *made);
+        LevelSink sink(FinestPages(coarser), next, *made);
         LevelStep step(first, from, partition_, waiting, sink);
         for (size_t bin = 0; bin < partition_.bins(); ++bin) {
             EXPECT_TRUE(bins_->raw().flush().ok());

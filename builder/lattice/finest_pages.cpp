@@ -1,0 +1,86 @@
+#include "builder/lattice/finest_pages.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/gtc/type_precision.hpp>
+
+namespace vcp {
+
+namespace {
+
+void makeSet(std::vector<uint64_t>& codes) {
+    std::sort(codes.begin(), codes.end());
+    codes.erase(std::unique(codes.begin(), codes.end()), codes.end());
+}
+
+}  // namespace
+
+FinestPages::FinestPages(PageGrid base, std::vector<std::vector<uint64_t>> parted)
+    : grid_(base), parted_(std::move(parted)) {
+    while (!parted_.empty() && parted_.back().empty()) parted_.pop_back();
+    for (size_t i = parted_.size(); i-- > 0;) {
+        makeSet(parted_[i]);
+        if (i == 0) break;
+        for (const uint64_t code : parted_[i]) parted_[i - 1].push_back(code >> 3);
+    }
+}
+
+bool FinestPages::isParted(uint32_t level, uint64_t code) const {
+    const size_t i = level - base();
+    return i < parted_.size() && std::binary_search(parted_[i].begin(), parted_[i].end(), code);
+}
+
+void FinestPages::addLevels(uint32_t level, uint64_t code, const glm::i64vec3& low, const glm::i64vec3& high,
+                            Levels& levels) const {
+    if (!isParted(level, code)) {
+        levels.coarsest = std::min(levels.coarsest, level);
+        levels.deepest = std::max(levels.deepest, level);
+        return;
+    }
+    const int64_t half = int64_t{1} << log2PageSteps(level + 1);
+    const glm::i64vec3 middle = glm::i64vec3(mortonDecode(code)) * (2 * half) + half;
+    const int first[3] = {low.x > middle.x, low.y > middle.y, low.z > middle.z};
+    const int last[3] = {high.x >= middle.x, high.y >= middle.y, high.z >= middle.z};
+    for (int z = first[2]; z <= last[2]; ++z)
+        for (int y = first[1]; y <= last[1]; ++y)
+            for (int x = first[0]; x <= last[0]; ++x)
+                addLevels(level + 1, code << 3 | uint64_t(x + 2 * y + 4 * z), low, high, levels);
+}
+
+FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) const {
+    const int bits = log2PageSteps(base());
+    const glm::i64vec3 low = glm::i64vec3(p) - reach, high = glm::i64vec3(p) + reach;
+    // A page holds its walls.
+    const glm::i64vec3 first = glm::max((low - int64_t{1}) >> int64_t(bits), int64_t{0}),
+                       last = glm::min(high >> int64_t(bits), int64_t(grid_.lastPage()));
+    Levels levels{deepest(), base()};
+    for (int64_t z = first.z; z <= last.z; ++z)
+        for (int64_t y = first.y; y <= last.y; ++y)
+            for (int64_t x = first.x; x <= last.x; ++x)
+                addLevels(base(), mortonEncode(glm::u32vec3(x, y, z)), low, high, levels);
+    return levels;
+}
+
+int FinestPages::stepAt(glm::i32vec3 p) const {
+    if (isUniform()) return 1;
+    const uint32_t here = levelsAround(p, 0).deepest;
+    // A cell more than the longest edge, since rounding moves the ends.
+    const int64_t reach = int64_t{kPartedEdgeCells + 1} << (PageGrid::kLog2LatticePerCell + deepest() - here);
+    return 1 << (deepest() - levelsAround(p, reach).coarsest);
+}
+
+bool FinestPages::isTooLong(glm::i32vec3 a, glm::i32vec3 b) const {
+    if (isUniform()) return false;
+    const glm::dvec3 d = glm::dvec3(a) - glm::dvec3(b);
+    const double length = glm::length(d);
+    const auto longest = [&](uint32_t level) {
+        return std::ldexp(double(kPartedEdgeCells), int(PageGrid::kLog2LatticePerCell + deepest() - level));
+    };
+    if (length <= longest(deepest())) return false;
+    const glm::i32vec3 middle((glm::i64vec3(a) + glm::i64vec3(b)) >> int64_t{1});
+    const uint32_t level = levelsAround(middle, int64_t(length) + 2).deepest;
+    return level > base() && length > longest(level);
+}
+
+}  // namespace vcp

@@ -1,0 +1,113 @@
+// The pages that hold the mesh: those of one level, and where they would hold more triangles than a page should, those
+// of finer levels. So a page is small wherever triangles are small, and the statue in a building costs no more than the
+// statue alone.
+//
+// All triangles lie on one lattice, the deepest level's. A page of a coarser level needs vertices that lie on its own,
+// coarser lattice, and a triangle that several pages hold must be the same in all of them, or rays would slip through
+// between. So:
+//   - pages that touch differ by one level at most;
+//   - near pages below the base level no edge is longer than kPartedEdgeCells of their cells (longest edges of a
+//     triangle lie within their own length of all of it, so this depends on the edge alone);
+//   - a vertex lies on the lattice of the coarsest page within that reach (stepAt).
+// A triangle then has its corners on the lattice of every page that it touches.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <glm/gtc/type_precision.hpp>
+
+#include "builder/lattice/page_partition.h"
+
+namespace vcp {
+
+/// Longest edge of a triangle that touches a page below the base level, in cells of that page.
+inline constexpr int kPartedEdgeCells = 16;
+
+class FinestPages {
+public:
+    /// Makes all pages of a level.
+    explicit FinestPages(PageGrid base = {}) : grid_(base) {}
+    /// `parted`: for the base level and each one below, the Morton codes of pages that are parted into eight, in any
+    /// order, at any depth; the pages above them, and those that keep neighbours from differing by more than a level,
+    /// are added.
+    FinestPages(PageGrid base, std::vector<std::vector<uint64_t>> parted);
+
+    [[nodiscard]] bool isUniform() const { return parted_.empty(); }
+    [[nodiscard]] uint32_t base() const { return grid_.level; }
+    [[nodiscard]] uint32_t deepest() const { return grid_.level + uint32_t(parted_.size()); }
+    [[nodiscard]] PageGrid gridOf(uint32_t level) const { return {grid_.log2Cells, level}; }
+    /// What makes the same pages again; ascending codes.
+    [[nodiscard]] const std::vector<std::vector<uint64_t>>& parted() const { return parted_; }
+    [[nodiscard]] bool isParted(uint32_t level, uint64_t code) const;
+    /// Returns the first code of the deepest level within a page.
+    [[nodiscard]] uint64_t firstCode(uint32_t level, uint64_t code) const { return code << 3 * (deepest() - level); }
+
+    /// Calls visit(level, Morton code) for every page whose cube, widened by `margin` of its cells, the triangle
+    /// overlaps. `corner`: on the lattice of the deepest level, or of the level `lattice`.
+    template <class Visit>
+    void forPagesNear(const glm::i32vec3 (&corner)[3], double margin, uint32_t lattice, Visit&& visit) const;
+    template <class Visit>
+    void forPagesNear(const glm::i32vec3 (&corner)[3], double margin, Visit&& visit) const {
+        forPagesNear(corner, margin, deepest(), visit);
+    }
+
+    /// Returns the distance between neighbouring vertices around a point, in steps of the deepest level's lattice:
+    /// vertices lie on multiples of it.
+    [[nodiscard]] int stepAt(glm::i32vec3 p) const;
+    /// Whether the edge between two points is too long for a page near it.
+    [[nodiscard]] bool isTooLong(glm::i32vec3 a, glm::i32vec3 b) const;
+
+private:
+    struct Levels {
+        uint32_t coarsest, deepest;
+    };
+    /// Returns the levels of the pages that touch the box of half edge `reach` around a point.
+    [[nodiscard]] Levels levelsAround(glm::i32vec3 p, int64_t reach) const;
+    void addLevels(uint32_t level, uint64_t code, const glm::i64vec3& low, const glm::i64vec3& high,
+                   Levels& levels) const;
+    [[nodiscard]] int log2PageSteps(uint32_t level) const {
+        return int(grid_.log2Cells + PageGrid::kLog2LatticePerCell + deepest() - level);
+    }
+
+    PageGrid grid_;
+    std::vector<std::vector<uint64_t>> parted_;  ///< [0]: of the base level; the last is not empty
+};
+
+template <class Visit>
+void FinestPages::forPagesNear(const glm::i32vec3 (&corner)[3], double margin, uint32_t lattice, Visit&& visit) const {
+    if (isUniform()) return grid_.forPagesNear(corner, margin, [&](uint64_t code) { visit(base(), code); });
+    // In pages of the base level.
+    const int log2Steps = int(grid_.log2Cells + PageGrid::kLog2LatticePerCell + lattice - base());
+    const double perStep = std::ldexp(1.0, -log2Steps), reach = margin / grid_.edgeCells();
+    const BoxOverlap overlap(
+        {glm::dvec3(corner[0]) * perStep, glm::dvec3(corner[1]) * perStep, glm::dvec3(corner[2]) * perStep});
+    // The triangle's bounds choose the pages; where they leave more than one, it may still miss some.
+    const auto visitRange = [&](const auto& self, uint32_t level, glm::u32vec3 first, glm::u32vec3 last) -> void {
+        const double edge = std::ldexp(1.0, -int(level - base()));
+        for (uint32_t z = first.z; z <= last.z; ++z)
+            for (uint32_t y = first.y; y <= last.y; ++y)
+                for (uint32_t x = first.x; x <= last.x; ++x) {
+                    const glm::u32vec3 at(x, y, z);
+                    const glm::dvec3 low = glm::dvec3(at) * edge, high = low + edge;
+                    const bool isWithin = glm::all(glm::lessThanEqual(low, overlap.lower())) &&
+                                          glm::all(glm::lessThanEqual(overlap.upper(), high));
+                    if (!isWithin && !overlap.test((low + high) / 2.0, (0.5 + reach) * edge)) continue;
+                    const uint64_t code = mortonEncode(at);
+                    if (!isParted(level, code)) {
+                        visit(level, code);
+                        continue;
+                    }
+                    const glm::dvec3 middle = (low + high) / 2.0;
+                    const double wide = reach * edge / 2 + 1e-9;
+                    self(self, level + 1, at * 2u + glm::u32vec3(glm::greaterThan(overlap.lower() - wide, middle)),
+                         at * 2u + glm::u32vec3(glm::greaterThanEqual(overlap.upper() + wide, middle)));
+                }
+    };
+    const glm::dvec3 from = overlap.lower() - reach - 1e-9, to = overlap.upper() + reach + 1e-9;
+    visitRange(visitRange, base(), glm::u32vec3(glm::max(glm::i32vec3(glm::floor(from)), 0)),
+               glm::u32vec3(glm::min(glm::i32vec3(glm::floor(to)), grid_.lastPage())));
+}
+
+}  // namespace vcp
