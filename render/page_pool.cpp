@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "render/frame.h"
+#include "render/shared/frame.h"
 #include "render/vulkan/compute_pipeline.h"
 
 namespace vcp {
