@@ -63,6 +63,14 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
     return pool;
 }
 
+PageMemorySource poolsOf(Device& device, PageAccess access) {
+    return {poolChunkBytes(device.limits(), access),
+            [&device, access](uint64_t bytes) -> Result<std::unique_ptr<PageMemory>> {
+                VCP_TRY_ASSIGN(auto pool, PagePool::create(device, bytes, access));
+                return std::unique_ptr<PageMemory>(std::move(pool));
+            }};
+}
+
 PagePool::~PagePool() { static_cast<void>(device_.waitForCopies()); }
 
 Result<void> PagePool::reserveStaging(uint64_t bytes) {
