@@ -19,7 +19,7 @@ const Error kNothingDrawn{.code = ErrorCode::Usage, .message = "nothing was draw
 
 Error unsupported(const char* what) {
     return {.code = ErrorCode::Unsupported,
-            .message = fmt::format("the host does not draw {}; take a Vulkan device for them", what)};
+            .message = fmt::format("the host does not draw {}; take a Vulkan device", what)};
 }
 
 Result<void> checkDrawable(const PlacedDataset& placed) {
@@ -32,17 +32,7 @@ Result<void> checkDrawable(const PlacedDataset& placed) {
     // Where pages do not cover the surface, the shaders continue coarser pages into finer ones.
     if (dataset.header.levels > 1 && !dataset.isCovering())
         return refused(
-            "the host does not draw the seams between levels of soft leaves, which files built to a tolerance have; "
-            "build the mesh without one, or take a Vulkan device");
-    return {};
-}
-
-Result<void> checkDrawable(const FrameRequest& request) {
-    const ShadingMode mode = request.shading.mode;
-    if (!request.sections.empty()) return unsupported("section planes");
-    if (mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches)
-        return unsupported("the work of rays");
-    if (request.countSteps) return unsupported("the work of rays");
+            "the host does not draw the seams between levels that are no slabs, as this file's; take a Vulkan device");
     return {};
 }
 
@@ -92,6 +82,14 @@ DeviceInfo hostDevice() {
             .usable = true};
 }
 
+Result<void> checkHostDraws(const FrameRequest& request) {
+    const ShadingMode mode = request.shading.mode;
+    if (!request.sections.empty()) return unsupported("section planes");
+    if (mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches || request.countSteps)
+        return unsupported("the work of rays");
+    return {};
+}
+
 Result<std::unique_ptr<HostRenderer>> HostRenderer::create(const RendererOptions& options) {
     VCP_TRY(checkBudget(options.budgetBytes));
     if (options.validation)
@@ -114,7 +112,7 @@ Result<void> HostRenderer::setSurfaces(std::span<const MesoSurface> surfaces) {
 
 Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
-    VCP_TRY(checkDrawable(request));
+    VCP_TRY(checkHostDraws(request));
     std::optional<UpdateResult> all;
     for (size_t i = 0; i < datasets_.size(); ++i) {
         const auto& [residency, placement] = datasets_[i];
@@ -148,7 +146,7 @@ Result<void> HostRenderer::drawDataset(size_t number, const FrameRequest& reques
 Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::function<bool()>& cancel) {
     drawn_.reset();
     VCP_TRY(checkRequest(request));
-    VCP_TRY(checkDrawable(request));
+    VCP_TRY(checkHostDraws(request));
     const auto began = std::chrono::steady_clock::now();
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));

@@ -18,6 +18,9 @@ namespace vcp {
 /// The processor, as `vcp devices` lists it.
 DeviceInfo hostDevice();
 
+/// Refuses what the host does not draw of a request. Errors: Unsupported.
+Result<void> checkHostDraws(const FrameRequest& request);
+
 class HostRenderer final : public PictureRenderer {
 public:
     /// Errors: Usage (the budget is too small), Unsupported (validation layers are Vulkan's).

@@ -56,7 +56,7 @@ struct Renderer::Shared {
     void take(std::unique_ptr<Device> made);
     /// Uploads the copies of the surfaces to the device. After an error there are none.
     Result<void> uploadSurfaces();
-    /// Opens datasets beside those that are open, and shows all. After an error none is. Errors: as of
+    /// Opens datasets beside those that are open, and shows all. After an error none is added. Errors: as of
     /// Renderer::open.
     Result<void> addDatasets(std::vector<PlacedDataset> placed);
     /// hidePool: ends what is in flight; no shader of any view sees a pool then. showPool: shaders see the residencies'

@@ -64,8 +64,8 @@ std::string table(const DeviceList& list) {
         if (!device.usable) text += "; not usable: needs Vulkan 1.2 and a compute queue";
         text += '\n';
     }
-    text += fmt::format("{} -  {}: pictures on the processor, without Vulkan; {}\n", list.host.chosen ? '*' : ' ',
-                        list.host.name, list.host.driver);
+    text += fmt::format("{} -  {}: cpu, {}; software: draws pictures on the processor, without Vulkan\n",
+                        list.host.chosen ? '*' : ' ', list.host.name, list.host.driver);
     if (list.problem) text += fmt::format("no Vulkan, which windows need: {}\n", list.problem->line());
     return text + "* is the one that vcp takes; --device takes another";
 }

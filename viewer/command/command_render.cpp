@@ -10,7 +10,7 @@
 #include "builder/measure/quantile.h"
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/method.h"
-#include "render/picture_renderer.h"
+#include "render/host_renderer.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
@@ -211,7 +211,7 @@ Result<void> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
                                         .isNumbered = command.isSequence(),
                                         .tile = command.tile > 0 ? command.tile : kTile,
                                         .rules = rules,
-                                        .problem = {}});
+                                        .cancel = interrupted});
     for (bool isDone = false; !isDone;) {
         VCP_TRY_ASSIGN(isDone, sequence.step());
         display.update("drawing", sequence.fraction());
@@ -324,8 +324,17 @@ FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, co
     return request;
 }
 
+/// Refuses what the host does not draw before a mesh is built for it.
+Result<void> checkHost(const RenderCommand& command) {
+    FrameRequest request;
+    request.shading = command.render.shading;
+    request.sections.resize(command.render.sections.size());
+    return checkHostDraws(request);
+}
+
 Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
+    if (isHostName(command.render.device)) VCP_TRY(checkHost(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     VCP_TRY_ASSIGN(const auto open,
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),

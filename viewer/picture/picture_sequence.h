@@ -28,8 +28,9 @@ struct PictureSequenceOptions {
     bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on
     uint32_t tile = 2048;     ///< edge in pixels, at least 16
     OutputRules rules = {};   ///< what the files may replace
-    /// Called as TiledPictureOptions::problem is.
-    std::function<void(const Error& problem)> problem;
+    /// Called as those of TiledPictureOptions are.
+    std::function<void(const Error& problem)> problem = {};
+    std::function<bool()> cancel = {};
 };
 
 /// Returns "turn-0007.png" for "turn.png" and 7.

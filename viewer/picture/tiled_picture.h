@@ -21,6 +21,8 @@ struct TiledPictureOptions {
     bool depth = false, normals = false;
     /// Called with the error of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
     std::function<void(const Error& problem)> problem;
+    /// Asked while a tile is drawn (PictureRenderer::render); true ends the picture with Cancelled.
+    std::function<bool()> cancel;
 };
 
 /// Rows of the picture, over its whole width, from the upper one on.
