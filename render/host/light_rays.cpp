@@ -16,6 +16,7 @@
 #include <hwy/highway.h>
 
 #include "render/host/scene_walk-inl.h"
+#include "render/host/triangles-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
@@ -126,25 +127,43 @@ private:
         const PageView& view = *page.view;
         const auto cell = float(1u << page.cellBits);  // page space counts in cells of the page's level
         const float edgeInCells = edge / cell;
-        const glm::vec3 lowest = glm::vec3(at.corner - page.corner) * float(kSubcell) / cell;
-        const glm::vec3 from = lowest + part.p * edgeInCells;
-        const auto vertex = [&](uint32_t number) {
-            const glm::u32vec2 code = view.vertices[number];
-            return f32::decodeVertex(code.x, code.y);
-        };
+        // Coordinates are relative to the leaf's lowest corner.
+        constexpr int kSteps = kLatticePerCell >> kMaxSubcellDepth;
+        const glm::ivec3 corner = glm::ivec3((at.corner - page.corner) >> page.cellBits) * kSteps;
+        const glm::vec3 from = part.p * edgeInCells;
         const float least = part.fromWall ? -f32::kIntervalSlack : 0.0f;
         float best = (part.last - part.first) * edgeInCells + f32::kIntervalSlack;
         bool isHit = false;
-        for (StripWalk walk(view.strips, at.word); walk.next();) {
-            const Index3 corners = walk.triangle();
-            const glm::vec3 t = f32::intersectTriangle(from, direction_, vertex(corners[0]), vertex(corners[1]),
-                                                       vertex(corners[2]), f32::kTriangleSlack);
-            if (!(t.x >= least && t.x <= best)) continue;
-            best = t.x;
-            isHit = true;
+        Triangles t;
+        for (StripWalk walk(view.strips, at.word); nextTriangles(walk, t);) {
+            loadVertices(view, corner, t);
+            for (uint32_t rest = trianglesNear(t, from) & ((1u << t.count) - 1); rest != 0; rest &= rest - 1) {
+                const int k = std::countr_zero(rest);
+                const auto vertex = [&](int i) { return glm::vec3(t.x[i][k], t.y[i][k], t.z[i][k]); };
+                const glm::vec3 hit =
+                    f32::intersectTriangle(from, direction_, vertex(0), vertex(1), vertex(2), f32::kTriangleSlack);
+                if (!(hit.x >= least && hit.x <= best)) continue;
+                best = hit.x;
+                isHit = true;
+            }
         }
         if (!isHit) return std::numeric_limits<float>::infinity();
         return std::max(float(part.distance) + (part.first * edgeInCells + best) * cell, 0.0f);
+    }
+
+    /// Tells which triangles the line from a point may meet: the first test of intersectTriangle (leaf_math.h), with
+    /// four times its slack, a triangle a lane.
+    [[nodiscard]] uint32_t trianglesNear(const Triangles& t, glm::vec3 from) const {
+        const Lane3 d = spread(direction_), q = spread(from);
+        const Lane3 a = vertexOf(t, 0) - q, b = vertexOf(t, 1) - q, c = vertexOf(t, 2) - q;
+        const Lane3 ab = b - a, bc = c - b, ca = a - c;
+        const Mask isBack = dot(cross(ab, ca), d) > Lane(0.0f);  // the normal is (b - a) x (c - a)
+        const auto misses = [&](Lane3 corner, Lane3 edge) HWY_ATTR {
+            const Lane volume = dot(d, cross(corner, edge)), inside = select(isBack, -volume, volume);
+            const float slack = 4 * f32::kTriangleSlack;
+            return (inside < Lane(0.0f)) & (inside * inside > Lane(slack * slack) * dot(edge, edge));
+        };
+        return ~bitsOf(misses(b, bc) | misses(c, ca) | misses(a, ab));
     }
 
     const HostScene& scene_;
