@@ -4,17 +4,23 @@
 
 namespace vcp {
 
+namespace {
+
+/// Whether the host draws where no device could be made: none was asked for, and there is none.
+bool isHostNeeded(const RendererOptions& options) {
+    return options.device.empty() && !options.validation && !options.host && !listDevices();
+}
+
+}  // namespace
+
 Result<std::unique_ptr<PictureRenderer>> createPictureRenderer(const RendererOptions& options) {
     if (!isHostName(options.device)) {
         auto made = Renderer::create(options);
-        const bool mayBeHost = options.device.empty() && !options.validation && !options.host;
-        if (made || !mayBeHost || listDevices()) {
-            if (!made) return made.error();
-            return std::unique_ptr<PictureRenderer>(std::move(*made));
-        }
+        if (made) return std::unique_ptr<PictureRenderer>(std::move(*made));
+        if (!isHostNeeded(options)) return made.error();
     }
-    VCP_TRY_ASSIGN(auto made, HostRenderer::create(options));
-    return std::unique_ptr<PictureRenderer>(std::move(made));
+    VCP_TRY_ASSIGN(auto host, HostRenderer::create(options));
+    return std::unique_ptr<PictureRenderer>(std::move(host));
 }
 
 }  // namespace vcp
