@@ -1,5 +1,5 @@
 // Where a picture is taken from. Plain data in world space and double precision; what the GPU gets is
-// relative to the eye (render/frame.h), so that large coordinates lose nothing.
+// relative to the eye (render/shared/frame.h), so that large coordinates lose nothing.
 #pragma once
 
 #include <cstdint>

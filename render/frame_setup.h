@@ -1,8 +1,8 @@
 // Computes from a request what shaders and selection need: in double, rounded once. Pure.
 #pragma once
 
-#include "render/frame.h"
 #include "render/frame_request.h"
+#include "render/shared/frame.h"
 #include "render/similarity.h"
 #include "streaming/page_selection.h"
 

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "render/frame.h"
+#include "render/shared/frame.h"
 #include "render/vulkan/compute_pipeline.h"
 
 namespace vcp {
@@ -61,6 +61,14 @@ Result<std::unique_ptr<PagePool>> PagePool::create(Device& device, uint64_t byte
         pool->chunks_.push_back(std::move(chunk));
     }
     return pool;
+}
+
+PageMemorySource poolsOf(Device& device, PageAccess access) {
+    return {poolChunkBytes(device.limits(), access),
+            [&device, access](uint64_t bytes) -> Result<std::unique_ptr<PageMemory>> {
+                VCP_TRY_ASSIGN(auto pool, PagePool::create(device, bytes, access));
+                return std::unique_ptr<PageMemory>(std::move(pool));
+            }};
 }
 
 PagePool::~PagePool() { static_cast<void>(device_.waitForCopies()); }

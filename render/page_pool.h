@@ -9,31 +9,22 @@
 #include <span>
 #include <vector>
 
+#include "render/page_memory.h"
 #include "render/vulkan/device.h"
-#include "streaming/slot_allocator.h"
 
 namespace vcp {
 
-class PagePool {
+class PagePool final : public PageMemory {
 public:
     /// Takes at most `bytes`, rounded down to units. Errors: Device; Limit, where shaders could not address it.
     static Result<std::unique_ptr<PagePool>> create(Device& device, uint64_t bytes, PageAccess access);
-    ~PagePool();
+    ~PagePool() override;
 
-    /// Writes at byte `at` of a slot, at the latest with flush(). Precondition: the bytes fit into the slot and are
-    /// multiples of 16. Errors: Device.
-    Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes);
-    /// Makes what was written visible to all that is submitted later, and waits for nothing. Errors: Device.
-    Result<void> flush();
-    /// Reads from byte `at` of a slot; preconditions as for write(). Errors: Device.
-    Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes);
-    /// Copies a slot's bytes, at the latest with flush(), in order with what is written; both slots are in one chunk
-    /// and may overlap. Errors: Device.
-    Result<void> move(PoolSlot from, PoolSlot to);
-
-    /// Returns the number of the slot's first texel, over all chunks.
-    [[nodiscard]] uint32_t texel(PoolSlot slot) const { return uint32_t(slot.firstUnit * (kPoolUnitBytes / 16)); }
-    [[nodiscard]] uint64_t bytes() const { return bytes_; }
+    Result<void> write(PoolSlot slot, uint64_t at, std::span<const std::byte> bytes) override;
+    Result<void> flush() override;
+    Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes) override;
+    Result<void> move(PoolSlot from, PoolSlot to) override;
+    [[nodiscard]] uint64_t bytes() const override { return bytes_; }
 
     [[nodiscard]] uint32_t chunks() const { return uint32_t(chunks_.size()); }
     [[nodiscard]] uint32_t chunkShift() const { return chunkShift_; }
@@ -75,5 +66,8 @@ private:
 
 /// Returns the largest chunk that shaders of this device can address whole, a power of two of at most 1 GiB.
 uint64_t poolChunkBytes(const VkPhysicalDeviceLimits& limits, PageAccess access);
+
+/// Gives pools of a device, which must outlive them.
+PageMemorySource poolsOf(Device& device, PageAccess access);
 
 }  // namespace vcp

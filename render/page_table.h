@@ -10,7 +10,7 @@
 
 #include "octree/dataset_reader.h"
 #include "octree/page/page.h"
-#include "render/frame.h"
+#include "render/shared/frame.h"
 
 namespace vcp {
 

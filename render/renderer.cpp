@@ -1,10 +1,7 @@
 #include "render/renderer.h"
 
-#include <algorithm>
 #include <chrono>
 #include <limits>
-
-#include <fmt/format.h>
 
 #include "render/frame_setup.h"
 #include "render/renderer_view.h"
@@ -12,20 +9,14 @@
 
 namespace vcp {
 
-namespace {
-
-constexpr uint64_t kLeastBudget = 1ull << 20;
-
-}  // namespace
-
 Renderer::Renderer(std::unique_ptr<View> view) : view_(std::move(view)) {}
 Renderer::~Renderer() = default;
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
-    if (options.budgetBytes < kLeastBudget)
-        return Error{.code = ErrorCode::Usage,
-                     .message = fmt::format("a budget of {} bytes is too small; at least {}", options.budgetBytes,
-                                            kLeastBudget)};
+    VCP_TRY(checkBudget(options.budgetBytes));
+    if (isHostName(options.device))
+        return Error{.code = ErrorCode::Unsupported,
+                     .message = "the host draws pictures into files only; here a Vulkan device is needed"};
     auto shared = std::make_shared<Shared>();
     shared->options = options;
     if (options.host) {
@@ -74,10 +65,7 @@ Result<void> Renderer::open(std::vector<PlacedDataset> datasets, std::span<const
 Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     Shared& s = *view_->shared;
     if (!s.device) return kGone;
-    if (budgetBytes < kLeastBudget)
-        return Error{
-            .code = ErrorCode::Usage,
-            .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
+    VCP_TRY(checkBudget(budgetBytes));
     if (!s.datasets.empty()) {
         s.hidePool();
         const auto done = s.setShares(budgetBytes, ramBytes);
@@ -135,34 +123,6 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     return result;
 }
 
-Result<UpdateResult> Renderer::settle(const FrameRequest& request, const std::function<bool()>& cancel) {
-    bool changed = false;
-    std::vector<Error> problems;
-    while (true) {
-        auto result = update(request);
-        if (!result) return result;
-        changed = changed || result->changed;
-        problems.insert(problems.end(), result->problems.begin(), result->problems.end());
-        if (result->settled) {
-            result->changed = changed;
-            result->problems = std::move(problems);
-            return result;
-        }
-        if (cancel && cancel()) return Error::cancelled();
-        waitForPage(std::chrono::milliseconds(100));
-    }
-}
-
-void Renderer::waitForPage(std::chrono::milliseconds timeout) {
-    std::vector<Shared::Placed>& datasets = view_->shared->datasets;
-    if (datasets.size() == 1) return static_cast<void>(datasets.front().residency->waitForPage(timeout));
-    // The datasets take turns until one has pages.
-    constexpr std::chrono::milliseconds kTurn(5);
-    const auto until = std::chrono::steady_clock::now() + timeout;
-    for (const Shared::Placed& placed : datasets) {
-        if (std::chrono::steady_clock::now() >= until) return;
-        if (placed.residency->waitForPage(std::min(timeout, kTurn))) return;
-    }
-}
+void Renderer::waitForPage(std::chrono::milliseconds timeout) { vcp::waitForPage(view_->shared->datasets, timeout); }
 
 }  // namespace vcp

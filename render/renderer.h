@@ -38,36 +38,19 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "octree/dataset_reader.h"
-#include "octree/io/result.h"
-#include "render/frame_request.h"
-#include "render/frame_result.h"
-#include "render/picture.h"
-#include "render/renderer_options.h"
-#include "render/similarity.h"
+#include "render/picture_renderer.h"
 #include "render/window_drawing.h"
-#include "streaming/page_source.h"
 
 namespace vcp {
-
-/// A dataset and where it lies in the world.
-struct PlacedDataset {
-    std::shared_ptr<const Dataset> dataset;
-    std::shared_ptr<const PageSource> source;  ///< source of this dataset only
-    Similarity placement;
-    uint32_t loaderThreads = 2;  ///< threads that keep its source busy
-};
-
-struct MesoSurface;  // render/passes/meso_surface.h
 
 /// The most frames of a view that are in flight at once.
 constexpr size_t kFramesAhead = 2;
 
-class Renderer {
+class Renderer final : public PictureRenderer {
 public:
     /// Makes all anew. Errors: Device (no such device, no memory for the pool), Usage (options contradict each other).
     static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
-    ~Renderer();
+    ~Renderer() override;
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
@@ -76,7 +59,7 @@ public:
     /// meet what windows need. Errors: Device.
     Result<std::unique_ptr<Renderer>> addView(const std::optional<SurfaceSource>& surface = {});
 
-    [[nodiscard]] const DeviceInfo& device() const;
+    [[nodiscard]] const DeviceInfo& device() const override;
     [[nodiscard]] PageAccess access() const;
 
     /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
@@ -84,7 +67,7 @@ public:
     /// Shows several datasets, each drawn by itself, and the nearest surface is seen; shadows and occlusion act within
     /// each dataset. Budgets are shared out (budgetShares). `surfaces`: as in setSurfaces. Errors: those of open for
     /// one dataset and of setSurfaces; then nothing is shown.
-    Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces = {});
+    Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces = {}) override;
     /// Stops the loader and forgets all pages.
     void close();
 
@@ -94,7 +77,7 @@ public:
     /// its mean height is shown by its light from far. They and the datasets cast no shadow on each other, and no
     /// section plane cuts them. The renderer keeps them to upload them again to a device that is made anew. Without
     /// any, nothing is made for them. After an error there are none. Errors: Device, Limit.
-    Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
+    Result<void> setSurfaces(std::span<const MesoSurface> surfaces) override;
 
     /// Sets other budgets than the options', from now on: pages without room go at once, and kept pages are not read
     /// again where `ramBytes` has room to carry them over. Waits for the copies. update() must follow. Errors: Usage;
@@ -108,17 +91,13 @@ public:
     /// Takes in pages and chooses the cut; see the top of this file. Where the device runs out of memory, here or in
     /// render(), the pool is halved; where the device was lost, all is made anew, at most once a call, and read again.
     /// Errors: Device. The result lists problems of single pages.
-    Result<UpdateResult> update(const FrameRequest& request);
-    /// Calls update() until settled, and waits for the loader in between. Stops early with Cancelled where `cancel`
-    /// returns true (it is called several times a second).
-    Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
-
+    Result<UpdateResult> update(const FrameRequest& request) override;
     /// Waits until the loader has read a page, has nothing to do, or the time is over. A host calls it between updates
     /// when it has nothing else to do. Other calls never wait for reads.
-    void waitForPage(std::chrono::milliseconds timeout);
+    void waitForPage(std::chrono::milliseconds timeout) override;
 
     /// Draws the cut of the last update and waits for the GPU. Without a dataset it draws the background.
-    Result<FrameStats> render(const FrameRequest& request);
+    Result<FrameStats> render(const FrameRequest& request, const std::function<bool()>& cancel = {}) override;
 
     /// Draws as render() does, but returns when the frame is handed to the GPU. Waits only where kFramesAhead frames
     /// are in flight, for the older one. `cursor`: a pixel of the picture whose hit comes back with the frame. Errors:
@@ -135,16 +114,13 @@ public:
     /// open() and close().
     [[nodiscard]] const std::optional<DoneFrame>& lastDone() const;
 
-    /// Returns the picture of the last render(). Errors: Usage, where nothing was drawn yet; Device.
-    Result<Picture> readPicture();
-    /// Distances in world units along the unit ray; infinity where nothing is hit, not a number where the ray gave up.
-    Result<std::vector<float>> readDepth();
-    Result<std::vector<glm::vec3>> readNormals();  ///< unit, towards the viewer; 0 where no hit
+    Result<Picture> readPicture() override;
+    Result<std::vector<float>> readDepth() override;
+    Result<std::vector<glm::vec3>> readNormals() override;
     /// Returns the number behind the false colour of each pixel: steps, cells or fetches of its ray. Precondition: the
     /// last render() was shaded so.
     Result<std::vector<uint32_t>> readWork();
-    /// Returns each pixel's iterations in mesostructure, over all pieces that its ray passed; all 0 without surfaces.
-    Result<std::vector<uint32_t>> readIterations();
+    Result<std::vector<uint32_t>> readIterations() override;
     /// Returns what one pixel of the last render() shows; nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);
     /// Returns what the picture shows at a pixel of a window of that size. At the cursor of lastDone() that frame is
@@ -169,8 +145,7 @@ public:
     /// Returns the same as long as the renderer lives. Precondition: options.surface. Errors: Device.
     Result<WindowDrawing> windowDrawing();
 
-    /// Returns validation messages (warnings and errors) since create(); always empty without options.validation.
-    [[nodiscard]] std::vector<std::string> validationMessages() const;
+    [[nodiscard]] std::vector<std::string> validationMessages() const override;
 
 private:
     struct Shared;

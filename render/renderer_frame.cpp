@@ -43,8 +43,8 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
     PassConstants c;
     c.access = shared->access;
     if (const Residency* residency = layer.residency) {
-        c.poolChunks = residency->pages().chunks();
-        c.chunkShift = residency->pages().chunkShift();
+        c.poolChunks = poolOf(*residency).chunks();
+        c.chunkShift = poolOf(*residency).chunkShift();
         c.colour = residency->hasColour();
     }
     c.falseColour = isFalseColour(request.shading.mode);
@@ -168,7 +168,7 @@ FrameRequest Renderer::View::Layer::drawable(const FrameRequest& wanted) const {
     return request;
 }
 
-Result<FrameStats> Renderer::render(const FrameRequest& request) {
+Result<FrameStats> Renderer::render(const FrameRequest& request, const std::function<bool()>&) {
     return view_->shared->tryAgain(*view_, [&] { return view_->draw(request); });
 }
 

@@ -12,7 +12,7 @@
 namespace vcp {
 
 struct RendererOptions {
-    std::string device;                   ///< index, or part of the name in any case; empty: the best one
+    std::string device;  ///< index, or part of the name in any case; empty: the best one; kHostName (device_info.h)
     uint64_t budgetBytes = 512ull << 20;  ///< bytes of the page pool, never exceeded; at least 1 MiB
     bool colour = true;                   ///< false: colour pages are neither read nor allocated
     bool validation = false;              ///< validation layers, core and synchronization; see validationMessages

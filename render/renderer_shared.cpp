@@ -9,18 +9,6 @@
 
 namespace vcp {
 
-namespace {
-
-constexpr uint64_t kMoreThanAnyBudget = 1ull << 60;
-
-/// Returns the largest pool that the dataset can use, as far as is known.
-uint64_t bytesOf(const Dataset& dataset, bool withColour) {
-    return poolShapeFor(dataset, withColour && dataset.hasColour(), kMoreThanAnyBudget, kMoreThanAnyBudget).units *
-           kPoolUnitBytes;
-}
-
-}  // namespace
-
 void Renderer::Shared::take(std::unique_ptr<Device> made) {
     device = std::move(made);
     info = device->info();
@@ -44,48 +32,22 @@ Result<void> Renderer::Shared::uploadSurfaces() {
 }
 
 Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
-    ResidencyOptions each;
-    each.order = options.order;
-    each.loader.withColour = options.colour;
-    const auto loaders = uint32_t(std::max<size_t>(placed.size(), 1));
-    uint32_t threads = options.loaderThreads;
-    if (threads == 0)
-        for (const PlacedDataset& one : placed) threads = std::max(threads, one.loaderThreads);
-    each.loader.threads = std::max(threads / loaders, 1u);
-    each.loader.allThreads = loaders * each.loader.threads;
-    each.uploadBytes = options.uploadBytes / loaders;
-    each.loader.heldBytes = options.ramBytes / loaders;
-    std::vector<uint64_t> bytes;
-    for (const PlacedDataset& one : placed) bytes.push_back(bytesOf(*one.dataset, options.colour));
-    const std::vector<uint64_t> shares = budgetShares(options.budgetBytes, bytes);
-    for (size_t i = 0; i < placed.size(); ++i) {
-        each.budgetBytes = shares[i];
-        const bool isShared = placed.size() > 1 && !placed[i].dataset->pages.empty();
-        const uint64_t needed =
-            isShared ? placed[i].source->bytesToRead(0, options.colour && placed[i].dataset->hasColour()) : 0;
-        if (needed > each.loader.heldBytes)
-            return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to "
-                                                "read the coarsest page of one takes {}: allow more",
-                                                placed.size(), options.ramBytes, needed)};
-        VCP_TRY_ASSIGN(auto residency, Residency::create(*device, access, each, std::move(placed[i].dataset),
-                                                         std::move(placed[i].source)));
-        datasets.push_back({std::move(residency), placed[i].placement});
-    }
+    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), options, std::move(placed)));
+    std::move(opened.begin(), opened.end(), std::back_inserter(datasets));
     return showPool();
 }
 
 Result<void> Renderer::Shared::setShares(uint64_t budgetBytes, uint64_t ramBytes) {
     std::vector<uint64_t> bytes;
-    for (const Placed& placed : datasets)
-        bytes.push_back(bytesOf(placed.residency->dataset(), placed.residency->hasColour()));
+    for (const PlacedResidency& placed : datasets)
+        bytes.push_back(largestPoolBytes(placed.residency->dataset(), placed.residency->hasColour()));
     const std::vector<uint64_t> shares = budgetShares(budgetBytes, bytes);
     // Pools that shrink are changed first, so that all together never exceed the budget.
     for (const bool shrinks : {true, false})
         for (size_t i = 0; i < datasets.size(); ++i) {
             Residency& residency = *datasets[i].residency;
             if ((residency.hasPool() && residency.pages().bytes() > shares[i]) != shrinks) continue;
-            VCP_TRY(residency.setBudgets(*device, access, shares[i], ramBytes / datasets.size()));
+            VCP_TRY(residency.setBudgets(poolsOf(*device, access), shares[i], ramBytes / datasets.size()));
         }
     return {};
 }
@@ -103,11 +65,12 @@ void Renderer::Shared::hidePool() {
 
 Result<void> Renderer::Shared::showPool() {
     static_cast<void>(device->takeOutOfMemory());  // a pool that was halved for it is fine
-    if (std::any_of(datasets.begin(), datasets.end(), [](const Placed& each) { return !each.residency->hasPool(); }))
+    if (std::any_of(datasets.begin(), datasets.end(),
+                    [](const PlacedResidency& each) { return !each.residency->hasPool(); }))
         datasets.clear();
     std::vector<std::pair<uint32_t, uint32_t>> layouts;
-    for (const Placed& each : datasets)
-        layouts.emplace_back(each.residency->pages().chunks(), each.residency->pages().chunkShift());
+    for (const PlacedResidency& each : datasets)
+        layouts.emplace_back(poolOf(*each.residency).chunks(), poolOf(*each.residency).chunkShift());
     if (!layouts.empty() && layouts != std::exchange(poolLayouts, layouts)) clearPipelines();
     for (View* view : views) VCP_TRY(view->showDatasets());
     return {};
@@ -127,7 +90,7 @@ void Renderer::Shared::clearPipelines() {
 Result<void> Renderer::Shared::rebuild(View& asked) {
     ++losses;
     for (View* view : views) view->release();
-    for (const Placed& placed : datasets) placed.residency->releasePool();
+    for (const PlacedResidency& placed : datasets) placed.residency->releasePool();
     clearPipelines();
     if (meso) *meso = {.surfaces = std::move(meso->surfaces)};
     device.reset();
@@ -141,8 +104,8 @@ Result<void> Renderer::Shared::rebuild(View& asked) {
     for (View* view : views)
         if (view != first) VCP_TRY(view->attachToDevice());
     Result<void> done = uploadSurfaces();
-    for (const Placed& placed : datasets)
-        if (done) done = placed.residency->rebuild(*device, access);
+    for (const PlacedResidency& placed : datasets)
+        if (done) done = placed.residency->rebuild(poolsOf(*device, access));
     VCP_TRY(showPool());
     return done;
 }
@@ -154,9 +117,9 @@ bool Renderer::Shared::recover(View& asked, bool mayRebuild) {
     hidePool();
     // A dataset whose coarsest page has all of its pool already stays as it is.
     bool halved = false;
-    for (const Placed& placed : datasets) {
+    for (const PlacedResidency& placed : datasets) {
         if (!placed.residency->hasPool()) continue;
-        const auto done = placed.residency->setBudgets(*device, access, placed.residency->pages().bytes() / 2,
+        const auto done = placed.residency->setBudgets(poolsOf(*device, access), placed.residency->pages().bytes() / 2,
                                                        options.ramBytes / datasets.size());
         if (!done && done.error().code != ErrorCode::Limit) return false;
         halved = halved || done.ok();

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "render/page_pool.h"
 #include "render/passes/beam.h"
 #include "render/passes/compose.h"
 #include "render/passes/feedback.h"
@@ -13,22 +14,21 @@
 #include "render/passes/paper_trace.h"
 #include "render/passes/shade.h"
 #include "render/passes/trace.h"
-#include "render/residency.h"
+#include "render/residencies.h"
 
 namespace vcp {
 
+/// The pool of a residency whose memory is a device's.
+inline const PagePool& poolOf(const Residency& residency) { return static_cast<const PagePool&>(residency.pages()); }
+
 struct Renderer::Shared {
-    struct Placed {
-        std::unique_ptr<Residency> residency;
-        Similarity placement;
-    };
     RendererOptions options;
     std::unique_ptr<Instance> instance;
     std::unique_ptr<Device> device;  // null after a loss that could not be repaired
     DeviceInfo info;
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
-    std::vector<Placed> datasets;
+    std::vector<PlacedResidency> datasets;
     std::vector<std::pair<uint32_t, uint32_t>> poolLayouts;  // layouts of the datasets that the pipelines were made for
     uint32_t losses = 0;
     // Views record their frames one after the other, so one set of pipelines is enough for all.
@@ -56,7 +56,7 @@ struct Renderer::Shared {
     void take(std::unique_ptr<Device> made);
     /// Uploads the copies of the surfaces to the device. After an error there are none.
     Result<void> uploadSurfaces();
-    /// Opens datasets beside those that are open, and shows all. After an error some may be open. Errors: as of
+    /// Opens datasets beside those that are open, and shows all. After an error none is added. Errors: as of
     /// Renderer::open.
     Result<void> addDatasets(std::vector<PlacedDataset> placed);
     /// hidePool: ends what is in flight; no shader of any view sees a pool then. showPool: shaders see the residencies'

@@ -9,35 +9,6 @@
 
 namespace vcp {
 
-namespace {
-
-/// Adds the result of another dataset in the same picture.
-void add(UpdateResult& all, const UpdateResult& one) {
-    all.changed = all.changed || one.changed;
-    all.settled = all.settled && one.settled;
-    all.relaxed = all.relaxed || one.relaxed;
-    all.errorPixels = std::max(all.errorPixels, one.errorPixels);
-    all.residentBytes += one.residentBytes;
-    all.bytesRead += one.bytesRead;
-    all.heldBytesMax += one.heldBytesMax;
-    all.loads += one.loads;
-    all.evictions += one.evictions;
-    all.reloads += one.reloads;
-    all.failures += one.failures;
-    all.pagesResident += one.pagesResident;
-    all.pagesInCut += one.pagesInCut;
-    all.pagesWanted += one.pagesWanted;
-    all.pagesMissing += one.pagesMissing;
-    all.pagesPending += one.pagesPending;
-    all.problems.insert(all.problems.end(), one.problems.begin(), one.problems.end());
-    if (!one.drawable) return;
-    all.coarsestLevel = all.drawable ? std::min(all.coarsestLevel, one.coarsestLevel) : one.coarsestLevel;
-    all.finestLevel = std::max(all.finestLevel, one.finestLevel);
-    all.drawable = true;
-}
-
-}  // namespace
-
 Renderer::View::View(std::shared_ptr<Shared> with, std::optional<SurfaceSource> window)
     : shared(std::move(with)), surface(std::move(window)), number(shared->nextNumber++) {
     shared->views.push_back(this);
@@ -46,7 +17,7 @@ Renderer::View::View(std::shared_ptr<Shared> with, std::optional<SurfaceSource> 
 Renderer::View::~View() {
     if (shared->device) static_cast<void>(shared->device->waitForAll());
     std::erase(shared->views, this);
-    for (const Shared::Placed& placed : shared->datasets) placed.residency->forgetView(number);
+    for (const PlacedResidency& placed : shared->datasets) placed.residency->forgetView(number);
 }
 
 Result<VkSurfaceKHR> Renderer::View::createSurface() const {
@@ -118,14 +89,14 @@ Result<void> Renderer::View::makeLayers(Frame& frame) {
 void Renderer::View::bindPools(Frame& frame) {
     for (size_t i = 0; i < frame.layers.size(); ++i) {
         const Residency* residency = i < layers.size() ? layers[i].residency : nullptr;
-        const PagePool* pool = residency != nullptr ? &residency->pages() : nullptr;
+        const PagePool* pool = residency != nullptr ? &poolOf(*residency) : nullptr;
         frame.layers[i].resources->setPools(pool, pool != nullptr && residency->hasColour() ? pool : nullptr);
     }
 }
 
 Result<void> Renderer::View::showDatasets() {
     VCP_TRY(makeLayers());
-    const std::vector<Shared::Placed>& datasets = shared->datasets;
+    const std::vector<PlacedResidency>& datasets = shared->datasets;
     for (size_t i = 0; i < layers.size(); ++i) {
         layers[i].residency = i < datasets.size() ? datasets[i].residency.get() : nullptr;
         layers[i].placement = i < datasets.size() ? datasets[i].placement : Similarity{};

@@ -18,14 +18,14 @@ double steadySeconds() {
 
 }  // namespace
 
-Result<std::unique_ptr<Residency>> Residency::create(Device& device, PageAccess access, const ResidencyOptions& options,
+Result<std::unique_ptr<Residency>> Residency::create(const PageMemorySource& memory, const ResidencyOptions& options,
                                                      std::shared_ptr<const Dataset> dataset,
                                                      std::shared_ptr<const PageSource> source) {
     std::unique_ptr<Residency> made(new Residency(options));
     made->options_.loader.withColour = options.loader.withColour && dataset->hasColour();
     made->dataset_ = std::move(dataset);
     made->source_ = std::move(source);
-    VCP_TRY(made->createPool(device, access));
+    VCP_TRY(made->createPool(memory));
     made->startLoader();
     return made;
 }
@@ -44,9 +44,9 @@ bool Residency::hasRoomIn(PoolShape shape) const {
     return dataset_->pages.empty() || ResidencyPolicy(dataset_, hasColour(), shape).hasRoom();
 }
 
-Result<void> Residency::createPool(Device& device, PageAccess access) {
+Result<void> Residency::createPool(const PageMemorySource& memory) {
     for (uint64_t budget = options_.budgetBytes;; budget /= 2) {
-        const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budget, poolChunkBytes(device.limits(), access));
+        const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budget, memory.chunkBytes);
         if (policy_)
             policy_->setPool(shape);
         else
@@ -57,7 +57,7 @@ Result<void> Residency::createPool(Device& device, PageAccess access) {
                 .message = fmt::format("a budget of {} bytes has no room for the coarsest page, which takes {}", budget,
                                        pageUnits(dataset_->pages[0], hasColour()) * kPoolUnitBytes),
                 .file = source_->name()};
-        auto pool = PagePool::create(device, shape.units * kPoolUnitBytes, access);
+        auto pool = memory.take(shape.units * kPoolUnitBytes);
         if (pool) {
             pool_ = std::move(*pool);
             return {};
@@ -86,9 +86,8 @@ Result<std::vector<Residency::CarriedPage>> Residency::carryOut() {
     return carried;
 }
 
-Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t budgetBytes, uint64_t ramBytes) {
-    const uint64_t chunkBytes = poolChunkBytes(device.limits(), access);
-    const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budgetBytes, chunkBytes);
+Result<void> Residency::setBudgets(const PageMemorySource& memory, uint64_t budgetBytes, uint64_t ramBytes) {
+    const PoolShape shape = poolShapeFor(*dataset_, hasColour(), budgetBytes, memory.chunkBytes);
     if (!hasRoomIn(shape))
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("a budget of {} bytes has no room for the coarsest page", budgetBytes),
@@ -99,7 +98,7 @@ Result<void> Residency::setBudgets(Device& device, PageAccess access, uint64_t b
     for (const Request request : std::exchange(tooLarge_, {})) policy_->restore(request);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
     VCP_TRY_ASSIGN(auto carried, pool_ ? carryOut() : std::vector<CarriedPage>());
-    VCP_TRY(rebuild(device, access));
+    VCP_TRY(rebuild(memory));
     for (CarriedPage& page : carried) {
         VCP_TRY_ASSIGN(const auto slot, slotFor(page.page));
         if (slot) VCP_TRY(pool_->write(*slot, 0, page.bytes));
@@ -115,9 +114,9 @@ void Residency::releasePool() {
     listens_ = false;
 }
 
-Result<void> Residency::rebuild(Device& device, PageAccess access) {
+Result<void> Residency::rebuild(const PageMemorySource& memory) {
     releasePool();
-    return createPool(device, access);
+    return createPool(memory);
 }
 
 void Residency::forgetView(ViewNumber number) {
@@ -214,7 +213,7 @@ uint64_t Residency::colourBytes() const {
 std::vector<frame::TableRecord> Residency::table(ViewNumber number) {
     return pageTable(*dataset_, cut(number), [&](uint64_t page) -> std::optional<ResidentPage> {
         if (!policy_->isResident(page)) return {};
-        const uint32_t texel = pool_->texel(policy_->slotOf(page));
+        const auto texel = uint32_t(slotOf(page).firstUnit * (kPoolUnitBytes / 16));
         const bool colour = hasColour() && dataset_->pages[page].colourBytes > 0;
         return ResidentPage{headers_.at(page), texel, colour ? texel + dataset_->pages[page].pageBytes / 16 : 0};
     });

@@ -1,5 +1,5 @@
 // Which pages of one dataset are in the pool: carries out what the policy (streaming/residency_policy.h) decides,
-// between the loader's threads and the pool in the device's memory.
+// between the loader's threads and the pool: memory of the device, or the host's own.
 //
 // A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while views want it,
 // evicted when its slot is needed. One update takes in a limited number of bytes, so that no frame waits for many
@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "render/frame_result.h"
-#include "render/page_pool.h"
+#include "render/page_memory.h"
 #include "render/page_table.h"
 #include "streaming/page_loader.h"
 #include "streaming/residency_policy.h"
@@ -30,9 +30,9 @@ struct ResidencyOptions {
 
 class Residency {
 public:
-    /// Allocates the pool: never more than budgetBytes, and no more than the dataset can fill. Where the device has
+    /// Takes the pool from `memory`: never more than budgetBytes, and no more than the dataset can fill. Where there is
     /// less memory, takes half of it, and so on. Errors: Device; Limit, where the coarsest page has no room.
-    static Result<std::unique_ptr<Residency>> create(Device& device, PageAccess access, const ResidencyOptions& options,
+    static Result<std::unique_ptr<Residency>> create(const PageMemorySource& memory, const ResidencyOptions& options,
                                                      std::shared_ptr<const Dataset> dataset,
                                                      std::shared_ptr<const PageSource> source);
 
@@ -40,13 +40,14 @@ public:
     /// being more than one: pages go from the old one to the new through the memory that `ramBytes` allows, coarse ones
     /// first; others are read again. Ends reads that are under way. Errors: Device; Limit, where the coarsest page
     /// would have no room: nothing changes then.
-    Result<void> setBudgets(Device& device, PageAccess access, uint64_t budgetBytes, uint64_t ramBytes);
+    Result<void> setBudgets(const PageMemorySource& memory, uint64_t budgetBytes, uint64_t ramBytes);
 
     /// After the device and all that was in it were lost: releases what there was of it, then begins anew on another.
     void releasePool();
-    Result<void> rebuild(Device& device, PageAccess access);
+    Result<void> rebuild(const PageMemorySource& memory);
 
-    /// Takes in pages; never waits for the loader. Copies wait for the frames in flight (page_pool.h). Errors: Device.
+    /// Takes in pages; never waits for the loader. Copies wait for the frames in flight (page_memory.h). Errors:
+    /// Device.
     Result<UpdateResult> update(const SelectionView& view, ViewNumber number = 0);
     void forgetView(ViewNumber number);
 
@@ -65,7 +66,9 @@ public:
     [[nodiscard]] uint64_t version() const { return policy_->version(); }
     /// There is none after an error of setBudgets() or rebuild(): then only the destructor may be called.
     [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
-    [[nodiscard]] const PagePool& pages() const { return *pool_; }
+    [[nodiscard]] const PageMemory& pages() const { return *pool_; }
+    /// Returns the slot of a page that is resident.
+    [[nodiscard]] PoolSlot slotOf(uint64_t page) const { return policy_->slotOf(page); }
     [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
     template <class Visit>
     void forEachResident(Visit&& visit) const {
@@ -80,7 +83,7 @@ private:
         uint64_t page = 0;
         std::vector<std::byte> bytes;  // geometry followed by colour
     };
-    Result<void> createPool(Device& device, PageAccess access);
+    Result<void> createPool(const PageMemorySource& memory);
     void startLoader();
     Result<std::vector<CarriedPage>> carryOut();
     [[nodiscard]] bool hasRoomIn(PoolShape shape) const;
@@ -101,7 +104,7 @@ private:
     ResidencyOptions options_;
     std::shared_ptr<const Dataset> dataset_;
     std::unique_ptr<ResidencyPolicy> policy_;
-    std::unique_ptr<PagePool> pool_;
+    std::unique_ptr<PageMemory> pool_;
     std::shared_ptr<const PageSource> source_;
     std::unique_ptr<PageLoader> loader_;
     LoaderStats past_;                                  // counts of the loaders before this one

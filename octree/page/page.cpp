@@ -137,12 +137,10 @@ PageSections pageSections(const PageHeader& h) {
 
 uint64_t colourPageBytes(const PageHeader& h) { return align16(uint64_t{16} * h.faces + uint64_t{4} * h.vertices); }
 
-Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours) {
-    if (bytes.size() < kPageHeaderBytes) return broken(0, "page is shorter than its header");
+PageView viewOfChecked(std::span<const std::byte> bytes, std::span<const std::byte> colours) {
     PageView page;
     std::memcpy(&page.header, bytes.data(), sizeof(PageHeader));
     const PageHeader& h = page.header;
-    VCP_TRY(checkHeader(h, bytes.size()));
     const PageSections s = pageSections(h);
     page.nodes = section<uint32_t>(bytes, s.nodes, uint64_t{8} * h.groups);
     page.faces = section<uint4>(bytes, s.faces, h.faces);
@@ -151,10 +149,20 @@ Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std
     const uint32_t bytesEach = entryBytes(h.vertices);
     page.strips = {bytes.subspan(s.strips, size_t{bytesEach} * h.entries), bytesEach};
     if (!colours.empty()) {
-        if (colours.size() != colourPageBytes(h)) return broken(0, "colour page does not match its page");
         page.faceColours = section<uint4>(colours, 0, h.faces);
         page.vertexColours = section<uint32_t>(colours, uint64_t{16} * h.faces, h.vertices);
     }
+    return page;
+}
+
+Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours) {
+    if (bytes.size() < kPageHeaderBytes) return broken(0, "page is shorter than its header");
+    PageHeader header;
+    std::memcpy(&header, bytes.data(), sizeof(PageHeader));
+    VCP_TRY(checkHeader(header, bytes.size()));
+    if (!colours.empty() && colours.size() != colourPageBytes(header))
+        return broken(0, "colour page does not match its page");
+    const PageView page = viewOfChecked(bytes, colours);
     VCP_TRY(NodeCheck(page).run());
     return page;
 }

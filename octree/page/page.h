@@ -62,6 +62,10 @@ struct PageView {
 /// hostile. `colours` is empty or a colour page. Errors: InvalidInput, with the byte within the page.
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
 
+/// Returns the view of a page that parsePage has accepted before, wherever its bytes lie now; checks nothing. `colours`
+/// is empty or the colour page that was accepted with it.
+PageView viewOfChecked(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
+
 /// The parts of a node word; nodeType() is in octree/shared/page_layout.h.
 inline uint32_t emptyNode(double clearanceCells) {
     return kNodeEmpty << kNodeTypeShift | uint32_t(clearanceCells * double(kClearancePerCell));

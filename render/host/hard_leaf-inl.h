@@ -49,8 +49,8 @@ HWY_INLINE Mask takeHits(GroupInHardLeaf& in, Mask candidates, Lane tau, Lane we
 
 /// Decides the rays in `doubtful` one by one, in double precision: along a triangle seen nearly edge-on, single
 /// precision says little about where it is hit.
-HWY_NOINLINE Mask castDoubtful(const HardLeaf& leaf, const Triangles& t, int i, const RayGroup& group, Mask doubtful,
-                               GroupInHardLeaf& in) {
+inline HWY_NOINLINE Mask castDoubtful(const HardLeaf& leaf, const Triangles& t, int i, const RayGroup& group,
+                                      Mask doubtful, GroupInHardLeaf& in) {
     const Lane3 starts = mulAdd(in.from, group.direction,
                                 mulAdd(group.column, leaf.startPerX, mulAdd(group.row, leaf.startPerY, leaf.start)));
     alignas(32) float qx[8], qy[8], qz[8], dx[8], dy[8], dz[8], from[8], tau[8] = {}, b[8] = {}, c[8] = {};

@@ -12,19 +12,21 @@ glm::vec4 blendColours(uint4 codes, glm::vec4 weights) {
            weights.z * glm::unpackUnorm4x8(codes.z) + weights.w * glm::unpackUnorm4x8(codes.w);
 }
 
-HitSurface softSurface(const PageView& view, uint32_t node, glm::vec3 at, float side, glm::vec3 direction) {
-    const uint32_t axis = node >> kSoftAxisShift & 3u, face = node & kLeafIndexMask;
-    const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], axis);
-    HitSurface surface{f32::facingNormal(f32::leafNormal(leaf, at), direction, side), glm::vec4(0)};
-    if (view.faceColours.empty()) return surface;
-    const glm::vec3 r = f32::rotateToAxis(at, axis);
+glm::vec4 softColour(const PageView& view, uint32_t node, glm::vec3 at) {
+    const uint32_t face = node & kLeafIndexMask;
+    const glm::vec3 r = f32::rotateToAxis(at, node >> kSoftAxisShift & 3u);
     const glm::vec4 weights = f32::faceWeights(r.y, r.z);
-    surface.colour = blendColours(view.faceColours[face], weights * (1.0f - r.x)) +
-                     blendColours(view.faceColours[face + 1], weights * r.x);
-    return surface;
+    return blendColours(view.faceColours[face], weights * (1.0f - r.x)) +
+           blendColours(view.faceColours[face + 1], weights * r.x);
 }
 
-HitSurface triangleSurface(const PageView& view, const Index3& corners, glm::vec3 weights, glm::vec3 direction) {
+glm::vec3 softNormal(const PageView& view, uint32_t node, glm::vec3 at, float side, glm::vec3 direction) {
+    const uint32_t axis = node >> kSoftAxisShift & 3u, face = node & kLeafIndexMask;
+    const f32::LeafField leaf = f32::decodeLeaf(view.faces[face], view.faces[face + 1], axis);
+    return f32::facingNormal(f32::leafNormal(leaf, at), direction, side);
+}
+
+glm::vec3 triangleNormal(const PageView& view, const Index3& corners, glm::vec3 weights, glm::vec3 direction) {
     glm::vec3 p[3];
     for (int i = 0; i < 3; ++i) {
         const glm::u32vec2 vertex = view.vertices[corners[size_t(i)]];
@@ -33,32 +35,48 @@ HitSurface triangleSurface(const PageView& view, const Index3& corners, glm::vec
     glm::vec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);
     flat *= glm::inversesqrt(std::max(glm::dot(flat, flat), 1e-30f));
     flat = f32::turnedTo(flat, -direction);
-    HitSurface surface{glm::vec3(0), glm::vec4(0)};
-    for (int i = 0; i < 3; ++i) {
-        const uint32_t vertex = corners[size_t(i)];
-        surface.normal += weights[i] * f32::cornerNormal(view.normals[vertex], flat);
-        if (!view.vertexColours.empty()) surface.colour += weights[i] * glm::unpackUnorm4x8(view.vertexColours[vertex]);
-    }
-    return surface;
+    glm::vec3 normal(0);
+    for (int i = 0; i < 3; ++i) normal += weights[i] * f32::cornerNormal(view.normals[corners[size_t(i)]], flat);
+    return normal;
 }
 
-HitSurface slabSurface(const PageView& view, uint32_t node, glm::vec3 direction) {
-    const uint32_t vector = slabVector(node);
-    const glm::vec3 normal = f32::decodeDirection(vectorWord(view.faces, vector) >> kSlabDirectionShift);
-    HitSurface surface{f32::turnedTo(normal, -direction), glm::vec4(0)};
-    if (!view.faceColours.empty()) surface.colour = glm::unpackUnorm4x8(vectorWord(view.faceColours, vector));
-    return surface;
+glm::vec4 triangleColour(const PageView& view, const Index3& corners, glm::vec3 weights) {
+    glm::vec4 colour(0);
+    for (int i = 0; i < 3; ++i) colour += weights[i] * glm::unpackUnorm4x8(view.vertexColours[corners[size_t(i)]]);
+    return colour;
+}
+
+glm::vec3 slabNormal(const PageView& view, uint32_t node, glm::vec3 direction) {
+    const glm::vec3 normal = f32::decodeDirection(vectorWord(view.faces, slabVector(node)) >> kSlabDirectionShift);
+    return f32::turnedTo(normal, -direction);
+}
+
+/// Where a hit is: in leaf space, or the weights of a triangle's vertices.
+glm::vec3 placeOf(const TileHits& hits, int pixel) { return {hits.x[pixel], hits.y[pixel], hits.z[pixel]}; }
+glm::vec3 weightsOf(const TileHits& hits, int pixel) {
+    return {1 - hits.x[pixel] - hits.y[pixel], hits.x[pixel], hits.y[pixel]};
 }
 
 }  // namespace
 
+glm::vec4 colourAt(const HostScene& scene, const TileHits& hits, int pixel) {
+    const HitLeaf& leaf = hits.leaves[hits.leaf[pixel]];
+    const PageView& view = *scene.page(leaf.page).view;
+    if (view.faceColours.empty() && view.vertexColours.empty()) return glm::vec4(0);
+    if (nodeType(leaf.node) == kNodeSoft) return softColour(view, leaf.node, placeOf(hits, pixel));
+    if (nodeType(leaf.node) == kNodeSlab)
+        return glm::unpackUnorm4x8(vectorWord(view.faceColours, slabVector(leaf.node)));
+    return triangleColour(view, leaf.corners, weightsOf(hits, pixel));
+}
+
 HitSurface surfaceAt(const HostScene& scene, const TileHits& hits, int pixel, glm::vec3 direction) {
     const HitLeaf& leaf = hits.leaves[hits.leaf[pixel]];
     const PageView& view = *scene.page(leaf.page).view;
-    const glm::vec3 at(hits.x[pixel], hits.y[pixel], hits.z[pixel]);
-    if (nodeType(leaf.node) == kNodeSoft) return softSurface(view, leaf.node, at, hits.side[pixel], direction);
-    if (nodeType(leaf.node) == kNodeSlab) return slabSurface(view, leaf.node, direction);
-    return triangleSurface(view, leaf.corners, {1 - at.x - at.y, at.x, at.y}, direction);
+    const uint32_t type = nodeType(leaf.node);
+    return {type == kNodeSoft   ? softNormal(view, leaf.node, placeOf(hits, pixel), hits.side[pixel], direction)
+            : type == kNodeSlab ? slabNormal(view, leaf.node, direction)
+                                : triangleNormal(view, leaf.corners, weightsOf(hits, pixel), direction),
+            colourAt(scene, hits, pixel)};
 }
 
 }  // namespace vcp

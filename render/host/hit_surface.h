@@ -16,6 +16,9 @@ struct HitSurface {
     glm::vec4 colour;
 };
 
+/// Returns the colour alone of such a hit.
+glm::vec4 colourAt(const HostScene& scene, const TileHits& hits, int pixel);
+
 /// `pixel`: element of the arrays of `hits` at which there is a hit; `direction`: of its ray, of any length.
 HitSurface surfaceAt(const HostScene& scene, const TileHits& hits, int pixel, glm::vec3 direction);
 

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <functional>
-#include <stop_token>
 #include <string>
 
 #include "render/host/host_scene.h"
@@ -17,14 +16,18 @@
 namespace vcp {
 
 struct HostCastOptions {
-    unsigned threads = 0;       ///< 0: one a processor
-    std::stop_token stop = {};  ///< is looked at between tiles
+    unsigned threads = 0;               ///< 0: one a processor
+    std::function<bool()> cancel = {};  ///< is asked between tiles, by several threads; true ends it with Cancelled
 };
 
 /// Calls `take` with the hits of each tile of the picture, from several threads at once and in any order; the hits are
 /// valid during the call. Errors: Cancelled.
 Result<void> castPicture(const HostScene& scene, const PictureRays& rays, const HostCastOptions& options,
                          const std::function<void(const TileHits&)>& take);
+
+/// Calls `draw` with the upper left pixel of each tile of a picture, likewise. Errors: Cancelled.
+Result<void> forEachTile(glm::ivec2 size, const HostCastOptions& options,
+                         const std::function<void(glm::ivec2 corner)>& draw);
 
 /// Casts the tile whose upper left pixel is hits.corner. Any thread.
 void castTile(const HostScene& scene, const PictureRays& rays, TileHits& hits);

@@ -14,6 +14,13 @@ Error badCut(const HostPage& page, const char* what) {
 
 }  // namespace
 
+HostGrid hostGrid(const FileHeader& header) {
+    return {.origin = {header.origin[0], header.origin[1], header.origin[2]},
+            .cell = header.cell,
+            .levels = header.levels,
+            .log2Cells = header.log2Cells};
+}
+
 uint32_t HostScene::rootBits() const { return grid_.log2Cells + grid_.levels - 1 + kMaxSubcellDepth; }
 
 Result<HostScene> HostScene::create(const HostGrid& grid, std::span<const HostPage> cut) {
@@ -32,13 +39,10 @@ Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint
         const PageEntry& entry = cache.dataset().pages[number];
         page.place = mortonDecode(entry.morton);
         page.level = entry.level;
+        page.error = float(double(entry.certifiedError) / header.cell);
         pages.push_back(page);
     }
-    return create({.origin = {header.origin[0], header.origin[1], header.origin[2]},
-                   .cell = header.cell,
-                   .levels = header.levels,
-                   .log2Cells = header.log2Cells},
-                  pages);
+    return create(hostGrid(header), pages);
 }
 
 Result<void> HostScene::add(const HostPage& page) {
@@ -68,7 +72,7 @@ Result<void> HostScene::add(const HostPage& page) {
         at = (*parent)[octant];
     }
     const uint32_t bits = rootBits() - level;
-    pages_.push_back({page.view, page.number, page.place << bits, bits, grid_.levels - 1 - level});
+    pages_.push_back({page.view, page.number, page.place << bits, bits, grid_.levels - 1 - level, page.error});
     return {};
 }
 

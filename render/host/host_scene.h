@@ -21,12 +21,15 @@ struct HostGrid {
     uint32_t log2Cells = 1;  ///< cells an edge of a page: 2^log2Cells
 };
 
+HostGrid hostGrid(const FileHeader& header);
+
 /// A page of a cut. The view must outlive the scene.
 struct HostPage {
     const PageView* view = nullptr;
     uint64_t number = 0;  ///< in the directory
     glm::uvec3 place{0};  ///< among the subvolumes of its level
     uint32_t level = 0;   ///< 0 is the coarsest
+    float error = 0;      ///< certified error, finest cells
 };
 
 /// An immutable tree down to the pages of a cut. Any thread may read it.
@@ -46,6 +49,7 @@ public:
         glm::uvec3 corner;  ///< subcells
         uint32_t edgeBits;  ///< log2 of its edge in subcells
         uint32_t cellBits;  ///< log2 of the edge of a cell of its level in finest cells
+        float error;        ///< certified error, finest cells
     };
     /// A child of the tree: nothing, another node, or a page.
     struct Child {
@@ -59,6 +63,8 @@ public:
     [[nodiscard]] uint32_t rootBits() const;  ///< log2 of the root's edge in subcells
     [[nodiscard]] const Node& node(uint32_t index) const { return nodes_[index]; }
     [[nodiscard]] const Page& page(uint32_t index) const { return pages_[index]; }
+    /// The level of a page; 0 is the coarsest.
+    [[nodiscard]] uint32_t levelOf(const Page& page) const { return grid_.levels - 1 - page.cellBits; }
 
 private:
     Result<void> add(const HostPage& page);

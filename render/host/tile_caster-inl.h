@@ -6,9 +6,8 @@
 #define VCP_RENDER_HOST_TILE_CASTER_INL_H
 #endif
 
-#include <array>
-
 #include "render/host/hard_leaf-inl.h"
+#include "render/host/scene_walk-inl.h"
 #include "render/host/slab_leaf-inl.h"
 #include "render/host/soft_leaf-inl.h"
 
@@ -16,23 +15,19 @@ HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
 
 constexpr uint32_t kAllGroups = uint32_t((uint64_t{1} << kGroups) - 1);
-/// A traversal leaves at most seven siblings behind at each of at most 31 depths.
-constexpr int kStackEntries = 7 * 32 + 8;
-
 class TileCaster {
 public:
     TileCaster(const HostScene& scene, const TileRays& rays, TileHits& hits)
-        : scene_(scene), rays_(rays), hits_(hits), sides_(tileSides(rays, kGroupHeight)) {
+        : scene_(scene), walk_(scene), rays_(rays), hits_(hits), sides_(tileSides(rays, kGroupHeight)) {
         for (int axis = 0; axis < 3; ++axis) nearOctant_ |= uint32_t(rays.direction[axis] < 0) << axis;
     }
 
     void run() {
         hits_.any = false;
         hits_.leaves.clear();
-        push(scene_.root(), glm::uvec3(0), scene_.rootBits());
-        while (count_ > 0 && open_ != 0) {
-            const Entry at = stack_[size_t(--count_)];
-            if (at.page == kNoPage || nodeType(at.word) == kNodeInternal)
+        while (!walk_.isDone() && open_ != 0) {
+            const WalkEntry at = walk_.next();
+            if (isNode(at))
                 visitNode(at);
             else
                 visitLeaf(at);
@@ -41,77 +36,23 @@ public:
     }
 
 private:
-    static constexpr uint32_t kNoPage = ~0u;
-
-    /// A box that is still to be visited: a node of the scene's tree, or of a page's.
-    struct Entry {
-        glm::uvec3 corner;  // subcells
-        uint32_t bits;      // log2 of its edge in subcells
-        uint32_t page;      // or kNoPage
-        uint32_t word;      // its node word, or the number of the scene's node
-    };
-
-    void push(HostScene::Child child, glm::uvec3 corner, uint32_t bits) {
-        if (child.kind == HostScene::Child::Kind::None) return;
-        const bool isPage = child.kind == HostScene::Child::Kind::Page;
-        const uint32_t word = isPage ? scene_.page(child.index).view->header.root : child.index;
-        if (isPage && nodeType(word) == kNodeEmpty) return;
-        stack_[size_t(count_++)] = {corner, bits, isPage ? child.index : kNoPage, word};
-    }
-
-    static double cellsOf(uint32_t bits) { return double(uint64_t{1} << bits) * kSubcell; }
-
     /// Pushes the children that rays of the tile may meet, the farthest first.
-    void visitNode(const Entry& at) {
+    void visitNode(const WalkEntry& at) {
         const double half = 0.5 * cellsOf(at.bits);
         const glm::dvec3 middle = glm::dvec3(at.corner) * kSubcell + half - rays_.origin;
         uint32_t nearest = nearOctant_;
         if (!rays_.isParallel)
             nearest = uint32_t(middle.x < 0) | uint32_t(middle.y < 0) << 1 | uint32_t(middle.z < 0) << 2;
-        const uint32_t met = childrenMet(glm::vec3(middle), float(0.5 * half));
-        const uint32_t bits = at.bits - 1;
-        if (at.page == kNoPage) {
-            const HostScene::Node& node = scene_.node(at.word);
-            for (uint32_t k = 8; k-- > 0;) {
-                const uint32_t octant = k ^ nearest;
-                if (met >> octant & 1) push(node[octant], childCorner(at, octant), bits);
-            }
-            return;
-        }
-        const uint32_t* words = &scene_.page(at.page).view->nodes[8 * (at.word & kNodePayloadMask)];
-        const uint32_t open = met & ~emptyChildren(words);
-        if (open == 0) return;
-        for (uint32_t k = 8; k-- > 0;) {
-            const uint32_t octant = k ^ nearest;
-            if (open >> octant & 1) stack_[size_t(count_++)] = {childCorner(at, octant), bits, at.page, words[octant]};
-        }
-    }
-
-    static glm::uvec3 childCorner(const Entry& at, uint32_t octant) {
-        return at.corner + (glm::uvec3(octant & 1, octant >> 1 & 1, octant >> 2) << (at.bits - 1));
-    }
-
-    static uint32_t emptyChildren(const uint32_t* words) {
-        uint32_t empty = 0;
-        for (int i = 0; i < 8; i += kLanes) {
-            // The bit below the type tells an empty node from a slab leaf.
-            const LaneWords type = hn::ShiftRight<int(kNodeTypeShift) - 1>(hn::LoadU(Words(), words + i));
-            empty |= bitsOf(hn::RebindMask(Floats(), hn::Eq(type, hn::Set(Words(), 2 * kNodeEmpty)))) << i;
-        }
-        return empty;
+        walk_.pushChildren(at, childrenMet(glm::vec3(middle), float(0.5 * half)), nearest);
     }
 
     /// Returns which of the octants about `middle` lie between the tile's outermost planes, and not behind its origin.
     /// `half`: of an octant's edge. All in finest cells, relative to the tile's origin.
     [[nodiscard]] uint32_t childrenMet(glm::vec3 middle, float half) const {
-        alignas(32) static constexpr float kSign[3][8] = {
-            {-1, 1, -1, 1, -1, 1, -1, 1}, {-1, -1, 1, 1, -1, -1, 1, 1}, {-1, -1, -1, -1, 1, 1, 1, 1}};
         const glm::vec3 ahead(rays_.direction);
         uint32_t met = 0;
         for (int i = 0; i < 8; i += kLanes) {
-            const Lane3 c(mulAdd(load(kSign[0] + i), Lane(half), Lane(middle.x)),
-                          mulAdd(load(kSign[1] + i), Lane(half), Lane(middle.y)),
-                          mulAdd(load(kSign[2] + i), Lane(half), Lane(middle.z)));
+            const Lane3 c = octantMiddles(i, middle, half);
             const Lane rounding = (abs(c.x) + abs(c.y) + abs(c.z)) * Lane(kPlaceRounding);
             const int lastColumn = kGroupColumns - 1, firstRow = kGroupColumns,
                       lastRow = kGroupColumns + kGroupRows - 1;
@@ -157,7 +98,7 @@ private:
         return groups;
     }
 
-    void visitLeaf(const Entry& at) {
+    void visitLeaf(const WalkEntry& at) {
         const double edge = cellsOf(at.bits);
         const glm::dvec3 lowest = glm::dvec3(at.corner) * kSubcell - rays_.origin;
         const uint32_t groups = open_ & groupsMet(glm::vec3(lowest + 0.5 * edge), float(0.5 * edge));
@@ -184,7 +125,7 @@ private:
 
     /// Casts groups of rays through one leaf: cast(group) returns the rays that hit.
     template <class Cast>
-    void castGroups(const Entry& at, uint32_t groups, const Cast& cast) {
+    void castGroups(const WalkEntry& at, uint32_t groups, const Cast& cast) {
         const auto number = uint32_t(hits_.leaves.size());
         bool found = false;
         for (groups &= open_; groups != 0; groups &= groups - 1) {
@@ -206,7 +147,7 @@ private:
         hits_.any = true;
     }
 
-    void castHard(const Entry& at, const LeafRays& leaf, uint32_t groups) {
+    void castHard(const WalkEntry& at, const LeafRays& leaf, uint32_t groups) {
         const HostScene::Page& page = scene_.page(at.page);
         const float cell = float(1u << page.cellBits), edge = leaf.edge / cell;
         uint32_t active = 0;
@@ -229,7 +170,7 @@ private:
         for (; active != 0; active &= active - 1) takeHits(std::countr_zero(active), leaf, cell);
     }
 
-    void castAtTriangles(const Entry& at, const HardLeaf& hard, Triangles& triangles, int i) {
+    void castAtTriangles(const WalkEntry& at, const HardLeaf& hard, Triangles& triangles, int i) {
         const RayGroup& group = groups_[i];
         for (uint32_t met = trianglesMet(triangles, i); met != 0; met &= met - 1) {
             const int t = std::countr_zero(met);
@@ -293,17 +234,14 @@ private:
             std::copy_n(numbers + row * kGroupWidth, kGroupWidth, first + row * kTileWidth);
     }
 
-    static constexpr double kSubcell = 1.0 / (1u << kMaxSubcellDepth);  // finest cells
-
     const HostScene& scene_;
+    SceneWalk walk_;
     const TileRays& rays_;
     TileHits& hits_;
     const TileSides sides_;
     uint32_t nearOctant_ = 0;     // of parallel rays
     uint32_t open_ = kAllGroups;  // groups with rays that are alive
     bool haveRays_ = false;
-    int count_ = 0;
-    std::array<Entry, kStackEntries> stack_;
     RayGroup groups_[kGroups];
     GroupInHardLeaf inLeaf_[kGroups];
 };

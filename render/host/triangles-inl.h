@@ -105,17 +105,22 @@ HWY_INLINE bool nextTriangles(StripWalk& walk, Triangles& t) {
 
 HWY_INLINE Lane3 vertexOf(const Triangles& t, int k) { return {load(t.x[k]), load(t.y[k]), load(t.z[k])}; }
 
-/// Finds the sums of triangles whose corners are known.
-HWY_INLINE void setUpTriangles(const PageView& view, const HardLeaf& leaf, Triangles& t) {
-    Lane3 p[3];
+/// Reads the vertices of triangles whose corners are known. `corner`: as of HardLeaf.
+HWY_INLINE void loadVertices(const PageView& view, glm::ivec3 corner, Triangles& t) {
     for (int k = 0; k < 3; ++k) {
         const LaneWords twice = hn::ShiftLeft<1>(hn::Load(Words(), t.corners[k]));
         const uint32_t* words = &view.vertices.data()->x;
-        p[k] = decodeVertices(gather(words, twice), gather(words + 1, twice), leaf.corner);
-        store(p[k].x, t.x[k]);
-        store(p[k].y, t.y[k]);
-        store(p[k].z, t.z[k]);
+        const Lane3 p = decodeVertices(gather(words, twice), gather(words + 1, twice), corner);
+        store(p.x, t.x[k]);
+        store(p.y, t.y[k]);
+        store(p.z, t.z[k]);
     }
+}
+
+/// Finds the sums of triangles whose corners are known.
+HWY_INLINE void setUpTriangles(const PageView& view, const HardLeaf& leaf, Triangles& t) {
+    loadVertices(view, leaf.corner, t);
+    const Lane3 p[3] = {vertexOf(t, 0), vertexOf(t, 1), vertexOf(t, 2)};
     Lane length[3];
     for (int k = 0; k < 3; ++k) {
         const Lane3 from = p[(k + 1) % 3] - leaf.start, e = p[(k + 2) % 3] - p[(k + 1) % 3], moment = cross(from, e);
@@ -145,7 +150,7 @@ HWY_INLINE Lane3 decodeNormals(LaneWords code) {
 }
 
 /// Finds the normals that are blended over triangles: those of the vertices, and at a crease the triangle's own.
-HWY_NOINLINE void setUpNormals(const PageView& view, Triangles& t) {
+inline HWY_NOINLINE void setUpNormals(const PageView& view, Triangles& t) {
     const Lane3 a = vertexOf(t, 0);
     Lane3 flat = cross(vertexOf(t, 1) - a, vertexOf(t, 2) - a);
     flat = (Lane(1.0f) / sqrt(max(dot(flat, flat), Lane(1e-30f)))) * flat;

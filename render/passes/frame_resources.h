@@ -22,9 +22,9 @@
 #include <span>
 #include <vector>
 
-#include "render/frame.h"
 #include "render/frame_result.h"
 #include "render/page_pool.h"
+#include "render/shared/frame.h"
 #include "render/vulkan/compute_pipeline.h"
 #include "render/vulkan/device.h"
 

@@ -9,24 +9,9 @@
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
+#include "render/shared/hit_light.h"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-const float kTurn = 6.2831853;
-const float kGoldenTurn = 0.61803399;
-
-// Returns the direction of ray `i` of `count` about the normal, by its cosine (Malley's method on a spiral of the
-// disc). Each
-// pixel of a square of 4 x 4 has its own spiral; the shade pass averages over the square.
-vec3 skyDirection(vec3 n, uint i, uint count, uvec2 pixel) {
-    uint square = (pixel.x & 3u) | (pixel.y & 3u) << 2;
-    uint mixedUp = square * 7u & 15u;
-    float radius2 = (float(i) + (float(mixedUp) + 0.5) / 16.0) / float(count);
-    float angle = kTurn * fract(float(i) * kGoldenTurn + (float(square) + 0.5) / 16.0);
-    vec3 side = normalize(abs(n.z) < 0.7 ? vec3(n.y, -n.x, 0.0) : vec3(0.0, n.z, -n.y));
-    float r = sqrt(radius2);
-    return r * cos(angle) * side + r * sin(angle) * cross(n, side) + sqrt(1.0 - radius2) * n;
-}
 
 void main() {
     uvec2 pixel;
@@ -49,7 +34,7 @@ void main() {
     float sun = lit ? 1.0 : 0.0, open = 0.0;
     Work work = Work(0u, 0u, 0u);
     for (uint i = 1u - frame.hasShadows; i <= sky; i++) {
-        vec3 direction = i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel);
+        vec3 direction = i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel.x, pixel.y);
         ray.direction = withoutZeros(direction);
         ray.inverse = 1.0 / ray.direction;
         float reach = min(i == 0u ? kNoHit : radius, keptInterval(ray).last);
@@ -57,8 +42,7 @@ void main() {
         Hit hit = castRay(ray, needed ? 0.0 : kNoHit, reach, work);
         bool blocked = hit.depth < reach;
         if (i == 0u && blocked) sun = 0.0;
-        float near = 1.0 - hit.depth / radius;
-        if (i > 0u) open += blocked ? 1.0 - near * near : 1.0;
+        if (i > 0u) open += blocked ? skyBehind(hit.depth / radius) : 1.0;
     }
     float skyLight = sky == 0u ? 1.0 : open / float(sky);
     if (found) hits[frame.lightPlane * plane + at] = packUnorm4x8(vec4(sun, skyLight, 0.0, 0.0));

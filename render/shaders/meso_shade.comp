@@ -7,7 +7,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
-#include "render/shaders/heat.glsl"
+#include "render/shared/hit_light.h"
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;

@@ -5,19 +5,10 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/hit_records.glsl"
-#include "render/shaders/heat.glsl"
+#include "render/shared/hit_light.h"
 
 layout(constant_id = 6) const uint kLight = 0u;  // 1: the hits have a plane of light
 layout(local_size_x = 8, local_size_y = 8) in;
-
-// Returns the light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
-// colours come encoded, so that one power a pixel is enough.
-float encodedLight(vec3 n, float sunSeen, float skySeen) {
-    float sun = max(dot(n, frame.lightDirection.xyz), 0.0);
-    float sky = 0.5 + 0.5 * dot(n, frame.upDirection.xyz);
-    // Hollows are darker than the sun alone would have them: they see less of what it lights.
-    return pow(0.72 * sun * sunSeen * (0.5 + 0.5 * skySeen) + (0.10 + 0.18 * sky) * skySeen, 1.0 / 2.2);
-}
 
 // Returns how much sky is seen, averaged over the pixels around that show the same surface: light.comp gives each pixel
 // of a square of 4 x 4 its own directions.
@@ -34,12 +25,6 @@ float skyAbout(uvec2 pixel, float depth, uint plane) {
         count += same ? 1.0 : 0.0;
     }
     return sum / max(count, 1.0);
-}
-
-// Turns a normal from the dataset's own axes to the world's.
-vec3 worldNormal(vec3 n) {
-    vec4 q = frame.rotation;
-    return n + 2.0 * cross(q.xyz, cross(q.xyz, n) + q.w * n);
 }
 
 void main() {
@@ -67,8 +52,9 @@ void main() {
         sunSeen = unpackUnorm4x8(fetchHit(frame.lightPlane * plane + at)).x;
         if (frame.occlusionRays > 0u) skySeen = skyAbout(pixel, depth, plane);
     }
-    vec3 colour = frame.shadingMode == kShadeNormals ? worldNormal(n) * 0.5 + 0.5
-                  : frame.shadingMode == kShadeUnlit ? albedo
-                                                     : albedo * encodedLight(n, sunSeen, skySeen);
+    vec3 colour = frame.shadingMode == kShadeNormals ? turnedBy(frame.rotation.xyz, frame.rotation.w, n) * 0.5 + 0.5
+                  : frame.shadingMode == kShadeUnlit
+                      ? albedo
+                      : albedo * encodedLight(n, frame.lightDirection.xyz, frame.upDirection.xyz, sunSeen, skySeen);
     picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

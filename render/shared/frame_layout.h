@@ -1,4 +1,4 @@
-// What the CPU hands to the shaders for a frame. Compiles as C++ (render/frame.h) and as GLSL; every
+// What the CPU hands to the shaders for a frame. Compiles as C++ (render/shared/frame.h) and as GLSL; every
 // struct is made of 16-byte vectors and of scalars in fours, so that both agree on the layout, and a test reads the
 // offsets back out of the SPIR-V.
 //

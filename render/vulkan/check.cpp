@@ -21,7 +21,7 @@ const char* vulkanResultText(VkResult result) {
         case VK_ERROR_FEATURE_NOT_PRESENT:
             return "a feature is missing";
         case VK_ERROR_INCOMPATIBLE_DRIVER:
-            return "no Vulkan driver is installed";
+            return "no Vulkan driver is installed; host draws pictures without Vulkan";
         case VK_ERROR_SURFACE_LOST_KHR:
             return "the window is gone";
         case VK_ERROR_OUT_OF_DATE_KHR:

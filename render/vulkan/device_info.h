@@ -27,6 +27,10 @@ struct DeviceInfo {
 /// Errors: Device, where Vulkan cannot be loaded or there is no device, or where `choice` names none.
 Result<std::vector<DeviceInfo>> listDevices(const std::string& choice = {});
 
+/// The processor as what draws pictures, without Vulkan: it is called so, in any case, among devices.
+inline constexpr const char* kHostName = "host";
+bool isHostName(const std::string& choice);
+
 /// What a window gives: the instance extensions it needs and a function that makes the surface
 /// (glfwGetRequiredInstanceExtensions, glfwCreateWindowSurface).
 struct SurfaceSource {

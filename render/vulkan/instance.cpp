@@ -71,6 +71,7 @@ Error noDevice(const std::vector<DeviceInfo>& devices, const std::string& what) 
     for (const DeviceInfo& device : devices)
         text += (device.index == 0 ? " " : ", ") + std::to_string(device.index) + ": " + device.name +
                 (device.usable ? "" : " (no Vulkan 1.2)");
+    text += std::string("; ") + kHostName + " draws pictures without Vulkan";
     return {.code = ErrorCode::Device, .message = text};
 }
 
@@ -202,6 +203,8 @@ Result<uint32_t> chooseDevice(const std::vector<DeviceInfo>& devices, const std:
         if (lower(device.name).find(lower(choice)) != std::string::npos) return usable(device);
     return noDevice(devices, "no Vulkan device is called '" + choice + "'");
 }
+
+bool isHostName(const std::string& choice) { return lower(choice) == kHostName; }
 
 Result<std::vector<DeviceInfo>> listDevices(const std::string& choice) {
     VCP_TRY_ASSIGN(auto instance, Instance::create(false, {}));

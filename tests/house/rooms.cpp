@@ -30,8 +30,9 @@ const std::vector<Room>& rooms() {
         {"mesostructure", {"octree/"}},
         {"mesostructure/base", {"octree/", "mesostructure"}},
         {"streaming", {"octree/"}},
-        {"render/host", {"octree/"}},
-        {"render", {"octree/", "mesostructure", "streaming", "render/host"}},
+        {"render/shared", {}},
+        {"render/host", {"octree/", "render/shared"}},
+        {"render", {"octree/", "mesostructure", "streaming", "render/shared", "render/host"}},
 
         {"viewer/camera", {"octree/", "render"}},
         {"viewer/scene", {"octree/", "builder/", "mesostructure/", "streaming", "render", "viewer/camera"}},

@@ -10,12 +10,12 @@
 #include "render/beam_spirv.h"
 #include "render/compose_spirv.h"
 #include "render/feedback_spirv.h"
-#include "render/frame.h"
 #include "render/light_spirv.h"
 #include "render/meso_surface_spirv.h"
 #include "render/paper_trace_spirv.h"
 #include "render/passes/meso_resources.h"
 #include "render/shade_spirv.h"
+#include "render/shared/frame.h"
 #include "render/trace_spirv.h"
 
 namespace vcp {

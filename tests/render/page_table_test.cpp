@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render/frame.h"
+#include "render/shared/frame.h"
 #include "tests/support/analytic_page.h"
 
 namespace vcp {

@@ -10,7 +10,7 @@
 #include "builder/measure/quantile.h"
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/method.h"
-#include "render/renderer.h"
+#include "render/host_renderer.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
@@ -73,7 +73,7 @@ struct Drawing {
 };
 
 /// Without --settle: updates until the coarsest page is there, and shows what there is.
-Result<UpdateResult> updateUntilDrawable(Renderer& renderer, const FrameRequest& request) {
+Result<UpdateResult> updateUntilDrawable(PictureRenderer& renderer, const FrameRequest& request) {
     for (;;) {
         auto update = renderer.update(request);
         if (!update || update->drawable || !update->problems.empty() || update->settled) return update;
@@ -82,7 +82,7 @@ Result<UpdateResult> updateUntilDrawable(Renderer& renderer, const FrameRequest&
     }
 }
 
-Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const RenderCommand& command) {
+Result<Drawing> draw(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command) {
     VCP_TRY_ASSIGN(auto update,
                    command.settle ? renderer.settle(request, interrupted) : updateUntilDrawable(renderer, request));
     if (!update.problems.empty()) return update.problems.front();
@@ -90,7 +90,7 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
     drawing.update = std::move(update);
     for (int i = 0; i <= command.framesToTime(); ++i) {
         if (interrupted()) return Error::cancelled();
-        VCP_TRY_ASSIGN(auto stats, renderer.render(request));
+        VCP_TRY_ASSIGN(auto stats, renderer.render(request, interrupted));
         drawing.stats = stats;
         if (i == 0)
             drawing.firstFrameMs = stats.msFrame;
@@ -101,7 +101,7 @@ Result<Drawing> draw(Renderer& renderer, const FrameRequest& request, const Rend
 }
 
 /// Writes depth and normals of the last frame, where they are asked for.
-Result<void> writePlanes(Renderer& renderer, const FrameRequest& request, const RenderCommand& command,
+Result<void> writePlanes(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command,
                          const OutputRules& rules) {
     if (!command.depth.empty()) {
         VCP_TRY_ASSIGN(const auto depth, renderer.readDepth());
@@ -202,7 +202,7 @@ Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& d
 }
 
 /// Makes pictures in tiles and sequences, with progress; when it is cancelled, finished pictures stay.
-Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras,
+Result<void> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras,
                        const RenderCommand& command, const OutputRules& rules) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     PictureSequence sequence(renderer, {.request = request,
@@ -211,7 +211,7 @@ Result<void> makeTiled(Renderer& renderer, const FrameRequest& request, const st
                                         .isNumbered = command.isSequence(),
                                         .tile = command.tile > 0 ? command.tile : kTile,
                                         .rules = rules,
-                                        .problem = {}});
+                                        .cancel = interrupted});
     for (bool isDone = false; !isDone;) {
         VCP_TRY_ASSIGN(isDone, sequence.step());
         display.update("drawing", sequence.fraction());
@@ -267,13 +267,13 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
     return {};
 }
 
-Result<void> checkValidation(const Renderer& renderer) {
+Result<void> checkValidation(const PictureRenderer& renderer) {
     const std::vector<std::string> problems = renderer.validationMessages();
     return problems.empty() ? Result<void>() : Error{.code = ErrorCode::Device, .message = problems.front()};
 }
 
 /// Draws one picture, or one a method, side by side.
-Result<void> drawOne(Renderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
+Result<void> drawOne(PictureRenderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
                      const RenderCommand& command, const SceneFile& scene, const OutputRules& rules) {
     std::vector<std::string> methods = command.methods;
     if (methods.empty()) methods.emplace_back();
@@ -324,8 +324,17 @@ FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, co
     return request;
 }
 
+/// Refuses what the host does not draw before a mesh is built for it.
+Result<void> checkHost(const RenderCommand& command) {
+    FrameRequest request;
+    request.shading = command.render.shading;
+    request.sections.resize(command.render.sections.size());
+    return checkHostDraws(request);
+}
+
 Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOptions(command));
+    if (isHostName(command.render.device)) VCP_TRY(checkHost(command));
     VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
     VCP_TRY_ASSIGN(const auto open,
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
@@ -346,7 +355,7 @@ Result<int> run(const RenderCommand& command) {
     VCP_TRY(checkOutputs(command, rules, cameras.size()));
     RendererOptions options = command.render.rendererOptions();
     options.validation = command.validation;
-    VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
+    VCP_TRY_ASSIGN(auto renderer, createPictureRenderer(options));
     VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
 
     const FrameRequest request = requestFor(command, scene, camera, bounds);

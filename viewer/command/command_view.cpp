@@ -69,6 +69,9 @@ Result<void> checkInputs(const ViewCommand& command) {
 void warn(const std::string& line) { fmt::print(stderr, "warning: {}\n", line); }
 
 Result<int> run(ViewCommand command, const CLI::App& app) {
+    if (isHostName(command.render.device))
+        return Error{.code = ErrorCode::Usage,
+                     .message = "the host draws no window, only pictures (vcp render); choose a Vulkan device"};
     VCP_TRY(checkInputs(command));
     const auto settingsPath = userSettingsPath();
     WindowOptions options;

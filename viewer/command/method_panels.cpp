@@ -14,7 +14,7 @@ Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene) {
     return makeMesoScene(scene.surfaces);
 }
 
-Result<MethodPanel> readPanel(Renderer& renderer, const std::string& method, bool withIterations,
+Result<MethodPanel> readPanel(PictureRenderer& renderer, const std::string& method, bool withIterations,
                               const FrameStats& stats, double msPerFrame) {
     VCP_TRY_ASSIGN(auto picture, renderer.readPicture());
     MethodPanel panel{method, std::move(picture), stats, msPerFrame, {}};

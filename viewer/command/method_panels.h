@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "render/renderer.h"
+#include "render/picture_renderer.h"
 #include "viewer/command/commands.h"
 #include "viewer/scene/scene_file.h"
 
@@ -24,7 +24,7 @@ struct MethodPanel {
 Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene);
 
 /// Reads back what was drawn last. Errors: those of the renderer.
-Result<MethodPanel> readPanel(Renderer& renderer, const std::string& method, bool withIterations,
+Result<MethodPanel> readPanel(PictureRenderer& renderer, const std::string& method, bool withIterations,
                               const FrameStats& stats, double msPerFrame);
 
 /// Puts pictures of one size beside each other, the first on the left. Precondition: there is one.

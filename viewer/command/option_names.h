@@ -20,6 +20,7 @@ inline constexpr SettingName kOptionNames[] = {
     {"authority's certificate", "--ca-file"},
     {"another axis up", "--up"},
     {"how far it repeats", "--period"},
+    {"take a Vulkan device", "--device"},
 };
 
 }  // namespace vcp

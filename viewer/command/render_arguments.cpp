@@ -85,7 +85,8 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     addPaperMarchOptions(app, settings.march);
     addSourceSettings(app, settings.source);
     app.add_option("--device", settings.device,
-                   "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]")
+                   "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]; host: pictures "
+                   "without Vulkan")
         ->type_name("DEVICE");
 }
 

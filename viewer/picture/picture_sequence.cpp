@@ -30,8 +30,11 @@ Result<void> PictureSequence::begin() {
     FrameRequest request = o_.request;
     request.camera = o_.cameras[finished_];
     VCP_TRY_ASSIGN(png_, PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules));
-    const TiledPictureOptions options{
-        .tile = o_.tile, .depth = !o_.files.depth.empty(), .normals = !o_.files.normals.empty(), .problem = o_.problem};
+    const TiledPictureOptions options{.tile = o_.tile,
+                                      .depth = !o_.files.depth.empty(),
+                                      .normals = !o_.files.normals.empty(),
+                                      .problem = o_.problem,
+                                      .cancel = o_.cancel};
     picture_ = std::make_unique<TiledPicture>(*renderer_, request, options,
                                               [this](const PictureBand& band) { return take(band); });
     return {};

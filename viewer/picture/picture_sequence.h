@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "octree/io/result.h"
-#include "render/renderer.h"
+#include "render/picture_renderer.h"
 #include "viewer/picture/png_rows.h"
 #include "viewer/picture/tiled_picture.h"
 
@@ -28,8 +28,9 @@ struct PictureSequenceOptions {
     bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on
     uint32_t tile = 2048;     ///< edge in pixels, at least 16
     OutputRules rules = {};   ///< what the files may replace
-    /// Called as TiledPictureOptions::problem is.
-    std::function<void(const Error& problem)> problem;
+    /// Called as those of TiledPictureOptions are.
+    std::function<void(const Error& problem)> problem = {};
+    std::function<bool()> cancel = {};
 };
 
 /// Returns "turn-0007.png" for "turn.png" and 7.
@@ -39,7 +40,7 @@ std::filesystem::path numbered(const std::filesystem::path& path, size_t number)
 /// and normals are kept until their picture is whole, 4 and 12 bytes a pixel. Used by one thread.
 class PictureSequence {
 public:
-    PictureSequence(Renderer& renderer, PictureSequenceOptions options)
+    PictureSequence(PictureRenderer& renderer, PictureSequenceOptions options)
         : renderer_(&renderer), o_(std::move(options)) {}
     PictureSequence(const PictureSequence&) = delete;
     PictureSequence& operator=(const PictureSequence&) = delete;
@@ -66,7 +67,7 @@ private:
     Result<void> take(const PictureBand& band);
     Result<void> finish();
 
-    Renderer* renderer_;
+    PictureRenderer* renderer_;
     PictureSequenceOptions o_;
     size_t finished_ = 0;
     TiledPictureStats stats_;

@@ -69,7 +69,7 @@ Result<bool> TiledPicture::step() {
 }
 
 Result<void> TiledPicture::draw(const FrameRequest& request) {
-    VCP_TRY_ASSIGN(const auto stats, renderer_->render(request));
+    VCP_TRY_ASSIGN(const auto stats, renderer_->render(request, options_.cancel));
     ++stats_.tiles;
     stats_.rays += stats.rays;
     stats_.hitPixels += stats.hitPixels;

@@ -12,7 +12,7 @@
 #include <glm/vec3.hpp>
 
 #include "octree/io/result.h"
-#include "render/renderer.h"
+#include "render/picture_renderer.h"
 
 namespace vcp {
 
@@ -21,6 +21,8 @@ struct TiledPictureOptions {
     bool depth = false, normals = false;
     /// Called with the error of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
     std::function<void(const Error& problem)> problem;
+    /// Asked while a tile is drawn (PictureRenderer::render); true ends the picture with Cancelled.
+    std::function<bool()> cancel;
 };
 
 /// Rows of the picture, over its whole width, from the upper one on.
@@ -43,11 +45,12 @@ public:
     using Take = std::function<Result<void>(const PictureBand&)>;
 
     /// `request`: its width and height may be up to 2^20 here. `take` gets each band.
-    TiledPicture(Renderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
+    TiledPicture(PictureRenderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 
     /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. Returns true
-    /// when the last band was taken. Errors: those of Renderer; those of `take`; the first page that cannot be read.
+    /// when the last band was taken. Errors: those of PictureRenderer; those of `take`; the first page that cannot be
+    /// read.
     Result<bool> step();
     /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return isWaiting_; }
@@ -63,7 +66,7 @@ private:
     Result<void> draw(const FrameRequest& request);
     Result<void> copyTile(const Rect& outer, const Rect& inner);
 
-    Renderer* renderer_;
+    PictureRenderer* renderer_;
     FrameRequest whole_;
     TiledPictureOptions options_;
     Take take_;

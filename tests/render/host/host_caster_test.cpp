@@ -1,7 +1,6 @@
 // The host's caster against the reference, ray by ray, on every instruction set that this processor has.
 #include "render/host/host_caster.h"
 
-#include <atomic>
 #include <cmath>
 #include <set>
 
@@ -220,11 +219,9 @@ TEST(HostCaster, StopsBetweenTiles) {
     ASSERT_TRUE(host);
     const PictureRays rays =
         pictureRays(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 1), 640, 640);
-    std::stop_source stop;
-    std::atomic<int> tiles = 0;
-    const auto cast = castPicture(*host, rays, {.threads = 1, .stop = stop.get_token()}, [&](const TileHits&) {
-        if (++tiles == 3) stop.request_stop();
-    });
+    int tiles = 0;
+    const auto cast = castPicture(*host, rays, {.threads = 1, .cancel = [&] { return tiles == 3; }},
+                                  [&](const TileHits&) { ++tiles; });
     ASSERT_FALSE(cast);
     EXPECT_EQ(cast.error().code, ErrorCode::Cancelled);
     EXPECT_EQ(tiles, 3);

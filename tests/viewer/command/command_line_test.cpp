@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -456,6 +457,93 @@ TEST_F(CommandLine, Devices) {
     expectFailure(run({"devices", "--device", "no such device"}), 1, "no such device");
     expectFailure(run({"render", dataset().string(), "-o", "x.png", "--device", "no such device"}), 1,
                   "no such device");
+}
+
+/// While it lives, programs that are started find no Vulkan driver.
+class WithoutDrivers {
+public:
+    WithoutDrivers() {
+        for (const char* name : {"VK_ICD_FILENAMES", "VK_DRIVER_FILES"}) {
+            const char* value = getenv(name);
+            before_.emplace_back(name, value ? std::optional<std::string>(value) : std::nullopt);
+            setenv(name, "/nonexistent/driver.json", 1);
+        }
+    }
+    ~WithoutDrivers() {
+        for (const auto& [name, value] : before_)
+            value ? setenv(name.c_str(), value->c_str(), 1) : unsetenv(name.c_str());
+    }
+
+private:
+    std::vector<std::pair<std::string, std::optional<std::string>>> before_;
+};
+
+TEST_F(CommandLine, TheHostDrawsWithoutAnyDriver) {
+    const auto render = [&](const std::string& name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o",    (*folder_ / name).string(),
+                                           "--size", "160x120",          "--json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    const auto picture = [&](const char* name) { return readPng(*folder_ / name).value(); };
+    if (hasDevice()) {
+        ASSERT_EQ(render("device.png", {"--shadows"}).status, 0);
+        EXPECT_FALSE(Json::parse(run({"devices", "--json"}).out)["devices"].back()["chosen"].get<bool>());
+    }
+    const WithoutDrivers none;
+    ASSERT_FALSE(hasDevice());
+    const Json devices = Json::parse(run({"devices", "--json"}).out);
+    ASSERT_EQ(devices["devices"].size(), 1u);
+    EXPECT_EQ(devices["devices"][0]["name"], "host");
+    EXPECT_TRUE(devices["devices"][0]["chosen"].get<bool>());
+    EXPECT_TRUE(devices["problem"].is_string());
+    EXPECT_TRUE(run({"devices"}).out.starts_with("* -  host: cpu"));
+
+    const Ran drawn =
+        render("host.png", {"--device", "host", "--shadows", "--depth", (*folder_ / "host.pfm").string()});
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    const Json report = Json::parse(drawn.out);
+    EXPECT_EQ(report["device"], "host");
+    EXPECT_EQ(report["pipelines"], 0);
+    EXPECT_TRUE(report["settled"].get<bool>());
+    EXPECT_GT(report["hit_pixels"], 160 * 120 / 5);
+    EXPECT_EQ(fs::file_size(*folder_ / "host.pfm"), std::string("Pf\n160 120\n-1.0\n").size() + 4 * 160 * 120);
+    // Where there is no driver, the host is the best there is.
+    ASSERT_EQ(render("best.png", {"--shadows"}).status, 0);
+    EXPECT_EQ(picture("best.png"), picture("host.png"));
+    // Tiles begin where those of the whole picture do, so that their rays are rounded alike.
+    ASSERT_EQ(render("tiles.png", {"--shadows", "--tile", "64"}).status, 0);
+    EXPECT_EQ(picture("tiles.png"), picture("host.png"));
+    ASSERT_EQ(render("turn.png", {"--turntable", "2"}).status, 0);
+    EXPECT_NE(picture("turn-0001.png"), Picture{});
+    EXPECT_TRUE(fs::exists(*folder_ / "turn-0002.png"));
+    expectFailure(render("x.png", {"--device", "llvmpipe"}), 1, "host draws pictures without Vulkan");
+    if (!fs::exists(*folder_ / "device.png")) return;
+    const Picture host = picture("host.png"), device = picture("device.png");
+    uint64_t apart = 0;
+    for (size_t i = 0; i < device.rgba.size(); ++i) apart += std::abs(host.rgba[i] - device.rgba[i]) > 2 ? 1 : 0;
+    EXPECT_LE(apart, 8u);
+}
+
+TEST_F(CommandLine, TheHostSaysWhatItDoesNotDraw) {
+    const std::string out = (*folder_ / "refused.png").string();
+    const auto refused = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o", out, "--device", "host"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    expectFailure(refused({"--section", "x<50%"}), 1, "section planes; take a Vulkan device");
+    expectFailure(refused({"--shading", "steps"}), 1, "--device");
+    const fs::path cache = *folder_ / "cache";
+    fs::remove_all(cache);
+    expectFailure(run({"render", ball().string(), "-o", out, "--device", "host", "--section", "x<50%"}), 1, "section");
+    EXPECT_FALSE(fs::exists(cache)) << "nothing was built first";
+    expectFailure(refused({"--validation"}), 1, "validation layers");
+    expectFailure(run({"view", dataset().string(), "--device", "host"}), 2, "the host draws no window");
+    const fs::path soft = *folder_ / "soft.vcp";
+    ASSERT_EQ(run({"build", ball().string(), "-o", soft.string(), "--cell", "0.02", "--error", "0.001"}).status, 0);
+    expectFailure(run({"render", soft.string(), "-o", out, "--device", "host"}), 1, soft.string());
+    EXPECT_FALSE(fs::exists(out));
 }
 
 TEST_F(CommandLine, PicturesInTilesAndSequences) {

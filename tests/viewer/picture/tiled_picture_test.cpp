@@ -14,16 +14,18 @@
 namespace vcp {
 namespace {
 
-class TiledPictureTest : public BuiltBall {
+/// By a Vulkan device and by the host.
+class TiledPictureTest : public BuiltBall, public testing::WithParamInterface<const char*> {
 protected:
     void SetUp() override {
-        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
         RendererOptions options;
+        options.device = GetParam();
+        if (!isHostName(options.device) && !listDevices()) GTEST_SKIP() << "no Vulkan device";
         options.budgetBytes = 64 << 20;
-        renderer_ = *Renderer::create(options);
+        renderer_ = *createPictureRenderer(options);
         auto reader = openFile(*folder_ / "ball.vcp").value();
         const auto dataset = std::make_shared<const Dataset>(readDataset(*reader).value());
-        ASSERT_TRUE(renderer_->open(dataset, std::make_shared<FilePageSource>(reader, dataset)));
+        ASSERT_TRUE(renderer_->open({{dataset, std::make_shared<FilePageSource>(reader, dataset), {}}}, {}));
     }
 
     static FrameRequest request(uint32_t width, uint32_t height, Projection projection = Projection::Perspective) {
@@ -81,11 +83,11 @@ protected:
         return 4.0 * double(count) / double(a.rgba.size());
     }
 
-    std::unique_ptr<Renderer> renderer_;
+    std::unique_ptr<PictureRenderer> renderer_;
 };
 
 // Rays of a tile are those of the whole but for rounding: a silhouette's pixel may flip.
-TEST_F(TiledPictureTest, TilesMakeThePictureThatIsDrawnAtOnce) {
+TEST_P(TiledPictureTest, TilesMakeThePictureThatIsDrawnAtOnce) {
     for (const Projection projection : {Projection::Perspective, Projection::Orthographic}) {
         const FrameRequest whole = request(250, 170, projection);
         const Picture expected = atOnce(whole);
@@ -94,7 +96,7 @@ TEST_F(TiledPictureTest, TilesMakeThePictureThatIsDrawnAtOnce) {
     }
 }
 
-TEST_F(TiledPictureTest, ShadowsAndOcclusionHaveNoSeams) {
+TEST_P(TiledPictureTest, ShadowsAndOcclusionHaveNoSeams) {
     FrameRequest whole = request(200, 140);
     whole.shading.shadows = true;
     whole.shading.occlusionRays = 4;
@@ -102,7 +104,7 @@ TEST_F(TiledPictureTest, ShadowsAndOcclusionHaveNoSeams) {
 }
 
 // Three times the size: each third pixel of the large picture is at the place of one of the small one.
-TEST_F(TiledPictureTest, TheLargePictureIsTheSmallOneEnlarged) {
+TEST_P(TiledPictureTest, TheLargePictureIsTheSmallOneEnlarged) {
     const Picture small = atOnce(request(96, 64)), large = inTiles(request(288, 192), 80);
     Picture shrunk{96, 64, {}};
     for (uint32_t y = 0; y < 64; ++y)
@@ -113,7 +115,7 @@ TEST_F(TiledPictureTest, TheLargePictureIsTheSmallOneEnlarged) {
     EXPECT_LT(differing(shrunk, small, 2), 2e-3);
 }
 
-TEST_F(TiledPictureTest, DepthAndNormalsComeInTilesToo) {
+TEST_P(TiledPictureTest, DepthAndNormalsComeInTilesToo) {
     const FrameRequest whole = request(120, 90);
     PictureBand planes;
     inTiles(whole, 48, &planes);
@@ -131,7 +133,7 @@ TEST_F(TiledPictureTest, DepthAndNormalsComeInTilesToo) {
     EXPECT_LT(wrong, depth.size() / 500);
 }
 
-TEST_F(TiledPictureTest, TransparentIsAlphaZeroWhereNothingIsHit) {
+TEST_P(TiledPictureTest, TransparentIsAlphaZeroWhereNothingIsHit) {
     FrameRequest whole = request(96, 64);
     const Picture opaque = atOnce(whole);
     whole.shading.transparent = true;
@@ -150,7 +152,7 @@ TEST_F(TiledPictureTest, TransparentIsAlphaZeroWhereNothingIsHit) {
     EXPECT_LT(clear, 96u * 64u * 19 / 20);
 }
 
-TEST_F(TiledPictureTest, ATileOutsideOfItsPictureIsRefused) {
+TEST_P(TiledPictureTest, ATileOutsideOfItsPictureIsRefused) {
     FrameRequest tile = request(32, 32);
     tile.tile = {80, 0, 96, 64};
     EXPECT_FALSE(renderer_->render(tile));
@@ -158,6 +160,9 @@ TEST_F(TiledPictureTest, ATileOutsideOfItsPictureIsRefused) {
     EXPECT_TRUE(renderer_->update(tile));
     EXPECT_TRUE(renderer_->render(tile));
 }
+
+INSTANTIATE_TEST_SUITE_P(By, TiledPictureTest, testing::Values("", "host"),
+                         [](const auto& named) { return std::string(named.param).empty() ? "Vulkan" : "Host"; });
 
 }  // namespace
 }  // namespace vcp

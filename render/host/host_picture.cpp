@@ -1,0 +1,266 @@
+#include "render/host/host_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/packing.hpp>
+
+#include "render/host/hit_light.h"
+#include "render/host/hit_surface.h"
+#include "render/host/light_rays.h"
+#include "render/host/tile_shading.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr float kNothing = std::numeric_limits<float>::infinity();
+
+/// What is kept of each pixel until the sky that its neighbours see is known.
+struct SkyPlanes {
+    explicit SkyPlanes(size_t pixels)
+        : depth(pixels, kNothing), normals(pixels), albedo(pixels), sun(pixels), sky(pixels) {}
+
+    std::vector<float> depth;  // finest cells
+    std::vector<glm::vec3> normals;
+    std::vector<uint32_t> albedo;  // RGBA8
+    std::vector<uint8_t> sun, sky;
+};
+
+uint8_t toByte(float x) { return uint8_t(std::lround(255 * x)); }
+
+class LayerDrawing {
+public:
+    LayerDrawing(const HostLayer& layer, HostPicture& picture)
+        : layer_(layer),
+          frame_(layer.frame),
+          picture_(picture),
+          isColoured_(layer.hasColour &&
+                      (frame_.shadingMode == frame::kShadeLit || frame_.shadingMode == frame::kShadeUnlit)),
+          turn_(frame_.rotation.w, frame_.rotation.x, frame_.rotation.y, frame_.rotation.z) {}
+
+    Result<void> draw(const HostCastOptions& options) {
+        const bool averagesSky = frame_.occlusionRays > 0;
+        if (averagesSky) planes_.emplace(picture_.colours.size());
+        VCP_TRY(castPicture(layer_.scene, layer_.rays, options, [&](const TileHits& hits) {
+            if (hits.any) drawTile(hits);
+        }));
+        if (!averagesSky) return {};
+        return forEachTile(picture_.size, options, [&](glm::ivec2 corner) { drawKeptTile(corner); });
+    }
+
+private:
+    [[nodiscard]] size_t at(glm::ivec2 pixel) const {
+        return size_t(pixel.y) * size_t(picture_.size.x) + size_t(pixel.x);
+    }
+
+    /// Calls visit(pixel of the picture, element of the tile's arrays) for each pixel of a tile in the picture.
+    template <class Visit>
+    void forEachPixel(glm::ivec2 corner, const Visit& visit) const {
+        const glm::ivec2 size = glm::min(picture_.size - corner, glm::ivec2(kTileWidth, kTileHeight));
+        for (int y = 0; y < size.y; ++y)
+            for (int x = 0; x < size.x; ++x) visit(corner + glm::ivec2(x, y), y * kTileWidth + x);
+    }
+    template <class Visit>
+    void forEachHit(const TileHits& hits, const Visit& visit) const {
+        forEachPixel(hits.corner, [&](glm::ivec2 pixel, int i) {
+            if (hits.depth[i] < kNothing) visit(pixel, i);
+        });
+    }
+
+    [[nodiscard]] float depthInCells(float depth) const { return float(double(depth) / layer_.scene.grid().cell); }
+    /// A pixel's edge at a depth; both in finest cells.
+    [[nodiscard]] float pixelEdgeAt(float depth) const { return frame_.pixelEdge + frame_.pixelEdgePerDepth * depth; }
+
+    void drawTile(const TileHits& hits) {
+        TileSurface surface;
+        findNormals(layer_.rays, hits, surface);
+        alignas(32) uint32_t colours[kTilePixels];
+        if (frame_.shadingMode >= frame::kShadeSteps) {
+            forEachHit(hits, [&](glm::ivec2, int i) { colours[i] = falseColour(hits, i); });
+            return put(hits, surface, colours);
+        }
+        std::fill_n(surface.sun, kTilePixels, 1.0f);
+        std::fill_n(surface.sky, kTilePixels, 1.0f);
+        if (frame_.hasShadows != 0) castSun(hits, surface);
+        if (planes_) {
+            castSky(hits, surface);
+            return keep(hits, surface);
+        }
+        findAlbedo(hits, surface);
+        shadeTile(frame_, surface, colours);
+        put(hits, surface, colours);
+    }
+
+    [[nodiscard]] uint32_t falseColour(const TileHits& hits, int i) const {
+        const HostScene::Page& page = layer_.scene.page(hits.leaves[hits.leaf[i]].page);
+        const float shown = frame_.shadingMode == frame::kShadeLevel
+                                ? float(layer_.scene.levelOf(page)) / std::max(float(frame_.finestLevel), 1.0f)
+                                : page.error / std::max(pixelEdgeAt(depthInCells(hits.depth[i])), 1e-30f);
+        return glm::packUnorm4x8(glm::vec4(f32::heat(shown), 1));
+    }
+
+    void findAlbedo(const TileHits& hits, TileSurface& surface) const {
+        setClay(surface);
+        if (!isColoured_) return;
+        // Colours have 8 bits between the passes of a device, too.
+        forEachHit(hits, [&](glm::ivec2, int i) {
+            setAlbedo(surface, i, glm::packUnorm4x8(colourAt(layer_.scene, hits, i)));
+        });
+    }
+
+    void setClay(TileSurface& surface) const {
+        std::fill_n(surface.red, kTilePixels, frame_.clay.x);
+        std::fill_n(surface.green, kTilePixels, frame_.clay.y);
+        std::fill_n(surface.blue, kTilePixels, frame_.clay.z);
+    }
+    static void setAlbedo(TileSurface& surface, int i, uint32_t packed) {
+        const glm::vec4 colour = glm::unpackUnorm4x8(packed);
+        surface.red[i] = colour.x;
+        surface.green[i] = colour.y;
+        surface.blue[i] = colour.z;
+    }
+
+    /// Returns where rays of light begin: above the hit by more than the picture's own error and the roundings.
+    [[nodiscard]] glm::dvec3 lifted(const TileHits& hits, const TileSurface& surface, glm::ivec2 pixel, int i) const {
+        const HostGrid& grid = layer_.scene.grid();
+        const glm::dvec3 origin = layer_.rays.originAt(pixel.x + 0.5, pixel.y + 0.5);
+        const glm::dvec3 direction = glm::normalize(layer_.rays.directionAt(pixel.x + 0.5, pixel.y + 0.5));
+        const float lift = 0.15f + frame_.lightLift * pixelEdgeAt(depthInCells(hits.depth[i]));
+        return (origin + double(hits.depth[i]) * direction - grid.origin) / grid.cell +
+               glm::dvec3(lift * surface.normal(i));
+    }
+
+    void castSun(const TileHits& hits, TileSurface& surface) const {
+        const glm::vec3 light(frame_.lightDirection);
+        LightRay rays[kTilePixels];
+        int pixels[kTilePixels];
+        size_t count = 0;
+        forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+            if (!(glm::dot(surface.normal(i), light) > 0)) return void(surface.sun[i] = 0);
+            rays[count] = {lifted(hits, surface, pixel, i), light, frame::kNoHit};
+            pixels[count++] = i;
+        });
+        float distances[kTilePixels];
+        castLightRays(layer_.scene, {rays, count}, distances);
+        for (size_t k = 0; k < count; ++k) surface.sun[pixels[k]] = distances[k] < kNothing ? 0.0f : 1.0f;
+    }
+
+    void castSky(const TileHits& hits, TileSurface& surface) const {
+        const float reach = frame_.occlusionReach;
+        const uint32_t sky = frame_.occlusionRays;
+        glm::dvec3 origins[kTilePixels];
+        forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+            origins[i] = lifted(hits, surface, pixel, i);
+            surface.sky[i] = 0;
+        });
+        LightRay rays[kTilePixels];
+        float distances[kTilePixels];
+        // The rays of one number, over the tile, begin side by side.
+        for (uint32_t number = 0; number < sky; ++number) {
+            size_t count = 0;
+            forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+                const glm::vec3 direction =
+                    f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x), uint32_t(pixel.y));
+                rays[count++] = {origins[i], direction, reach};
+            });
+            castLightRays(layer_.scene, {rays, count}, distances);
+            size_t next = 0;
+            forEachHit(hits, [&](glm::ivec2, int i) {
+                const float distance = distances[next++];
+                surface.sky[i] += distance < reach ? f32::skyBehind(distance / reach) : 1.0f;
+            });
+        }
+        for (float& seen : surface.sky) seen /= float(sky);
+    }
+
+    void keep(const TileHits& hits, const TileSurface& surface) {
+        forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+            const size_t to = at(pixel);
+            planes_->depth[to] = depthInCells(hits.depth[i]);
+            planes_->normals[to] = surface.normal(i);
+            if (isColoured_) planes_->albedo[to] = glm::packUnorm4x8(colourAt(layer_.scene, hits, i));
+            planes_->sun[to] = toByte(surface.sun[i]);
+            planes_->sky[to] = toByte(surface.sky[i]);
+        });
+    }
+
+    void drawKeptTile(glm::ivec2 corner) {
+        TileSurface surface{};
+        setClay(surface);
+        TileHits hits;
+        hits.corner = corner;
+        std::fill_n(hits.depth, kTilePixels, kNothing);
+        forEachPixel(corner, [&](glm::ivec2 pixel, int i) {
+            const size_t from = at(pixel);
+            if (!(planes_->depth[from] < kNothing)) return;
+            hits.any = true;
+            hits.depth[i] = float(double(planes_->depth[from]) * layer_.scene.grid().cell);
+            const glm::vec3 normal = planes_->normals[from];
+            surface.normalX[i] = normal.x, surface.normalY[i] = normal.y, surface.normalZ[i] = normal.z;
+            if (isColoured_) setAlbedo(surface, i, planes_->albedo[from]);
+            surface.sun[i] = float(planes_->sun[from]) / 255;
+            surface.sky[i] = skyAbout(pixel);
+        });
+        if (!hits.any) return;
+        alignas(32) uint32_t colours[kTilePixels];
+        shadeTile(frame_, surface, colours);
+        put(hits, surface, colours);
+    }
+
+    /// Returns how much sky is seen, averaged over the pixels around that show the same surface: each pixel of a square
+    /// of 4 x 4 has its own directions.
+    [[nodiscard]] float skyAbout(glm::ivec2 pixel) const {
+        const float depth = planes_->depth[at(pixel)], reach = 8 * pixelEdgeAt(depth);
+        float sum = 0, count = 0;
+        for (int i = 0; i < 16; ++i) {
+            const glm::ivec2 p =
+                glm::clamp(pixel + glm::ivec2((i & 3) - 1, (i >> 2) - 1), glm::ivec2(0), picture_.size - 1);
+            if (!(std::abs(planes_->depth[at(p)] - depth) <= reach)) continue;
+            sum += float(planes_->sky[at(p)]) / 255;
+            ++count;
+        }
+        return sum / std::max(count, 1.0f);
+    }
+
+    /// Puts a tile's hits into the picture, where they are nearer than what is there.
+    void put(const TileHits& hits, const TileSurface& surface, const uint32_t* colours) {
+        forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+            const size_t to = at(pixel);
+            const auto depth = float(double(hits.depth[i]) * layer_.worldPerUnit);
+            if (!(depth < picture_.depth[to])) return;
+            picture_.depth[to] = depth;
+            picture_.colours[to] = colours[i];
+            picture_.normals[to] = turn_ * surface.normal(i);
+        });
+    }
+
+    const HostLayer& layer_;
+    const frame::FrameConstants& frame_;
+    HostPicture& picture_;
+    const bool isColoured_;  // hits are shown in their own colours
+    const glm::quat turn_;   // from the dataset's axes to the world's
+    std::optional<SkyPlanes> planes_;
+};
+
+}  // namespace
+
+HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> background)
+    : size(pictureSize),
+      colours(size_t(size.x) * size_t(size.y)),
+      depth(colours.size(), kNothing),
+      normals(colours.size(), glm::vec3(0)) {
+    for (size_t y = 0; y < size_t(size.y); ++y)
+        std::fill_n(colours.begin() + std::ptrdiff_t(y * size_t(size.x)), size.x, background[y]);
+}
+
+Result<void> drawLayer(const HostLayer& layer, const HostCastOptions& options, HostPicture& picture) {
+    return LayerDrawing(layer, picture).draw(options);
+}
+
+}  // namespace vcp

@@ -1,0 +1,43 @@
+// Draws a dataset into a picture: rays, light and colours of a tile, then the next tile.
+//
+// Ambient occlusion is averaged over pixels of neighbouring tiles, so with it a second turn over the tiles gives the
+// colours. Of several datasets, drawn one after the other, the nearest surface is seen at each pixel.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "render/host/host_caster.h"
+#include "render/shared/frame.h"
+
+namespace vcp {
+
+/// A picture in the making: width * height elements each, row by row from the upper left.
+struct HostPicture {
+    /// `background`: RGBA8, one a row.
+    HostPicture(glm::ivec2 size, std::span<const uint32_t> background);
+
+    glm::ivec2 size;
+    std::vector<uint32_t> colours;   ///< RGBA8
+    std::vector<float> depth;        ///< world units along the unit ray; infinite where nothing is hit
+    std::vector<glm::vec3> normals;  ///< unit, world axes, towards the viewer; 0 where nothing is hit
+};
+
+/// A dataset as a picture shows it.
+struct HostLayer {
+    const HostScene& scene;
+    PictureRays rays;             ///< in the dataset's own space
+    frame::FrameConstants frame;  ///< as the shaders get it
+    bool hasColour = false;       ///< hits have colours
+    double worldPerUnit = 1;      ///< world units per unit of the dataset's own
+};
+
+/// Draws a layer over what is in the picture. Precondition: frame.shadingMode is none of the counts of a ray's work,
+/// and there are no section planes. Errors: Cancelled, between tiles.
+Result<void> drawLayer(const HostLayer& layer, const HostCastOptions& options, HostPicture& picture);
+
+}  // namespace vcp

@@ -1,0 +1,23 @@
+// Rays of light: from hits to the sun and into the sky. They part in all directions, so each goes through the scene by
+// itself; a leaf is met with the same mathematics as in the shaders (octree/shared/leaf_math.h).
+#pragma once
+
+#include <span>
+
+#include <glm/vec3.hpp>
+
+#include "render/host/host_scene.h"
+
+namespace vcp {
+
+struct LightRay {
+    glm::dvec3 origin;    ///< finest cells, from the root's lowest corner
+    glm::vec3 direction;  ///< unit
+    float reach;          ///< finest cells; what is farther does not matter
+};
+
+/// Finds how far each ray comes, in finest cells: below its reach where something is in its way, else infinite.
+/// `distances`: one a ray. Any thread.
+void castLightRays(const HostScene& scene, std::span<const LightRay> rays, float* distances);
+
+}  // namespace vcp

@@ -1,0 +1,110 @@
+// The boxes of a scene that are still to be visited, in the order in which rays come to them.
+#if defined(VCP_RENDER_HOST_SCENE_WALK_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef VCP_RENDER_HOST_SCENE_WALK_INL_H
+#undef VCP_RENDER_HOST_SCENE_WALK_INL_H
+#else
+#define VCP_RENDER_HOST_SCENE_WALK_INL_H
+#endif
+
+#include <array>
+
+#include "render/host/host_scene.h"
+#include "render/host/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace vcp::HWY_NAMESPACE {
+
+constexpr double kSubcell = 1.0 / (1u << kMaxSubcellDepth);  // finest cells
+
+/// Returns the edge of a box in finest cells. `bits`: log2 of it in subcells.
+HWY_INLINE double cellsOf(uint32_t bits) { return double(uint64_t{1} << bits) * kSubcell; }
+
+/// A node of the scene's tree, or of a page's.
+struct WalkEntry {
+    glm::uvec3 corner;  // subcells
+    uint32_t bits;      // log2 of its edge in subcells
+    uint32_t page;      // or kNoPage
+    uint32_t word;      // its node word, or the number of the scene's node
+};
+constexpr uint32_t kNoPage = ~0u;
+
+/// Whether it has children; else it is a leaf.
+HWY_INLINE bool isNode(const WalkEntry& at) { return at.page == kNoPage || nodeType(at.word) == kNodeInternal; }
+
+/// Returns the middles of octants i to i + kLanes - 1 about `middle`. `half`: of an octant's edge.
+HWY_INLINE Lane3 octantMiddles(int i, glm::vec3 middle, float half) {
+    alignas(32) static constexpr float kSign[3][8] = {
+        {-1, 1, -1, 1, -1, 1, -1, 1}, {-1, -1, 1, 1, -1, -1, 1, 1}, {-1, -1, -1, -1, 1, 1, 1, 1}};
+    return {mulAdd(load(kSign[0] + i), Lane(half), Lane(middle.x)),
+            mulAdd(load(kSign[1] + i), Lane(half), Lane(middle.y)),
+            mulAdd(load(kSign[2] + i), Lane(half), Lane(middle.z))};
+}
+
+/// A stack of boxes; begins with the scene's root.
+class SceneWalk {
+public:
+    explicit SceneWalk(const HostScene& scene) : scene_(scene) { restart(); }
+
+    void restart() {
+        count_ = 0;
+        push(scene_.root(), glm::uvec3(0), scene_.rootBits());
+    }
+    [[nodiscard]] bool isDone() const { return count_ == 0; }
+    WalkEntry next() { return stack_[size_t(--count_)]; }
+
+    /// Pushes those children of a node that are in `met`, a bit an octant, and hold anything: last, so that it comes
+    /// next, the one in the octant `nearest`, and the one across from it first.
+    void pushChildren(const WalkEntry& at, uint32_t met, uint32_t nearest) {
+        const uint32_t bits = at.bits - 1;
+        if (at.page == kNoPage) {
+            const HostScene::Node& node = scene_.node(at.word);
+            for (uint32_t k = 8; k-- > 0;) {
+                const uint32_t octant = k ^ nearest;
+                if (met >> octant & 1) push(node[octant], childCorner(at, octant), bits);
+            }
+            return;
+        }
+        const uint32_t* words = &scene_.page(at.page).view->nodes[8 * (at.word & kNodePayloadMask)];
+        const uint32_t open = met & ~emptyChildren(words);
+        if (open == 0) return;
+        for (uint32_t k = 8; k-- > 0;) {
+            const uint32_t octant = k ^ nearest;
+            if (open >> octant & 1) stack_[size_t(count_++)] = {childCorner(at, octant), bits, at.page, words[octant]};
+        }
+    }
+
+private:
+    /// A traversal leaves at most seven siblings behind at each of at most 31 depths.
+    static constexpr int kStackEntries = 7 * 32 + 8;
+
+    void push(HostScene::Child child, glm::uvec3 corner, uint32_t bits) {
+        if (child.kind == HostScene::Child::Kind::None) return;
+        const bool isPage = child.kind == HostScene::Child::Kind::Page;
+        const uint32_t word = isPage ? scene_.page(child.index).view->header.root : child.index;
+        if (isPage && nodeType(word) == kNodeEmpty) return;
+        stack_[size_t(count_++)] = {corner, bits, isPage ? child.index : kNoPage, word};
+    }
+
+    static glm::uvec3 childCorner(const WalkEntry& at, uint32_t octant) {
+        return at.corner + (glm::uvec3(octant & 1, octant >> 1 & 1, octant >> 2) << (at.bits - 1));
+    }
+
+    static uint32_t emptyChildren(const uint32_t* words) {
+        uint32_t empty = 0;
+        for (int i = 0; i < 8; i += kLanes) {
+            // The bit below the type tells an empty node from a slab leaf.
+            const LaneWords type = hn::ShiftRight<int(kNodeTypeShift) - 1>(hn::LoadU(Words(), words + i));
+            empty |= bitsOf(hn::RebindMask(Floats(), hn::Eq(type, hn::Set(Words(), 2 * kNodeEmpty)))) << i;
+        }
+        return empty;
+    }
+
+    const HostScene& scene_;
+    int count_ = 0;
+    std::array<WalkEntry, kStackEntries> stack_;
+};
+
+}  // namespace vcp::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,54 @@
+// Draws pictures on the processor, without Vulkan: no instance, driver or pipeline is touched. Pages are chosen, read
+// and kept as for a device (residency.h), in plain memory; rays, light and colours are those of the shaders, cast and
+// shaded tile by tile on all processors (render/host/host_picture.h).
+//
+// It does not draw sections, mesostructure, the march of the method `paper`, the false colours that count a shader's
+// work, and seams between levels (docs/rays.md): each is refused as Unsupported, and never left out.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "render/host/host_picture.h"
+#include "render/picture_renderer.h"
+#include "render/residencies.h"
+
+namespace vcp {
+
+/// The processor, as `vcp devices` lists it.
+DeviceInfo hostDevice();
+
+/// Refuses what the host does not draw of a request. Errors: Unsupported.
+Result<void> checkHostDraws(const FrameRequest& request);
+
+class HostRenderer final : public PictureRenderer {
+public:
+    /// Errors: Usage (the budget is too small), Unsupported (validation layers are Vulkan's).
+    static Result<std::unique_ptr<HostRenderer>> create(const RendererOptions& options);
+
+    [[nodiscard]] const DeviceInfo& device() const override { return info_; }
+    Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces) override;
+    Result<void> setSurfaces(std::span<const MesoSurface> surfaces) override;
+    Result<UpdateResult> update(const FrameRequest& request) override;
+    void waitForPage(std::chrono::milliseconds timeout) override { vcp::waitForPage(datasets_, timeout); }
+    Result<FrameStats> render(const FrameRequest& request, const std::function<bool()>& cancel = {}) override;
+    Result<Picture> readPicture() override;
+    Result<std::vector<float>> readDepth() override;
+    Result<std::vector<glm::vec3>> readNormals() override;
+    Result<std::vector<uint32_t>> readIterations() override;
+    [[nodiscard]] std::vector<std::string> validationMessages() const override { return {}; }
+
+private:
+    explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
+    /// Draws the cut of one dataset over what is in the picture.
+    Result<void> drawDataset(size_t number, const FrameRequest& request, const HostCastOptions& options,
+                             HostPicture& picture);
+
+    const RendererOptions options_;
+    const DeviceInfo info_;
+    std::vector<PlacedResidency> datasets_;
+    std::vector<double> errorPixels_;  // of each dataset's last update
+    std::optional<HostPicture> drawn_;
+};
+
+}  // namespace vcp

@@ -1,0 +1,79 @@
+// What draws pictures of datasets without a window: a Vulkan device (Renderer, renderer.h) or the processor alone
+// (HostRenderer, host_renderer.h). Whoever only wants pictures knows no more than this.
+//
+// A picture is settle(request), render(request), readPicture(). The same request and the same cut give the same bytes.
+// One thread at a time may call a renderer.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "octree/dataset_reader.h"
+#include "octree/io/result.h"
+#include "render/frame_request.h"
+#include "render/frame_result.h"
+#include "render/picture.h"
+#include "render/renderer_options.h"
+#include "render/similarity.h"
+#include "streaming/page_source.h"
+
+namespace vcp {
+
+/// A dataset and where it lies in the world.
+struct PlacedDataset {
+    std::shared_ptr<const Dataset> dataset;
+    std::shared_ptr<const PageSource> source;  ///< source of this dataset only
+    Similarity placement;
+    uint32_t loaderThreads = 2;  ///< threads that keep its source busy
+};
+
+struct MesoSurface;  // render/passes/meso_surface.h
+
+class PictureRenderer {
+public:
+    virtual ~PictureRenderer() = default;
+
+    [[nodiscard]] virtual const DeviceInfo& device() const = 0;
+
+    /// Shows datasets, and surfaces with mesostructure, in place of those before. Errors: Device, Limit; Unsupported,
+    /// where this renderer cannot draw them. After an error nothing is shown.
+    virtual Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces) = 0;
+    /// Shows other surfaces beside the same datasets. Errors: as of open().
+    virtual Result<void> setSurfaces(std::span<const MesoSurface> surfaces) = 0;
+
+    /// Takes in pages that have arrived, chooses the cut, and sends the loader its wishes; never waits for reads.
+    /// Errors: Usage, where the request makes no picture; Unsupported; Device.
+    virtual Result<UpdateResult> update(const FrameRequest& request) = 0;
+    /// Waits until a page was read, there is nothing to read, or the time is over.
+    virtual void waitForPage(std::chrono::milliseconds timeout) = 0;
+    /// Calls update() until settled, and waits for the loader in between. Stops early with Cancelled where `cancel`
+    /// returns true (it is called several times a second).
+    Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
+
+    /// Draws the cut of the last update and waits for it; without a dataset, the background. `cancel` may be called by
+    /// several threads: where it returns true, the processor stops with Cancelled; a device draws its frame to the end.
+    virtual Result<FrameStats> render(const FrameRequest& request, const std::function<bool()>& cancel = {}) = 0;
+
+    /// Returns the picture of the last render(). Errors: Usage, where nothing was drawn yet; Device.
+    virtual Result<Picture> readPicture() = 0;
+    /// Distances in world units along the unit ray; infinity where nothing is hit, not a number where the ray gave up.
+    virtual Result<std::vector<float>> readDepth() = 0;
+    virtual Result<std::vector<glm::vec3>> readNormals() = 0;  ///< unit, towards the viewer; 0 where no hit
+    /// Returns each pixel's iterations in mesostructure, over all pieces that its ray passed; all 0 without surfaces.
+    virtual Result<std::vector<uint32_t>> readIterations() = 0;
+
+    /// Returns validation messages (warnings and errors) so far; always empty without options.validation.
+    [[nodiscard]] virtual std::vector<std::string> validationMessages() const = 0;
+};
+
+/// Makes the renderer that the options name: the host's for kHostName, and where nothing is named and there is no
+/// Vulkan device; else one of Vulkan. Errors: as of Renderer::create and HostRenderer::create.
+Result<std::unique_ptr<PictureRenderer>> createPictureRenderer(const RendererOptions& options);
+
+}  // namespace vcp

@@ -1,0 +1,48 @@
+// Light on a hit, and the colours that stand for normals and counts. Compiles as GLSL, as C++ (render/host/hit_light.h)
+// and, up to the line that says so, for several pixels at once (render/host/tile_shading.cpp). Only the common subset
+// of GLSL and GLM is used.
+
+// Returns the light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
+// colours come encoded, so that one power a pixel is enough.
+INLINE Real encodedLight(Real3 n, Real3 light, Real3 up, Real sunSeen, Real skySeen) {
+    Real sun = max(dot(n, light), Real(0.0));
+    Real sky = Real(0.5) + Real(0.5) * dot(n, up);
+    // Hollows are darker than the sun alone would have them: they see less of what it lights.
+    return pow(
+        Real(0.72) * sun * sunSeen * (Real(0.5) + Real(0.5) * skySeen) + (Real(0.10) + Real(0.18) * sky) * skySeen,
+        Real(1.0 / 2.2));
+}
+
+// Turns a normal by a quaternion: from the dataset's own axes to the world's.
+INLINE Real3 turnedBy(Real3 q, Real w, Real3 n) { return n + Real(2.0) * cross(q, cross(q, n) + w * n); }
+
+// What follows is computed pixel by pixel.
+#ifndef FOR_LANES
+
+const float kTurn = 6.2831853f;
+const float kGoldenTurn = 0.61803399f;
+
+// Returns the direction of ray `i` of `count` about the normal, by its cosine (Malley's method on a spiral of the
+// disc). Each pixel of a square of 4 x 4 has its own spiral; shading averages over the square.
+INLINE Real3 skyDirection(Real3 n, uint i, uint count, uint x, uint y) {
+    uint square = (x & 3u) | (y & 3u) << 2;
+    uint mixedUp = square * 7u & 15u;
+    float radius2 = (float(i) + (float(mixedUp) + 0.5f) / 16.0f) / float(count);
+    float angle = kTurn * fract(float(i) * kGoldenTurn + (float(square) + 0.5f) / 16.0f);
+    Real3 side = normalize(abs(n.z) < 0.7f ? Real3(n.y, -n.x, 0.0f) : Real3(0.0f, n.z, -n.y));
+    float r = sqrt(radius2);
+    return r * cos(angle) * side + r * sin(angle) * cross(n, side) + sqrt(1.0f - radius2) * n;
+}
+
+// Returns what an occlusion ray sees of the sky, where it is blocked at a part of its reach: less, the nearer.
+INLINE Real skyBehind(Real part) {
+    float near = 1.0f - part;
+    return 1.0f - near * near;
+}
+
+// Maps 0 to 1 from blue through green to red.
+INLINE Real3 heat(Real x) {
+    return clamp(Real3(3.0f * x - 1.2f, 1.5f - abs(3.0f * x - 1.2f), 1.4f - 3.0f * x), 0.0f, 1.0f);
+}
+
+#endif

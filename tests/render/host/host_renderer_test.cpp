@@ -1,0 +1,389 @@
+// Pictures by the host against pictures by the shaders, pixel by pixel.
+#include "render/host_renderer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "render/passes/meso_surface.h"
+#include "streaming/page_source.h"
+#include "tests/support/built_mesh.h"
+#include "tests/support/reference_comparison.h"
+
+namespace vcp {
+namespace {
+
+using test::NamedCamera;
+using test::requestOf;
+using test::Scene;
+
+/// What a renderer says of each pixel.
+struct Planes {
+    UpdateResult update;
+    Picture picture;
+    std::vector<float> depth;
+    std::vector<glm::vec3> normals;
+};
+
+Planes drawnBy(PictureRenderer& renderer, const FrameRequest& request) {
+    Planes planes;
+    planes.update = renderer.settle(request).value();
+    const auto stats = renderer.render(request);
+    EXPECT_TRUE(stats) << stats.error().line();
+    planes.picture = renderer.readPicture().value();
+    planes.depth = renderer.readDepth().value();
+    planes.normals = renderer.readNormals().value();
+    const auto hits = std::ranges::count_if(planes.depth, [](float depth) { return std::isfinite(depth); });
+    EXPECT_EQ(stats->hitPixels, uint64_t(hits));
+    return planes;
+}
+
+/// How pixels of two pictures differ. Each is counted once, by the first that differs.
+struct Difference {
+    uint64_t pixels = 0, hits = 0;
+    uint64_t state = 0;   ///< one has a hit
+    uint64_t depth = 0;   ///< by more than a thousandth of a finest cell, where the surface is not seen edge-on
+    uint64_t normal = 0;  ///< by more than 0.2 degrees
+    uint64_t colour = 0;  ///< by more than two of 255 steps of a channel
+
+    Difference& operator+=(const Difference& other) {
+        pixels += other.pixels, hits += other.hits;
+        state += other.state, depth += other.depth, normal += other.normal, colour += other.colour;
+        return *this;
+    }
+};
+
+int channelsApart(const Picture& a, const Picture& b, size_t pixel) {
+    int most = 0;
+    for (size_t c = 4 * pixel; c < 4 * pixel + 4; ++c) most = std::max(most, std::abs(a.rgba[c] - b.rgba[c]));
+    return most;
+}
+
+Difference compare(const Planes& host, const Planes& device, double cell) {
+    Difference d;
+    for (size_t i = 0; i < device.depth.size(); ++i) {
+        ++d.pixels;
+        const bool isHit = std::isfinite(device.depth[i]);
+        d.hits += isHit ? 1 : 0;
+        if (std::isfinite(host.depth[i]) != isHit) {
+            ++d.state;
+            continue;
+        }
+        if (isHit) {
+            const double apart = std::abs(double(host.depth[i]) - double(device.depth[i]));
+            if (apart > 1e-3 * cell + 1e-6 * double(device.depth[i])) {
+                ++d.depth;
+                continue;
+            }
+            if (glm::distance(host.normals[i], device.normals[i]) > 0.0035f) {
+                ++d.normal;
+                continue;
+            }
+        }
+        d.colour += channelsApart(host.picture, device.picture, i) > 2 ? 1 : 0;
+    }
+    return d;
+}
+
+class HostRendererTest : public test::RendererFixture {
+protected:
+    void SetUp() override {
+        start();
+        host_ = HostRenderer::create({}).value();
+    }
+    void open(std::vector<PlacedDataset> datasets) {
+        ASSERT_TRUE(host_->open(datasets, {}));
+        ASSERT_TRUE(renderer_->open(std::move(datasets)));
+    }
+    void open(const Scene& scene) { open({{scene.dataset, scene.source, {}}}); }
+    void open(const test::BuiltMesh& built) { open({placed(built.file())}); }
+    static PlacedDataset placed(const std::filesystem::path& file, const Similarity& placement = {}) {
+        auto reader = openFile(file).value();
+        const auto dataset = std::make_shared<const Dataset>(readDataset(*reader).value());
+        return {dataset, std::make_shared<FilePageSource>(reader, dataset), placement};
+    }
+    /// `cell`: of the finest level, world units.
+    Difference difference(const FrameRequest& request, double cell) {
+        const Planes host = drawnBy(*host_, request), device = drawnBy(*renderer_, request);
+        EXPECT_EQ(host.update.pagesInCut, device.update.pagesInCut);
+        EXPECT_EQ(host.update.errorPixels, device.update.errorPixels);
+        EXPECT_EQ(host.update.residentBytes, device.update.residentBytes);
+        return compare(host, device, cell);
+    }
+    std::unique_ptr<HostRenderer> host_;
+};
+
+/// A few pixels differ: where a ray passes an edge, or a silhouette, on one side or the other by less than both round,
+/// and where it grazes the surface. 15 of 100,000 hits did at most, all in depth or normal; three times that may.
+void expectFew(const Difference& d) {
+    EXPECT_GT(d.hits, 10000u);
+    EXPECT_LE(double(d.state + d.depth + d.normal + d.colour), 45e-5 * double(d.hits))
+        << d.state << " states, " << d.depth << " depths, " << d.normal << " normals, " << d.colour << " colours of "
+        << d.hits << " hits";
+    EXPECT_LE(double(d.state + d.colour), 5e-5 * double(d.hits)) << d.state << ", " << d.colour;
+}
+
+constexpr ShadingMode kModes[] = {ShadingMode::Lit,     ShadingMode::Clay,  ShadingMode::Unlit,
+                                  ShadingMode::Normals, ShadingMode::Level, ShadingMode::Error};
+
+test::BuiltMesh torusAndBox() {
+    IndexedMesh mesh = test::torusMesh({0.1, 0.2, 0.3}, 1, 0.4, 90, 45);
+    test::append(mesh, test::boxMesh({-0.3, -0.3, -0.3}, {0.35, 0.25, 0.3}, 4));
+    return {mesh, 0.03};
+}
+const glm::dvec3 kLow(-1.4, -1.3, -1.2), kHigh(1.6, 1.7, 1.8);
+
+Scene torusOfOneLevel() {
+    test::AnalyticOptions o;
+    o.levels = 1;
+    o.axis = 2;
+    return test::sceneOf("torus", test::analyticDataset(test::torus(glm::dvec3(8.2, 7.8, 8.1), 4.8, 1.8), o));
+}
+
+TEST_F(HostRendererTest, EveryKindOfLeafFromEveryCamera) {
+    for (const Scene& scene : {test::sphereScene(1), torusOfOneLevel(), test::cubeScene(1), test::wavesScene(12, 2),
+                               test::sphereScene(1, {483920.0, 3792000.0, 1200.0}, 1.0 / 1024)}) {
+        SCOPED_TRACE(scene.name);
+        open(scene);
+        Difference all;
+        for (const NamedCamera& named : test::cameras(scene)) {
+            FrameRequest request = requestOf(named.camera);
+            all += difference(request, scene.dataset->header.cell);
+        }
+        expectFew(all);
+    }
+}
+
+TEST_F(HostRendererTest, ABuiltMeshInEveryModeAndSeveralLevels) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    const auto cameras = test::cameras(kLow, kHigh);
+    for (const double errorPixels : {0.2, 4.0, 30.0}) {
+        Difference all;
+        for (size_t i = 0; i < cameras.size(); ++i) {
+            FrameRequest request = requestOf(cameras[i].camera);
+            request.errorPixels = errorPixels;
+            request.shading.mode = kModes[i % std::size(kModes)];
+            all += difference(request, built.cache().dataset().header.cell);
+        }
+        expectFew(all);
+    }
+}
+
+TEST_F(HostRendererTest, ShadowsAndOcclusion) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    Difference all;
+    uint64_t darker = 0;
+    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+        SCOPED_TRACE(named.name);
+        FrameRequest request = requestOf(named.camera);
+        const Planes plain = drawnBy(*host_, request);
+        request.shading.shadows = true;
+        all += difference(request, built.cache().dataset().header.cell);
+        request.shading.occlusionRays = 4;
+        all += difference(request, built.cache().dataset().header.cell);
+        const Planes shaded = drawnBy(*host_, request);
+        for (size_t i = 0; i < plain.depth.size(); ++i) {
+            EXPECT_LE(shaded.picture.rgba[4 * i], plain.picture.rgba[4 * i]);
+            darker += shaded.picture.rgba[4 * i] + 8 < plain.picture.rgba[4 * i] ? 1 : 0;
+        }
+    }
+    expectFew(all);
+    EXPECT_GT(darker, 5000u);
+}
+
+// Nothing stands between a convex body and its light: not the body itself either.
+TEST_F(HostRendererTest, AConvexBodyCastsNoShadowOnItself) {
+    for (const Scene& scene :
+         {test::sphereScene(1), test::sphereScene(1, glm::dvec3(4e6, -3e6, 1e6), 0.01), test::cubeScene(0)}) {
+        open(scene);
+        for (const glm::vec3 light : {glm::vec3(-0.35, 0.55, 0.75), glm::vec3(-1, 0.05, 0.1)}) {
+            FrameRequest request = requestOf(test::cameras(scene).front().camera);
+            request.shading.lightDirection = light;
+            const Planes plain = drawnBy(*host_, request);
+            request.shading.shadows = true;
+            request.shading.occlusionRays = 4;
+            EXPECT_EQ(drawnBy(*host_, request).picture, plain.picture) << scene.name;
+        }
+    }
+}
+
+/// A ball whose colours change from vertex to vertex.
+void writePaintedBall(const std::filesystem::path& file) {
+    constexpr int kRows = 60, kColumns = 120;
+    std::ofstream out(file);
+    out << "ply\nformat ascii 1.0\nelement vertex " << (kRows + 1) * kColumns
+        << "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+           "property uchar blue\nelement face "
+        << 2 * kRows * kColumns << "\nproperty list uchar int vertex_indices\nend_header\n";
+    for (int row = 0; row <= kRows; ++row)
+        for (int column = 0; column < kColumns; ++column) {
+            const double up = M_PI * row / kRows, around = 2 * M_PI * column / kColumns;
+            out << std::sin(up) * std::cos(around) << ' ' << std::cos(up) << ' ' << std::sin(up) * std::sin(around)
+                << ' ' << 40 + 3 * row << ' ' << 60 + column << ' ' << (row * 37 + column * 11) % 200 + 30 << '\n';
+        }
+    for (int row = 0; row < kRows; ++row)
+        for (int column = 0; column < kColumns; ++column) {
+            const int right = (column + 1) % kColumns, here = row * kColumns, below = here + kColumns;
+            out << "3 " << here + column << ' ' << here + right << ' ' << below + column << '\n';
+            out << "3 " << here + right << ' ' << below + right << ' ' << below + column << '\n';
+        }
+}
+
+TEST_F(HostRendererTest, ColoursOfEveryKindOfLeaf) {
+    const TestFolder folder("vcp_host_renderer_test");
+    writePaintedBall(folder / "ball.ply");
+    for (const double error : {0.0, 0.002}) {
+        BuildOptions options;
+        options.inputs = {folder / "ball.ply"};
+        options.output = folder / "ball.vcp";
+        options.overwrite = true;
+        options.cell = error > 0 ? 0.1 : 0.03;
+        options.error = error;  // above 0: soft leaves, here of one level
+        const auto report = buildOctree(options);
+        ASSERT_TRUE(report) << report.error().line();
+        open({placed(folder / "ball.vcp")});
+        Difference all;
+        for (const ShadingMode mode : {ShadingMode::Lit, ShadingMode::Unlit})
+            for (const NamedCamera& named : test::cameras(glm::dvec3(-1), glm::dvec3(1)))
+                for (const double errorPixels : {1e-3, 5.0}) {
+                    FrameRequest request = requestOf(named.camera);
+                    request.errorPixels = errorPixels;
+                    request.shading.mode = mode;
+                    request.shading.occlusionRays = mode == ShadingMode::Lit ? 2 : 0;
+                    all += difference(request, options.cell);
+                }
+        expectFew(all);
+    }
+}
+
+TEST_F(HostRendererTest, SeveralDatasetsTurnedAndScaled) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    const Similarity beside{glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -0.5))), 0.6, {0.5, 0.2, 0.7}};
+    open({placed(built.file()), placed(built.file(), beside)});
+    Difference all;
+    for (const ShadingMode mode : {ShadingMode::Lit, ShadingMode::Normals})
+        for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+            FrameRequest request = requestOf(named.camera);
+            request.shading.mode = mode;
+            request.shading.shadows = true;
+            all += difference(request, built.cache().dataset().header.cell);
+        }
+    expectFew(all);
+}
+
+TEST_F(HostRendererTest, ATileShowsThatPartOfTheWhole) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    for (const NamedCamera& named : {test::cameras(kLow, kHigh)[0], test::cameras(kLow, kHigh)[5]}) {
+        FrameRequest request = requestOf(named.camera, 160, 120);
+        const Planes whole = drawnBy(*host_, request);
+        const PictureTile tile{40, 24, request.width, request.height};
+        request.width = 72, request.height = 56;
+        request.tile = tile;
+        const Planes part = drawnBy(*host_, request);
+        uint64_t hits = 0, differing = 0;
+        for (uint32_t y = 0; y < request.height; ++y)
+            for (uint32_t x = 0; x < request.width; ++x) {
+                const size_t in = size_t{y} * request.width + x, at = size_t{y + tile.y} * 160 + x + tile.x;
+                hits += std::isfinite(part.depth[in]) ? 1 : 0;
+                for (size_t c = 0; c < 4; ++c)
+                    differing += std::abs(part.picture.rgba[4 * in + c] - whole.picture.rgba[4 * at + c]) > 2 ? 1 : 0;
+            }
+        EXPECT_GT(hits, 1000u);
+        EXPECT_LE(differing, 8u);
+    }
+}
+
+TEST_F(HostRendererTest, TheSameRequestGivesTheSameBytes) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
+    request.shading.occlusionRays = 2;
+    const Planes once = drawnBy(*host_, request), again = drawnBy(*host_, request);
+    EXPECT_EQ(once.picture, again.picture);
+    EXPECT_EQ(once.depth, again.depth);
+}
+
+TEST_F(HostRendererTest, WithoutADatasetThereIsTheBackground) {
+    FrameRequest request = requestOf(Camera{});
+    EXPECT_EQ(drawnBy(*host_, request).picture, drawnBy(*renderer_, request).picture);
+    request.shading.transparent = true;
+    EXPECT_EQ(drawnBy(*host_, request).picture, drawnBy(*renderer_, request).picture);
+}
+
+TEST_F(HostRendererTest, ABudgetTooSmallIsKept) {
+    const test::BuiltMesh built(test::torusMesh({0.1, 0.2, 0.3}, 1, 0.4, 240, 120), 0.01);
+    ASSERT_TRUE(built.ok());
+    RendererOptions options;
+    options.budgetBytes = 1 << 20;
+    host_ = HostRenderer::create(options).value();
+    ASSERT_TRUE(host_->open({placed(built.file())}, {}));
+    FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera, 640, 480);
+    request.errorPixels = 1e-3;
+    const Planes drawn = drawnBy(*host_, request);
+    EXPECT_TRUE(drawn.update.settled);
+    EXPECT_TRUE(drawn.update.relaxed);
+    EXPECT_LE(drawn.update.residentBytes, options.budgetBytes);
+    EXPECT_GT(std::ranges::count_if(drawn.depth, [](float d) { return std::isfinite(d); }), 1000);
+    options.budgetBytes = 1000;
+    EXPECT_EQ(HostRenderer::create(options).error().code, ErrorCode::Usage);
+}
+
+TEST_F(HostRendererTest, RefusesWhatItDoesNotDraw) {
+    const Scene scene = test::sphereScene(1), seams = test::sphereScene(2);
+    EXPECT_EQ(host_->open({{seams.dataset, seams.source, {}}}, {}).error().code, ErrorCode::Unsupported);
+    open(scene);
+    const FrameRequest request = requestOf(test::cameras(scene)[0].camera);
+    const auto refused = [&](const FrameRequest& asked) {
+        const auto update = host_->update(asked);
+        return !update && update.error().code == ErrorCode::Unsupported && !host_->render(asked);
+    };
+    FrameRequest asked = request;
+    asked.sections = {{{1, 0, 0}, 3}};
+    EXPECT_TRUE(refused(asked));
+    for (const ShadingMode mode : {ShadingMode::Steps, ShadingMode::Cells, ShadingMode::Fetches}) {
+        asked = request;
+        asked.shading.mode = mode;
+        EXPECT_TRUE(refused(asked));
+    }
+    const std::vector<MesoSurface> surfaces(1);
+    EXPECT_EQ(host_->setSurfaces(surfaces).error().code, ErrorCode::Unsupported);
+    EXPECT_FALSE(host_->open({{scene.dataset, scene.source, {}}}, surfaces));
+    auto paper = std::make_shared<Dataset>(*scene.dataset);
+    paper->header.method = Method::Paper;
+    EXPECT_EQ(host_->open({{paper, scene.source, {}}}, {}).error().code, ErrorCode::Unsupported);
+    RendererOptions options;
+    options.validation = true;
+    EXPECT_FALSE(HostRenderer::create(options));
+    options = {};
+    options.device = "Host";
+    EXPECT_EQ(createPictureRenderer(options).value()->device().name, kHostName);
+    EXPECT_EQ(Renderer::create(options).error().code, ErrorCode::Unsupported);
+}
+
+TEST_F(HostRendererTest, StopsBetweenTiles) {
+    open(test::cubeScene(0));
+    const FrameRequest request = requestOf(test::cameras(test::cubeScene(0))[0].camera, 640, 480);
+    ASSERT_TRUE(host_->settle(request));
+    std::atomic<int> asked = 0;
+    const auto drawn = host_->render(request, [&] { return ++asked > 3; });
+    ASSERT_FALSE(drawn);
+    EXPECT_EQ(drawn.error().code, ErrorCode::Cancelled);
+    EXPECT_LT(asked, 40 * 60);
+    EXPECT_FALSE(host_->readPicture()) << "there is no picture";
+    EXPECT_TRUE(host_->render(request));
+}
+
+}  // namespace
+}  // namespace vcp
