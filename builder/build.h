@@ -2,7 +2,7 @@
 //
 // Nothing but bins that fit memory is ever held of the mesh. The stages, each in files of their own:
 //   ingest      meshes -> a soup of triangles in the world (mesh/, vertex_join.h, ingest.h)
-//   deal        soup -> the finest level's lattice (lattice_soup.h), dealt into bins (deal.h)
+//   deal        which pages hold the mesh, and the soup on their lattice (lattice_soup.h), dealt into bins (deal.h)
 //   step        a level's bins -> the next coarser level's bins (level/); the first step finds normals
 //   pages       a bin -> its certified pages (page/, level_pages.h)
 //   write       pages, directory, hashes (dataset_assembly.h, octree/vcp_writer.h)
@@ -46,8 +46,8 @@ struct BuildOptions {
     std::string format;  ///< format of inputs whose content does not tell it (meshFormats())
     std::filesystem::path output;
     bool overwrite = false;  ///< also replaces an output that is no dataset (octree/io/output_file.h); never an input
-    double cell = 0;         ///< finest cell edge, world units; 0: chosen from the mesh
-    double error = 0;        ///< tolerated distance to the mesh, world units; 0: the finest level is the mesh
+    double cell = 0;   ///< finest cell edge, world units, where triangles are not crowded; 0: chosen from the mesh
+    double error = 0;  ///< tolerated distance to the mesh, world units; 0: the finest level is the mesh
     bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal
     unsigned threads = 0;          ///< 0: one a processor
     uint64_t memoryBytes = 0;      ///< cap on what the build allocates; 0: defaultMemoryBytes()
@@ -71,11 +71,11 @@ struct BuildFigures {
     uint64_t fileBytes = 0;
     uint32_t levels = 0;
     uint64_t subvolumes = 0;
-    uint64_t leaves = 0;           ///< soft and hard leaves of the finest level
-    uint64_t hardLeaves = 0;       ///< hard leaves of the finest level
-    double cell = 0;               ///< finest cell edge, world units
+    uint64_t leaves = 0;           ///< soft and hard leaves of the pages without children
+    uint64_t hardLeaves = 0;       ///< hard leaves of the pages without children
+    double cell = 0;               ///< cell edge of the last level, world units
     double errorTarget = 0;        ///< world units
-    double certifiedErrorMax = 0;  ///< largest certified error of the finest level, world units
+    double certifiedErrorMax = 0;  ///< largest certified error of the pages without children, world units
 };
 
 struct BuildReport : BuildFigures {
