@@ -144,7 +144,7 @@ TEST_F(PaperFileTest, ParametersThatNoMethodHasAreRefused) {
         return verifyFile(**openFile(write(change))).error().line();
     };
     EXPECT_NE(page([](FileHeader& h) { h.paper.packing = 1; }).find("its packing differs"), std::string::npos);
-    EXPECT_NE(page([](FileHeader& h) { h.leaves = 13; }).find("13 leaves, but the pages of the finest level have 14"),
+    EXPECT_NE(page([](FileHeader& h) { h.leaves = 13; }).find("13 leaves, but the pages without children have 14"),
               std::string::npos);
 }
 
