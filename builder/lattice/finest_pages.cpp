@@ -24,6 +24,13 @@ FinestPages::FinestPages(PageGrid base, std::vector<std::vector<uint64_t>> parte
         if (i == 0) break;
         for (const uint64_t code : parted_[i]) parted_[i - 1].push_back(code >> 3);
     }
+    if (parted_.empty()) return;
+    first_ = last_ = glm::i64vec3(mortonDecode(parted_[0][0]));
+    for (const uint64_t code : parted_[0]) {
+        const glm::i64vec3 at(mortonDecode(code));
+        first_ = glm::min(first_, at);
+        last_ = glm::max(last_, at);
+    }
 }
 
 bool FinestPages::isParted(uint32_t level, uint64_t code) const {
@@ -52,9 +59,13 @@ FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) con
     const int bits = log2PageSteps(base());
     const glm::i64vec3 low = glm::i64vec3(p) - reach, high = glm::i64vec3(p) + reach;
     // A page holds its walls.
-    const glm::i64vec3 first = glm::max((low - int64_t{1}) >> int64_t(bits), int64_t{0}),
-                       last = glm::min(high >> int64_t(bits), int64_t(grid_.lastPage()));
+    glm::i64vec3 first = glm::max((low - int64_t{1}) >> int64_t(bits), int64_t{0}),
+                 last = glm::min(high >> int64_t(bits), int64_t(grid_.lastPage()));
     Levels levels{deepest(), base()};
+    // No page outside of the box is parted.
+    if (glm::any(glm::lessThan(first, first_)) || glm::any(glm::greaterThan(last, last_))) levels.coarsest = base();
+    first = glm::max(first, first_);
+    last = glm::min(last, last_);
     for (int64_t z = first.z; z <= last.z; ++z)
         for (int64_t y = first.y; y <= last.y; ++y)
             for (int64_t x = first.x; x <= last.x; ++x)

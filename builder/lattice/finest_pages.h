@@ -5,7 +5,6 @@
 // All triangles lie on one lattice, the deepest level's. A page of a coarser level needs vertices that lie on its own,
 // coarser lattice, and a triangle that several pages hold must be the same in all of them, or rays would slip through
 // between. So:
-//   - pages that touch differ by one level at most;
 //   - near pages below the base level no edge is longer than kPartedEdgeCells of their cells (longest edges of a
 //     triangle lie within their own length of all of it, so this depends on the edge alone);
 //   - a vertex lies on the lattice of the coarsest page within that reach (stepAt).
@@ -30,8 +29,7 @@ public:
     /// Makes all pages of a level.
     explicit FinestPages(PageGrid base = {}) : grid_(base) {}
     /// `parted`: for the base level and each one below, the Morton codes of pages that are parted into eight, in any
-    /// order, at any depth; the pages above them, and those that keep neighbours from differing by more than a level,
-    /// are added.
+    /// order; the pages above them are added.
     FinestPages(PageGrid base, std::vector<std::vector<uint64_t>> parted);
 
     [[nodiscard]] bool isUniform() const { return parted_.empty(); }
@@ -73,6 +71,7 @@ private:
 
     PageGrid grid_;
     std::vector<std::vector<uint64_t>> parted_;  ///< [0]: of the base level; the last is not empty
+    glm::i64vec3 first_{0}, last_{-1};           ///< box of pages of the base level that holds those that are parted
 };
 
 template <class Visit>
