@@ -9,7 +9,7 @@
 
 #include "octree/surface/morton.h"
 #include "render/frame_setup.h"
-#include "render/host_page_memory.h"
+#include "render/pages/host_page_memory.h"
 
 namespace vcp {
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "render/page_memory.h"
+#include "render/pages/page_memory.h"
 #include "render/vulkan/device.h"
 
 namespace vcp {

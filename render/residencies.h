@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "render/pages/residency.h"
 #include "render/picture_renderer.h"
-#include "render/residency.h"
 
 namespace vcp {
 

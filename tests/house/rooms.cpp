@@ -32,7 +32,8 @@ const std::vector<Room>& rooms() {
         {"streaming", {"octree/"}},
         {"render/shared", {}},
         {"render/host", {"octree/", "render/shared"}},
-        {"render", {"octree/", "mesostructure", "streaming", "render/shared", "render/host"}},
+        {"render/pages", {"octree/", "streaming", "render/shared"}},
+        {"render", {"octree/", "mesostructure", "streaming", "render/shared", "render/host", "render/pages"}},
 
         {"viewer/camera", {"octree/", "render"}},
         {"viewer/scene", {"octree/", "builder/", "mesostructure/", "streaming", "render", "viewer/camera"}},

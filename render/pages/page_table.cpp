@@ -1,4 +1,4 @@
-#include "render/page_table.h"
+#include "render/pages/page_table.h"
 
 #include <algorithm>
 #include <bit>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "octree/page/page.h"
-#include "render/page_memory.h"
+#include "render/pages/page_memory.h"
 
 namespace vcp {
 

@@ -1,4 +1,4 @@
-#include "render/host_page_memory.h"
+#include "render/pages/host_page_memory.h"
 
 #include <cassert>
 #include <cstring>

@@ -1,5 +1,5 @@
 // The frame's page tree.
-#include "render/page_table.h"
+#include "render/pages/page_table.h"
 
 #include <bit>
 

@@ -13,9 +13,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "render/frame_result.h"
-#include "render/page_memory.h"
-#include "render/page_table.h"
+#include "render/pages/page_memory.h"
+#include "render/pages/page_table.h"
+#include "render/pages/update_result.h"
 #include "streaming/page_loader.h"
 #include "streaming/residency_policy.h"
 

@@ -1,4 +1,4 @@
-#include "render/residency.h"
+#include "render/pages/residency.h"
 
 #include <algorithm>
 #include <chrono>

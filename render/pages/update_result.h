@@ -1,0 +1,33 @@
+// What an update of the pages that a view draws came to.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "octree/io/result.h"
+
+namespace vcp {
+
+struct UpdateResult {
+    bool changed = false;        ///< the cut differs from that of the update before
+    bool settled = false;        ///< nothing that this view wants is missing, loading or queued
+    bool drawable = false;       ///< at least the coarsest page is there
+    double errorPixels = 0;      ///< largest projected certified error in the cut (inf without a page or certificate)
+    uint64_t residentBytes = 0;  ///< geometry and colour pages in the pool
+    uint64_t bytesRead = 0;      ///< decompressed page bytes the loader has delivered since open()
+    bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels is what it reaches
+    uint64_t heldBytesMax =
+        0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
+    uint64_t loads = 0, evictions = 0;        ///< pages into and out of the pool since open()
+    uint64_t reloads = 0;                     ///< pages loaded twice in one still view: always 0
+    uint32_t deviceLosses = 0;                ///< losses since create(): all was made anew and pages are read again
+    uint64_t submissions = 0, hostWaits = 0;  ///< this update's submissions, and how often it waited for one
+    uint64_t failures = 0;                    ///< reads that failed and were, or will be, tried again
+    uint32_t pagesResident = 0, pagesInCut = 0, pagesWanted = 0;
+    uint32_t pagesMissing = 0;                    ///< pages wanted, but not resident
+    uint32_t pagesPending = 0;                    ///< pages wished for, being read, or waiting for an update
+    uint32_t coarsestLevel = 0, finestLevel = 0;  ///< levels of the pages in the cut
+    std::vector<Error> problems;                  ///< pages that cannot be read; each is reported once
+};
+
+}  // namespace vcp
