@@ -6,10 +6,9 @@
 #include <glm/geometric.hpp>
 
 #include "octree/surface/leaf_math.h"
+#include "render/host/instruction_sets.h"
 #include "render/host/tile_rays.h"
 
-#define HWY_BROKEN_EMU128 0
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/host/light_rays.cpp"
 #include <hwy/foreach_target.h>

@@ -2,12 +2,9 @@
 #include <limits>
 
 #include "render/host/host_caster.h"
+#include "render/host/instruction_sets.h"
 #include "render/host/tile_rays.h"
 
-// Left out are vectors of a length that is not known when compiling, and sets that gain nothing over another one. Where
-// a processor has none of them, four lanes are emulated; the tests run them on every set.
-#define HWY_BROKEN_EMU128 0
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/host/tile_caster.cpp"
 #include <hwy/foreach_target.h>
