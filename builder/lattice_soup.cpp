@@ -20,8 +20,9 @@ glm::i32vec3 roundTo(glm::dvec3 p, int step) {
     return glm::i32vec3(std::lround(p.x / step), std::lround(p.y / step), std::lround(p.z / step)) * step;
 }
 
-// What a piece says for those beside it that are left out.
-constexpr int kRoundingsOfNeighbours = 3;
+// A piece that was cut says that it may have strayed by so many roundings at least: those beside it that lost their
+// area are left out, and rays in single precision miss long needles by about as much.
+constexpr int kMostRoundings = 3;
 
 /// Returns the edge of a cell in texture coordinates, from the ratio of the triangle's areas.
 float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
@@ -47,10 +48,16 @@ bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
     return glm::dot(d, d) > longest_ * longest_ || pages_.isTooLong(a, b);
 }
 
-glm::i32vec3 LatticeSnapper::middle(glm::i32vec3 a, glm::i32vec3 b) const {
-    const glm::i32vec3 m((int64_t{a.x} + b.x) >> 1, (int64_t{a.y} + b.y) >> 1, (int64_t{a.z} + b.z) >> 1);
-    const int step = pages_.stepAt(m);
-    return step == 1 ? m : roundTo((glm::dvec3(a) + glm::dvec3(b)) / 2.0, step);
+LatticeSnapper::Point LatticeSnapper::pointOf(const Piece& piece, int corner) {
+    return {piece.triangle.corner[corner], piece.moved[corner], piece.triangle.colour[corner], piece.uv[corner]};
+}
+
+LatticeSnapper::Point LatticeSnapper::middle(const Point& a, const Point& b) const {
+    const glm::dvec3 exact = (glm::dvec3(a.at) + glm::dvec3(b.at)) / 2.0;
+    glm::i32vec3 at(glm::floor(exact));
+    if (const int step = pages_.stepAt(at); step > 1) at = roundTo(exact, step);
+    return {at, (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact), middleColour(a.colour, b.colour),
+            (a.uv + b.uv) * 0.5f};
 }
 
 // Whether an edge is cut does not depend on the triangle.
@@ -64,24 +71,21 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
     int turn = 0;
     if (cuts == 1) turn = isLong[0] ? 0 : isLong[1] ? 1 : 2;
     if (cuts == 2) turn = !isLong[2] ? 0 : !isLong[0] ? 1 : 2;
+    // Points 0 to 2 are corners; 3 to 5 are middles of the edges from them, where these are cut.
+    Point points[6];
+    for (int i = 0; i < 3; ++i) points[i] = pointOf(piece, (i + turn) % 3);
+    for (int i = 0; i < cuts; ++i) points[3 + i] = middle(points[i], points[(i + 1) % 3]);
     int count = 0;
-    // Points 0 to 2 are corners; 3 to 5 are middles of the edges from them.
     const auto add = [&](int a, int b, int c) {
         Piece& p = pieces[count++] = piece;
         ++p.cuts;
         const int from[3] = {a, b, c};
         for (int i = 0; i < 3; ++i) {
-            const int k = (from[i] + turn) % 3, next = (k + 1) % 3;
-            const bool isMiddle = from[i] >= 3;
-            p.triangle.corner[i] = isMiddle ? middle(corner[k], corner[next]) : corner[k];
-            p.moved[i] = piece.moved[k];
-            if (isMiddle) {
-                const glm::dvec3 exact = (glm::dvec3(corner[k]) + glm::dvec3(corner[next])) / 2.0;
-                p.moved[i] = (piece.moved[k] + piece.moved[next]) / 2.0 + (glm::dvec3(p.triangle.corner[i]) - exact);
-            }
-            p.triangle.colour[i] = isMiddle ? middleColour(piece.triangle.colour[k], piece.triangle.colour[next])
-                                            : piece.triangle.colour[k];
-            p.uv[i] = isMiddle ? (piece.uv[k] + piece.uv[next]) * 0.5f : piece.uv[k];
+            const Point& point = points[from[i]];
+            p.triangle.corner[i] = point.at;
+            p.triangle.colour[i] = point.colour;
+            p.moved[i] = point.moved;
+            p.uv[i] = point.uv;
         }
     };
     if (cuts == 1) {
@@ -108,12 +112,11 @@ void LatticeSnapper::paint(Piece& piece) const {
 }
 
 float LatticeSnapper::strayOf(const Piece& piece) const {
-    // A point of the piece has moved by a mean of its corners' ways, so by no more than the longest of them. A piece
-    // beside it that lost its area is left out: it moved by a rounding or two.
+    // A point of the piece has moved by a mean of its corners' ways, so by no more than the longest of them.
     double longest = 0;
     for (int i = 0; i < 3; ++i) {
         const double rounding = kLatticeRounding * kLatticePerCell * pages_.stepAt(piece.triangle.corner[i]);
-        const double roundings = std::min(piece.cuts + 1, kRoundingsOfNeighbours) * rounding;
+        const double roundings = std::min(piece.cuts + 1, kMostRoundings) * rounding;
         longest = std::max({longest, roundings, glm::length(piece.moved[i]) * (1 + 1e-6)});
     }
     return float(longest / kLatticePerCell);

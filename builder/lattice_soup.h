@@ -43,10 +43,20 @@ private:
         float footprint;  ///< edge of a cell in texture coordinates
     };
 
+    /// A corner of a piece, or the middle of an edge.
+    struct Point {
+        glm::i32vec3 at;
+        glm::dvec3 moved;
+        uint32_t colour;
+        glm::vec2 uv;
+    };
+
     template <class Real>
     Piece snap(const WorldTriangle<Real>& triangle) const;
     [[nodiscard]] bool tooLong(glm::i32vec3 a, glm::i32vec3 b) const;
-    [[nodiscard]] glm::i32vec3 middle(glm::i32vec3 a, glm::i32vec3 b) const;
+    static Point pointOf(const Piece& piece, int corner);
+    /// Returns the middle of an edge, the same whichever end comes first.
+    [[nodiscard]] Point middle(const Point& a, const Point& b) const;
     /// Cuts each edge that is too long in its middle. Returns the number of pieces, 0 when none is too long.
     int cut(const Piece& piece, Piece (&pieces)[4]) const;
     void paint(Piece& piece) const;
