@@ -59,51 +59,57 @@ Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper
 using Page = std::pair<uint32_t, uint64_t>;
 using PageCounts = std::map<Page, uint64_t>;
 
+/// A box on the base level's lattice.
+struct LatticeBox {
+    glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
+
+    [[nodiscard]] bool touches(const LatticeTriangle& t) const {
+        const auto& [a, b, c] = t.corner;
+        return glm::all(glm::lessThanEqual(low, glm::dvec3(glm::max(a, glm::max(b, c))))) &&
+               glm::all(glm::greaterThanEqual(high, glm::dvec3(glm::min(a, glm::min(b, c)))));
+    }
+};
+
+/// Returns the box around some pages, widened as far as they need triangles.
+LatticeBox boxOf(const PageCounts& pages, PageGrid base, double marginCells) {
+    LatticeBox box;
+    for (const auto& [page, count] : pages) {
+        const double edge = std::ldexp(base.edgeCells() * kLatticePerCell, int(base.level) - int(page.first));
+        const glm::dvec3 corner = glm::dvec3(mortonDecode(page.second)) * edge;
+        box.low = glm::min(box.low, corner - marginCells * kLatticePerCell);
+        box.high = glm::max(box.high, corner + edge + marginCells * kLatticePerCell);
+    }
+    return box;
+}
+
 /// Counts a triangle, on the base level's lattice, for every page that will need it, or for the parts of some pages:
 /// near enough for a count.
-class CountVisit {
-public:
-    /// `parted`: the pages whose parts are counted; none: all pages are.
-    CountVisit(const FinestPages& pages, double marginCells, const PageCounts& parted, PageCounts& counts)
-        : pages_(pages), margin_(marginCells), parted_(parted), counts_(counts) {
-        if (!parted.empty()) low_ = glm::dvec3(std::numeric_limits<double>::infinity()), high_ = -low_;
-        for (const auto& [page, count] : parted) {
-            const double edge =
-                std::ldexp(pages.gridOf(0).edgeCells() * kLatticePerCell, int(pages.base()) - int(page.first));
-            const glm::dvec3 corner = glm::dvec3(mortonDecode(page.second)) * edge;
-            low_ = glm::min(low_, corner - marginCells * kLatticePerCell);
-            high_ = glm::max(high_, corner + edge + marginCells * kLatticePerCell);
-        }
-    }
+struct CountVisit {
+    const FinestPages& pages;
+    double marginCells;
+    const PageCounts& parted;  ///< the pages whose parts are counted; none: all pages are
+    LatticeBox box;            ///< around them
+    PageCounts& counts;
 
     Result<void> operator()(const LatticeTriangle& t) {
-        const auto& [a, b, c] = t.corner;
-        const bool isOutside = glm::any(glm::lessThan(glm::dvec3(glm::max(a, glm::max(b, c))), low_)) ||
-                               glm::any(glm::greaterThan(glm::dvec3(glm::min(a, glm::min(b, c))), high_));
-        if (isOutside) return {};
-        pages_.forPagesNear(t.corner, margin_, pages_.base(), [&](uint32_t level, uint64_t code) {
-            if (parted_.empty() || (level > pages_.base() && parted_.contains({level - 1, code >> 3})))
-                ++counts_[{level, code}];
+        if (!parted.empty() && !box.touches(t)) return {};
+        pages.forPagesNear(t.corner, marginCells, pages.base(), [&](uint32_t level, uint64_t code) {
+            if (parted.empty() || (level > pages.base() && parted.contains({level - 1, code >> 3})))
+                ++counts[{level, code}];
         });
         return {};
     }
     static Result<void> finish() { return {}; }
-
-private:
-    const FinestPages& pages_;
-    double margin_;
-    const PageCounts& parted_;
-    PageCounts& counts_;
-    glm::dvec3 low_{-std::numeric_limits<double>::infinity()};  ///< box that holds the parted pages, widened
-    glm::dvec3 high_{std::numeric_limits<double>::infinity()};
 };
 
 Result<PageCounts> countTriangles(const PageChoosing& choosing, const FinestPages& pages, const PageCounts& parted,
                                   const std::function<bool(double)>& progress) {
     const LatticeSnapper snapper(choosing.frame, nullptr, false);
+    const LatticeBox box = boxOf(parted, pages.gridOf(pages.base()), choosing.marginCells);
     tbb::enumerable_thread_specific<PageCounts> parts;
-    VCP_TRY(forLatticeTriangles(choosing.soup, snapper, false, progress,
-                                [&] { return CountVisit(pages, choosing.marginCells, parted, parts.local()); }));
+    VCP_TRY(forLatticeTriangles(choosing.soup, snapper, false, progress, [&] {
+        return CountVisit{pages, choosing.marginCells, parted, box, parts.local()};
+    }));
     PageCounts sums;
     for (const PageCounts& part : parts)
         for (const auto& [page, count] : part) sums[page] += count;
