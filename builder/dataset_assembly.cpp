@@ -18,9 +18,8 @@ StoredPage passagePage(uint32_t log2Cells) {
     return compressPage(std::as_bytes(std::span(&header, 1)), {});
 }
 
-/// Gives every page a parent. The entry of a passage has no leaves.
+/// Gives every page a parent, and brings all into Morton order. The entry of a passage has no leaves.
 void addPassages(std::deque<PageSpool>& levels) {
-    const auto byMorton = [](const PageEntry& a, const PageEntry& b) { return a.morton < b.morton; };
     for (PageSpool& level : levels) level.sortEntries();
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
@@ -30,7 +29,8 @@ void addPassages(std::deque<PageSpool>& levels) {
             passage.morton = page.morton >> 3;
             passage.level = uint8_t(level - 1);
             if (!missing.empty() && missing.back().morton == passage.morton) continue;
-            if (!std::binary_search(parents.begin(), parents.end(), passage, byMorton)) missing.push_back(passage);
+            if (!std::ranges::binary_search(parents, passage.morton, {}, &PageEntry::morton))
+                missing.push_back(passage);
         }
         parents.insert(parents.end(), missing.begin(), missing.end());
         levels[level - 1].sortEntries();

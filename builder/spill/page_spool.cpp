@@ -89,10 +89,7 @@ Result<StoredPage> PageSpool::read(const PageEntry& entry) const {
     return page;
 }
 
-void PageSpool::sortEntries() {
-    std::sort(entries_.begin(), entries_.end(),
-              [](const PageEntry& a, const PageEntry& b) { return a.morton < b.morton; });
-}
+void PageSpool::sortEntries() { std::ranges::sort(entries_, {}, &PageEntry::morton); }
 
 void PageSpool::remove() {
     pages_.remove();

@@ -27,7 +27,7 @@ public:
     /// Returns a page as it was appended. Errors: Io; InvalidInput (damaged).
     Result<StoredPage> read(const PageEntry& entry) const;
     void remove();
-    /// Brings the entries into Morton order, in memory; nothing may be appended after that.
+    /// Brings the entries that are in memory into Morton order.
     void sortEntries();
 
     [[nodiscard]] std::vector<PageEntry>& entries() { return entries_; }
