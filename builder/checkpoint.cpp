@@ -130,6 +130,7 @@ void readLevels(Fields& all, Recorded& recorded) {
     for (const json& first : all.list("partition")) recorded.partition.push_back(all.countOf(first));
     const auto& bins = recorded.partition;
     all.require(!bins.empty() && bins[0] == 0 && std::is_sorted(bins.begin(), bins.end(), std::less_equal<>()));
+    all.require(all.list("parted").size() < kMaxLevels);
     for (const json& codes : all.list("parted")) {
         all.require(codes.is_array());
         recorded.parted.emplace_back();

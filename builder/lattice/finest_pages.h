@@ -1,6 +1,5 @@
 // The pages that hold the mesh: those of one level, and where they would hold more triangles than a page should, those
-// of finer levels. So a page is small wherever triangles are small, and the statue in a building costs no more than the
-// statue alone.
+// of finer levels. So a page is small wherever triangles are small: a statue in a building has levels of its own.
 //
 // All triangles lie on one lattice, the deepest level's. A page of a coarser level needs vertices that lie on its own,
 // coarser lattice, and a triangle that several pages hold must be the same in all of them, or rays would slip through

@@ -23,7 +23,7 @@ CLI::Option* addCell(CLI::App& app, double& cell) {
         return length && !length->isRelative ? std::optional(length->value) : std::nullopt;
     };
     return addParsed(app, "--cell", cell, parse, "a length in world units like 0.25",
-                     "Edge of the finest cells, world units [chosen from the mesh]")
+                     "Edge of the finest cells where triangles are not crowded, world units [chosen from the mesh]")
         ->type_name("LENGTH");
 }
 
