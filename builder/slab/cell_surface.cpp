@@ -56,19 +56,26 @@ Extent extentAlong(std::span<const CellSurface> eighths, std::span<const uint32_
 }
 
 void chooseAxis(CellSurface& cell) {
-    glm::dmat3 m = matrixOf(cell.moment);
+    double xx = double(cell.moment[0]), yy = double(cell.moment[1]), zz = double(cell.moment[2]);
+    double yz = double(cell.moment[3]), zx = double(cell.moment[4]), xy = double(cell.moment[5]);
     cell.axis = {0, 0, 1};
     // Squared often enough, the matrix has columns along its main direction only.
     constexpr int kSquarings = 6;
     for (int i = 0; i < kSquarings; ++i) {
-        const double trace = m[0][0] + m[1][1] + m[2][2];
+        const double trace = xx + yy + zz;
         if (!(trace > 0)) return;
-        m /= trace;
-        m = m * m;
+        for (double* entry : {&xx, &yy, &zz, &yz, &zx, &xy}) *entry /= trace;
+        const double xx2 = xx * xx + xy * xy + zx * zx, yy2 = xy * xy + yy * yy + yz * yz,
+                     zz2 = zx * zx + yz * yz + zz * zz;
+        const double yz2 = xy * zx + yy * yz + yz * zz, zx2 = zx * xx + yz * xy + zz * zx,
+                     xy2 = xx * xy + xy * yy + zx * yz;
+        xx = xx2, yy = yy2, zz = zz2, yz = yz2, zx = zx2, xy = xy2;
     }
-    const int longest = m[0][0] >= m[1][1] && m[0][0] >= m[2][2] ? 0 : m[1][1] >= m[2][2] ? 1 : 2;
-    const double length = glm::length(m[longest]);
-    if (length > 0) cell.axis = glm::vec3(m[longest] / length);
+    const glm::dvec3 column = xx >= yy && xx >= zz ? glm::dvec3(xx, xy, zx)
+                              : yy >= zz           ? glm::dvec3(xy, yy, yz)
+                                                   : glm::dvec3(zx, yz, zz);
+    const double length = glm::length(column);
+    if (length > 0) cell.axis = glm::vec3(column / length);
 }
 
 CellSurface foldEighths(std::span<const CellSurface> eighths, std::span<const uint32_t> octants) {

@@ -28,9 +28,7 @@ glm::dvec3 areaVector(const Polygon& polygon) {
 
 glm::dvec3 TriangleCutter::Source::weightsAt(glm::dvec3 p) const {
     const glm::dvec3 ab = corners[1] - corners[0], ac = corners[2] - corners[0], ap = p - corners[0];
-    const glm::dvec3 n = glm::cross(ab, ac);
-    const double perArea = 1 / glm::dot(n, n);
-    const double b = glm::dot(glm::cross(ap, ac), n) * perArea, c = glm::dot(glm::cross(ab, ap), n) * perArea;
+    const double b = glm::dot(glm::cross(ap, ac), cross) * perArea, c = glm::dot(glm::cross(ab, ap), cross) * perArea;
     return {1 - b - c, b, c};
 }
 
@@ -40,7 +38,9 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     for (size_t i = 0; i < 3; ++i)
         source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (2.0 / double(kLatticePerCell));
     const auto& [a, b, c] = source.corners;
-    const glm::dvec3 flat = glm::normalize(glm::cross(b - a, c - a));
+    source.cross = glm::cross(b - a, c - a);
+    source.perArea = 1 / glm::dot(source.cross, source.cross);
+    const glm::dvec3 flat = glm::normalize(source.cross);
     for (size_t i = 0; i < 3; ++i) {
         source.normal[i] = f64::cornerNormal(mesh_.normals[t[i]], flat);
         const uint32_t rgba = mesh_.colours.empty() ? 0xffffffffu : mesh_.colours[t[i]];
@@ -53,36 +53,59 @@ void TriangleCutter::cut(uint32_t triangle) {
     source_ = sourceOf(triangle);
     Polygon piece;
     clipToBox(source_.corners, glm::dvec3(0), glm::dvec3(std::ldexp(1.0, depth_)), piece);
-    if (piece.empty()) return;
-    // The smallest box of the octree that holds the piece.
-    int differ = 0, last = (1 << depth_) - 1;
-    glm::ivec3 lower(0);
+    if (!piece.empty()) split(piece, glm::ivec3(0), depth_);
+}
+
+TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, glm::ivec3 lower, int log2Edge) {
+    glm::dvec3 least = piece[0], most = piece[0];
+    for (const glm::dvec3& p : piece) {
+        least = glm::min(least, p);
+        most = glm::max(most, p);
+    }
+    glm::ivec3 first, last;
+    int differ = 0;
     for (int axis = 0; axis < 3; ++axis) {
-        const auto [least, most] = extentOf(piece, axis);
-        const bool isInWall = least == most && least == std::floor(least);
-        lower[axis] = std::clamp(int(least) - (isInWall ? 1 : 0), 0, last);
-        differ |= lower[axis] ^ std::min(int(most), last);
+        // A piece that only reaches a wall is in the cell that it comes from; one in a wall is on both sides of it.
+        const double floor = std::floor(least[axis]);
+        const bool isInWall = least[axis] == most[axis] && least[axis] == floor;
+        const int upper = lower[axis] + (1 << log2Edge) - 1;
+        first[axis] = std::clamp(int(floor) - (isInWall ? 1 : 0), lower[axis], upper);
+        last[axis] = std::clamp(isInWall ? int(floor) : int(std::ceil(most[axis])) - 1, lower[axis], upper);
+        differ |= first[axis] ^ last[axis];
     }
     const int bits = int(std::bit_width(unsigned(differ)));
-    split(piece, lower >> bits << bits, bits);
+    OctreeBox box{first >> bits << bits, bits, {}};
+    if (bits > 0)
+        for (int axis = 0; axis < 3; ++axis)
+            box.halves[size_t(axis)] = 1u << (first[axis] >> (bits - 1) & 1) | 1u << (last[axis] >> (bits - 1) & 1);
+    return box;
 }
 
 void TriangleCutter::split(const Polygon& piece, glm::ivec3 lower, int log2Edge) {
-    if (log2Edge == 0) return keep(piece, lower);
-    const int half = 1 << (log2Edge - 1);
-    const glm::dvec3 middle(lower + half);
+    const OctreeBox box = boxAround(piece, lower, log2Edge);
+    if (box.log2Edge == 0) return keep(piece, box.lower);
+    const int half = 1 << (box.log2Edge - 1);
+    const glm::dvec3 middle(box.lower + half);
     Polygon room[3][2];
-    const PolygonSides x = partAt(piece, 0, middle.x, room[0][0], room[0][1]);
+    const auto sidesOf = [&](const Polygon& part, int axis) -> PolygonSides {
+        const uint32_t halves = box.halves[size_t(axis)];
+        if (halves == 3) return partAt(part, axis, middle[axis], room[axis][0], room[axis][1]);
+        return {halves == 1 ? &part : nullptr, halves == 2 ? &part : nullptr};
+    };
+    const auto splitHalf = [&](const Polygon* part, int x, int y, int z) {
+        if (part != nullptr) split(*part, box.lower + half * glm::ivec3(x, y, z), box.log2Edge - 1);
+    };
+    const PolygonSides x = sidesOf(piece, 0);
     for (int i = 0; i < 2; ++i) {
         const Polygon* byX = i == 0 ? x.below : x.above;
         if (byX == nullptr) continue;
-        const PolygonSides y = partAt(*byX, 1, middle.y, room[1][0], room[1][1]);
+        const PolygonSides y = sidesOf(*byX, 1);
         for (int j = 0; j < 2; ++j) {
             const Polygon* byY = j == 0 ? y.below : y.above;
             if (byY == nullptr) continue;
-            const PolygonSides z = partAt(*byY, 2, middle.z, room[2][0], room[2][1]);
-            if (z.below != nullptr) split(*z.below, lower + half * glm::ivec3(i, j, 0), log2Edge - 1);
-            if (z.above != nullptr) split(*z.above, lower + half * glm::ivec3(i, j, 1), log2Edge - 1);
+            const PolygonSides z = sidesOf(*byY, 2);
+            splitHalf(z.below, i, j, 0);
+            splitHalf(z.above, i, j, 1);
         }
     }
 }
@@ -131,16 +154,18 @@ CellSurface TriangleCutter::sum(std::span<const CellPiece> pieces) const {
 }
 
 SurfaceCells TriangleCutter::take() {
-    std::stable_sort(pieces_.begin(), pieces_.end(),
-                     [](const CellPiece& a, const CellPiece& b) { return a.code < b.code; });
+    // Cells in order, and in each the pieces as they were cut.
+    std::vector<uint64_t> order(pieces_.size());
+    for (size_t i = 0; i < order.size(); ++i) order[i] = uint64_t{pieces_[i].code} << 32 | i;
+    std::sort(order.begin(), order.end());
     SurfaceCells surface;
-    for (size_t i = 0; i < pieces_.size();) {
-        const uint32_t code = pieces_[i].code;
-        size_t end = i;
-        while (end < pieces_.size() && pieces_[end].code == code) ++end;
+    std::vector<CellPiece> inCell;
+    for (size_t i = 0; i < order.size();) {
+        const uint32_t code = uint32_t(order[i] >> 32);
+        inCell.clear();
+        for (; i < order.size() && uint32_t(order[i] >> 32) == code; ++i) inCell.push_back(pieces_[uint32_t(order[i])]);
         surface.codes.push_back(code);
-        surface.cells.push_back(sum(std::span(pieces_).subspan(i, end - i)));
-        i = end;
+        surface.cells.push_back(sum(inCell));
     }
     return surface;
 }

@@ -29,10 +29,19 @@ private:
     /// it.
     struct Source {
         Triangle3 corners;
+        glm::dvec3 cross{0};  ///< along the normal, twice the area long
+        double perArea = 0;   ///< one by the square of that
         std::array<glm::dvec3, 3> normal;
         std::array<glm::dvec4, 3> colour;
         /// Returns the weights of the corners at a point of the triangle.
         [[nodiscard]] glm::dvec3 weightsAt(glm::dvec3 p) const;
+    };
+    /// A box of the octree over the cutter's cells, and the halves of it along each axis that a piece is in: 1, 2 or
+    /// both.
+    struct OctreeBox {
+        glm::ivec3 lower;
+        int log2Edge;
+        std::array<uint32_t, 3> halves;
     };
     /// A piece that lies in one cell.
     struct CellPiece {
@@ -42,6 +51,9 @@ private:
         glm::vec4 colour;
     };
     [[nodiscard]] Source sourceOf(uint32_t triangle) const;
+    /// Returns the smallest box around the part of a piece that is in a box.
+    [[nodiscard]] static OctreeBox boxAround(const Polygon& piece, glm::ivec3 lower, int log2Edge);
+    /// Cuts what is in a box into pieces that lie in one cell each.
     void split(const Polygon& piece, glm::ivec3 lower, int log2Edge);
     void keep(const Polygon& piece, glm::ivec3 cell);
     [[nodiscard]] CellSurface sum(std::span<const CellPiece> pieces) const;

@@ -94,11 +94,6 @@ bool codeColour(Coder& coder, const PageView& page, std::span<uint4> block) {
     return std::make_unique<ColourCodec<Coder>>(coder, page, block.first(page.header.faces), vertices)->run();
 }
 
-/// Whether stored bytes decode to `block`.
-bool isBlock(const Result<std::vector<uint4>>& decoded, const std::vector<uint4>& block) {
-    return decoded && std::memcmp(decoded->data(), block.data(), block.size() * sizeof(uint4)) == 0;
-}
-
 }  // namespace
 
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
@@ -118,15 +113,13 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
     codePage(coder, page);
     if (page.wrong) return plainly();
     PackedPage packed{coded(coder), {}, page.block.size() * sizeof(uint4)};
-    // A page whose coded form does not decode to it is stored plainly: a lost page costs more than this check.
-    if (!isBlock(unpackGeometry(packed.geometry, packed.geometryBytes), page.block)) return plainly();
     if (colour.empty()) return packed;
     const auto view = parsePage(std::as_bytes(std::span(page.block)));
     std::vector<uint4> block = inOrder(colour, page);
     RangeEncoder colourCoder;
-    codeColour(colourCoder, *view, block);
+    if (!codeColour(colourCoder, *view, block)) return plainly();
     packed.colour = coded(colourCoder);
-    return isBlock(unpackColour(packed.colour, colour.size(), *view), block) ? packed : plainly();
+    return packed;
 }
 
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {

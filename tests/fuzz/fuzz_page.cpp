@@ -38,6 +38,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     require(view->header.softLeaves == page->header.softLeaves && view->header.hardLeaves == page->header.hardLeaves &&
                 view->header.slabLeaves == page->header.slabLeaves,
             "with its leaves");
+    const vcp::PackedPage packedTwice = vcp::packPage(std::as_bytes(std::span(*again)), {});
+    require(packedTwice.geometry == packedAgain.geometry, "and with all that is in them");
     static_cast<void>(vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page));
     return 0;
 }
