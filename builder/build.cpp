@@ -326,6 +326,11 @@ private:
 
     // Levels
 
+    /// Whether the pass ends with a mesh in memory that the next one begins with: the vertices of a build of one bin.
+    [[nodiscard]] bool keepsMesh() const { return pass_ == plan_.levels() && plan_.finest.bins() == 1; }
+    /// Whether the pass fills the bins of the next one.
+    [[nodiscard]] bool steps() const { return plan_.steps(pass_) && !keepsMesh(); }
+
     /// Makes the bins of a pass and of the pass after it.
     void openPass() {
         const auto bins = [&](int pass) {
@@ -335,7 +340,7 @@ private:
         };
         if (plan_.isOfSlabs(pass_)) return;
         if (!files_.current) files_.current = bins(pass_);
-        if (!plan_.steps(pass_)) return;
+        if (!steps()) return;
         files_.next = bins(pass_ - 1);
         files_.waiting = std::make_unique<RecordBins<WaitingTriangle>>(space_, fmt::format("waiting{}", pass_),
                                                                        plan_.partitionOf(plan_.levelOf(pass_)).bins(),
@@ -412,14 +417,14 @@ private:
 
     Result<void> runPass() {
         if (plan_.isOfSlabs(pass_)) return runSlabPass();
-        if (!files_.next && plan_.steps(pass_)) openPass();
+        if (!files_.next && steps()) openPass();
         const int level = plan_.levelOf(pass_);
         const PagePartition partition = plan_.partitionOf(level);
         const PageGrid grid = plan_.gridOf(level), coarser = plan_.gridOf(std::max(pass_ - 1, 0));
         const PagePartition nextPartition = plan_.partitionOf(std::max(pass_ - 1, 0));
         std::optional<LevelSink> sink;
         std::optional<LevelStep> step;
-        if (plan_.steps(pass_)) {
+        if (steps()) {
             sink.emplace(pass_ > level ? plan_.pages : FinestPages(coarser), nextPartition, *files_.next,
                          plan_.marginCells());
             step.emplace(pass_ > level, grid, partition, *files_.waiting, *sink);
@@ -448,19 +453,30 @@ private:
         const bool vertices = pass_ == plan_.levels();
         const std::string stage = stageOf(pass_);
         if (!progress(stage, at(0))) return cancelled();
-        VCP_TRY_ASSIGN(auto soup, files_.current->load(bin));
-        // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
-        if (soup.empty()) return {};
-        Result<void> result;
-        arena_.execute([&] {
-            if (vertices) keepThin(soup, bin);
-            LatticeMesh mesh = meshOf(soup, hasColour());
-            std::vector<LatticeTriangle>().swap(soup);
-            if (vertices) computeNormals(mesh);
-            if (!vertices) result = buildBin(mesh, first, end, [&](double part) { return progress(stage, at(part)); });
-            if (result && step) result = step->run(bin, mesh);
+        return arena_.execute([&]() -> Result<void> {
+            LatticeMesh mesh = std::move(mesh_);
+            mesh_ = {};
+            if (mesh.positions.empty()) {
+                VCP_TRY_ASSIGN(mesh, loadMesh(bin));
+            }
+            // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
+            if (mesh.positions.empty()) return {};
+            if (!vertices) VCP_TRY(buildBin(mesh, first, end, [&](double part) { return progress(stage, at(part)); }));
+            if (step) return step->run(bin, mesh);
+            if (keepsMesh()) mesh_ = std::move(mesh);
+            return {};
         });
-        return result;
+    }
+
+    /// Returns the mesh of a bin; in the first pass, what is thin is kept and normals are found.
+    Result<LatticeMesh> loadMesh(size_t bin) {
+        VCP_TRY_ASSIGN(auto soup, files_.current->load(bin));
+        if (pass_ < plan_.levels()) return meshOf(soup, hasColour());
+        keepThin(soup, bin);
+        LatticeMesh mesh = meshOf(soup, hasColour());
+        std::vector<LatticeTriangle>().swap(soup);
+        computeNormals(mesh);
+        return mesh;
     }
 
     /// Builds the pass's pages from code `first` to before `end`. Leaves `mesh` on the lattice of their coarsest level.
@@ -494,6 +510,8 @@ private:
 
     Result<void> endPass() {
         firstBin_ = 0;
+        // What the mesh was made from stays until its pages are made: an interrupted build goes on from there.
+        if (keepsMesh()) return {};
         if (files_.next) VCP_TRY(files_.next->raw().flush());
         auto finished = std::move(files_.current);
         auto waited = std::move(files_.waiting);
@@ -561,6 +579,7 @@ private:
     LevelPlan plan_;
     BuildReport report_;
     WorkFiles files_;
+    LatticeMesh mesh_;  ///< what a pass hands to the next one, where it keepsMesh()
     int pass_ = 0;
     size_t firstBin_ = 0;  ///< where the pass that is resumed begins
 };

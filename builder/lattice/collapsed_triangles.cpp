@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <set>
+#include <atomic>
 #include <span>
 #include <tuple>
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include "builder/lattice/lattice_mesh.h"
 #include "octree/surface/leaf_math.h"
@@ -43,15 +46,24 @@ void addSegments(const LatticeTriangle& t, std::vector<Segment>& segments) {
 
 /// Removes the segments that are an edge, or a corner, of a triangle with area.
 void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segment>& segments) {
-    std::set<std::pair<Point, Point>> covered, wanted;
-    for (const Segment& s : segments) wanted.insert(s.ends());
-    for (const LatticeTriangle& t : triangles)
-        for (int i = 0; i < 3; ++i) {
-            const Point p = pointOf(t.corner[i]), q = pointOf(t.corner[(i + 1) % 3]);
-            for (const auto& ends : {std::pair(std::min(p, q), std::max(p, q)), std::pair(p, p)})
-                if (wanted.contains(ends)) covered.insert(ends);
-        }
-    std::erase_if(segments, [&](const Segment& s) { return covered.contains(s.ends()); });
+    std::vector<std::pair<Point, Point>> wanted;
+    for (const Segment& s : segments) wanted.push_back(s.ends());
+    std::sort(wanted.begin(), wanted.end());
+    wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+    std::vector<std::atomic<bool>> covered(wanted.size());
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, triangles.size(), 16384), [&](const auto& range) {
+        for (size_t k = range.begin(); k < range.end(); ++k)
+            for (int i = 0; i < 3; ++i) {
+                const Point p = pointOf(triangles[k].corner[i]), q = pointOf(triangles[k].corner[(i + 1) % 3]);
+                for (const auto& ends : {std::pair(std::min(p, q), std::max(p, q)), std::pair(p, p)}) {
+                    const auto at = std::lower_bound(wanted.begin(), wanted.end(), ends);
+                    if (at != wanted.end() && *at == ends) covered[size_t(at - wanted.begin())] = true;
+                }
+            }
+    });
+    std::erase_if(segments, [&](const Segment& s) {
+        return covered[size_t(std::lower_bound(wanted.begin(), wanted.end(), s.ends()) - wanted.begin())].load();
+    });
 }
 
 /// Whether a vertex may lie there.

@@ -4,9 +4,12 @@
 #include <cmath>
 #include <numeric>
 
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_sort.h>
 #include <glm/geometric.hpp>
 
+#include "builder/lattice/page_partition.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/morton.h"
 #include "octree/surface/vertex_normal.h"
@@ -70,19 +73,76 @@ struct OrderedVertex {
     }
 };
 
-/// Sorts the vertices; returns the new number of each.
-std::vector<uint32_t> sortVertices(std::vector<glm::i32vec3>& positions) {
-    std::vector<OrderedVertex> order(positions.size());
-    for (uint32_t v = 0; v < order.size(); ++v)
-        order[v] = {mortonEncode(glm::u32vec3(positions[v] >> 11)), positions[v], v};
-    tbb::parallel_sort(order.begin(), order.end());
-    std::vector<uint32_t> renamed(order.size());
-    for (uint32_t v = 0; v < order.size(); ++v) {
-        positions[v] = order[v].position;
-        renamed[order[v].number] = v;
-    }
-    return renamed;
+OrderedVertex orderedVertex(glm::i32vec3 p, uint32_t number) {
+    return {mortonEncode(glm::u32vec3(p >> int(PageGrid::kLog2LatticePerCell))), p, number};
 }
+
+constexpr size_t kGrain = 16384;  // elements that a thread takes at a time
+
+/// Distinct positions, found in parts at the same time: a part has those with its own hashes.
+class DistinctPositions {
+public:
+    /// Sets for each corner of the soup the number of its position, in the order that the parts found them.
+    DistinctPositions(std::span<const LatticeTriangle> soup, std::span<uint32_t> corners) {
+        tbb::parallel_for(size_t{0}, kParts, [&](size_t part) { find(part, soup, corners); });
+        uint32_t first = 0;
+        for (Part& part : parts_) {
+            part.first = first;
+            first += uint32_t(part.positions.size());
+        }
+        count_ = first;
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, corners.size(), kGrain), [&](const auto& range) {
+            for (size_t k = range.begin(); k < range.end(); ++k)
+                corners[k] += parts_[partOf(soup[k / 3].corner[k % 3])].first;
+        });
+    }
+
+    /// Returns the positions in the canonical order; sets the new number of each.
+    std::vector<glm::i32vec3> sorted(std::vector<uint32_t>& renamed) {
+        std::vector<OrderedVertex> order(count_);
+        tbb::parallel_for(size_t{0}, kParts, [&](size_t i) {
+            Part& part = parts_[i];
+            for (uint32_t v = 0; v < part.positions.size(); ++v)
+                order[part.first + v] = orderedVertex(part.positions[v], part.first + v);
+            std::vector<glm::i32vec3>().swap(part.positions);
+        });
+        tbb::parallel_sort(order.begin(), order.end());
+        std::vector<glm::i32vec3> positions(count_);
+        renamed.resize(count_);
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, count_, kGrain), [&](const auto& range) {
+            for (size_t v = range.begin(); v < range.end(); ++v) {
+                positions[v] = order[v].position;
+                renamed[order[v].number] = uint32_t(v);
+            }
+        });
+        return positions;
+    }
+
+private:
+    static constexpr size_t kParts = 4;
+    struct Part {
+        std::vector<glm::i32vec3> positions;
+        uint32_t first = 0;
+    };
+
+    // An index takes low bits of the hash, and a part high ones.
+    static size_t partOf(glm::i32vec3 p) { return PositionHash{}(p) >> 62; }
+
+    void find(size_t part, std::span<const LatticeTriangle> soup, std::span<uint32_t> corners) {
+        std::vector<glm::i32vec3>& positions = parts_[part].positions;
+        PositionIndex index(soup.size() * 6 / 10 / kParts);
+        for (size_t k = 0; k < corners.size(); ++k) {
+            const glm::i32vec3 p = soup[k / 3].corner[k % 3];
+            if (partOf(p) != part) continue;
+            const uint32_t next = uint32_t(positions.size());
+            corners[k] = index.findOrAdd(positions, p, next);
+            if (corners[k] == next) positions.push_back(p);
+        }
+    }
+
+    std::array<Part, kParts> parts_;
+    size_t count_ = 0;
+};
 
 /// A triangle whose smallest vertex is known: the other two ascending. `turned`: they were swapped to ascend.
 struct OrderedTriangle {
@@ -108,11 +168,14 @@ void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint
         const bool turned = v[1] > v[2];
         ordered[next[v[0]]++] = {std::min(v[1], v[2]), std::max(v[1], v[2]), soup[k].stray, turned};
     }
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, begin.size() - 1, kGrain), [&](const auto& range) {
+        for (size_t v = range.begin(); v < range.end(); ++v)
+            std::sort(ordered.begin() + begin[v], ordered.begin() + begin[v + 1]);
+    });
     mesh.triangles.reserve(soup.size());
     mesh.stray.reserve(soup.size());
     for (uint32_t v = 0; v + 1 < begin.size(); ++v) {
         const auto from = ordered.begin() + begin[v], to = ordered.begin() + begin[v + 1];
-        std::sort(from, to);
         for (auto t = from; t != to; ++t) {
             if (t != from && t->key() == (t - 1)->key()) {
                 mesh.stray.back() = std::max(mesh.stray.back(), t->stray);
@@ -155,17 +218,11 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
     LatticeMesh mesh;
     std::vector<uint32_t> corners(soup.size() * 3);
     {
-        PositionIndex index(soup.size() * 6 / 10);
-        for (size_t k = 0; k < corners.size(); ++k) {
-            const glm::i32vec3 p = soup[k / 3].corner[k % 3];
-            const uint32_t next = uint32_t(mesh.positions.size());
-            corners[k] = index.findOrAdd(mesh.positions, p, next);
-            if (corners[k] == next) mesh.positions.push_back(p);
-        }
-    }
-    {
-        const std::vector<uint32_t> renamed = sortVertices(mesh.positions);
-        for (uint32_t& v : corners) v = renamed[v];
+        std::vector<uint32_t> renamed;
+        mesh.positions = DistinctPositions(soup, corners).sorted(renamed);
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, corners.size(), kGrain), [&](const auto& range) {
+            for (size_t k = range.begin(); k < range.end(); ++k) corners[k] = renamed[corners[k]];
+        });
     }
     // The normals agree, except where a kept thin part ends at another triangle's vertex: then any of them will do that
     // does not depend on the order.
@@ -183,9 +240,9 @@ void halveLattice(LatticeMesh& mesh) {
 }
 
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
-    const auto named = [](glm::i32vec3 q) { return OrderedVertex{mortonEncode(glm::u32vec3(q >> 11)), q, 0}; };
-    const auto at = std::lower_bound(mesh.positions.begin(), mesh.positions.end(), named(p),
-                                     [&](glm::i32vec3 q, const OrderedVertex& wanted) { return named(q) < wanted; });
+    const auto at = std::lower_bound(
+        mesh.positions.begin(), mesh.positions.end(), orderedVertex(p, 0),
+        [&](glm::i32vec3 q, const OrderedVertex& wanted) { return orderedVertex(q, 0) < wanted; });
     if (at == mesh.positions.end() || *at != p) return {};
     return uint32_t(at - mesh.positions.begin());
 }
@@ -193,14 +250,20 @@ std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
 void computeNormals(LatticeMesh& mesh) {
     std::vector<WideVector> sum(mesh.positions.size(), WideVector(0));
     std::vector<WideVector> faces(mesh.triangles.size());
-    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
-        const std::array<uint32_t, 3>& t = mesh.triangles[k];
-        faces[k] = areaNormal(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]);
-        for (const uint32_t v : t) addNormal(sum[v], faces[k]);
-    }
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, faces.size(), kGrain), [&](const auto& range) {
+        for (size_t k = range.begin(); k < range.end(); ++k) {
+            const auto& [a, b, c] = mesh.triangles[k];
+            faces[k] = areaNormal(mesh.positions[a], mesh.positions[b], mesh.positions[c]);
+        }
+    });
+    for (size_t k = 0; k < faces.size(); ++k)
+        for (const uint32_t v : mesh.triangles[k]) addNormal(sum[v], faces[k]);
     const std::vector<uint8_t> crease = creases(faces, sum, mesh.triangles);
     mesh.normals.resize(mesh.positions.size());
-    for (size_t v = 0; v < sum.size(); ++v) mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, sum.size(), kGrain), [&](const auto& range) {
+        for (size_t v = range.begin(); v < range.end(); ++v)
+            mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
+    });
 }
 
 }  // namespace vcp

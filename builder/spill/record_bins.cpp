@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <numeric>
 
+#include <oneapi/tbb/parallel_for.h>
 #include <xxhash.h>
 #include <zstd.h>
 
@@ -176,6 +177,28 @@ Result<void> RawBins::read(const Block& block, std::byte* out) const {
         return damagedTempFile(file_.path(), block.offset);
     fromPlanes(planes.data(), block.records, recordBytes_, out);
     return {};
+}
+
+Result<void> RawBins::load(size_t bin, std::span<std::byte> out) const {
+    const std::span<const Block> blocks = this->blocks(bin);
+    std::vector<size_t> begin;
+    size_t at = 0;
+    for (const Block& block : blocks) {
+        begin.push_back(at);
+        at += block.records * recordBytes_;
+    }
+    // Of several damaged blocks the first is named.
+    std::mutex mutex;
+    size_t firstWrong = blocks.size();
+    Result<void> result;
+    tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t i) {
+        auto done = read(blocks[i], out.data() + begin[i]);
+        if (done) return;
+        const std::scoped_lock lock(mutex);
+        if (i < firstWrong) result = std::move(done);
+        firstWrong = std::min(firstWrong, i);
+    });
+    return result;
 }
 
 }  // namespace vcp

@@ -54,6 +54,8 @@ public:
     [[nodiscard]] size_t blockRecords() const { return blockRecords_; }
     /// Decodes a block to `out` (block.records records).
     Result<void> read(const Block& block, std::byte* out) const;
+    /// Decodes all blocks of a bin, on the calling arena's threads. `out`: room for count(bin) records.
+    Result<void> load(size_t bin, std::span<std::byte> out) const;
 
 private:
     Result<void> writeBlock(size_t bin, const std::vector<std::byte>& records);
@@ -87,14 +89,10 @@ public:
         VCP_TRY(raw_.read(block, reinterpret_cast<std::byte*>(records.data())));
         return records;
     }
-    /// Returns all records of a bin.
+    /// Returns all records of a bin. Uses the calling arena's threads.
     Result<std::vector<Record>> load(size_t bin) const {
         std::vector<Record> records(raw_.count(bin));
-        size_t at = 0;
-        for (const RawBins::Block& block : raw_.blocks(bin)) {
-            VCP_TRY(raw_.read(block, reinterpret_cast<std::byte*>(records.data() + at)));
-            at += block.records;
-        }
+        VCP_TRY(raw_.load(bin, std::as_writable_bytes(std::span(records))));
         return records;
     }
 
