@@ -228,13 +228,14 @@ private:
     Result<void> read() {
         if (!progress("reading", 0)) return cancelled();
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
-        VCP_TRY_ASSIGN(measures_, readInputs(
-                                      options_, space_, memory_.vertexBytes, *files_.soup,
-                                      [this](double fraction, uint64_t triangles) {
-                                          measures_.triangles = triangles;
-                                          return progress("reading", kReadingShare * fraction);
-                                      },
-                                      report_.warnings, report_.sideFiles));
+        const auto report = [this](double fraction, uint64_t triangles) {
+            measures_.triangles = triangles;
+            return progress("reading", kReadingShare * fraction);
+        };
+        VCP_TRY_ASSIGN(measures_, arena_.execute([&] {
+            return readInputs(options_, space_, memory_.vertexBytes, *files_.soup, report, report_.warnings,
+                              report_.sideFiles);
+        }));
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         releaseMemory();
         VCP_TRY(checkFreeSpace());

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <set>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <oneapi/tbb/task_group.h>
 
 #include "builder/lattice/exact_sum.h"
 #include "builder/lattice/lattice_mesh.h"
@@ -40,13 +42,22 @@ Error badInput(const BuildOptions& options, std::string message) {
     return {.code = ErrorCode::InvalidInput, .message = std::move(message), .file = nameOf(options)};
 }
 
-/// Measures triangles and packs them into the soup.
+/// Measures triangles and packs them into the soup. Other threads of the calling arena code the blocks meanwhile.
 class SoupWriter {
 public:
     explicit SoupWriter(Soup& soup) : soup_(soup) {
         measures_.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
         measures_.boundsMax = -measures_.boundsMin;
     }
+    ~SoupWriter() {
+        // Nobody asks any more what became of the last batches.
+        try {
+            coding_.wait();
+        } catch (...) {
+        }
+    }
+    SoupWriter(const SoupWriter&) = delete;
+    SoupWriter& operator=(const SoupWriter&) = delete;
 
     Result<void> add(const WorldTriangle<double>& t) {
         ++measures_.triangles;
@@ -65,12 +76,10 @@ public:
         return store(t);
     }
 
+    /// Hands all triangles on, and waits until they are in the soup.
     Result<void> flush() {
-        VCP_TRY(soup_.doubles.append(0, doubles_));
-        VCP_TRY(soup_.floats.append(0, floats_));
-        doubles_.clear();
-        floats_.clear();
-        return {};
+        handOn();
+        return wait();
     }
 
     [[nodiscard]] bool tooLarge() const { return tooLarge_; }
@@ -97,10 +106,31 @@ private:
         } else {
             doubles_.push_back(t);
         }
-        return floats_.size() + doubles_.size() >= kBatch ? flush() : Result<void>();
+        if (floats_.size() + doubles_.size() < kBatch) return {};
+        handOn();
+        return batches_ < kMostBatches ? Result<void>() : wait();
     }
 
-    static constexpr size_t kBatch = 4096;
+    void handOn() {
+        ++batches_;
+        coding_.run([this, floats = std::move(floats_), doubles = std::move(doubles_)] {
+            auto done = soup_.doubles.append(0, doubles);
+            if (done) done = soup_.floats.append(0, floats);
+            const std::scoped_lock lock(mutex_);
+            if (coded_) coded_ = std::move(done);
+        });
+        floats_.clear();
+        doubles_.clear();
+        floats_.reserve(kBatch);
+    }
+
+    Result<void> wait() {
+        coding_.wait();
+        batches_ = 0;
+        return coded_;
+    }
+
+    static constexpr size_t kBatch = 4096, kMostBatches = 8;
 
     Soup& soup_;
     SoupMeasures measures_;
@@ -108,6 +138,11 @@ private:
     bool tooLarge_ = false;
     std::vector<WorldTriangle<float>> floats_;
     std::vector<WorldTriangle<double>> doubles_;
+
+    tbb::task_group coding_;
+    size_t batches_ = 0;  ///< handed on since the last wait
+    std::mutex mutex_;
+    Result<void> coded_;  ///< of all batches so far
 };
 
 }  // namespace

@@ -55,7 +55,7 @@ struct Soup {
 
 /// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is given the
 /// fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
-/// left out, `sideFiles` the files that the inputs name, each once.
+/// left out, `sideFiles` the files that the inputs name, each once. Uses the calling arena's threads.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
                                 const std::function<bool(double fraction, uint64_t triangles)>& progress,
                                 std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
