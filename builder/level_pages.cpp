@@ -27,8 +27,9 @@ EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh
     return encodePage(tree, mesh);
 }
 
-Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
-                            std::span<const uint32_t> triangles, bool withSurface) {
+/// Builds a page as it is stored; all else that this takes is freed at the end.
+Result<BuiltPage> storedPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
+                             std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
     // A page that cannot be read back must not spoil the whole file.
     if (const auto view = parsePage(encoded.geometry); encoded.leaves > 0 && !view)
@@ -36,7 +37,12 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
                      .message = fmt::format(
                          "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller cell edge",
                          triangles.size(), encoded.leaves)};
-    BuiltPage page = builtPage(settings, code, encoded);
+    return builtPage(settings, code, encoded);
+}
+
+Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
+                            std::span<const uint32_t> triangles, bool withSurface) {
+    VCP_TRY_ASSIGN(auto page, storedPage(settings, mesh, code, triangles));
     if (withSurface)
         page.surface = storedSurface(surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells));
     return page;
@@ -63,16 +69,16 @@ Extents extentsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) 
     return sum;
 }
 
-/// Returns the memory to build a page of these triangles.
+/// Returns the memory to build a page of these triangles: its bytes first, then the surface in it.
 uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles,
                 bool withSurface) {
     const uint64_t count = triangles.size();
     if (settings.exact && !withSurface) return exactPageWorkBytes(count);
     const Extents extents = extentsOf(mesh, triangles);
-    const uint64_t surface = withSurface ? surfaceWorkBytes(count, extents.area, extents.perimeter) : 0;
-    if (settings.exact) return exactPageWorkBytes(count) + surface;
+    if (settings.exact)
+        return std::max(exactPageWorkBytes(count), surfaceWorkBytes(count, extents.area, extents.perimeter));
     // The cells that a flat shape touches: its area over three axes, its rim, and those of its corners.
-    return pageWorkBytes(count, uint64_t(1.75 * extents.area + 1.5 * extents.perimeter + 4 * double(count))) + surface;
+    return pageWorkBytes(count, uint64_t(1.75 * extents.area + 1.5 * extents.perimeter + 4 * double(count)));
 }
 
 }  // namespace

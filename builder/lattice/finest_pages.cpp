@@ -75,10 +75,15 @@ FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) con
 
 int FinestPages::stepAt(glm::i32vec3 p) const {
     if (isUniform()) return 1;
-    const uint32_t here = levelsAround(p, 0).deepest;
-    // A cell more than the longest edge, since rounding moves the ends.
-    const int64_t reach = int64_t{kPartedEdgeCells + 1} << (PageGrid::kLog2LatticePerCell + deepest() - here);
-    return 1 << (deepest() - levelsAround(p, reach).coarsest);
+    const Levels here = levelsAround(p, 0);
+    uint32_t coarsest = here.coarsest;
+    if (coarsest > base()) {
+        // A cell more than the longest edge, since rounding moves the ends.
+        const int64_t reach = int64_t{kPartedEdgeCells + 1}
+                              << (PageGrid::kLog2LatticePerCell + deepest() - here.deepest);
+        coarsest = levelsAround(p, reach).coarsest;
+    }
+    return 1 << (deepest() - coarsest);
 }
 
 bool FinestPages::isTooLong(glm::i32vec3 a, glm::i32vec3 b) const {
