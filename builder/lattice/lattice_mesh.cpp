@@ -77,6 +77,9 @@ OrderedVertex orderedVertex(glm::i32vec3 p, uint32_t number) {
     return {mortonEncode(glm::u32vec3(p >> int(PageGrid::kLog2LatticePerCell))), p, number};
 }
 
+// Triangles that turn away make a crease where they have so large a part of the area around a vertex.
+constexpr int64_t kCreaseShare = 16;
+
 constexpr size_t kGrain = 16384;  // elements that a thread takes at a time
 
 /// Distinct positions, found in parts at the same time: a part has those with its own hashes.
@@ -258,7 +261,7 @@ void computeNormals(LatticeMesh& mesh) {
     });
     for (size_t k = 0; k < faces.size(); ++k)
         for (const uint32_t v : mesh.triangles[k]) addNormal(sum[v], faces[k]);
-    const std::vector<uint8_t> crease = creases(faces, sum, mesh.triangles);
+    const std::vector<uint8_t> crease = creases(faces, sum, mesh.triangles, kCreaseShare);
     mesh.normals.resize(mesh.positions.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, sum.size(), kGrain), [&](const auto& range) {
         for (size_t v = range.begin(); v < range.end(); ++v)

@@ -42,19 +42,23 @@ void addNormal(WideVector& sum, WideVector normal) {
 }
 
 std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums,
-                             std::span<const std::array<uint32_t, 3>> triangles) {
+                             std::span<const std::array<uint32_t, 3>> triangles, int64_t share) {
     std::vector<glm::i32vec3> of(sums.size());
     for (size_t v = 0; v < sums.size(); ++v) of[v] = glm::i32vec3(shortened(sums[v], 11));
-    std::vector<uint8_t> crease(sums.size(), 0);
+    std::vector<int64_t> turned(sums.size(), 0);  // by area
     for (size_t k = 0; k < triangles.size(); ++k) {
         const glm::i32vec3 n(shortened(normals[k], 11));
         const int64_t size = product(n, n);
         for (const uint32_t v : triangles[k]) {
             const int64_t along = product(n, of[v]);
             // cos^2 of 40 degrees is 0.5868.
-            if (along * along * 10000 < 5868 * size * product(of[v], of[v])) crease[v] = 1;
+            if (along * along * 10000 < 5868 * size * product(of[v], of[v]))
+                turned[v] = std::min(turned[v] + largest(normals[k]), int64_t{1} << 61);
         }
     }
+    std::vector<uint8_t> crease(sums.size(), 0);
+    for (size_t v = 0; v < sums.size(); ++v)
+        crease[v] = turned[v] > 0 && (share == 0 || turned[v] >= largest(sums[v]) / share) ? 1 : 0;
     return crease;
 }
 

@@ -20,9 +20,11 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 /// Adds a triangle's normal to a vertex' sum, without orientation: the normal is turned to the side of the sum.
 void addNormal(WideVector& sum, WideVector normal);
 
-/// Returns for each vertex whether the normal of one of its triangles turns away from its own by more than 40 degrees.
+/// Returns for each vertex whether its triangles turn away from its normal by more than 40 degrees: any of them, or, for
+/// a `share`, so many that they have 1 / share of the area around it. Scans are full of slivers that face anywhere, and
+/// these alone make no crease.
 std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums,
-                             std::span<const std::array<uint32_t, 3>> triangles);
+                             std::span<const std::array<uint32_t, 3>> triangles, int64_t share = 0);
 
 /// Normals are kept to 12 + 12 bits of the octahedron's upper half (z >= 0), 0.07 degrees: they have no side.
 inline constexpr uint32_t kNormalSteps = 4095;

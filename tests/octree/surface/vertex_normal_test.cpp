@@ -50,5 +50,17 @@ TEST(VertexNormal, CreasesTurnByFortyDegrees) {
     }
 }
 
+TEST(VertexNormal, SliversAloneMakeNoCrease) {
+    const WideVector sum(0, 0, 1 << 20), sliver(1 << 15, 0, 0);
+    const std::vector<std::array<uint32_t, 3>> corner{{0, 1, 2}};
+    const std::vector<WideVector> sums(3, sum);
+    EXPECT_EQ(creases(std::span(&sliver, 1), sums, corner)[0], 1) << "without a share any triangle counts";
+    EXPECT_EQ(creases(std::span(&sliver, 1), sums, corner, 16)[0], 0) << "1 of 32";
+    EXPECT_EQ(creases(std::span(&sliver, 1), sums, corner, 32)[0], 1);
+    const std::vector<WideVector> slivers(2, sliver);
+    const std::vector<std::array<uint32_t, 3>> both{{0, 1, 2}, {0, 2, 1}};
+    EXPECT_EQ(creases(slivers, sums, both, 16)[0], 1) << "2 of 32";
+}
+
 }  // namespace
 }  // namespace vcp

@@ -23,8 +23,10 @@ constexpr float kBackground = 0.17f;  // linear
 
 #ifdef VCP_HAVE_EMBREE
 
-// The cosine of the angle up to which a triangle takes a vertex' normal.
+// The cosine of the angle up to which a triangle takes a vertex' normal, and how large a part of the area around the
+// vertex is a crease where it turns farther.
 const double kCreaseCosine = std::cos(40 * std::numbers::pi / 180);
+constexpr double kCreaseShare = 1.0 / 16;
 
 struct PositionHash {
     size_t operator()(const glm::dvec3& p) const {
@@ -49,18 +51,20 @@ std::vector<glm::vec3> shadingNormals(const IndexedMesh& mesh) {
             sum += glm::dot(sum, flat[t]) < 0 ? -flat[t] : flat[t];
         }
     }
-    std::vector<uint8_t> crease(sums.size(), 0);
+    std::vector<double> turned(sums.size(), 0);
     for (size_t t = 0; t < flat.size(); ++t)
         for (const uint32_t vertex : mesh.triangles[t]) {
             const glm::dvec3 sum = sums[place[vertex]];
-            if (std::abs(glm::dot(sum, flat[t])) < kCreaseCosine * glm::length(sum) * glm::length(flat[t]))
-                crease[place[vertex]] = 1;
+            const double size = glm::length(flat[t]);
+            if (std::abs(glm::dot(sum, flat[t])) < kCreaseCosine * glm::length(sum) * size)
+                turned[place[vertex]] += size;
         }
     std::vector<glm::vec3> normals(3 * flat.size());
     for (size_t t = 0; t < flat.size(); ++t)
         for (int i = 0; i < 3; ++i) {
             const uint32_t at = place[mesh.triangles[t][i]];
-            const glm::dvec3 n = crease[at] ? flat[t] : glm::dot(sums[at], flat[t]) < 0 ? -sums[at] : sums[at];
+            const bool isCrease = turned[at] > 0 && turned[at] >= kCreaseShare * glm::length(sums[at]);
+            const glm::dvec3 n = isCrease ? flat[t] : glm::dot(sums[at], flat[t]) < 0 ? -sums[at] : sums[at];
             const double length = glm::length(n);
             normals[3 * t + i] = glm::vec3(length > 0 ? n / length : n);
         }
