@@ -100,10 +100,7 @@ private:
             VCP_TRY(read());
         else
             VCP_TRY(resumeMeasures());
-        VCP_TRY_ASSIGN(auto frame, chooseFrame(options_, measures_));
-        VCP_TRY_ASSIGN(auto error, chooseError(options_, measures_, frame));
-        plan_.setPages(frame, FinestPages({frame.log2Cells, frame.levels - 1}));
-        plan_.errorTarget = error;
+        VCP_TRY(chooseGrid(done_.levelsLess));
         plan_.isExact = options_.error <= 0;
         // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
         plan_.hasSlabs = plan_.isExact && options_.coarseLeaves == CoarseLeaves::Slabs;
@@ -188,6 +185,7 @@ private:
         if (!partitionRecorded_ && files_.current) {
             fields["partition"] = plan_.finest.first();
             fields["parted"] = plan_.pages.parted();
+            fields["levels less"] = levelsLess_;
             partitionRecorded_ = true;
         }
         VCP_TRY(journal_.record(space_.folder(), fields));
@@ -224,6 +222,14 @@ private:
     }
 
     // Reading and dealing
+
+    Result<void> chooseGrid(uint32_t levelsLess) {
+        VCP_TRY_ASSIGN(auto frame, chooseFrame(options_, measures_, levelsLess));
+        VCP_TRY_ASSIGN(plan_.errorTarget, chooseError(options_, measures_, frame));
+        plan_.setPages(frame, FinestPages({frame.log2Cells, frame.levels - 1}));
+        levelsLess_ = levelsLess;
+        return {};
+    }
 
     Result<void> read() {
         if (!progress("reading", 0)) return cancelled();
@@ -282,20 +288,29 @@ private:
         files_.neededSurfaces = files_.surfaces.size();
     }
 
-    /// Chooses the pages that hold the mesh, and the bins.
+    /// Chooses the pages that hold the mesh, their grid once more where these would be too sparse, and the bins.
     Result<void> choosePlan() {
+        VCP_TRY_ASSIGN(auto choice, choosePagesOnGrid());
+        while (choice.levelsLess > 0) {
+            VCP_TRY(chooseGrid(levelsLess_ + choice.levelsLess));
+            VCP_TRY_ASSIGN(choice, choosePagesOnGrid());
+        }
+        plan_.finest = PagePartition(choice.counts, memory_.binTriangles);
+        plan_.setPages(plan_.frame, std::move(choice.pages));
+        return {};
+    }
+
+    Result<PageChoice> choosePagesOnGrid() {
         // Pages of soft leaves must be of one level: their levels come from each other by clustering.
         const PageChoosing choosing{
             .soup = *files_.soup,
             .frame = plan_.frame,
             .mostLevelsBelow = plan_.hasSlabs ? mostLevelsBelow(plan_.frame, measures_) : 0,
+            .mayBeCoarser = plan_.hasSlabs && options_.cell <= 0,
             .marginCells = plan_.marginCells(),
             .uncounted = memory_.binTriangles,
             .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
-        VCP_TRY_ASSIGN(auto choice, arena_.execute([&] { return choosePages(choosing); }));
-        plan_.finest = PagePartition(choice.counts, memory_.binTriangles);
-        plan_.setPages(plan_.frame, std::move(choice.pages));
-        return {};
+        return arena_.execute([&] { return choosePages(choosing); });
     }
 
     Result<void> dealSoup() {
@@ -578,6 +593,7 @@ private:
 
     SoupMeasures measures_;
     LevelPlan plan_;
+    uint32_t levelsLess_ = 0;  ///< as chooseFrame took it
     BuildReport report_;
     WorkFiles files_;
     LatticeMesh mesh_;  ///< what a pass hands to the next one, where it keepsMesh()

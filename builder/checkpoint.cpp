@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 6;
+constexpr int kTempVersion = 7;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -82,13 +82,15 @@ SoupMeasures measuresFrom(Fields& all) {
     m.boundsMin = from.vector("min");
     m.boundsMax = from.vector("max");
     m.area = from.number("area");
+    m.length = from.number("length");
     m.triangles = from.count("triangles");
     m.degenerateTriangles = from.count("degenerate");
     m.vertices = from.count("vertices");
     m.hasVertexColours = from.truth("vertex colours");
     m.hasMaterials = from.truth("materials");
     const glm::dvec3 extent = m.boundsMax - m.boundsMin;
-    from.require(std::min({extent.x, extent.y, extent.z}) >= 0 && m.area > 0 && m.triangles > m.degenerateTriangles);
+    from.require(std::min({extent.x, extent.y, extent.z}) >= 0 && m.area > 0 && m.length > 0 &&
+                 m.triangles > m.degenerateTriangles);
     all.require(from.areWhole());
     return m;
 }
@@ -136,6 +138,9 @@ void readLevels(Fields& all, Recorded& recorded) {
         recorded.parted.emplace_back();
         for (const json& code : codes) recorded.parted.back().push_back(all.countOf(code));
     }
+    const uint64_t levelsLess = all.count("levels less");
+    all.require(levelsLess < kMaxLevels);
+    recorded.levelsLess = uint32_t(std::min<uint64_t>(levelsLess, kMaxLevels));
     const json& pass = all.at("pass");
     const int levels = int(std::min<size_t>(recorded.files.spools.size(), kMaxLevels));
     const bool isPass = pass.is_number_integer() && pass >= -1 && pass <= levels;
@@ -200,6 +205,7 @@ json jsonOf(const SoupMeasures& m) {
     return {{"min", jsonOf(m.boundsMin)},
             {"max", jsonOf(m.boundsMax)},
             {"area", m.area},
+            {"length", m.length},
             {"triangles", m.triangles},
             {"degenerate", m.degenerateTriangles},
             {"vertices", m.vertices},

@@ -41,6 +41,7 @@ struct Recorded {
     Files files;
     std::vector<uint64_t> partition;            ///< with "levels": where the deepest level's bins begin
     std::vector<std::vector<uint64_t>> parted;  ///< with "levels": FinestPages::parted()
+    uint32_t levelsLess = 0;                    ///< with "levels": as chooseFrame takes it
     int pass = 0;
     size_t bin = 0;
 };

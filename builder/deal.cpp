@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <numeric>
 #include <set>
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
@@ -177,6 +178,23 @@ struct DealVisit {
     Result<void> finish() { return batch.flush(); }
 };
 
+/// Returns by how many levels the base level is too fine for pages that hold triangles of their own (deal.h). `pages`:
+/// those of the base level.
+uint32_t levelsTooMany(const PageCounts& pages, uint64_t triangles) {
+    std::vector<uint64_t> codes, pagesAbove;
+    for (const auto& [page, count] : pages) codes.push_back(page.second);
+    while (codes.size() > 1) {
+        pagesAbove.push_back(codes.size());
+        for (uint64_t& code : codes) code >>= 3;
+        codes.erase(std::unique(codes.begin(), codes.end()), codes.end());
+    }
+    uint64_t all = std::accumulate(pagesAbove.begin(), pagesAbove.end(), uint64_t{1});
+    uint32_t less = 0;
+    for (; less < pagesAbove.size() && all > kFreePages + triangles / kLeastPageTriangles; ++less)
+        all -= pagesAbove[less];
+    return less;
+}
+
 }  // namespace
 
 Result<PageChoice> choosePages(const PageChoosing& choosing) {
@@ -185,13 +203,15 @@ Result<PageChoice> choosePages(const PageChoosing& choosing) {
     const uint64_t uncounted =
         choosing.mostLevelsBelow > 0 ? std::min(choosing.uncounted, kMostPageTriangles) : choosing.uncounted;
     PageChoice choice{parting.pages(), {}};
-    if (triangles <= uncounted) return choice;
+    if (triangles <= uncounted && !choosing.mayBeCoarser) return choice;
     for (int round = 0;; ++round) {
         // Each round takes half of what is left of the progress.
         const double left = std::ldexp(1.0, -round);
         VCP_TRY_ASSIGN(const auto parts, countTriangles(choosing, choice.pages, parting.partedLast(), [&](double part) {
                            return choosing.progress(1 - left + left / 2 * part);
                        }));
+        if (round == 0 && choosing.mayBeCoarser) choice.levelsLess = levelsTooMany(parts, triangles);
+        if (choice.levelsLess > 0) return choice;
         const bool goesOn = parting.improve(parts);
         choice.pages = parting.pages();
         if (!goesOn) break;

@@ -19,11 +19,17 @@ inline constexpr uint64_t kMostPageTriangles = 1 << 17;
 /// as pages, parts help nobody.
 inline constexpr double kMostGrowth = 1.5;
 
+/// Where pages, of all levels together, hold fewer triangles than this in the mean, the base level is a coarser one:
+/// each takes some hundred bytes by itself. So many pages are free.
+inline constexpr uint64_t kLeastPageTriangles = 24, kFreePages = 64;
+
 struct PageChoice {
     FinestPages pages;
     /// First codes of pages and how many triangles each needs, ascending; empty where there are so few triangles that
     /// nothing was counted.
     std::vector<std::pair<uint64_t, uint64_t>> counts;
+    /// Where the base level's pages are too sparse, how many levels coarser it should be; nothing is chosen then.
+    uint32_t levelsLess = 0;
 };
 
 /// How pages are chosen. The calling arena's threads do the work.
@@ -31,6 +37,7 @@ struct PageChoosing {
     const Soup& soup;
     GridFrame frame;                       ///< frame of the base level
     uint32_t mostLevelsBelow;              ///< 0: all pages are the base level's
+    bool mayBeCoarser;                     ///< whether another base level may be asked for
     double marginCells;                    ///< how far around it a page needs triangles
     uint64_t uncounted;                    ///< so few triangles need no count
     std::function<bool(double)> progress;  ///< as Dealing's

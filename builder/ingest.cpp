@@ -7,9 +7,9 @@
 #include <set>
 
 #include <fmt/format.h>
+#include <oneapi/tbb/task_group.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <oneapi/tbb/task_group.h>
 
 #include "builder/lattice/exact_sum.h"
 #include "builder/lattice/lattice_mesh.h"
@@ -25,6 +25,9 @@ namespace {
 // The default cell holds about ten triangles, and its edge is twice as long as theirs: then most leaves are cells, and
 // a triangle is stored in the fewest bytes (docs/surface.md).
 constexpr double kTriangleAreaPerCellArea = 0.105;
+
+// Of triangles that are longer in the mean than so many cells, each would be in more leaves than it takes to store it.
+constexpr double kMostMeanEdgeCells = 4;
 
 // Extent limit: positions are 31-bit lattice coordinates.
 constexpr double kMaxExtentCells = double(1u << 20) - 4;
@@ -69,10 +72,14 @@ public:
             ++measures_.degenerateTriangles;
             return {};
         }
-        if (std::isfinite(twice))
+        const double longest =
+            std::sqrt(std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)}));
+        if (std::isfinite(twice) && std::isfinite(longest)) {
             area_.add(twice / 2);
-        else
+            length_.add(longest);
+        } else {
             tooLarge_ = true;
+        }
         return store(t);
     }
 
@@ -87,6 +94,7 @@ public:
     [[nodiscard]] SoupMeasures measures() const {
         SoupMeasures m = measures_;
         m.area = area_.value();
+        m.length = length_.value();
         return m;
     }
 
@@ -134,7 +142,7 @@ private:
 
     Soup& soup_;
     SoupMeasures measures_;
-    ExactSum area_;
+    ExactSum area_, length_;
     bool tooLarge_ = false;
     std::vector<WorldTriangle<float>> floats_;
     std::vector<WorldTriangle<double>> doubles_;
@@ -231,13 +239,17 @@ uint32_t mostLevelsBelow(const GridFrame& frame, const SoupMeasures& m) {
     return count;
 }
 
-Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m) {
+Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m, uint32_t levelsLess) {
     GridFrame frame;
     frame.log2Cells = kLog2Cells;
     const double longest = longestOf(m);
     const double useful = double(m.triangles - m.degenerateTriangles);
     frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
-    if (options.cell <= 0) frame.cell = std::max({frame.cell, longest / kMaxExtentCells, resolvedCell(m)});
+    if (options.cell <= 0) {
+        frame.cell =
+            std::max({frame.cell, m.length / useful / kMostMeanEdgeCells, longest / kMaxExtentCells, resolvedCell(m)});
+        frame.cell = std::ldexp(frame.cell, int(levelsLess));
+    }
     if (longest / frame.cell > kMaxExtentCells)
         return Error{
             .code = ErrorCode::Limit,

@@ -36,6 +36,7 @@ struct GridFrame {
 struct SoupMeasures {
     glm::dvec3 boundsMin{0}, boundsMax{0};  ///< bounds of the vertices that triangles use
     double area = 0;
+    double length = 0;  ///< sum of the triangles' longest edges
     uint64_t triangles = 0;
     uint64_t degenerateTriangles = 0;  ///< those among them without area in the file's own coordinates
     uint64_t vertices = 0;
@@ -63,8 +64,9 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
 /// Returns how the inputs are opened.
 MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 
-/// Chooses the grid; `options.cell` 0 chooses a cell from area and number of triangles. Errors: InvalidInput, Limit.
-Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures);
+/// Chooses the grid; `options.cell` 0 chooses a cell from the area, the lengths and the number of triangles, then twice
+/// as long as often as `levelsLess` says. Errors: InvalidInput, Limit.
+Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures, uint32_t levelsLess = 0);
 
 /// Returns how many levels more than the frame's the lattice and the mesh's coordinates can tell apart.
 uint32_t mostLevelsBelow(const GridFrame& frame, const SoupMeasures& measures);

@@ -58,13 +58,17 @@ struct Extents {
     double area = 0, perimeter = 0;
 };
 
-Extents extentsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
+/// Returns bounds for the parts of triangles that lie in a page. No section of a cube has a larger area, or a longer
+/// perimeter, than the rectangle through the diagonals of two faces.
+Extents extentsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, double pageEdge) {
+    const Extents most{std::sqrt(2.0) * pageEdge * pageEdge, 2 * (1 + std::sqrt(2.0)) * pageEdge};
     Extents sum;
     for (const uint32_t k : triangles) {
         glm::dvec3 p[3];
         for (int i = 0; i < 3; ++i) p[i] = glm::dvec3(mesh.positions[mesh.triangles[k][i]]) / double(kLatticePerCell);
-        sum.area += glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) / 2;
-        sum.perimeter += glm::distance(p[0], p[1]) + glm::distance(p[1], p[2]) + glm::distance(p[2], p[0]);
+        const double perimeter = glm::distance(p[0], p[1]) + glm::distance(p[1], p[2]) + glm::distance(p[2], p[0]);
+        sum.area += std::min(glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) / 2, most.area);
+        sum.perimeter += std::min(perimeter, most.perimeter);
     }
     return sum;
 }
@@ -74,7 +78,8 @@ uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::spa
                 bool withSurface) {
     const uint64_t count = triangles.size();
     if (settings.exact && !withSurface) return exactPageWorkBytes(count);
-    const Extents extents = extentsOf(mesh, triangles);
+    const double margin = settings.exact ? kExactMarginCells : kBinMarginCells;
+    const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * margin);
     if (settings.exact)
         return std::max(exactPageWorkBytes(count), surfaceWorkBytes(count, extents.area, extents.perimeter));
     // The cells that a flat shape touches: its area over three axes, its rim, and those of its corners.

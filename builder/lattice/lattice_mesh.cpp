@@ -243,9 +243,9 @@ void halveLattice(LatticeMesh& mesh) {
 }
 
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p) {
-    const auto at = std::lower_bound(
-        mesh.positions.begin(), mesh.positions.end(), orderedVertex(p, 0),
-        [&](glm::i32vec3 q, const OrderedVertex& wanted) { return orderedVertex(q, 0) < wanted; });
+    const auto at =
+        std::lower_bound(mesh.positions.begin(), mesh.positions.end(), orderedVertex(p, 0),
+                         [&](glm::i32vec3 q, const OrderedVertex& wanted) { return orderedVertex(q, 0) < wanted; });
     if (at == mesh.positions.end() || *at != p) return {};
     return uint32_t(at - mesh.positions.begin());
 }

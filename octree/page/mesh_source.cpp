@@ -1,6 +1,7 @@
 #include "octree/page/mesh_source.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "octree/surface/packing.h"
 #include "octree/surface/position_map.h"
@@ -50,7 +51,9 @@ void MeshSource::linkVertices(uint32_t vertices) {
 }
 
 uint32_t MeshSource::across(uint32_t from, uint32_t to) const {
-    const uint32_t a = oldVertex_[from], b = oldVertex_[to];
+    // From the end with fewer triangles around it: the tip of a fan has very many.
+    uint32_t a = oldVertex_[from], b = oldVertex_[to];
+    if (begin_[a + 1] - begin_[a] > begin_[b + 1] - begin_[b]) std::swap(a, b);
     for (uint32_t i = begin_[a]; i < begin_[a + 1]; ++i) {
         const uint32_t k = around_[i];
         const Index3& t = vertices_[k];
