@@ -19,6 +19,7 @@
 #include "octree/dataset_reader.h"
 #include "octree/reference_caster.h"
 #include "octree/vcp_verify.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
 
@@ -26,41 +27,6 @@ namespace vcp {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Little endian binary PLY in doubles, so that nothing is rounded.
-void writePly(const IndexedMesh& mesh, const fs::path& path, const std::vector<uint32_t>& colours = {}) {
-    std::ofstream out(path, std::ios::binary);
-    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << mesh.positions.size()
-        << "\nproperty double x\nproperty double y\nproperty double z\n";
-    if (!colours.empty())
-        out << "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
-    out << "element face " << mesh.triangles.size() << "\nproperty list uchar uint vertex_indices\nend_header\n";
-    for (size_t v = 0; v < mesh.positions.size(); ++v) {
-        out.write(reinterpret_cast<const char*>(&mesh.positions[v]), 24);
-        if (!colours.empty()) out.write(reinterpret_cast<const char*>(&colours[v]), 4);
-    }
-    for (const auto& t : mesh.triangles) {
-        out.put(3);
-        out.write(reinterpret_cast<const char*>(t.data()), 12);
-    }
-}
-
-/// Binary STL: a soup of floats.
-void writeStl(const IndexedMesh& mesh, const fs::path& path) {
-    std::ofstream out(path, std::ios::binary);
-    const std::string header(80, ' ');
-    out << header;
-    const auto count = uint32_t(mesh.triangles.size());
-    out.write(reinterpret_cast<const char*>(&count), 4);
-    for (size_t k = 0; k < mesh.triangles.size(); ++k) {
-        float values[12] = {};
-        const auto t = mesh.corners(k);
-        for (int i = 0; i < 3; ++i)
-            for (int a = 0; a < 3; ++a) values[3 + 3 * i + a] = float(t[i][a]);
-        out.write(reinterpret_cast<const char*>(values), 48);
-        out.write("\0\0", 2);
-    }
-}
 
 /// Rounded to float: what a file of floats holds.
 void roundToFloat(IndexedMesh& mesh) {
@@ -91,7 +57,7 @@ protected:
         return o;
     }
     fs::path ply(const IndexedMesh& mesh, const std::string& name = "mesh.ply") const {
-        writePly(mesh, folder_ / name);
+        test::writePly(mesh, folder_ / name);
         return folder_ / name;
     }
     Dataset dataset(const std::string& name = "out.vcp") const {
@@ -223,7 +189,7 @@ TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
     IndexedMesh mesh = largeScene();
     std::vector<uint32_t> colours(mesh.positions.size());
     for (size_t v = 0; v < colours.size(); ++v) colours[v] = uint32_t(0xff000000u | (v * 77 & 0xffffff));
-    writePly(mesh, folder_ / "straight.ply", colours);
+    test::writePly(mesh, folder_ / "straight.ply", colours);
     BuildOptions o = options({folder_ / "straight.ply"}, "straight.vcp");
     o.memoryBytes = 150 << 20;
     ASSERT_TRUE(buildOctree(o).ok());
@@ -243,7 +209,7 @@ TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
         std::rotate(t.begin(), t.begin() + ptrdiff_t(random() % 3), t.end());
     }
     std::shuffle(shuffled.triangles.begin(), shuffled.triangles.end(), random);
-    writePly(shuffled, folder_ / "shuffled.ply", itsColours);
+    test::writePly(shuffled, folder_ / "shuffled.ply", itsColours);
     for (const uint64_t megabytes : {150, 1024}) {
         BuildOptions other = options({folder_ / "shuffled.ply"}, "shuffled.vcp");
         other.memoryBytes = megabytes << 20;
@@ -332,7 +298,7 @@ TEST_F(Build, SoupEqualsIndexedMesh) {
         }
         ordered.triangles.push_back(r);
     }
-    writeStl(mesh, folder_ / "mesh.stl");
+    test::writeStl(mesh, folder_ / "mesh.stl");
     const auto soup = buildOctree(options({folder_ / "mesh.stl"}, "soup.vcp"));
     const auto indexed = buildOctree(options({ply(ordered)}));
     ASSERT_TRUE(soup.ok() && indexed.ok());
@@ -502,7 +468,7 @@ TEST_F(Build, ColourFollowsTheOption) {
     const IndexedMesh mesh = test::torusMesh(glm::dvec3(0), 2, 0.7, 40, 20);
     std::vector<uint32_t> colours(mesh.positions.size());
     for (size_t v = 0; v < colours.size(); ++v) colours[v] = uint32_t(0xff000000u | (v * 77 & 0xffffff));
-    writePly(mesh, folder_ / "colour.ply", colours);
+    test::writePly(mesh, folder_ / "colour.ply", colours);
     BuildOptions o = options({folder_ / "colour.ply"});
     ASSERT_TRUE(buildOctree(o).ok());
     EXPECT_TRUE(dataset().hasColour());
