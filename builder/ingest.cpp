@@ -27,7 +27,7 @@ namespace {
 constexpr double kTriangleAreaPerCellArea = 0.105;
 
 // Of triangles that are longer in the mean than so many cells, each would be in more leaves than it takes to store it.
-constexpr double kMostMeanEdgeCells = 4;
+constexpr double kMostMeanEdgeCells = 2;
 
 // Extent limit: positions are 31-bit lattice coordinates.
 constexpr double kMaxExtentCells = double(1u << 20) - 4;

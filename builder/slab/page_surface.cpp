@@ -23,13 +23,47 @@ SurfaceCells foldCells(const SurfaceCells& eighths) {
     return folded;
 }
 
+namespace {
+
+/// Cuts triangles, box by box where they make too many pieces at once.
+class SurfaceCutter {
+public:
+    SurfaceCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth)
+        : mesh_(mesh), origin_(origin), depth_(depth) {}
+
+    /// Appends the cells of a box, in Morton order.
+    void run(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
+        if (cutAll(triangles, box, cells)) return;
+        for (int octant = 0; octant < 8; ++octant) run(triangles, box.child(octant), cells);
+    }
+
+private:
+    /// Returns false, and appends nothing, where there are too many pieces.
+    bool cutAll(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
+        TriangleCutter cutter(mesh_, origin_, depth_, box);
+        for (const uint32_t k : triangles) {
+            cutter.cut(k);
+            if (cutter.pieces() > kMostPieces && box.log2Edge > 0) return false;
+        }
+        const SurfaceCells found = cutter.take();
+        cells.codes.insert(cells.codes.end(), found.codes.begin(), found.codes.end());
+        cells.cells.insert(cells.cells.end(), found.cells.begin(), found.cells.end());
+        return true;
+    }
+
+    const LatticeMesh& mesh_;
+    glm::i32vec3 origin_;
+    int depth_;
+};
+
+}  // namespace
+
 PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
                       uint32_t log2Cells) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
-    TriangleCutter cutter(mesh, origin, int(log2Cells) + 1);
-    for (const uint32_t k : triangles) cutter.cut(k);
+    const int depth = int(log2Cells) + 1;
     PageSurface surface;
-    surface.halves = cutter.take();
+    SurfaceCutter(mesh, origin, depth).run(triangles, {glm::ivec3(0), depth}, surface.halves);
     surface.cells = foldCells(surface.halves);
     return surface;
 }

@@ -46,10 +46,15 @@ SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes);
 StoredPage storedSurface(const PageSurface& surface);
 PageSurface surfaceFrom(const StoredPage& stored);
 
+/// surfaceOf has no more pieces of triangles in memory at a time, unless they are all in half a cell.
+inline constexpr size_t kMostPieces = 1 << 19;
+
 /// Returns the bytes that surfaceOf needs for triangles with so large areas and perimeters together, in cells: a piece
-/// for each half cell that a triangle touches.
+/// for each half cell that a triangle touches, and the cells themselves where the pieces come in parts.
 constexpr uint64_t surfaceWorkBytes(uint64_t triangles, double area, double perimeter) {
-    return 160 * uint64_t(7 * area + 3 * perimeter + 2 * double(triangles));
+    const double pieces = 7 * area + 3 * perimeter + 2 * double(triangles);
+    if (pieces < double(kMostPieces)) return uint64_t(160 * pieces);
+    return 160 * kMostPieces + (64 << 20) + 160 * triangles;
 }
 
 }  // namespace vcp

@@ -49,7 +49,17 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     return source;
 }
 
+bool TriangleCutter::mayReach(uint32_t triangle) const {
+    constexpr int kSteps = kLatticePerCell / 2;  // an edge of the cutter's cells
+    const auto& [a, b, c] = mesh_.triangles[triangle];
+    const glm::i32vec3 &p = mesh_.positions[a], &q = mesh_.positions[b], &r = mesh_.positions[c];
+    const glm::i32vec3 low = origin_ + within_.lower * kSteps, high = low + (kSteps << within_.log2Edge);
+    return glm::all(glm::lessThanEqual(glm::min(p, glm::min(q, r)), high)) &&
+           glm::all(glm::greaterThanEqual(glm::max(p, glm::max(q, r)), low));
+}
+
 void TriangleCutter::cut(uint32_t triangle) {
+    if (!mayReach(triangle)) return;
     source_ = sourceOf(triangle);
     Polygon piece;
     clipToBox(source_.corners, glm::dvec3(0), glm::dvec3(std::ldexp(1.0, depth_)), piece);
@@ -74,15 +84,21 @@ TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, glm::i
         differ |= first[axis] ^ last[axis];
     }
     const int bits = int(std::bit_width(unsigned(differ)));
-    OctreeBox box{first >> bits << bits, bits, {}};
+    OctreeBox box{{first >> bits << bits, bits}, {}};
     if (bits > 0)
         for (int axis = 0; axis < 3; ++axis)
             box.halves[size_t(axis)] = 1u << (first[axis] >> (bits - 1) & 1) | 1u << (last[axis] >> (bits - 1) & 1);
     return box;
 }
 
+bool TriangleCutter::isWanted(const CutterBox& box) const {
+    const int bits = std::max(box.log2Edge, within_.log2Edge);
+    return box.lower >> bits == within_.lower >> bits;
+}
+
 void TriangleCutter::split(const Polygon& piece, glm::ivec3 lower, int log2Edge) {
     const OctreeBox box = boxAround(piece, lower, log2Edge);
+    if (!isWanted(box)) return;
     if (box.log2Edge == 0) return keep(piece, box.lower);
     const int half = 1 << (box.log2Edge - 1);
     const glm::dvec3 middle(box.lower + half);
