@@ -72,8 +72,7 @@ public:
             ++measures_.degenerateTriangles;
             return {};
         }
-        const double longest =
-            std::sqrt(std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)}));
+        const double longest = longestEdge(a, b, c);
         if (std::isfinite(twice) && std::isfinite(longest)) {
             area_.add(twice / 2);
             length_.add(longest);

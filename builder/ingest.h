@@ -1,10 +1,12 @@
 // Ingest: mesh files become a soup of triangles in world space, measured; and the grid that will hold it.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include "builder/build.h"
@@ -43,6 +45,11 @@ struct SoupMeasures {
     bool hasVertexColours = false;
     bool hasMaterials = false;  ///< some have a colour other than white, or an image
 };
+
+/// Returns the length of a triangle's longest edge.
+inline double longestEdge(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+    return std::sqrt(std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)}));
+}
 
 /// The triangles of all inputs. Most files hold floats, which take half the room.
 struct Soup {
