@@ -56,7 +56,7 @@ TEST_F(TempFolderTest, IsMadeMarkedAndRemoved) {
 TEST_F(TempFolderTest, RemovesItsOwnFilesOnly) {
     TempFolder temp(place());
     ASSERT_TRUE(temp.take().ok());
-    const char* const own[] = {"level0.spill",   "level12.spill", "waiting3.spill", "waiting.spill",  "pages3.spill",
+    const char* const own[] = {"level1.spill",   "level12.spill", "waiting3.spill", "waiting.spill",  "pages3.spill",
                                "entries3.spill", "floats.spill",  "doubles.spill",  "vertices.spill", "journal"};
     const char* const others[] = {"diary.txt",        "my.spill", "level.txt", "levels3.spill",
                                   "level3.spill.bak", "3.spill",  ".spill"};
@@ -213,14 +213,14 @@ TEST_F(TempFolderTest, BuildsLeaveWhatIsNotTheirs) {
     write(place() / kTempMark, "");
     write(folder_ / "victim");
     fs::remove(place() / "journal");
-    fs::create_symlink(folder_ / "victim", place() / "level0.spill");
+    fs::create_symlink(folder_ / "victim", place() / "level1.spill");
     options.resume = false;
     const auto report = buildOctree(options);
     ASSERT_FALSE(report.ok());
-    EXPECT_NE(report.error().line().find("level0.spill: a build makes this file itself"), std::string::npos)
+    EXPECT_NE(report.error().line().find("level1.spill: a build makes this file itself"), std::string::npos)
         << report.error().line();
     EXPECT_EQ(contentOf(folder_ / "victim"), "text");
-    EXPECT_TRUE(fs::is_symlink(place() / "level0.spill"));
+    EXPECT_TRUE(fs::is_symlink(place() / "level1.spill"));
 }
 
 }  // namespace
