@@ -24,22 +24,20 @@ Result<UpdateResult> PictureRenderer::settle(const FrameRequest& request, const 
     }
 }
 
-Result<FrameStats> PictureRenderer::renderSamples(const FrameRequest& request, uint32_t samples,
-                                                  const std::function<bool()>& cancel) {
-    const auto began = std::chrono::steady_clock::now();
+Result<void> PictureRenderer::refineTo(uint32_t samples, const FrameRequest& request,
+                                       const std::function<bool()>& cancel,
+                                       const std::function<void(uint32_t samples)>& progress) {
     const uint32_t wanted = samplesOf(request, samples);
-    VCP_TRY_ASSIGN(auto stats, render(request, cancel));
     for (uint32_t drawn = 1; drawn < wanted;) {
         VCP_TRY_ASSIGN(drawn, refine(cancel));
-        if (drawn > 0) continue;
-        VCP_TRY(settle(request, cancel));
-        VCP_TRY_ASSIGN(stats, render(request, cancel));
-        drawn = 1;
+        if (drawn == 0) {
+            VCP_TRY(settle(request, cancel));
+            VCP_TRY(render(request, cancel));
+            drawn = 1;
+        }
+        if (progress) progress(drawn);
     }
-    if (wanted == 1) return stats;
-    stats.rays *= wanted;
-    stats.msFrame = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
-    return stats;
+    return {};
 }
 
 }  // namespace vcp

@@ -67,10 +67,11 @@ public:
     /// anew. `cancel` as in render(); after Cancelled it may be called again. Errors: Usage, where the picture has all
     /// its samples (samplesOf), or its request names a sample itself; Limit, where the picture is too large; Device.
     virtual Result<uint32_t> refine(const std::function<bool()>& cancel = {}) = 0;
-    /// Calls render(), and refine() until the picture has samplesOf(request, samples); where it has to begin anew,
-    /// settles before. Returns the statistics of render(), but rays and msFrame of all samples together.
-    Result<FrameStats> renderSamples(const FrameRequest& request, uint32_t samples,
-                                     const std::function<bool()>& cancel = {});
+    /// Calls refine() until the last picture, of `request`, has samplesOf(request, samples); where that begins anew,
+    /// settles and renders before. `progress`, where there is one, is told how many there are. Errors: those of
+    /// settle(), render() and refine().
+    Result<void> refineTo(uint32_t samples, const FrameRequest& request, const std::function<bool()>& cancel = {},
+                          const std::function<void(uint32_t samples)>& progress = {});
 
     /// Returns the last picture. Errors: Usage, where nothing was drawn yet; Device.
     virtual Result<Picture> readPicture() = 0;

@@ -157,8 +157,9 @@ protected:
     [[nodiscard]] std::vector<PictureRenderer*> both() const { return {host_.get(), renderer_.get()}; }
     static FrameStats sampled(PictureRenderer& renderer, const FrameRequest& request, uint32_t samples) {
         EXPECT_TRUE(renderer.settle(request));
-        const auto stats = renderer.renderSamples(request, samples);
+        const auto stats = renderer.render(request);
         EXPECT_TRUE(stats) << stats.error().line();
+        EXPECT_TRUE(renderer.refineTo(samples, request));
         return stats ? *stats : FrameStats{};
     }
     /// Compares a refined picture with the mean of its samples, drawn one by one.
@@ -301,7 +302,6 @@ TEST_F(SamplesTest, OneSampleMakesNothing) {
     EXPECT_EQ(renderer_->readPicture().value(), picture);
     const FrameStats refined = sampled(*renderer_, request, 4);
     EXPECT_EQ(refined.hitPixels, first.hitPixels);
-    EXPECT_EQ(refined.rays, 4 * first.rays);
     EXPECT_EQ(renderer_->render(request)->pipelines, first.pipelines + 1) << "one that accumulates";
     EXPECT_EQ(renderer_->readPicture().value(), picture) << "the next picture begins anew";
 }
@@ -355,7 +355,11 @@ TEST_F(SamplesTest, CancelledBetweenSamplesItGoesOn) {
         EXPECT_EQ(renderer->refine().value(), 3u);
         EXPECT_EQ(renderer->refine().value(), 4u);
         EXPECT_EQ(renderer->readPicture().value(), expected);
-        EXPECT_EQ(renderer->renderSamples(request, 64, [] { return true; }).error().code, ErrorCode::Cancelled);
+        uint32_t told = 4;
+        const auto stopped = renderer->refineTo(
+            64, request, [&] { return told > 5; }, [&](uint32_t samples) { told = samples; });
+        EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+        EXPECT_EQ(told, 6u);
     }
 }
 
@@ -372,7 +376,7 @@ TEST_F(SamplesTest, ALostDeviceBeginsAnew) {
         options.faults.lostAtSubmission = lostAt;
         start(options);
         show(scene);
-        ASSERT_TRUE(renderer_->settle(request) && renderer_->renderSamples(request, 4));
+        ASSERT_TRUE(renderer_->settle(request) && renderer_->render(request) && renderer_->refineTo(4, request));
         EXPECT_EQ(renderer_->update(request)->deviceLosses, 1u);
         EXPECT_EQ(renderer_->readPicture().value(), expected);
     }

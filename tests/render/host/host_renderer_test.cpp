@@ -32,8 +32,9 @@ struct Planes {
 Planes drawnBy(PictureRenderer& renderer, const FrameRequest& request, uint32_t samples = 1) {
     Planes planes;
     planes.update = renderer.settle(request).value();
-    const auto stats = renderer.renderSamples(request, samples);
+    const auto stats = renderer.render(request);
     EXPECT_TRUE(stats) << stats.error().line();
+    EXPECT_TRUE(renderer.refineTo(samples, request));
     planes.picture = renderer.readPicture().value();
     planes.depth = renderer.readDepth().value();
     planes.normals = renderer.readNormals().value();
