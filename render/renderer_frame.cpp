@@ -286,7 +286,7 @@ Result<void> Renderer::waitForFrame() {
 const std::optional<DoneFrame>& Renderer::lastDone() const { return view_->lastDone; }
 
 Result<void> Renderer::View::takeInDone() {
-    std::array<Frame*, kFramesAhead> order;
+    std::array<Frame*, std::tuple_size_v<decltype(frames)>> order;
     std::transform(frames.begin(), frames.end(), order.begin(), [](Frame& frame) { return &frame; });
     std::sort(order.begin(), order.end(), [](const Frame* a, const Frame* b) { return a->submission < b->submission; });
     for (Frame* frame : order)

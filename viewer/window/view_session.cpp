@@ -154,6 +154,8 @@ Result<NextStep> ViewSession::update(double now) {
     takePicked();
     goOnSaving();
     noteChanges();
+    // What is saved or built has the processors and the device for itself.
+    viewer_->setSamples(saving_ || opening_ ? 1 : options_.samples);
     auto next = viewer_->update(now);
     if (!next) return next;
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
