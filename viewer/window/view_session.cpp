@@ -296,7 +296,7 @@ void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path
                                    .files = std::move(files),
                                    .isNumbered = isSequence,
                                    .tile = kSavedTile,
-                                   .samples = kUsualSamples,
+                                   .samples = std::min(options_.samples, kUsualSamples),
                                    .problem = [this](const Error& problem) { say(problem.line()); }};
     for (const OrbitCamera& camera : cameras) options.cameras.push_back(camera.current());
     auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
