@@ -382,5 +382,60 @@ TEST_F(SamplesTest, ALostDeviceBeginsAnew) {
     }
 }
 
+TEST_F(SamplesTest, WithoutMemoryForSamplesThePoolIsHalved) {
+    const Scene scene = test::sphereScene(4);
+    FrameRequest request = requestOf(test::cameras(scene)[0].camera, 400, 300);
+    request.errorPixels = 0.001;
+    RendererOptions options;
+    options.faults.memoryBytes = 9 << 20;
+    start(options);
+    show(scene);
+    const uint64_t pool = draw(request).poolBytes;
+    ASSERT_TRUE(renderer_->refineTo(3, request));
+    const Picture picture = renderer_->readPicture().value();
+    const uint64_t smaller = renderer_->render(request)->poolBytes;
+    EXPECT_LT(smaller, pool);
+    EXPECT_GT(smaller, 0u);
+    // A pool of that size from the beginning shows the same.
+    RendererOptions plain;
+    plain.budgetBytes = smaller;
+    start(plain);
+    show(scene);
+    sampled(*renderer_, request, 3);
+    EXPECT_EQ(renderer_->readPicture().value(), picture);
+}
+
+TEST_F(SamplesTest, APartInFlightMayLoseAll) {
+    const Scene sphere = test::sphereScene(), torus = test::torusScene();
+    const FrameRequest request = requestOf(test::cameras(sphere)[0].camera);
+    start();
+    show(sphere);
+    const auto drawPart = [&] {
+        ASSERT_TRUE(renderer_->settle(request));
+        ASSERT_TRUE(renderer_->renderAhead(request));
+        EXPECT_EQ(renderer_->refineAhead().value(), 2u);
+        EXPECT_TRUE(renderer_->isDrawing());
+    };
+    drawPart();
+    ASSERT_TRUE(renderer_->setBudgets(uint64_t{2} << 20, uint64_t{8} << 20));
+    EXPECT_EQ(renderer_->refineAhead().value(), 0u);
+    drawPart();
+    show(torus);
+    EXPECT_EQ(renderer_->refineAhead().value(), 0u);
+    drawPart();
+    ASSERT_TRUE(renderer_->open({{torus.dataset, torus.source, {}}, {sphere.dataset, sphere.source, {}}}));
+    EXPECT_EQ(renderer_->refineAhead().value(), 0u);
+    drawPart();
+    renderer_->close();
+    EXPECT_EQ(renderer_->refineAhead().value(), 0u);
+    drawPart();  // of the background
+    {
+        const auto other = renderer_->addView();
+        ASSERT_TRUE(other);
+        EXPECT_EQ((*other)->refineAhead().value(), 0u);
+    }
+    drawPart();
+}
+
 }  // namespace
 }  // namespace vcp
