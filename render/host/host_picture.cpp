@@ -263,7 +263,7 @@ HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> backg
 void SampledLight::add(std::span<const uint32_t> colours) {
     static const std::array<float, 256> kLight = [] {
         std::array<float, 256> light;
-        for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOf(glm::vec3(float(i) / 255)).x;
+        for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOfColour(glm::vec3(float(i) / 255)).x;
         return light;
     }();
     sums_.resize(colours.size(), glm::vec4(0));
@@ -279,7 +279,7 @@ std::vector<uint32_t> SampledLight::mean() const {
     std::vector<uint32_t> colours(sums_.size());
     std::ranges::transform(sums_, colours.begin(), [this](const glm::vec4& sum) {
         const glm::vec3 light = glm::vec3(sum) / std::max(sum.w, 1.0f);
-        return glm::packUnorm4x8(glm::vec4(f32::encodedLightOf(light), sum.w / float(samples_)));
+        return glm::packUnorm4x8(glm::vec4(f32::colourOfLight(light), sum.w / float(samples_)));
     });
     return colours;
 }

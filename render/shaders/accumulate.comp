@@ -15,7 +15,7 @@ layout(set = 0, binding = 19, std430) buffer ShownPictureBlock { uint shownPixel
 
 vec4 seenLight(uint word) {
     vec4 colour = unpackUnorm4x8(word);
-    return vec4(lightOf(colour.rgb) * colour.a, colour.a);
+    return vec4(lightOfColour(colour.rgb) * colour.a, colour.a);
 }
 
 void main() {
@@ -26,5 +26,5 @@ void main() {
     vec4 sum = before + seenLight(partPixels[(pixel.y + frame.skippedRows) * frame.width + pixel.x]);
     sums[at] = sum;
     shownPixels[at] =
-        packUnorm4x8(vec4(encodedLightOf(sum.rgb / max(sum.a, 1.0)), sum.a / float(frame.sampleNumber + 1u)));
+        packUnorm4x8(vec4(colourOfLight(sum.rgb / max(sum.a, 1.0)), sum.a / float(frame.sampleNumber + 1u)));
 }

@@ -45,8 +45,8 @@ INLINE Real skyBehind(Real part) {
 }
 
 // Returns the light of a colour that is encoded for the screen, and the colour of light.
-INLINE Real3 lightOf(Real3 encoded) { return pow(encoded, Real3(2.2f)); }
-INLINE Real3 encodedLightOf(Real3 light) { return pow(light, Real3(1.0f / 2.2f)); }
+INLINE Real3 lightOfColour(Real3 encoded) { return pow(encoded, Real3(2.2f)); }
+INLINE Real3 colourOfLight(Real3 light) { return pow(light, Real3(1.0f / 2.2f)); }
 
 // Maps 0 to 1 from blue through green to red.
 INLINE Real3 heat(Real x) {

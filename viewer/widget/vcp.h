@@ -372,7 +372,7 @@ typedef struct vcp_stats {
     uint32_t relaxed;       /* 1: the budget is too small for the look's error_pixels */
     uint32_t reduction;     /* the picture has 1/reduction of the width and height */
     uint32_t device_losses; /* device losses that were repaired */
-    uint64_t frames;        /* frames rendered so far */
+    uint64_t frames;        /* frames rendered so far; each sample of a picture is one */
     double frame_ms;
     double error_pixels; /* largest projected certified error in the picture */
     uint64_t rays, hit_pixels;
