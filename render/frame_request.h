@@ -37,6 +37,8 @@ struct SectionPlane {
 constexpr size_t kMostSections = 6;
 /// Rays of ambient occlusion a pixel: at most, and where it is only switched on.
 constexpr uint32_t kMostOcclusionRays = 64, kUsualOcclusionRays = 8;
+/// Samples a pixel: at most, and of a picture where no number is asked for.
+constexpr uint32_t kMostSamples = 64, kUsualSamples = 16;
 
 struct Shading {
     ShadingMode mode = ShadingMode::Lit;
@@ -71,6 +73,7 @@ struct FrameRequest {
     Camera camera;                        ///< camera of the whole picture, where this one is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each
     std::optional<PictureTile> tile;      ///< absent: the picture is the whole
+    uint32_t sample = 0;                  ///< where in its pixel each ray goes (pixel_samples.h): 0: the middle
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
     std::vector<SectionPlane> sections;  ///< at most kMostSections

@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "render/pixel_samples.h"
+
 namespace vcp {
 
 static_assert(kMostSections == frame::kMaxSections);
@@ -46,12 +48,14 @@ frame::uint shadingMode(ShadingMode mode) {
 struct PicturePlane {
     glm::dvec3 corner, stepX, stepY;
 };
-PicturePlane picturePlane(const CameraBasis& basis, const PictureTile& tile) {
+PicturePlane picturePlane(const CameraBasis& basis, const FrameRequest& request) {
+    const PictureTile tile = wholePicture(request);
+    const glm::dvec2 corner = upperLeft(request);
     PicturePlane plane;
     plane.stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth);
     plane.stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
-    plane.corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + plane.stepX * double(tile.x) +
-                   plane.stepY * double(tile.y);
+    plane.corner =
+        basis.up * basis.halfHeight - basis.right * basis.halfWidth + plane.stepX * corner.x + plane.stepY * corner.y;
     return plane;
 }
 
@@ -128,7 +132,7 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     frame::FrameConstants c{};
     const FileHeader header = dataset != nullptr ? dataset->header : FileHeader{.cell = 1, .levels = 1, .log2Cells = 5};
     const CameraBasis basis = basisOf(request);
-    const PicturePlane plane = picturePlane(basis, wholePicture(request));
+    const PicturePlane plane = picturePlane(basis, request);
     if (request.camera.projection == Projection::Perspective) {
         c.direction = toVec4(basis.forward + plane.corner);
         c.directionX = toVec4(plane.stepX);
@@ -146,6 +150,7 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     setOrigin(c, (request.camera.eye - corner) / header.cell,
               std::ldexp(1.0, int(header.log2Cells + header.levels) - 1));
 
+    c.sampleNumber = request.sample;
     c.width = request.width;
     c.height = request.height;
     c.tilesX = (request.width + frame::kTileSize - 1) / frame::kTileSize;
@@ -172,6 +177,11 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
 
 PictureTile wholePicture(const FrameRequest& request) {
     return request.tile.value_or(PictureTile{0, 0, request.width, request.height});
+}
+
+glm::dvec2 upperLeft(const FrameRequest& request) {
+    const PictureTile tile = wholePicture(request);
+    return glm::dvec2(tile.x, tile.y) + sampleOffset(request.sample);
 }
 
 std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
@@ -220,6 +230,7 @@ Result<void> checkRequest(const FrameRequest& request) {
         whole.fullHeight > kLargestWhole || uint64_t{whole.x} + request.width > whole.fullWidth ||
         uint64_t{whole.y} + request.height > whole.fullHeight)
         return usage("a tile must lie within its picture, and that be at most 2^20 pixels wide and high");
+    if (request.sample >= kMostSamples) return usage("a pixel has at most 64 samples");
     if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
     const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up))

@@ -32,6 +32,10 @@ uint32_t hitPlanes(const FrameRequest& request, bool colour);
 /// Returns the tile that a request draws; the whole picture where it names none.
 PictureTile wholePicture(const FrameRequest& request);
 
+/// Returns where the upper left corner of the part that a request draws is seen, in pixels of the whole: where the
+/// tile begins, moved by the request's sample.
+glm::dvec2 upperLeft(const FrameRequest& request);
+
 /// Returns the picture's background, one RGBA8 word a row.
 std::vector<uint32_t> backgroundRows(const FrameRequest& request);
 

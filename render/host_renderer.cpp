@@ -10,6 +10,7 @@
 #include "octree/surface/morton.h"
 #include "render/frame_setup.h"
 #include "render/pages/host_page_memory.h"
+#include "render/pixel_samples.h"
 
 namespace vcp {
 
@@ -40,8 +41,9 @@ Result<void> checkDrawable(const PlacedDataset& placed) {
 PictureRays raysOf(const FrameRequest& request) {
     const PictureTile whole = wholePicture(request);
     PictureRays rays = pictureRays(request.camera, whole.fullWidth, whole.fullHeight);
-    rays.origin = rays.originAt(whole.x, whole.y);
-    rays.direction = rays.directionAt(whole.x, whole.y);
+    const glm::dvec2 corner = upperLeft(request);
+    rays.origin = rays.originAt(corner.x, corner.y);
+    rays.direction = rays.directionAt(corner.x, corner.y);
     rays.size = {int(request.width), int(request.height)};
     return rays;
 }
@@ -148,9 +150,7 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
     VCP_TRY(checkRequest(request));
     VCP_TRY(checkHostDraws(request));
     const auto began = std::chrono::steady_clock::now();
-    const HostCastOptions options{.cancel = cancel};
-    HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
-    for (size_t i = 0; i < datasets_.size(); ++i) VCP_TRY(drawDataset(i, request, options, picture));
+    VCP_TRY_ASSIGN(auto picture, draw(request, cancel));
     FrameStats stats{.rays = picture.depth.size(), .tracedRays = picture.depth.size()};
     for (const auto& [residency, placement] : datasets_) {
         stats.poolBytes += residency->pages().bytes();
@@ -160,14 +160,43 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
     stats.hitPixels = uint64_t(std::ranges::count_if(picture.depth, [](float depth) { return std::isfinite(depth); }));
     stats.msFrame = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
     drawn_ = std::move(picture);
+    request_ = request;
+    cuts_ = cuts();
+    light_ = {};
     return stats;
+}
+
+Result<HostPicture> HostRenderer::draw(const FrameRequest& request, const std::function<bool()>& cancel) {
+    const HostCastOptions options{.cancel = cancel};
+    HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
+    for (size_t i = 0; i < datasets_.size(); ++i) VCP_TRY(drawDataset(i, request, options, picture));
+    return picture;
+}
+
+std::vector<std::vector<uint64_t>> HostRenderer::cuts() const {
+    std::vector<std::vector<uint64_t>> all;
+    for (const auto& [residency, placement] : datasets_) all.push_back(residency->cut());
+    return all;
+}
+
+Result<uint32_t> HostRenderer::refine(const std::function<bool()>& cancel) {
+    if (!drawn_) return 0u;
+    const uint32_t samples = std::max(light_.samples(), 1u);
+    VCP_TRY(checkRefinable(request_, samples));
+    if (cuts() != cuts_) return 0u;
+    FrameRequest request = request_;
+    request.sample = samples;
+    VCP_TRY_ASSIGN(const auto more, draw(request, cancel));
+    if (samples == 1) light_.add(drawn_->colours);
+    light_.add(more.colours);
+    return light_.samples();
 }
 
 Result<Picture> HostRenderer::readPicture() {
     if (!drawn_) return kNothingDrawn;
-    Picture picture{uint32_t(drawn_->size.x), uint32_t(drawn_->size.y),
-                    std::vector<uint8_t>(drawn_->colours.size() * 4)};
-    std::memcpy(picture.rgba.data(), drawn_->colours.data(), picture.rgba.size());
+    const std::vector<uint32_t> colours = light_.samples() > 0 ? light_.mean() : drawn_->colours;
+    Picture picture{uint32_t(drawn_->size.x), uint32_t(drawn_->size.y), std::vector<uint8_t>(colours.size() * 4)};
+    std::memcpy(picture.rgba.data(), colours.data(), picture.rgba.size());
     return picture;
 }
 

@@ -32,6 +32,7 @@ public:
     Result<UpdateResult> update(const FrameRequest& request) override;
     void waitForPage(std::chrono::milliseconds timeout) override { vcp::waitForPage(datasets_, timeout); }
     Result<FrameStats> render(const FrameRequest& request, const std::function<bool()>& cancel = {}) override;
+    Result<uint32_t> refine(const std::function<bool()>& cancel = {}) override;
     Result<Picture> readPicture() override;
     Result<std::vector<float>> readDepth() override;
     Result<std::vector<glm::vec3>> readNormals() override;
@@ -40,6 +41,9 @@ public:
 
 private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
+    /// Draws all datasets.
+    Result<HostPicture> draw(const FrameRequest& request, const std::function<bool()>& cancel);
+    [[nodiscard]] std::vector<std::vector<uint64_t>> cuts() const;
     /// Draws the cut of one dataset over what is in the picture.
     Result<void> drawDataset(size_t number, const FrameRequest& request, const HostCastOptions& options,
                              HostPicture& picture);
@@ -47,8 +51,11 @@ private:
     const RendererOptions options_;
     const DeviceInfo info_;
     std::vector<PlacedResidency> datasets_;
-    std::vector<double> errorPixels_;  // of each dataset's last update
-    std::optional<HostPicture> drawn_;
+    std::vector<double> errorPixels_;          // of each dataset's last update
+    std::optional<HostPicture> drawn_;         // the last picture; its colours may be of fewer samples than light_
+    FrameRequest request_;                     // of that picture
+    std::vector<std::vector<uint64_t>> cuts_;  // that it shows
+    SampledLight light_;                       // none before the second sample
 };
 
 }  // namespace vcp

@@ -1,7 +1,8 @@
 // What draws pictures of datasets without a window: a Vulkan device (Renderer, renderer.h) or the processor alone
 // (HostRenderer, host_renderer.h). Whoever only wants pictures knows no more than this.
 //
-// A picture is settle(request), render(request), readPicture(). The same request and the same cut give the same bytes.
+// A picture is settle(request), render(request), readPicture(), with refine() before the last where edges are to be
+// smooth. The same request and the same cut give the same bytes.
 // One thread at a time may call a renderer.
 #pragma once
 
@@ -60,7 +61,19 @@ public:
     /// several threads: where it returns true, the processor stops with Cancelled; a device draws its frame to the end.
     virtual Result<FrameStats> render(const FrameRequest& request, const std::function<bool()>& cancel = {}) = 0;
 
-    /// Returns the picture of the last render(). Errors: Usage, where nothing was drawn yet; Device.
+    /// Adds one more sample (pixel_samples.h) to the last picture, which then shows the mean light of its samples;
+    /// depth, normals, iterations and statistics stay those of render(). Returns how many samples the picture has; 0
+    /// where it cannot go on, because pages or the device have changed since, or nothing was drawn: render() begins
+    /// anew. `cancel` as in render(); after Cancelled it may be called again. Errors: Usage, where the picture has all
+    /// its samples (samplesOf), or its request names a sample itself; Limit, where the picture is too large; Device.
+    virtual Result<uint32_t> refine(const std::function<bool()>& cancel = {}) = 0;
+    /// Calls refine() until the last picture, of `request`, has samplesOf(request, samples); where that begins anew,
+    /// settles and renders before. `progress`, where there is one, is told how many there are. Errors: those of
+    /// settle(), render() and refine().
+    Result<void> refineTo(uint32_t samples, const FrameRequest& request, const std::function<bool()>& cancel = {},
+                          const std::function<void(uint32_t samples)>& progress = {});
+
+    /// Returns the last picture. Errors: Usage, where nothing was drawn yet; Device.
     virtual Result<Picture> readPicture() = 0;
     /// Distances in world units along the unit ray; infinity where nothing is hit, not a number where the ray gave up.
     virtual Result<std::vector<float>> readDepth() = 0;

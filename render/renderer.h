@@ -12,6 +12,8 @@
 //     renderer->present(width, height);                // window only
 //   renderer->readPicture();                           // what render() drew
 //
+// A picture that stays gets smooth edges, sample by sample, with refine() or refineAhead().
+//
 // A window draws with renderAhead() in place of render(): then the CPU goes on while up to kFramesAhead frames are in
 // flight. What such a frame counted, what its rays asked for and what is under the cursor come back with its own
 // commands, and are taken in by the first update() or renderAhead() after its end: lastDone() is a frame or two behind
@@ -103,6 +105,10 @@ public:
     /// are in flight, for the older one. `cursor`: a pixel of the picture whose hit comes back with the frame. Errors:
     /// those of render(), also of frames before.
     Result<void> renderAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor = {});
+    /// Adds a part of the next sample (picture_parts.h) to the last picture, and returns when it is handed to the GPU.
+    /// Waits only where a part is in flight, for that. Returns how many whole samples the picture then has, and 0 as
+    /// refine() does. Errors: those of refine().
+    Result<uint32_t> refineAhead();
     /// Whether another frame should wait: on a software device as long as one is in flight, because it has the
     /// processors and the next one would only be older when it is shown; elsewhere while kFramesAhead are.
     [[nodiscard]] bool isBusy();
@@ -113,6 +119,8 @@ public:
     /// Returns the newest frame of this view that has ended and was taken in; nothing before the first, and after
     /// open() and close().
     [[nodiscard]] const std::optional<DoneFrame>& lastDone() const;
+
+    Result<uint32_t> refine(const std::function<bool()>& cancel = {}) override;
 
     Result<Picture> readPicture() override;
     Result<std::vector<float>> readDepth() override;

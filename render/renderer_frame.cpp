@@ -31,9 +31,13 @@ MesoLook mesoLook(const FrameRequest& request) {
     const PictureTile tile = wholePicture(request);
     const LightDirections directions =
         lightDirections(request, cameraBasis(request.camera, tile.fullWidth, tile.fullHeight));
-    return {request.camera,          tile,
-            directions.light,        directions.sky,
-            request.shading.shadows, mesoShading(request.shading.mode),
+    return {request.camera,
+            tile,
+            upperLeft(request),
+            directions.light,
+            directions.sky,
+            request.shading.shadows,
+            mesoShading(request.shading.mode),
             request.errorPixels};
 }
 
@@ -66,15 +70,18 @@ Result<void> Renderer::View::checkLimits(const Layer& layer, const FrameRequest&
                                    (words / (uint64_t{request.width} * request.height)))};
 }
 
-Result<void> Renderer::View::prepareTable(Layer& layer, LayerFrame& frame) {
+void Renderer::View::refreshTable(Layer& layer) const {
     const uint64_t version = layer.residency != nullptr ? layer.residency->version() : 0;
-    if (layer.tableStale || version != layer.tableVersion) {
-        auto next = layer.residency != nullptr ? layer.residency->table(number) : std::vector{frame::TableRecord{}};
-        if (layer.tableStale || next != layer.table) ++layer.tableNumber;
-        layer.table = std::move(next);
-        layer.tableVersion = version;
-        layer.tableStale = false;
-    }
+    if (!layer.tableStale && version == layer.tableVersion) return;
+    auto next = layer.residency != nullptr ? layer.residency->table(number) : std::vector{frame::TableRecord{}};
+    if (layer.tableStale || next != layer.table) ++layer.tableNumber;
+    layer.table = std::move(next);
+    layer.tableVersion = version;
+    layer.tableStale = false;
+}
+
+Result<void> Renderer::View::prepareTable(Layer& layer, LayerFrame& frame) {
+    refreshTable(layer);
     if (frame.tableNumber == layer.tableNumber) return {};
     VCP_TRY(frame.resources->setTable(layer.table));
     frame.tableNumber = layer.tableNumber;
@@ -85,7 +92,7 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     Layer& layer = layers[i];
     LayerFrame& drawing = frame.layers[i];
     drawing.request = layer.drawable(frame.request);
-    drawing.listened = layer.listens();
+    drawing.listened = layer.listens() && !frame.part;
     drawing.constants = constantsFor(layer, drawing.request);
     const FrameRequest& request = drawing.request;
     const PassConstants& constants = drawing.constants;
@@ -98,6 +105,10 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
         VCP_TRY(frame.target.resize(*shared->device, resources.size()));
         resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths());
         VCP_TRY(shared->compose.prepare(resources, constants));
+    }
+    if (frame.part && i == 0) {
+        resources.setSums(sums.buffer(), frames[*drawn].layers.front().resources->picture());
+        VCP_TRY(shared->accumulate.prepare(resources, constants));
     }
     VCP_TRY(shared->beam.prepare(resources, constants, request.beam));
     const SectionKind sections = request.sections.empty() ? SectionKind::None
@@ -125,6 +136,11 @@ void Renderer::View::record(VkCommandBuffer commands, Frame& frame, size_t i) {
                        shared->stripes, drawing.constants.colour, layer.errorPixels, layer.placement);
     c.feedbackX = shared->feedback.jitter().x;
     c.feedbackY = shared->feedback.jitter().y;
+    if (frame.part) {
+        c.partRow = frame.part->row;
+        c.partRows = frame.part->rows;
+        c.skippedRows = frame.part->skippedRows;
+    }
     resources.begin(commands, c);
     if (shared->composes() && i == 0) frame.target.clear(commands);
     timer.mark(commands, 0);
@@ -188,6 +204,7 @@ Result<FrameStats> Renderer::View::draw(const FrameRequest& request) {
     stats.submissions = shared->device->work().submissions - before.submissions;
     stats.hostWaits = shared->device->work().waits - before.waits;
     drawn = 0;
+    samples = 1, nextPart = 0;
     return stats;
 }
 
@@ -207,6 +224,7 @@ Result<void> Renderer::View::drawAhead(const FrameRequest& request, const std::o
     frame.stats.submissions = shared->device->work().submissions - before.submissions;
     frame.stats.hostWaits = shared->device->work().waits - before.waits;
     drawn = next;
+    samples = 1, nextPart = 0;
     return {};
 }
 
@@ -232,6 +250,7 @@ Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
         frame.stats.pagesInCut += uint32_t(residency->cut(number).size());
     }
     if (shared->meso) VCP_TRY(recordSurfaces(commands, frame));
+    if (frame.part) shared->accumulate.record(commands, *frame.layers.front().resources, frame.part->rows);
     frame.stats.feedbackPasses = shared->feedback.passes();
     frame.began = std::chrono::steady_clock::now();
     VCP_TRY_ASSIGN(const auto submission, shared->device->endCommands());
@@ -267,7 +286,7 @@ Result<void> Renderer::waitForFrame() {
 const std::optional<DoneFrame>& Renderer::lastDone() const { return view_->lastDone; }
 
 Result<void> Renderer::View::takeInDone() {
-    std::array<Frame*, kFramesAhead> order;
+    std::array<Frame*, std::tuple_size_v<decltype(frames)>> order;
     std::transform(frames.begin(), frames.end(), order.begin(), [](Frame& frame) { return &frame; });
     std::sort(order.begin(), order.end(), [](const Frame* a, const Frame* b) { return a->submission < b->submission; });
     for (Frame* frame : order)
@@ -285,6 +304,7 @@ Result<void> Renderer::View::takeInAll() {
 Result<void> Renderer::View::takeIn(Frame& frame) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - frame.began;
     frame.submission = 0;
+    if (frame.part) return {};
     FrameStats stats = frame.stats;
     for (size_t i = 0; i < frame.layers.size(); ++i) VCP_TRY(addStats(frame, i, stats));
     if (shared->composes()) stats.hitPixels = frame.target.hitPixels();

@@ -175,8 +175,8 @@ Result<std::optional<PixelHit>> Renderer::View::pick(PicturePixel pixel) {
 std::optional<PixelHit> Renderer::View::nearestHit(const FrameRequest& request, PicturePixel pixel,
                                                    std::span<const HitWords> words, const MesoReport& surfaces) const {
     const PictureTile whole = wholePicture(request);
-    const CameraRay ray =
-        cameraRay(request.camera, whole.fullWidth, whole.fullHeight, whole.x + pixel.x + 0.5, whole.y + pixel.y + 0.5);
+    const glm::dvec2 at = upperLeft(request) + glm::dvec2(pixel.x, pixel.y) + 0.5;
+    const CameraRay ray = cameraRay(request.camera, whole.fullWidth, whole.fullHeight, at.x, at.y);
     const auto hitAt = [&](double depth, glm::vec3 normal) {
         return PixelHit{.depth = depth, .position = ray.origin + ray.direction * depth, .normal = normal};
     };

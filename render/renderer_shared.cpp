@@ -85,6 +85,7 @@ void Renderer::Shared::clearPipelines() {
     shade.clear();
     feedback.clear();
     compose.clear();
+    accumulate.clear();
 }
 
 Result<void> Renderer::Shared::rebuild(View& asked) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render/page_pool.h"
+#include "render/passes/accumulate.h"
 #include "render/passes/beam.h"
 #include "render/passes/compose.h"
 #include "render/passes/feedback.h"
@@ -39,6 +40,7 @@ struct Renderer::Shared {
     ShadePass shade;
     FeedbackPass feedback;
     ComposePass compose;
+    AccumulatePass accumulate;
     /// The surfaces with mesostructure, and what draws them.
     struct Meso {
         std::vector<MesoSurface> surfaces;  // kept to be uploaded again

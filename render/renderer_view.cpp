@@ -132,6 +132,7 @@ void Renderer::View::release() {
     scaling.reset();
     layers.clear();
     frames = {};
+    sums = {};
 }
 
 Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {

@@ -1,5 +1,5 @@
 // A view of a renderer: camera, pictures and window of its own. Included by renderer.cpp (its life), renderer_frame.cpp
-// (drawing) and renderer_readback.cpp (what was drawn).
+// (drawing), renderer_refine.cpp (further samples) and renderer_readback.cpp (what was drawn).
 //
 // The life of a frame: it is recorded with resources that no frame in flight has, submitted as one submission, and,
 // when the device has ended it, taken in: its counts, what its rays asked for, and the hit under the cursor. Everything
@@ -10,12 +10,16 @@
 #include <array>
 #include <chrono>
 
+#include "render/picture_parts.h"
 #include "render/picture_scaling.h"
 #include "render/renderer_shared.h"
 #include "render/swapchain.h"
 #include "render/vulkan/pass_timer.h"
 
 namespace vcp {
+
+/// Number of the frame that draws parts of further samples (View::frames).
+constexpr size_t kRefiningFrame = kFramesAhead;
 
 /// Number of time marks of a dataset in a frame: one before the beam pass, and one after each pass.
 constexpr uint32_t kPassMarks = 6;
@@ -64,6 +68,7 @@ struct Renderer::View {
         MesoTarget surfaces;
         PassTimer surfacesTimer;
         FrameRequest request;
+        std::optional<PicturePart> part;  // what is added to the last picture, where this is no picture of its own
         std::optional<PicturePixel> cursor;
         FrameStats stats;  // what is known when it is submitted
         std::chrono::steady_clock::time_point began;
@@ -79,8 +84,12 @@ struct Renderer::View {
     std::unique_ptr<Swapchain> swapchain;
     std::unique_ptr<PictureScaling> scaling;  // scales to the host's images; made on first use
     std::vector<Layer> layers;                // one for each dataset, and at least one
-    std::array<Frame, kFramesAhead> frames;   // render() draws with the first one only
-    std::optional<size_t> drawn;              // number of the frame with the last picture
+    /// render() draws with the first one only; the last one is for parts of further samples, and is as small.
+    std::array<Frame, kFramesAhead + 1> frames;
+    std::optional<size_t> drawn;  // number of the frame with the last picture, and with its hits
+    SampleSums sums;              // of that picture
+    uint32_t samples = 1;         // that it has
+    uint32_t nextPart = 0;        // of the sample that is being added
     std::optional<DoneFrame> lastDone;
     uint64_t framesDone = 0;  // counts those that were taken in
     uint64_t mesoSeen = 0;    // Shared::mesoVersion of the last update
@@ -109,9 +118,12 @@ struct Renderer::View {
     /// Draws a frame and waits for it.
     Result<FrameStats> draw(const FrameRequest& request);
     Result<void> drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor);
+    /// Draws the next part of a further sample; as Renderer::refineAhead().
+    Result<uint32_t> drawPart();
     Result<void> submit(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor);
     Result<void> checkLimits(const Layer& layer, const FrameRequest& request) const;
     [[nodiscard]] PassConstants constantsFor(const Layer& layer, const FrameRequest& request) const;
+    void refreshTable(Layer& layer) const;
     Result<void> prepareTable(Layer& layer, LayerFrame& frame);
     Result<void> prepare(Frame& frame, size_t layer);
     void record(VkCommandBuffer commands, Frame& frame, size_t layer);

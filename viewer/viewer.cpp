@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "render/pixel_samples.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
@@ -157,7 +158,10 @@ Result<void> Viewer::setBudget(uint64_t bytes) {
     return {};
 }
 
-void Viewer::resize(glm::ivec2 size) { size_ = glm::clamp(size, glm::ivec2(0), glm::ivec2(16384)); }
+void Viewer::resize(glm::ivec2 size) {
+    mostSamples_ = kMostSamples;
+    size_ = glm::clamp(size, glm::ivec2(0), glm::ivec2(16384));
+}
 
 std::optional<PixelHit> Viewer::hitAt(glm::dvec2 pixel) {
     if (!drawn_ || !hasSize()) return std::nullopt;
@@ -499,14 +503,30 @@ Result<NextStep> Viewer::update(double now) {
     return nextStep(now);
 }
 
-NextStep Viewer::nextStep(double now) const {
+/// Whether the last update's request leaves something out because the camera moves.
+bool Viewer::isCheaper() const {
+    return requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
+}
+
+bool Viewer::isAtRest() const { return status_.update.settled && !isCheaper() && !isSentSomewhere(); }
+
+bool Viewer::wantsSamples() const {
+    return isOpen_ && drawn_ == request_ && !pagesChanged_ && isAtRest() &&
+           status_.samples < std::min(mostSamples_, samplesOf(request_, options_.samples));
+}
+
+NextStep Viewer::nextStep(double now) {
     NextStep next;
     // Without a dataset, and where its coarsest page cannot be read, the background is shown.
     const bool canDraw = status_.update.drawable || !status_.problem.empty() || !isOpen_;
-    next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now));
+    const bool isNew = !drawn_ || *drawn_ != request_ || refinementIsDue(now);
+    addsSample_ = !isNew && !isMoving(now) && wantsSamples();
+    next.draw = canDraw && (isNew || addsSample_);
+    const bool samplesFollow =
+        isNew ? canDraw && isOpen_ && isAtRest() && samplesOf(request_, options_.samples) > 1 : wantsSamples();
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
-    const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
-    if (isCheaper) next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
+    if (isCheaper() || samplesFollow)
+        next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
     if (isSentSomewhere()) next.waitSeconds = 0;
     // What a frame in flight tells is taken in by the next update.
     if (renderer_->isDrawing()) next.waitSeconds = std::min(next.waitSeconds, kLoadingPollSeconds);
@@ -519,7 +539,20 @@ Result<bool> Viewer::waitForFrame() {
     return true;
 }
 
-Result<void> Viewer::draw() {
+/// Draws a part of a sample. Where a device cannot add any to so large a picture, it stays as it is.
+Result<bool> Viewer::drawSample() {
+    const auto samples = renderer_->refineAhead();
+    if (!samples && samples.error().code != ErrorCode::Limit) return samples.error();
+    if (!samples) mostSamples_ = status_.samples;
+    if (samples && *samples == 0) drawn_.reset();
+    if (!samples || *samples <= status_.samples) return false;
+    status_.samples = *samples;
+    ++framesDrawn_;
+    return true;
+}
+
+Result<bool> Viewer::draw() {
+    if (addsSample_) return drawSample();
     if (options_.framesAhead) {
         const glm::dvec2 cursor = cursor_ * glm::dvec2(request_.width, request_.height) / glm::dvec2(size_);
         const bool isInside = cursor.x >= 0 && cursor.y >= 0 && cursor.x < request_.width && cursor.y < request_.height;
@@ -530,6 +563,7 @@ Result<void> Viewer::draw() {
     }
     if (renderer_->lastDone()) takeStats(*renderer_->lastDone());
     status_.reduction = requestReduction_;
+    status_.samples = 1;
     const bool wantsLight =
         request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
     status_.without = isPaper_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
@@ -537,7 +571,7 @@ Result<void> Viewer::draw() {
     drawn_ = request_;
     drawnAt_ = now_;
     pagesChanged_ = false;
-    return {};
+    return true;
 }
 
 /// Takes a frame's statistics for the status, and for the size of frames while the camera moves.

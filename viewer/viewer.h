@@ -4,7 +4,7 @@
 //
 //   viewer->resize(size); viewer->press(...); viewer->move(...); viewer->key(...);
 //   next = viewer->update(now);          // never waits; takes in pages, chooses the resolution
-//   if (next.draw) { viewer->draw(); viewer->renderer().present(...); }
+//   if (next.draw && viewer->draw()) viewer->renderer().present(...);
 //   wait for events, at most next.waitSeconds
 //
 // A camera that is sent somewhere (act, moveTo, centreOn) goes there smoothly, and stops where it is as soon as the
@@ -12,7 +12,9 @@
 //
 // Nothing is drawn unless the picture would differ: the camera, the size, the light, or the pages it is made
 // of have changed. While the camera moves and a frame is slow, frames are drawn at a part of the resolution;
-// once it rests, at all of it. Pages load in the background meanwhile and the picture refines.
+// once it rests, at all of it. Pages load in the background meanwhile and the picture refines. When all is there and
+// nothing moves, each draw() adds a part of a further sample (Renderer::refineAhead) until the picture has
+// options.samples: any change begins with a whole picture of one sample again.
 //
 // Pixels are of the framebuffer, origin at the upper left. Time is what the host says it is: seconds, never
 // going back. One thread; several viewers may exist. Nothing here knows of a window system.
@@ -70,6 +72,7 @@ struct ViewerOptions {
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
     double movingFrameMs = 50;
     double moveSeconds = 0.3;  ///< time that a smooth move takes; 0: at once
+    uint32_t samples = 1;      ///< of a picture at rest (samplesOf in render/pixel_samples.h)
     /// draw() returns when the frame is handed to the GPU (Renderer::renderAhead), for hosts that only show pictures.
     /// The status then tells of the newest frame that has ended. Such a host calls waitForFrame() before it draws.
     bool framesAhead = false;
@@ -88,8 +91,9 @@ struct ViewerStatus {
     uint64_t triangles = 0;
     uint32_t levels = 0;
     UpdateResult update;
-    FrameStats frame;   ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
-    int reduction = 1;  ///< the last picture has 1/reduction of the width and height
+    FrameStats frame;      ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
+    int reduction = 1;     ///< the last picture has 1/reduction of the width and height
+    uint32_t samples = 0;  ///< whole samples of the last picture
     std::string device;
     bool software = false;
     uint64_t budgetBytes = 0;
@@ -151,8 +155,13 @@ public:
 
     /// Takes in pages and says what to do next. Errors: those of Renderer::update; problems of pages go to the status.
     Result<NextStep> update(double now);
-    /// Draws what the last update chose.
-    Result<void> draw();
+    /// Draws what the last update chose: a picture, or a part of a sample of the last one. Returns whether there is
+    /// something new to present: a picture or a whole sample.
+    Result<bool> draw();
+    /// Whether nothing is missing and nothing moves, so that the picture is drawn as it is to stay.
+    [[nodiscard]] bool isAtRest() const;
+    /// Whether the last picture is still to have further samples.
+    [[nodiscard]] bool wantsSamples() const;
     /// Waits until a frame that is drawn now would not wait itself for those in flight, where it is drawn ahead.
     /// Returns whether it waited: then the host looks for input and calls update() again, so that the frame shows the
     /// newest.
@@ -199,6 +208,9 @@ public:
     [[nodiscard]] SectionGrab sectionGrab() const;
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
+    [[nodiscard]] uint32_t samples() const { return options_.samples; }
+    /// Sets how many samples pictures have at rest, 1 to kMostSamples; a picture with more keeps them.
+    void setSamples(uint32_t samples) { options_.samples = samples; }
     /// Sets the budget of the page pool, from now on. Errors: those of Renderer::setBudgets.
     Result<void> setBudget(uint64_t bytes);
     [[nodiscard]] const ViewerStatus& status() const { return status_; }
@@ -222,7 +234,9 @@ private:
     [[nodiscard]] int reductionAt(double now) const;
     [[nodiscard]] FrameRequest requestWith(int reduction) const;
     [[nodiscard]] bool refinementIsDue(double now) const;
-    [[nodiscard]] NextStep nextStep(double now) const;
+    [[nodiscard]] NextStep nextStep(double now);
+    Result<bool> drawSample();
+    [[nodiscard]] bool isCheaper() const;
     void takeStats(const DoneFrame& done);
     glm::dvec3 pointOfInterest(glm::dvec2 pixel);
     void toggleLight();
@@ -271,6 +285,8 @@ private:
     double fullFrameMs_ = 0;
     int movingReduction_ = 1;  // grows within a motion, never shrinks: a size that flickers is worse than a small one
     bool pagesChanged_ = false;
+    bool addsSample_ = false;              // the next draw does
+    uint32_t mostSamples_ = kMostSamples;  // that the device can add to a picture of this size
     uint64_t framesDrawn_ = 0;
     ViewerStatus status_;
 };

@@ -1,6 +1,7 @@
 #include "render/host/host_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -165,8 +166,8 @@ private:
         for (uint32_t number = 0; number < sky; ++number) {
             size_t count = 0;
             forEachHit(hits, [&](glm::ivec2 pixel, int i) {
-                const glm::vec3 direction =
-                    f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x), uint32_t(pixel.y));
+                const glm::vec3 direction = f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x),
+                                                              uint32_t(pixel.y), frame_.sampleNumber);
                 rays[count++] = {origins[i], direction, reach};
             });
             castLightRays(layer_.scene, {rays, count}, distances);
@@ -257,6 +258,30 @@ HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> backg
       normals(colours.size(), glm::vec3(0)) {
     for (size_t y = 0; y < size_t(size.y); ++y)
         std::fill_n(colours.begin() + std::ptrdiff_t(y * size_t(size.x)), size.x, background[y]);
+}
+
+void SampledLight::add(std::span<const uint32_t> colours) {
+    static const std::array<float, 256> kLight = [] {
+        std::array<float, 256> light;
+        for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOfColour(glm::vec3(float(i) / 255)).x;
+        return light;
+    }();
+    sums_.resize(colours.size(), glm::vec4(0));
+    for (size_t i = 0; i < colours.size(); ++i) {
+        const uint32_t c = colours[i];
+        const float alpha = float(c >> 24) / 255;
+        sums_[i] += glm::vec4(glm::vec3(kLight[c & 255], kLight[c >> 8 & 255], kLight[c >> 16 & 255]) * alpha, alpha);
+    }
+    ++samples_;
+}
+
+std::vector<uint32_t> SampledLight::mean() const {
+    std::vector<uint32_t> colours(sums_.size());
+    std::ranges::transform(sums_, colours.begin(), [this](const glm::vec4& sum) {
+        const glm::vec3 light = glm::vec3(sum) / std::max(sum.w, 1.0f);
+        return glm::packUnorm4x8(glm::vec4(f32::colourOfLight(light), sum.w / float(samples_)));
+    });
+    return colours;
 }
 
 Result<void> drawLayer(const HostLayer& layer, const HostCastOptions& options, HostPicture& picture) {

@@ -10,6 +10,7 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include "render/host/host_caster.h"
 #include "render/shared/frame.h"
@@ -25,6 +26,20 @@ struct HostPicture {
     std::vector<uint32_t> colours;   ///< RGBA8
     std::vector<float> depth;        ///< world units along the unit ray; infinite where nothing is hit
     std::vector<glm::vec3> normals;  ///< unit, world axes, towards the viewer; 0 where nothing is hit
+};
+
+/// The light of a picture's samples: of each pixel the sum of light times alpha, and of alpha.
+class SampledLight {
+public:
+    /// Adds a sample's colours, RGBA8. Precondition: as many as before.
+    void add(std::span<const uint32_t> colours);
+    [[nodiscard]] uint32_t samples() const { return samples_; }
+    /// Returns the colours of the mean, as accumulate.comp finds them.
+    [[nodiscard]] std::vector<uint32_t> mean() const;
+
+private:
+    std::vector<glm::vec4> sums_;
+    uint32_t samples_ = 0;
 };
 
 /// A dataset as a picture shows it.

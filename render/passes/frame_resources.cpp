@@ -40,6 +40,8 @@ constexpr Binding kBindings[] = {
     {kStorage, 1},
     {kStorage, 1},
     {kStorage, 1},
+    {kStorage, 1},
+    {kStorage, 1},
 };
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
@@ -188,6 +190,13 @@ void FrameResources::setTarget(const Buffer* picture, const Buffer* depths) {
     setStale_ = true;
 }
 
+void FrameResources::setSums(const Buffer& sums, const Buffer& shown) {
+    sums_ = &sums;
+    shown_ = &shown;
+    // Another buffer may have the handle of one that is gone.
+    setStale_ = true;
+}
+
 void FrameResources::writeSet() {
     VkDescriptorBufferInfo buffers[kBindingCount][frame::kMaxPoolChunks] = {};
     VkBufferView views[kBindingCount][frame::kMaxPoolChunks] = {};
@@ -219,6 +228,8 @@ void FrameResources::writeSet() {
     useBuffer(15, 0, feedback_ != nullptr ? *feedback_ : none_.buffer);
     useBuffer(16, 0, targetPicture_ != nullptr ? *targetPicture_ : none_.buffer);
     useBuffer(17, 0, targetDepths_ != nullptr ? *targetDepths_ : none_.buffer);
+    useBuffer(18, 0, sums_ != nullptr ? *sums_ : none_.buffer);
+    useBuffer(19, 0, shown_ != nullptr ? *shown_ : none_.buffer);
 
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {
@@ -247,6 +258,10 @@ void FrameResources::begin(VkCommandBuffer commands, const frame::FrameConstants
     const uint32_t list[frame::kTileListHeader] = {frame::kTileRow, 0, 1, 0};
     vkCmdUpdateBuffer(commands, tileList_.buffer.handle(), 0, sizeof(list), list);
     barrierToAll(commands);
+    bind(commands);
+}
+
+void FrameResources::bind(VkCommandBuffer commands) const {
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set_, 0, nullptr);
 }
 

@@ -8,11 +8,13 @@
 //  7, 8     tile starts                    beam              trace, shade
 //  9, 10    tile list, indirect dispatch   beam              trace, light, shade
 // 11, 12    hits                           trace, light      light, shade, readback
-// 13        picture                        begin, shade      readback, present
+// 13        picture                        begin, shade      accumulate, readback, present
 // 14        counters                       trace             readback
 // 15        feedback (passes/feedback.h)   feedback          readback
 // 16, 17    picture and depths of all      compose           readback, present
 //           datasets (passes/compose.h)
+// 18, 19    sums of samples, and picture   accumulate        accumulate, readback, present
+//           of their mean
 #pragma once
 
 #include <initializer_list>
@@ -108,9 +110,14 @@ public:
     /// Sets what the pictures of several datasets are composed into, or null.
     void setTarget(const Buffer* picture, const Buffer* depths);
 
+    /// Sets what the picture of the next frame is added to (passes/accumulate.h).
+    void setSums(const Buffer& sums, const Buffer& shown);
+
     /// Copies the constants, clears counters, tile list and picture, binds the set. Comes after barrierToAll, and ends
     /// with it.
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
+    /// Binds the set again, after passes with sets of their own.
+    void bind(VkCommandBuffer commands) const;
 
     /// Records the copy of what a frame counted, and of the hit at `cursor`, to where counts() reads it. Comes after
     /// the last pass's barrierComputeToReadback; ends with barrierTransferToHost. Precondition: `cursor` is in the
@@ -158,6 +165,8 @@ private:
     const Buffer* targetPicture_ = nullptr;
     const Buffer* targetDepths_ = nullptr;
     VkBuffer targetHandles_[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};  // as of the last call
+    const Buffer* sums_ = nullptr;
+    const Buffer* shown_ = nullptr;
     bool setStale_ = true;
     uint32_t pipelinesMade_ = 0;
 };

@@ -138,8 +138,8 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize si
     const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
     const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth),
                      stepY = basis.up * (-2 * basis.halfHeight / tile.fullHeight);
-    const glm::dvec3 corner =
-        basis.up * basis.halfHeight - basis.right * basis.halfWidth + double(tile.x) * stepX + double(tile.y) * stepY;
+    const glm::dvec3 corner = basis.up * basis.halfHeight - basis.right * basis.halfWidth + look.upperLeft.x * stepX +
+                              look.upperLeft.y * stepY;
     const glm::dvec3 eye = look.camera.eye - surface.origin;
     if (look.camera.projection == Projection::Orthographic) {
         c.view.eye = toVec4(eye + corner), c.view.eyeX = toVec4(stepX), c.view.eyeY = toVec4(stepY);

@@ -50,6 +50,7 @@ enum class MesoShading : uint32_t {
 struct MesoLook {
     Camera camera;  ///< camera of the whole picture, where this one is a tile
     PictureTile tile;
+    glm::dvec2 upperLeft{0};           ///< as upperLeft() in frame_setup.h
     glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light, unit
     glm::dvec3 up{0, 0, 1};            ///< direction of the sky, unit
     bool shadows = false;

@@ -34,7 +34,8 @@ void main() {
     float sun = lit ? 1.0 : 0.0, open = 0.0;
     Work work = Work(0u, 0u, 0u);
     for (uint i = 1u - frame.hasShadows; i <= sky; i++) {
-        vec3 direction = i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel.x, pixel.y);
+        vec3 direction =
+            i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel.x, pixel.y, frame.sampleNumber);
         ray.direction = withoutZeros(direction);
         ray.inverse = 1.0 / ray.direction;
         float reach = min(i == 0u ? kNoHit : radius, keptInterval(ray).last);

@@ -59,7 +59,10 @@ struct FrameConstants {
     float paperEpsilon;  // of the method `paper`, finest cells
     float worldPerCell;  // world units a finest cell
     uint isCovering;     // 0 or 1: the surface of each page covers the mesh's within the page (kFlagCovering)
-    float unused0;
+    uint sampleNumber;   // of the pixels (render/pixel_samples.h): 0: their middles
+    // Rows of another picture that accumulate.comp adds this one to: from partRow on, partRows of them, for which this
+    // one has skippedRows above (render/picture_parts.h).
+    uint partRow, partRows, skippedRows, unused0;
     vec4 rotation;  // quaternion: world from the dataset's axes
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];

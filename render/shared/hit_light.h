@@ -21,14 +21,18 @@ INLINE Real3 turnedBy(Real3 q, Real w, Real3 n) { return n + Real(2.0) * cross(q
 
 const float kTurn = 6.2831853f;
 const float kGoldenTurn = 0.61803399f;
+const float kSilverTurn = 0.41421356f;
 
 // Returns the direction of ray `i` of `count` about the normal, by its cosine (Malley's method on a spiral of the
-// disc). Each pixel of a square of 4 x 4 has its own spiral; shading averages over the square.
-INLINE Real3 skyDirection(Real3 n, uint i, uint count, uint x, uint y) {
-    uint square = (x & 3u) | (y & 3u) << 2;
+// disc). Each pixel of a square of 4 x 4 has its own spiral; shading averages over the square. Each sample of the
+// picture gives a pixel the spiral of another, and moves all spirals between their neighbours.
+INLINE Real3 skyDirection(Real3 n, uint i, uint count, uint x, uint y, uint sampleNumber) {
+    uint square = (((x & 3u) | (y & 3u) << 2) + 5u * sampleNumber) & 15u;
     uint mixedUp = square * 7u & 15u;
-    float radius2 = (float(i) + (float(mixedUp) + 0.5f) / 16.0f) / float(count);
-    float angle = kTurn * fract(float(i) * kGoldenTurn + (float(square) + 0.5f) / 16.0f);
+    float wider = fract(0.5f + float(sampleNumber) * kGoldenTurn),
+          further = fract(0.5f + float(sampleNumber) * kSilverTurn);
+    float radius2 = (float(i) + (float(mixedUp) + wider) / 16.0f) / float(count);
+    float angle = kTurn * fract(float(i) * kGoldenTurn + (float(square) + further) / 16.0f);
     Real3 side = normalize(abs(n.z) < 0.7f ? Real3(n.y, -n.x, 0.0f) : Real3(0.0f, n.z, -n.y));
     float r = sqrt(radius2);
     return r * cos(angle) * side + r * sin(angle) * cross(n, side) + sqrt(1.0f - radius2) * n;
@@ -39,6 +43,10 @@ INLINE Real skyBehind(Real part) {
     float near = 1.0f - part;
     return 1.0f - near * near;
 }
+
+// Returns the light of a colour that is encoded for the screen, and the colour of light.
+INLINE Real3 lightOfColour(Real3 encoded) { return pow(encoded, Real3(2.2f)); }
+INLINE Real3 colourOfLight(Real3 light) { return pow(light, Real3(1.0f / 2.2f)); }
 
 // Maps 0 to 1 from blue through green to red.
 INLINE Real3 heat(Real x) {

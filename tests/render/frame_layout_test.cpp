@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render/accumulate_spirv.h"
 #include "render/beam_spirv.h"
 #include "render/compose_spirv.h"
 #include "render/feedback_spirv.h"
@@ -79,6 +80,10 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(paperEpsilon),
                                                                    OFFSET(worldPerCell),
                                                                    OFFSET(isCovering),
+                                                                   OFFSET(sampleNumber),
+                                                                   OFFSET(partRow),
+                                                                   OFFSET(partRows),
+                                                                   OFFSET(skippedRows),
                                                                    OFFSET(unused0),
                                                                    OFFSET(rotation),
                                                                    OFFSET(sections)}));
@@ -122,6 +127,7 @@ TEST(FrameLayout, Mesostructure) {
 
 TEST(FrameLayout, Light) { expectSameLayout(kLightSpirv); }
 TEST(FrameLayout, Beam) { expectSameLayout(kBeamSpirv); }
+TEST(FrameLayout, Accumulate) { expectSameLayout(kAccumulateSpirv); }
 TEST(FrameLayout, Compose) { expectSameLayout(kComposeSpirv); }
 TEST(FrameLayout, PaperTrace) { expectSameLayout(kPaperTraceSpirv); }
 TEST(FrameLayout, Feedback) { expectSameLayout(kFeedbackSpirv); }

@@ -47,10 +47,10 @@ protected:
 
     static std::string path(const std::string& name) { return (*folder_ / name).string(); }
 
-    /// Drawn with `options`, and as it was.
+    /// Drawn with `options` and one sample, and as it was.
     Picture draw(const std::string& name, const std::string& options, const std::string& input = path("statue.vcp")) {
         const Ran ran = VcpProgram(*folder_).runWords(
-            fmt::format("render {} -o {} --size {}x{} --progress none --depth {} --normals {} {}", input,
+            fmt::format("render {} -o {} --samples 1 --size {}x{} --progress none --depth {} --normals {} {}", input,
                         path(name + ".png"), kWidth, kHeight, path("depth.pfm"), path("normals.pfm"), options));
         EXPECT_EQ(ran.status, 0) << ran.err;
         const auto picture = readPng(path(name + ".png"));

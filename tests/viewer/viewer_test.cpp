@@ -23,12 +23,13 @@ protected:
     }
 
     void openViewer(double movingFrameMs = 0, const std::filesystem::path& file = *folder_ / "ball.vcp",
-                    double moveSeconds = 0, bool framesAhead = false) {
+                    double moveSeconds = 0, bool framesAhead = false, uint32_t samples = 1) {
         ViewerOptions options;
         options.renderer.budgetBytes = 64 << 20;
         options.movingFrameMs = movingFrameMs;
         options.moveSeconds = moveSeconds;
         options.framesAhead = framesAhead;
+        options.samples = samples;
         auto viewer = Viewer::create(options);
         ASSERT_TRUE(viewer) << viewer.error().line();
         viewer_ = *std::move(viewer);
@@ -103,6 +104,66 @@ TEST_F(ViewerTest, FramesAheadComeToTheSame) {
     const auto waited = viewer_->waitForFrame();
     ASSERT_TRUE(waited);
     EXPECT_FALSE(*waited) << "nothing is in flight";
+}
+
+TEST_F(ViewerTest, APictureThatStaysGetsItsSamplesAndThenNothingIsDrawn) {
+    for (const bool framesAhead : {false, true}) {
+        openViewer(0, *folder_ / "ball.vcp", 0, framesAhead, 6);
+        // Until all is there, pictures have one sample.
+        while (viewer_->framesDrawn() == 0 || !viewer_->status().update.settled) {
+            turn(0.5);
+            EXPECT_LE(viewer_->status().samples, 1u);
+        }
+        settle();
+        EXPECT_EQ(viewer_->status().samples, 6u);
+        const Picture refined = *viewer_->renderer().readPicture();
+        for (int i = 0; i < 20; ++i) EXPECT_FALSE(turn(0.1));
+        EXPECT_TRUE(std::isinf(next_.waitSeconds)) << "a viewer at rest waits for events alone";
+
+        // A change begins with one sample, and ends with all.
+        const uint64_t drawn = viewer_->framesDrawn();
+        viewer_->act(ViewerAction::ToggleLight);
+        EXPECT_TRUE(turn(0.1));
+        EXPECT_EQ(viewer_->framesDrawn(), drawn + 1);
+        EXPECT_EQ(viewer_->status().samples, 1u);
+        EXPECT_EQ(next_.waitSeconds, 0) << "the next sample follows";
+        settle();
+        EXPECT_EQ(viewer_->framesDrawn(), drawn + 6);
+        EXPECT_EQ(*viewer_->renderer().readPicture(), refined) << "the light is where it was";
+
+        // False colours have one.
+        Shading shading = viewer_->shading();
+        shading.mode = ShadingMode::Level;
+        viewer_->setShading(shading);
+        settle();
+        EXPECT_EQ(viewer_->framesDrawn(), drawn + 7);
+    }
+}
+
+TEST_F(ViewerTest, InputInterruptsSamplesAtOnce) {
+    for (const bool framesAhead : {false, true}) {
+        openViewer(50, *folder_ / "ball.vcp", 0, framesAhead, kMostSamples);
+        settle();
+        viewer_->act(ViewerAction::ToggleShadows);
+        for (int i = 0; i < 10; ++i) EXPECT_TRUE(turn(0.1));
+        const uint32_t samples = viewer_->status().samples;
+        EXPECT_GT(samples, 2u);
+        EXPECT_LT(samples, kMostSamples);
+        viewer_->press(MouseButton::Left, {160, 120});
+        viewer_->move({170, 120});
+        EXPECT_TRUE(turn(0.01));
+        EXPECT_EQ(viewer_->status().samples, 1u) << "the new view is what is drawn next";
+        // While the camera moves, and shortly after, there is one sample.
+        viewer_->move({171, 120});
+        EXPECT_TRUE(turn(0.01));
+        EXPECT_FALSE(turn(0.01));
+        EXPECT_EQ(viewer_->status().samples, 1u);
+        EXPECT_GT(next_.waitSeconds, 0);
+        EXPECT_LE(next_.waitSeconds, 0.15);
+        EXPECT_TRUE(turn(0.2));
+        settle();
+        EXPECT_EQ(viewer_->status().samples, kMostSamples);
+    }
 }
 
 TEST_F(ViewerTest, DrawsOnlyWhenSomethingChanged) {

@@ -105,8 +105,8 @@ static void picture(void) {
     OK(vcp_view_stats(view, &stats));
     uint64_t hits = 0;
     for (int i = 0; i < PIXELS; ++i) hits += isfinite(depth[i]) ? 1 : 0;
-    CHECK(hits > 500 && hits == stats.hit_pixels && stats.rays == PIXELS && stats.settled && stats.frames == 1 &&
-          stats.frame_ms > 0);
+    CHECK(hits > 500 && hits == stats.hit_pixels && stats.rays == PIXELS && stats.settled && stats.frames == 16 &&
+          stats.samples == 16 && stats.frame_ms > 0);
     CHECK(isinf(depth[0]) && memcmp(rgba, rgba + 4 * (PIXELS / 2 + WIDTH / 2), 4) != 0 && rgba[3] == 255);
 
     vcp_camera camera = VCP_INIT(vcp_camera);
@@ -132,6 +132,31 @@ static void picture(void) {
     CHECK(!step.draw && step.settled && isinf(step.wait_seconds));
     vcp_look look = VCP_INIT(vcp_look);
     OK(vcp_view_get_look(view, &look));
+    CHECK(look.samples == 16);
+    look.samples = 65;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    look.samples = 0;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    /* One more sample is drawn where one more is wanted; fewer are not fewer than there are. */
+    look.samples = 17;
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_settle(view, 60));
+    OK(vcp_view_stats(view, &stats));
+    CHECK(stats.frames == 17 && stats.samples == 17);
+    look.samples = 1;
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_update(view, &step));
+    CHECK(!step.draw);
+    /* Where the background is transparent, edges are between. */
+    look.samples = 4;
+    look.transparent = 1;
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, rgba, depth);
+    int partly = 0;
+    for (int i = 0; i < PIXELS; ++i) partly += rgba[4 * i + 3] > 0 && rgba[4 * i + 3] < 255 ? 1 : 0;
+    CHECK(partly > 20);
+    look.transparent = 0;
     look.shading = VCP_SHADING_NORMALS;
     look.section_count = 1;
     look.sections[0][0] = 1;

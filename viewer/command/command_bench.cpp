@@ -340,6 +340,10 @@ RunCommand addBenchPicture(CLI::App& bench) {
     count("--dive-steps", options.diveSteps, "Frames of the dive", 1000);
     count("--views", options.views, "Directions that each camera looks from", 1000);
     count("--samples", options.samples, "The mesh's picture has N x N rays a pixel", 64);
+    app->add_option("--picture-samples", options.pictureSamples, "Rays a pixel of certified, as vcp render --samples")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, int(kMostSamples)));
     app->add_flag("--pictures", options.pictures, "Also write the pictures into --out, with isolated pixels in red");
     app->add_option("--device", options.device,
                     "Vulkan device of the method certified, see `vcp devices` [the best one]")

@@ -11,6 +11,7 @@
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/method.h"
 #include "render/host_renderer.h"
+#include "render/pixel_samples.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
@@ -42,6 +43,7 @@ struct RenderCommand {
     int frames = 0;  // 0: not given
     bool settle = true;
     uint32_t tile = 0;  // 0: not given
+    uint32_t samples = kUsualSamples;
     bool transparent = false;
     int turntable = 0;
     std::string path;
@@ -66,6 +68,8 @@ struct Drawing {
     FrameStats stats;         ///< statistics of the last frame
     double firstFrameMs = 0;  ///< time of the first frame, with what is compiled on first use
     std::vector<double> frameMs;
+    uint32_t samples = 1;
+    double samplesMs = 0;  ///< time of all samples of the picture together
 
     /// Of the timed frames; of the first when none was timed.
     [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : upperQuantile(frameMs, 0.5); }
@@ -80,6 +84,20 @@ Result<UpdateResult> updateUntilDrawable(PictureRenderer& renderer, const FrameR
         if (interrupted()) return Error::cancelled();
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
+}
+
+/// Adds the other samples to the last frame, with progress.
+Result<void> refine(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command,
+                    Drawing& drawing) {
+    const auto began = std::chrono::steady_clock::now();
+    drawing.samples = samplesOf(request, command.samples);
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    VCP_TRY(renderer.refineTo(drawing.samples, request, interrupted, [&](uint32_t samples) {
+        display.update("drawing samples", double(samples) / drawing.samples);
+    }));
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
+    drawing.samplesMs = drawing.medianMs() + took.count();
+    return {};
 }
 
 Result<Drawing> draw(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command) {
@@ -97,6 +115,7 @@ Result<Drawing> draw(PictureRenderer& renderer, const FrameRequest& request, con
         else
             drawing.frameMs.push_back(stats.msFrame);
     }
+    VCP_TRY(refine(renderer, request, command, drawing));
     return drawing;
 }
 
@@ -121,6 +140,8 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"frames", std::max<size_t>(drawing.frameMs.size(), 1)},
             {"ms_per_frame", drawing.medianMs()},
             {"first_frame_ms", drawing.firstFrameMs},
+            {"samples", drawing.samples},
+            {"ms_samples", drawing.samplesMs},
             {"ms_beam", stats.msBeam},
             {"ms_trace", stats.msTrace},
             {"ms_light", stats.msLight},
@@ -148,9 +169,12 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
     const UpdateResult& update = drawing.update;
     const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
                                                                 : "no certified error";
-    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s) on {}{}\n  {} subvolumes, {} resident, {}, {}",
+    const std::string samples = drawing.samples > 1 ? fmt::format(", {} samples in {}", drawing.samples,
+                                                                  formatSeconds(1e-3 * drawing.samplesMs))
+                                                    : "";
+    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} subvolumes, {} resident, {}, {}",
                        command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
-                       drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), device.name,
+                       drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples, device.name,
                        device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
                        error, update.settled ? "settled" : "not settled");
 }
@@ -184,13 +208,15 @@ Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitC
     return current;
 }
 
-Json toJson(const TiledPictureStats& total, size_t pictures, const DeviceInfo& device, const FrameRequest& request) {
+Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, const DeviceInfo& device,
+            const FrameRequest& request) {
     return {{"width", request.width},
             {"height", request.height},
             {"pictures", pictures},
             {"tiles", total.tiles},
             {"ms_per_frame", total.ms / double(pictures)},
             {"rays_per_second", double(total.rays) / std::max(1e-3 * total.ms, 1e-9)},
+            {"samples", samples},
             {"rays", total.rays},
             {"hit_pixels", total.hitPixels},
             {"device", device.name},
@@ -210,6 +236,7 @@ Result<void> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
                                         .files = {command.output, command.depth, command.normals},
                                         .isNumbered = command.isSequence(),
                                         .tile = command.tile > 0 ? command.tile : kTile,
+                                        .samples = command.samples,
                                         .rules = rules,
                                         .cancel = interrupted});
     for (bool isDone = false; !isDone;) {
@@ -220,7 +247,9 @@ Result<void> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
     }
     display.finish();
     const TiledPictureStats& total = sequence.stats();
-    if (command.report.json) return printJson(toJson(total, cameras.size(), renderer.device(), request));
+    if (command.report.json)
+        return printJson(
+            toJson(total, cameras.size(), samplesOf(request, command.samples), renderer.device(), request));
     const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(),
                                                                 numbered(command.output, cameras.size()).string())
                                                   : command.output;
@@ -394,7 +423,9 @@ Command addRender(CLI::App& vcp) {
     addOverwriteOption(*app, command->overwrite);
     addSize(*app, command->size, "1920x1200", "Width and height in pixels")->default_str(sizeText(command->size));
     addRenderSettings(*app, command->render);
-    app->add_flag("--transparent", command->transparent, "No background: alpha 0 where nothing is hit");
+    addSamples(*app, command->samples, "Rays a pixel, whose light is averaged: smooth edges; 1: none");
+    app->add_flag("--transparent", command->transparent,
+                  "No background: alpha is the part of a pixel where something is hit");
     CLI::Option* turntable = app->add_option("--turntable", command->turntable,
                                              "So many pictures once around the up axis: OUT-0001.png and so on")
                                  ->type_name("N")

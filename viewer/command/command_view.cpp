@@ -21,6 +21,7 @@ namespace {
 struct ViewCommand {
     std::vector<std::string> inputs;
     glm::ivec2 size{0};  // 0: not given
+    uint32_t samples = kMostSamples;
     BuildOptions build;
     RenderSettings render;
     ReportOptions report;
@@ -34,6 +35,7 @@ Json toJson(const WindowReport& report) {
             {"first_picture_seconds", secondsOrNull(report.firstPictureSeconds)},
             {"settled_seconds", secondsOrNull(report.settledSeconds)},
             {"frames", report.framesDrawn},
+            {"samples", status.samples},
             {"ms_per_frame", status.frame.msFrame},
             {"device", status.device},
             {"software", status.software},
@@ -93,6 +95,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     options.session.inputs = command.inputs;
     options.session.build = command.build;
     options.session.render = command.render;
+    options.session.samples = command.samples;
     options.session.makeProgress = [style = command.report.progressStyle()] { return shownProgress(style); };
     options.catchInterrupts = [] { return std::make_shared<InterruptScope>(); };
     options.interrupted = interrupted;
@@ -121,6 +124,8 @@ Command addView(CLI::App& vcp) {
         ->type_name("");
     addSize(*app, command->size, "1280x800", "Width and height of the window [1280x800, then as it was left]");
     addRenderSettings(*app, command->render);
+    addSamples(*app, command->samples,
+               "Rays a pixel of a picture that stays, whose light is averaged: smooth edges; 1: none");
     addBuildSettings(*app, command->build);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);

@@ -42,6 +42,13 @@ void addUp(CLI::App& app, UpAxis& up) {
 
 }  // namespace
 
+void addSamples(CLI::App& app, uint32_t& samples, const std::string& description) {
+    app.add_option("--samples", samples, description)
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, int(kMostSamples)));
+}
+
 void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     addParsed(
         app, "--camera", settings.camera, parseCamera,

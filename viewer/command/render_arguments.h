@@ -8,4 +8,7 @@ namespace vcp {
 
 void addRenderSettings(CLI::App& app, RenderSettings& settings);
 
+/// Adds --samples, with the value that there is as the default.
+void addSamples(CLI::App& app, uint32_t& samples, const std::string& description);
+
 }  // namespace vcp

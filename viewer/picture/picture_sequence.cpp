@@ -31,6 +31,7 @@ Result<void> PictureSequence::begin() {
     request.camera = o_.cameras[finished_];
     VCP_TRY_ASSIGN(png_, PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules));
     const TiledPictureOptions options{.tile = o_.tile,
+                                      .samples = o_.samples,
                                       .depth = !o_.files.depth.empty(),
                                       .normals = !o_.files.normals.empty(),
                                       .problem = o_.problem,

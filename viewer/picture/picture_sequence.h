@@ -27,6 +27,7 @@ struct PictureSequenceOptions {
     PictureFiles files;
     bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on
     uint32_t tile = 2048;     ///< edge in pixels, at least 16
+    uint32_t samples = 1;     ///< of a pixel
     OutputRules rules = {};   ///< what the files may replace
     /// Called as those of TiledPictureOptions are.
     std::function<void(const Error& problem)> problem = {};
@@ -45,9 +46,9 @@ public:
     PictureSequence(const PictureSequence&) = delete;
     PictureSequence& operator=(const PictureSequence&) = delete;
 
-    /// Draws the next tile where all that it wants is there; never waits for reads. Returns true when the last file is
-    /// written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; after one, it must not be called
-    /// again.
+    /// Draws the next tile or a sample of it where all that it wants is there; never waits for reads. Returns true when
+    /// the last file is written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; after one, it
+    /// must not be called again.
     Result<bool> step();
     /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return picture_ && picture_->isWaiting(); }

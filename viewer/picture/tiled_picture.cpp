@@ -1,7 +1,10 @@
 #include "viewer/picture/tiled_picture.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
+
+#include "render/pixel_samples.h"
 
 namespace vcp {
 
@@ -38,27 +41,43 @@ TiledPicture::Rect TiledPicture::outer() const {
 
 double TiledPicture::fraction() const {
     const double rows = double(y_) * whole_.width;
-    const double inRow = y_ < whole_.height ? double(x_) * inner().height : 0;
-    return (rows + inRow) / (double(whole_.width) * whole_.height);
+    if (y_ >= whole_.height) return 1;
+    const Rect tile = inner();
+    const double inTile = double(samples_) / samplesOf(whole_, options_.samples) * tile.width * tile.height;
+    return (rows + double(x_) * tile.height + inTile) / (double(whole_.width) * whole_.height);
 }
 
-Result<bool> TiledPicture::step() {
-    if (y_ >= whole_.height) return true;
-    const Rect tile = inner(), with = outer();
+FrameRequest TiledPicture::tileRequest() const {
+    const Rect with = outer();
     FrameRequest request = whole_;
     request.width = with.width;
     request.height = with.height;
     if (with.width != whole_.width || with.height != whole_.height)
         request.tile = {with.x, with.y, whole_.width, whole_.height};
-    VCP_TRY_ASSIGN(auto update, renderer_->update(request));
-    if (!update.problems.empty() && !options_.problem) return update.problems.front();
-    for (const Error& problem : update.problems) options_.problem(problem);
-    isWaiting_ = !update.settled;
-    if (isWaiting_) return false;
-    stats_.errorPixels = std::max(stats_.errorPixels, update.errorPixels);
-    stats_.update = std::move(update);
-    VCP_TRY(draw(request));
-    VCP_TRY(copyTile(with, tile));
+    return request;
+}
+
+Result<bool> TiledPicture::step() {
+    if (y_ >= whole_.height) return true;
+    const FrameRequest request = tileRequest();
+    if (samples_ > 0) {
+        VCP_TRY(addSample());
+    } else {
+        VCP_TRY_ASSIGN(auto update, renderer_->update(request));
+        if (!update.problems.empty() && !options_.problem) return update.problems.front();
+        for (const Error& problem : update.problems) options_.problem(problem);
+        isWaiting_ = !update.settled;
+        if (isWaiting_) return false;
+        stats_.errorPixels = std::max(stats_.errorPixels, update.errorPixels);
+        stats_.update = std::move(update);
+        VCP_TRY(draw(request));
+    }
+    if (samples_ < samplesOf(request, options_.samples)) return false;
+    const Rect tile = inner();
+    VCP_TRY(copyTile(outer(), tile));
+    ++stats_.tiles;
+    stats_.hitPixels += tileHits_;
+    samples_ = 0;
     x_ += tile.width;
     if (x_ < whole_.width) return false;
     VCP_TRY(take_(band_));
@@ -70,10 +89,20 @@ Result<bool> TiledPicture::step() {
 
 Result<void> TiledPicture::draw(const FrameRequest& request) {
     VCP_TRY_ASSIGN(const auto stats, renderer_->render(request, options_.cancel));
-    ++stats_.tiles;
+    samples_ = 1;
+    tileHits_ = stats.hitPixels;
     stats_.rays += stats.rays;
-    stats_.hitPixels += stats.hitPixels;
     stats_.ms += stats.msFrame;
+    return {};
+}
+
+/// Adds a sample to the tile; where it cannot go on, the next step draws it anew.
+Result<void> TiledPicture::addSample() {
+    const auto began = std::chrono::steady_clock::now();
+    VCP_TRY_ASSIGN(samples_, renderer_->refine(options_.cancel));
+    const Rect with = outer();
+    stats_.rays += uint64_t{with.width} * with.height;
+    stats_.ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
     return {};
 }
 

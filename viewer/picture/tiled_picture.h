@@ -18,10 +18,11 @@ namespace vcp {
 
 struct TiledPictureOptions {
     uint32_t tile = 2048;  ///< edge in pixels, at least 16
+    uint32_t samples = 1;  ///< of a pixel; samplesOf (render/pixel_samples.h) says where there are fewer
     bool depth = false, normals = false;
     /// Called with the error of a page that cannot be read and is drawn from its parent; empty: that ends the picture.
     std::function<void(const Error& problem)> problem;
-    /// Asked while a tile is drawn (PictureRenderer::render); true ends the picture with Cancelled.
+    /// Asked while a tile is drawn (PictureRenderer::render and refine); true ends the picture with Cancelled.
     std::function<bool()> cancel;
 };
 
@@ -34,7 +35,7 @@ struct PictureBand {
 
 struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
-    double ms = 0;           ///< time of drawing alone
+    double ms = 0;           ///< time of drawing alone, of all samples, as are the rays
     double errorPixels = 0;  ///< largest over the tiles
     UpdateResult update;     ///< the last tile's
 };
@@ -48,9 +49,9 @@ public:
     TiledPicture(PictureRenderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 
-    /// Takes in pages and draws the next tile where all that it wants is there; never waits for reads. Returns true
-    /// when the last band was taken. Errors: those of PictureRenderer; those of `take`; the first page that cannot be
-    /// read.
+    /// Takes in pages and draws the next tile, or adds a sample to it, where all that it wants is there; never waits
+    /// for reads. Returns true when the last band was taken. Errors: those of PictureRenderer; those of `take`; the
+    /// first page that cannot be read.
     Result<bool> step();
     /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return isWaiting_; }
@@ -64,6 +65,8 @@ private:
     [[nodiscard]] Rect inner() const;
     [[nodiscard]] Rect outer() const;
     Result<void> draw(const FrameRequest& request);
+    Result<void> addSample();
+    [[nodiscard]] FrameRequest tileRequest() const;
     Result<void> copyTile(const Rect& outer, const Rect& inner);
 
     PictureRenderer* renderer_;
@@ -73,6 +76,8 @@ private:
     uint32_t x_ = 0, y_ = 0;  // place of the next tile
     PictureBand band_;
     bool isWaiting_ = false;
+    uint32_t samples_ = 0;   // that the tile has
+    uint64_t tileHits_ = 0;  // of the tile
     TiledPictureStats stats_;
 };
 

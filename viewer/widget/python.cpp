@@ -52,8 +52,8 @@ py::dict toDict(const vcp_stats& s) {
     using namespace py::literals;
     return py::dict("settled"_a = s.settled != 0, "relaxed"_a = s.relaxed != 0, "frames"_a = s.frames,
                     "frame_ms"_a = s.frame_ms, "error_pixels"_a = s.error_pixels, "rays"_a = s.rays,
-                    "hit_pixels"_a = s.hit_pixels, "resident_bytes"_a = s.resident_bytes, "pool_bytes"_a = s.pool_bytes,
-                    "bytes_read"_a = s.bytes_read, "pages_resident"_a = s.pages_resident,
+                    "hit_pixels"_a = s.hit_pixels, "samples"_a = s.samples, "resident_bytes"_a = s.resident_bytes,
+                    "pool_bytes"_a = s.pool_bytes, "bytes_read"_a = s.bytes_read, "pages_resident"_a = s.pages_resident,
                     "pages_drawn"_a = s.pages_drawn, "device_losses"_a = s.device_losses);
 }
 
@@ -175,6 +175,14 @@ PYBIND11_MODULE(vcp, module) {
         .def(
             "set_budgets", [](View& view, uint64_t gpu, uint64_t ram) { Context(view.context()).setBudgets(gpu, ram); },
             "gpu_bytes"_a, "ram_bytes"_a = 0)
+        .def_property(
+            "samples", [](const View& view) { return view.look().samples; },
+            [](View& view, uint32_t samples) {
+                vcp_look look = view.look();
+                look.samples = samples;
+                view.setLook(look);
+            },
+            "Rays a pixel of a picture that is settled, 1 to 64: smooth edges.")
         .def_property_readonly("camera", [](const View& view) { return toDict(view.camera()); })
         .def_property_readonly("stats", [](const View& view) { return toDict(view.stats()); })
         .def_property_readonly("dataset", datasetOf)

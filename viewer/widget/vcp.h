@@ -288,16 +288,20 @@ enum {
 typedef struct vcp_look {
     uint32_t struct_size;
     vcp_shading shading;
-    double error_pixels;                           /* certified error at which refining ends, in pixels; above 0 */
-    uint32_t shadows;                              /* 1: hard shadows */
-    uint32_t occlusion_rays;                       /* rays a pixel, at most 64; 0: no ambient occlusion */
-    double occlusion_radius;                       /* 0: a tenth of the diagonal */
-    uint32_t light_in_world;                       /* 0: the light follows the camera */
-    uint32_t transparent;                          /* 1: the background is black with alpha 0 */
-    float light[3];                                /* towards the light; camera axes (right, up, back), or world */
+    double error_pixels;     /* certified error at which refining ends, in pixels; above 0 */
+    uint32_t shadows;        /* 1: hard shadows */
+    uint32_t occlusion_rays; /* rays a pixel, at most 64; 0: no ambient occlusion */
+    double occlusion_radius; /* 0: a tenth of the diagonal */
+    uint32_t light_in_world; /* 0: the light follows the camera */
+    uint32_t transparent;    /* 1: the background is black with alpha 0, edges have alpha between */
+    float light[3];          /* towards the light; camera axes (right, up, back), or world */
     float background_top[3], background_bottom[3]; /* linear, 0 to 1 */
     uint32_t section_count;                        /* at most 6 planes; what lies beyond them is cut away */
     double sections[6][4];                         /* n, d: what has dot(n, x) >= d is kept */
+    /* Rays a pixel of a picture at rest, 1 to 64, whose light is averaged: smooth edges. From the beginning 16, and 64
+     * where the view has a window. Pictures in motion, false colours and normals have one. */
+    uint32_t samples;
+    uint32_t reserved;
 } vcp_look;
 
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
@@ -312,11 +316,11 @@ typedef struct vcp_step {
 } vcp_step;
 
 VCP_API vcp_status vcp_view_update(vcp_view* view, vcp_step* step);
-/* Draws what the last update chose, where that differs from the last picture; shows it in the view's window. Waits for
- * the GPU, never for a file. */
+/* Draws what the last update chose, where that differs from the last picture, or a part of a further sample of it;
+ * shows it in the view's window. Waits for the GPU, never for a file. */
 VCP_API vcp_status vcp_view_render(vcp_view* view);
-/* Updates until nothing is missing and nothing moves, then renders. VCP_CANCELLED when it takes longer than `seconds`;
- * what there is then is rendered. */
+/* Updates until nothing is missing and nothing moves, then renders, with all samples. VCP_CANCELLED when it takes
+ * longer than `seconds`; what there is then is rendered. */
 VCP_API vcp_status vcp_view_settle(vcp_view* view, double seconds);
 
 /* The last picture. While the camera moves, frames may be drawn smaller; then it is smaller than the view. */
@@ -368,7 +372,7 @@ typedef struct vcp_stats {
     uint32_t relaxed;       /* 1: the budget is too small for the look's error_pixels */
     uint32_t reduction;     /* the picture has 1/reduction of the width and height */
     uint32_t device_losses; /* device losses that were repaired */
-    uint64_t frames;        /* frames rendered so far */
+    uint64_t frames;        /* frames rendered so far; each sample of a picture is one */
     double frame_ms;
     double error_pixels; /* largest projected certified error in the picture */
     uint64_t rays, hit_pixels;
@@ -376,6 +380,8 @@ typedef struct vcp_stats {
     uint64_t read_failures; /* reads that failed and were tried again */
     uint32_t pages_resident, pages_drawn, pages_wanted, pages_missing;
     uint32_t coarsest_level, finest_level;
+    uint32_t samples; /* rays a pixel, so far, of the last picture */
+    uint32_t reserved;
 } vcp_stats;
 
 VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);

@@ -31,6 +31,7 @@ Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_vie
     options.renderer.ramBytes = context.ramBytes;
     options.movingFrameMs = given.moving_frame_ms;
     options.moveSeconds = given.move_seconds;
+    options.samples = surface ? kMostSamples : kUsualSamples;
     auto made = std::make_unique<vcp_view>();
     made->context = &context;
     made->hasWindow = surface.has_value();
@@ -67,10 +68,13 @@ Result<void> update(vcp_view& view) {
 
 Result<void> render(vcp_view& view) {
     if (!view.isUpdated) VCP_TRY(update(view));
-    if (view.next.draw) VCP_TRY(view.viewer->draw());
+    bool isNew = true;  // what is shown is shown again where nothing is drawn
+    if (view.next.draw) {
+        VCP_TRY_ASSIGN(isNew, view.viewer->draw());
+    }
     view.next.draw = false;
     const glm::ivec2 size = view.viewer->size();
-    if (!view.hasWindow || size.x == 0 || size.y == 0) return {};
+    if (!isNew || !view.hasWindow || size.x == 0 || size.y == 0) return {};
     return view.viewer->renderer().present(uint32_t(size.x), uint32_t(size.y));
 }
 
@@ -80,9 +84,13 @@ Result<void> settle(vcp_view& view, double seconds) {
     bool isLate = false;
     while (!isLate) {
         VCP_TRY(update(view));
-        if (view.viewer->status().update.settled && std::isinf(view.next.waitSeconds)) break;
+        const Viewer& viewer = *view.viewer;
+        if (viewer.status().update.settled && std::isinf(view.next.waitSeconds)) break;
+        // Then what is drawn stays, and gets its samples.
+        if (viewer.isAtRest()) VCP_TRY(render(view));
         const double left = begin + seconds - view.context->now();
         isLate = left <= 0;
+        if (viewer.isAtRest() && view.next.waitSeconds <= 0) continue;
         const std::chrono::milliseconds wait(int(1000 * std::clamp(left, 0.0, kPollSeconds)));
         if (!view.viewer->status().update.settled)
             view.viewer->renderer().waitForPage(wait);
@@ -204,6 +212,7 @@ vcp_look lookOf(const Viewer& viewer) {
     look.occlusion_radius = shading.occlusionRadius;
     look.light_in_world = shading.lightFollowsCamera ? 0 : 1;
     look.transparent = shading.transparent ? 1 : 0;
+    look.samples = viewer.samples();
     for (int i = 0; i < 3; ++i) {
         look.light[i] = shading.lightDirection[i];
         look.background_top[i] = shading.backgroundTop[i];
@@ -223,6 +232,7 @@ Result<void> checkLook(const vcp_look& look) {
     if (look.occlusion_rays > kMostOcclusionRays) return wrong("more than 64 occlusion rays");
     if (!(look.occlusion_radius >= 0) || !std::isfinite(look.occlusion_radius))
         return wrong("occlusion_radius is below 0 or not finite");
+    if (look.samples < 1 || look.samples > kMostSamples) return wrong("samples is not 1 to 64");
     if (!isFinite(look.light, 3) || vectorFrom(look.light) == glm::vec3(0)) return wrong("the light has no direction");
     if (!isFinite(look.background_top, 3) || !isFinite(look.background_bottom, 3))
         return wrong("the background is not finite");
@@ -252,6 +262,7 @@ Result<void> setLook(Viewer& viewer, const vcp_look* given) {
         sections.push_back({vectorFrom(look.sections[i]), look.sections[i][3]});
     viewer.setShading(shading);
     viewer.setErrorPixels(look.error_pixels);
+    viewer.setSamples(look.samples);
     viewer.setSections(std::move(sections));
     return {};
 }
@@ -266,6 +277,7 @@ vcp_stats statsOf(const Viewer& viewer) {
     stats.reduction = uint32_t(status.reduction);
     stats.device_losses = update.deviceLosses;
     stats.frames = viewer.framesDrawn();
+    stats.samples = status.samples;
     stats.frame_ms = status.frame.msFrame;
     stats.error_pixels = update.errorPixels;
     stats.rays = status.frame.rays;

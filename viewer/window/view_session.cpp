@@ -154,6 +154,8 @@ Result<NextStep> ViewSession::update(double now) {
     takePicked();
     goOnSaving();
     noteChanges();
+    // What is saved or built has the processors and the device for itself.
+    viewer_->setSamples(saving_ || opening_ ? 1 : options_.samples);
     auto next = viewer_->update(now);
     if (!next) return next;
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
@@ -294,6 +296,7 @@ void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path
                                    .files = std::move(files),
                                    .isNumbered = isSequence,
                                    .tile = kSavedTile,
+                                   .samples = std::min(options_.samples, kUsualSamples),
                                    .problem = [this](const Error& problem) { say(problem.line()); }};
     for (const OrbitCamera& camera : cameras) options.cameras.push_back(camera.current());
     auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));

@@ -34,7 +34,8 @@ struct SessionOptions {
     std::vector<std::string> inputs;  ///< what the window opens first
     BuildOptions build;               ///< of meshes; inputs, output and progress are ignored
     RenderSettings render;
-    UserSettings user;  ///< the remembered settings; `render` takes precedence over them
+    uint32_t samples = kMostSamples;  ///< of what is shown, at rest; what is saved has kUsualSamples at most
+    UserSettings user;                ///< the remembered settings; `render` takes precedence over them
     /// Makes, for each opening, the function that is told its progress (SceneOpening). May be empty.
     std::function<std::function<bool(const BuildProgress&)>()> makeProgress;
 };

@@ -139,9 +139,12 @@ public:
                     VCP_TRY_ASSIGN(next, session_->update(seconds()));
                 }
             }
-            if (next.draw) VCP_TRY(viewer.draw());
+            bool isNew = false;
+            if (next.draw) {
+                VCP_TRY_ASSIGN(isNew, viewer.draw());
+            }
             if (!painter_) VCP_TRY(makePainter());
-            VCP_TRY(present(next.draw));
+            VCP_TRY(present(isNew));
             if (!report.windowSeconds) report.windowSeconds = seconds();
             const bool isShown =
                 viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);

@@ -29,11 +29,12 @@ struct Planes {
     std::vector<glm::vec3> normals;
 };
 
-Planes drawnBy(PictureRenderer& renderer, const FrameRequest& request) {
+Planes drawnBy(PictureRenderer& renderer, const FrameRequest& request, uint32_t samples = 1) {
     Planes planes;
     planes.update = renderer.settle(request).value();
     const auto stats = renderer.render(request);
     EXPECT_TRUE(stats) << stats.error().line();
+    EXPECT_TRUE(renderer.refineTo(samples, request));
     planes.picture = renderer.readPicture().value();
     planes.depth = renderer.readDepth().value();
     planes.normals = renderer.readNormals().value();
@@ -107,8 +108,8 @@ protected:
         return {dataset, std::make_shared<FilePageSource>(reader, dataset), placement};
     }
     /// `cell`: of the finest level, world units.
-    Difference difference(const FrameRequest& request, double cell) {
-        const Planes host = drawnBy(*host_, request), device = drawnBy(*renderer_, request);
+    Difference difference(const FrameRequest& request, double cell, uint32_t samples = 1) {
+        const Planes host = drawnBy(*host_, request, samples), device = drawnBy(*renderer_, request, samples);
         EXPECT_EQ(host.update.pagesInCut, device.update.pagesInCut);
         EXPECT_EQ(host.update.errorPixels, device.update.errorPixels);
         EXPECT_EQ(host.update.residentBytes, device.update.residentBytes);
@@ -119,12 +120,14 @@ protected:
 
 /// A few pixels differ: where a ray passes an edge, or a silhouette, on one side or the other by less than both round,
 /// and where it grazes the surface. 15 of 100,000 hits did at most, all in depth or normal; three times that may.
-void expectFew(const Difference& d) {
+/// A colour is of as many rays as the picture has samples, each of which may differ.
+void expectFew(const Difference& d, uint32_t samples = 1) {
     EXPECT_GT(d.hits, 10000u);
     EXPECT_LE(double(d.state + d.depth + d.normal + d.colour), 45e-5 * double(d.hits))
         << d.state << " states, " << d.depth << " depths, " << d.normal << " normals, " << d.colour << " colours of "
         << d.hits << " hits";
-    EXPECT_LE(double(d.state + d.colour), 5e-5 * double(d.hits)) << d.state << ", " << d.colour;
+    EXPECT_LE(double(d.state), 5e-5 * double(d.hits)) << d.state;
+    EXPECT_LE(double(d.state + d.colour), 5e-5 * samples * double(d.hits)) << d.state << ", " << d.colour;
 }
 
 constexpr ShadingMode kModes[] = {ShadingMode::Lit,     ShadingMode::Clay,  ShadingMode::Unlit,
@@ -197,6 +200,22 @@ TEST_F(HostRendererTest, ShadowsAndOcclusion) {
     }
     expectFew(all);
     EXPECT_GT(darker, 5000u);
+}
+
+TEST_F(HostRendererTest, SixteenSamples) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    Difference all;
+    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+        SCOPED_TRACE(named.name);
+        FrameRequest request = requestOf(named.camera);
+        request.shading.shadows = true;
+        request.shading.occlusionRays = 1;
+        request.shading.transparent = true;
+        all += difference(request, built.cache().dataset().header.cell, 16);
+    }
+    expectFew(all, 16);
 }
 
 // Nothing stands between a convex body and its light: not the body itself either.

@@ -353,6 +353,38 @@ TEST_F(CommandLine, RenderReportsWhatProgramsRelyOn) {
     EXPECT_GT(fs::file_size(normals), 100u);
 }
 
+TEST_F(CommandLine, RenderDrawsSixteenSamples) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const auto render = [&](const std::string& name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o",    (*folder_ / name).string(), "--size",
+                                           "96x64",  "--transparent",    "--json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const Ran ran = run(arguments);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return Json::parse(ran.out);
+    };
+    // The alphas of the picture, counted.
+    const auto alphas = [&](const char* name) {
+        const Picture picture = readPng(*folder_ / name).value();
+        std::map<int, int> count;
+        for (size_t i = 3; i < picture.rgba.size(); i += 4) ++count[picture.rgba[i]];
+        return count;
+    };
+    EXPECT_EQ(render("one.png", {"--samples", "1"})["samples"], 1);
+    EXPECT_EQ(alphas("one.png").size(), 2u);
+    const Json usual = render("usual.png", {});
+    EXPECT_EQ(usual["samples"], 16);
+    EXPECT_GT(usual["ms_samples"], usual["ms_per_frame"]);
+    EXPECT_GT(alphas("usual.png").size(), 10u);
+    render("sixteen.png", {"--samples", "16"});
+    EXPECT_EQ(readPng(*folder_ / "sixteen.png").value(), readPng(*folder_ / "usual.png").value());
+    EXPECT_EQ(render("turn.png", {"--turntable", "2", "--samples", "4"})["samples"], 4);
+    EXPECT_EQ(alphas("turn-0002.png").size(), 5u) << "quarters";
+    EXPECT_EQ(render("level.png", {"--shading", "level"})["samples"], 1) << "numbers have no mean";
+    for (const char* wrong : {"0", "65", "x"})
+        expectFailure(run({"render", dataset().string(), "-o", "x.png", "--samples", wrong}), 2, "--samples");
+}
+
 TEST_F(CommandLine, RenderOfAMeshBuildsItOnce) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const fs::path first = *folder_ / "first.png", second = *folder_ / "second.png", built = *folder_ / "built.png";

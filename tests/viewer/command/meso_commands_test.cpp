@@ -35,8 +35,8 @@ protected:
     }
     /// Draws a scene into a.png, with one JSON object.
     [[nodiscard]] Ran draw(const std::string& scene, const std::string& options) const {
-        return run("render " + scene + " -o " + path("a.png") + " --up z --progress none --validation --json " +
-                   options);
+        return run("render --samples 1 " + scene + " -o " + path("a.png") +
+                   " --up z --progress none --validation --json " + options);
     }
     [[nodiscard]] std::vector<uint8_t> pixels() const {
         const auto picture = readPng(path("a.png"));
@@ -123,7 +123,7 @@ TEST_F(MesoCommands, ScenesHaveSurfacesBesideDatasets) {
     std::ofstream(path("both.json"))
         << R"({"datasets": [{"file": "ball.ply", "scale": 0.2, "translate": [0, 0.3, 0]}], )" << surface << "}";
     const auto draw = [&](const std::string& scene) {
-        const Ran ran = run("render " + path(scene) + " -o " + path("a.png") +
+        const Ran ran = run("render --samples 1 " + path(scene) + " -o " + path("a.png") +
                             " --size 64x48 --progress none --depth " + path("a.pfm") + " --normals " + path("n.png"));
         EXPECT_EQ(ran.status, 0) << ran.err;
         return hitsOf(path("a.pfm"));
@@ -141,7 +141,7 @@ TEST_F(MesoCommands, ScenesHaveSurfacesBesideDatasets) {
 
 TEST_F(MesoCommands, TheScenesOfTheDocumentsAreDrawn) {
     for (const std::string scene : {"maze_ball", "beads_gallery", "kitten_wall"}) {
-        const Ran ran = run("render " VCP_SOURCE_DIR "/docs/scenes/" + scene + ".json -o " + path("a.png") +
+        const Ran ran = run("render --samples 1 " VCP_SOURCE_DIR "/docs/scenes/" + scene + ".json -o " + path("a.png") +
                             " --size 96x64 --progress none --depth " + path("a.pfm"));
         ASSERT_EQ(ran.status, 0) << ran.err;
         EXPECT_GT(hitsOf(path("a.pfm")).first, 500u) << scene;
@@ -152,7 +152,7 @@ TEST_F(MesoCommands, TheDogOfTheDocumentsIsDrawn) {
     const auto makeScan = std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan";
     ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 10000 -o " + path("dog.obj")).c_str()), 0);
     std::filesystem::copy_file(VCP_SOURCE_DIR "/docs/scenes/beads_dog.json", path("beads_dog.json"));
-    const Ran ran = run("render " + path("beads_dog.json") + " -o " + path("a.png") +
+    const Ran ran = run("render --samples 1 " + path("beads_dog.json") + " -o " + path("a.png") +
                         " --size 96x64 --progress none --depth " + path("a.pfm"));
     ASSERT_EQ(ran.status, 0) << ran.err;
     EXPECT_GT(hitsOf(path("a.pfm")).first, 1500u);

@@ -46,9 +46,10 @@ protected:
         return renderer_->readPicture().value();
     }
 
-    Picture inTiles(const FrameRequest& request, uint32_t tile, PictureBand* planes = nullptr) {
+    Picture inTiles(const FrameRequest& request, uint32_t tile, PictureBand* planes = nullptr, uint32_t samples = 1) {
         TiledPictureOptions options;
         options.tile = tile;
+        options.samples = samples;
         options.depth = options.normals = planes != nullptr;
         Picture picture{request.width, request.height, {}};
         TiledPicture tiled(*renderer_, request, options, [&](const PictureBand& band) -> Result<void> {
@@ -115,10 +116,20 @@ TEST_P(TiledPictureTest, TheLargePictureIsTheSmallOneEnlarged) {
     EXPECT_LT(differing(shrunk, small, 2), 2e-3);
 }
 
+TEST_P(TiledPictureTest, TilesHaveAllSamples) {
+    FrameRequest whole = request(200, 150);
+    whole.shading.transparent = true;
+    const Picture plain = atOnce(whole);
+    ASSERT_TRUE(renderer_->refineTo(8, whole));
+    const Picture refined = renderer_->readPicture().value();
+    EXPECT_GT(differing(refined, plain, 8), 0.005) << "edges are smooth";
+    EXPECT_LT(differing(inTiles(whole, 64, nullptr, 8), refined, 4), 1e-3);
+}
+
 TEST_P(TiledPictureTest, DepthAndNormalsComeInTilesToo) {
     const FrameRequest whole = request(120, 90);
     PictureBand planes;
-    inTiles(whole, 48, &planes);
+    inTiles(whole, 48, &planes, 3);  // depth and normals stay those of the first sample
     atOnce(whole);
     const auto depth = renderer_->readDepth().value();
     const auto normals = renderer_->readNormals().value();

@@ -82,7 +82,8 @@ is_picture() { is_at_rest "$1" && [ "$(colours "$1")" -gt 50 ]; }
 differs() { waits_for "$1 and $2 are the same picture" is_other "$1" "$2"; }
 equals() { waits_for "$1 and $2 differ" is_same "$1" "$2"; }
 
-starts ball.ply ball.ply --size 640x480
+# Pictures of one sample are at rest at once.
+starts ball.ply ball.ply --size 640x480 --samples 1
 # The window shows its background and the build's progress first: wait for clay in the middle.
 is_first() { is_picture "$1" && [ "$(convert "$1.png" -format '%[fx:p{320,240}.r>0.6]' info:)" = 1 ]; }
 waits_for "the first picture is empty" is_first start
@@ -181,9 +182,16 @@ grep -q '"settled": true' report.json || fail "not settled at the end"
 grep -q '"first_picture_seconds": [0-9]' report.json || fail "no picture was ever shown"
 frames=$(grep '"frames"' report.json)
 
-# Settings are remembered: the size it was left with. A file whose disk is gone ends nothing.
+# A picture that stays gets all its samples, and then the window sleeps.
 "$vcp" build ball.ply -o gone.vcp --progress none >/dev/null
 starts gone.vcp gone.vcp
+waits_for "no picture that gets samples" is_resized
+waits_for "the window is woken often when its picture has all samples" sleeps
+ends 0
+grep -q '"samples": 64' report.json || fail "the picture did not get all its samples"
+
+# Settings are remembered: the size it was left with. A file whose disk is gone ends nothing.
+starts gone.vcp gone.vcp --samples 1
 waits_for "no picture of the size it was left with" is_resized
 : >gone.vcp
 xdotool mousemove --window $window 250 150 click --repeat 9 --delay 20 4
@@ -193,7 +201,7 @@ ends 0
 # A file is dropped into an empty window. Without a dataset the size is the one it was left with.
 if [ -n "$drop" ]; then
     export VCP_TEST_DROP=$folder/dropped
-    LD_PRELOAD=$drop starts vcp --size 640x480
+    LD_PRELOAD=$drop starts vcp --size 640x480 --samples 1
     echo "$folder/ball.ply" >dropped.part
     mv dropped.part dropped
     waits_for "what was dropped is not shown" is_first dropped_picture

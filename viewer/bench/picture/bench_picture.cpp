@@ -90,18 +90,22 @@ Result<double> medianCpuMs(int repetitions, const Draw& draw) {
 class RendererMethod final : public PictureMethod {
 public:
     static Result<std::unique_ptr<PictureMethod>> create(const std::filesystem::path& file, const std::string& device,
-                                                         double errorPixels, int repetitions) {
+                                                         double errorPixels, int repetitions, uint32_t samples) {
         RendererOptions options;
         options.device = device;
         options.budgetBytes = uint64_t{2} << 30;
         VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
         std::unique_ptr<RendererMethod> method(new RendererMethod(std::move(renderer), file, errorPixels));
         method->repetitions_ = repetitions;
+        method->samples_ = samples;
         return std::unique_ptr<PictureMethod>(std::move(method));
     }
 
     [[nodiscard]] std::string name() const override { return "certified"; }
-    [[nodiscard]] std::string knob() const override { return fmt::format("error-pixels {:g}", errorPixels_); }
+    [[nodiscard]] std::string knob() const override {
+        const std::string samples = samples_ > 1 ? fmt::format(", samples {}", samples_) : "";
+        return fmt::format("error-pixels {:g}{}", errorPixels_, samples);
+    }
     [[nodiscard]] std::string device() const override { return renderer_->device().name; }
 
     Result<void> startAnew() override {
@@ -120,7 +124,7 @@ public:
         drawn.cost = {0, reader_->bytes(), settled.residentBytes, settled.coarsestLevel, settled.finestLevel};
         VCP_TRY_ASSIGN(drawn.cost.cpuMs, medianCpuMs(repetitions_, [&]() -> Result<void> {
                            VCP_TRY(renderer_->render(request));
-                           return {};
+                           return renderer_->refineTo(samples_, request);
                        }));
         VCP_TRY(read(drawn.picture));
         return drawn;
@@ -150,6 +154,7 @@ private:
     std::filesystem::path file_;
     double errorPixels_;
     int repetitions_ = 1;
+    uint32_t samples_ = 1;
     std::shared_ptr<CountingReader> reader_;
 };
 
@@ -246,7 +251,8 @@ private:
                 continue;
             }
             for (const double pixels : o_.errorPixels) {
-                VCP_TRY_ASSIGN(auto method, RendererMethod::create(m.files.vcp, o_.device, pixels, o_.repetitions));
+                VCP_TRY_ASSIGN(auto method, RendererMethod::create(m.files.vcp, o_.device, pixels, o_.repetitions,
+                                                                   o_.pictureSamples));
                 methods.push_back(std::move(method));
             }
         }

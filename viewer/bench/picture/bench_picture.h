@@ -28,6 +28,7 @@ struct BenchPictureOptions {
     std::vector<std::string> methods = {"certified", "embree"};
     std::vector<std::string> cameras = {"whole", "half", "close", "dive"};
     std::vector<double> errorPixels = {0.5};  ///< values of the knob of `certified`
+    uint32_t pictureSamples = 1;              ///< of a pixel of `certified`: its cost is that of all of them
     glm::ivec2 size{960, 600};
     int diveSteps = 5;
     int views = 1;        ///< directions each camera looks from, spread over the sphere; a row counts them all

@@ -1,0 +1,30 @@
+// Adds a part of a sample of a picture to the sums of those before it, as light, and shows the mean. A pixel without a
+// hit before a transparent background adds nothing: the colour is the mean of what is seen, and alpha its part of the
+// pixel. Reads constants and the part's picture; reads and writes the sums and the picture that is shown, which is
+// sample 0 before sample 1 is added.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "render/shaders/bindings.glsl"
+#include "render/shared/hit_light.h"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(set = 0, binding = 13, std430) readonly buffer PartPictureBlock { uint partPixels[]; };
+layout(set = 0, binding = 18, std430) buffer SumBlock { vec4 sums[]; };
+layout(set = 0, binding = 19, std430) buffer ShownPictureBlock { uint shownPixels[]; };
+
+vec4 seenLight(uint word) {
+    vec4 colour = unpackUnorm4x8(word);
+    return vec4(lightOfColour(colour.rgb) * colour.a, colour.a);
+}
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= frame.width || pixel.y >= frame.partRows) return;
+    uint at = (pixel.y + frame.partRow) * frame.width + pixel.x;
+    vec4 before = frame.sampleNumber == 1u ? seenLight(shownPixels[at]) : sums[at];
+    vec4 sum = before + seenLight(partPixels[(pixel.y + frame.skippedRows) * frame.width + pixel.x]);
+    sums[at] = sum;
+    shownPixels[at] =
+        packUnorm4x8(vec4(colourOfLight(sum.rgb / max(sum.a, 1.0)), sum.a / float(frame.sampleNumber + 1u)));
+}
