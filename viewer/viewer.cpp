@@ -479,7 +479,7 @@ FrameRequest Viewer::pictureOf(glm::ivec2 size) const {
 
 bool Viewer::refinementIsDue(double now) const {
     if (!pagesChanged_) return false;
-    if (status_.update.settled || !drawn_) return true;
+    if (status_.update.settled || status_.update.awaitsRays || !drawn_) return true;
     return now - drawnAt_ >= std::max(kRefineSeconds, kRefineFrames * 1e-3 * status_.frame.msFrame);
 }
 
@@ -503,7 +503,8 @@ NextStep Viewer::nextStep(double now) const {
     NextStep next;
     // Without a dataset, and where its coarsest page cannot be read, the background is shown.
     const bool canDraw = status_.update.drawable || !status_.problem.empty() || !isOpen_;
-    next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now));
+    const bool raysAreAsked = status_.update.awaitsRays && !renderer_->isDrawing();
+    next.draw = canDraw && (!drawn_ || *drawn_ != request_ || refinementIsDue(now) || raysAreAsked);
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
     const bool isCheaper = requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
     if (isCheaper) next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));

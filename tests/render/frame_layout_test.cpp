@@ -79,7 +79,7 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(paperEpsilon),
                                                                    OFFSET(worldPerCell),
                                                                    OFFSET(isCovering),
-                                                                   OFFSET(unused0),
+                                                                   OFFSET(firstHitMark),
                                                                    OFFSET(rotation),
                                                                    OFFSET(sections)}));
 }

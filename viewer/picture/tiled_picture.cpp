@@ -53,11 +53,16 @@ Result<bool> TiledPicture::step() {
     VCP_TRY_ASSIGN(auto update, renderer_->update(request));
     if (!update.problems.empty() && !options_.problem) return update.problems.front();
     for (const Error& problem : update.problems) options_.problem(problem);
-    isWaiting_ = !update.settled;
+    if (update.changed) drawn_.reset();
+    isWaiting_ = !update.settled && !update.awaitsRays;
     if (isWaiting_) return false;
+    if (!drawn_ || update.awaitsRays) {
+        VCP_TRY_ASSIGN(drawn_, renderer_->render(request, options_.cancel));
+    }
+    if (!update.settled) return false;  // what its rays hit may be too coarse
     stats_.errorPixels = std::max(stats_.errorPixels, update.errorPixels);
     stats_.update = std::move(update);
-    VCP_TRY(draw(request));
+    count(*std::exchange(drawn_, std::nullopt));
     VCP_TRY(copyTile(with, tile));
     x_ += tile.width;
     if (x_ < whole_.width) return false;
@@ -68,13 +73,11 @@ Result<bool> TiledPicture::step() {
     return y_ >= whole_.height;
 }
 
-Result<void> TiledPicture::draw(const FrameRequest& request) {
-    VCP_TRY_ASSIGN(const auto stats, renderer_->render(request, options_.cancel));
+void TiledPicture::count(const FrameStats& tile) {
     ++stats_.tiles;
-    stats_.rays += stats.rays;
-    stats_.hitPixels += stats.hitPixels;
-    stats_.ms += stats.msFrame;
-    return {};
+    stats_.rays += tile.rays;
+    stats_.hitPixels += tile.hitPixels;
+    stats_.ms += tile.msFrame;
 }
 
 Result<void> TiledPicture::copyTile(const Rect& outer, const Rect& inner) {

@@ -81,6 +81,7 @@ Result<void> settle(vcp_view& view, double seconds) {
     while (!isLate) {
         VCP_TRY(update(view));
         if (view.viewer->status().update.settled && std::isinf(view.next.waitSeconds)) break;
+        if (view.viewer->status().update.awaitsRays) VCP_TRY(render(view));
         const double left = begin + seconds - view.context->now();
         isLate = left <= 0;
         const std::chrono::milliseconds wait(int(1000 * std::clamp(left, 0.0, kPollSeconds)));
