@@ -164,7 +164,7 @@ private:
         EnteredChildren order;
         for (uint32_t octant = 0; octant < 8; ++octant) {
             if ((entry.childMask >> octant & 1) == 0) continue;
-            const uint64_t child = entry.firstChild + std::popcount(entry.childMask & ((1u << octant) - 1));
+            const uint64_t child = childIn(entry, octant);
             order.insert(clipToCube(in.origin, in.direction, octantOffset(octant) * edge, edge).first, child);
         }
         for (uint32_t i = 0; i < order.count; ++i) visitPage(order.child[i]);

@@ -162,6 +162,11 @@ inline EntryRange childrenOf(const PageEntry& page) {
     return {page.firstChild, uint64_t(std::popcount(page.childMask))};
 }
 
+/// The entry of the child in an octant that has one.
+inline uint64_t childIn(const PageEntry& page, uint32_t octant) {
+    return uint64_t{page.firstChild} + uint64_t(std::popcount(page.childMask & ((1u << octant) - 1)));
+}
+
 struct CommitRecord {
     char magic[8] = {'V', 'C', 'P', 'c', 'o', 'm', 'm', 't'};
     uint64_t fileBytes = 0;

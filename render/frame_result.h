@@ -48,6 +48,7 @@ struct PageBox {
     std::array<glm::dvec3, 3> edges;  ///< world vectors from the corner
     uint32_t level = 0;               ///< 0: the coarsest
     bool isDrawn = false;             ///< the page is in the cut of this view
+    uint64_t number = 0;              ///< in the directory of its dataset
 };
 
 /// What the rays of the last frame that missed pages met, 24 x 16 over the picture, row by row from the upper left.

@@ -1,6 +1,9 @@
 #include "render/frame_setup.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <functional>
 
 #include <glm/common.hpp>
 #include <glm/exponential.hpp>
@@ -88,7 +91,7 @@ void setSections(frame::FrameConstants& c, const FrameRequest& request, const Fi
     }
 }
 
-// Rays of light begin so many pixels above the surface, in addition to the error of what is drawn.
+// Rays of light begin so many pixels above the surface, in addition to the error of the picture.
 constexpr double kLiftPixels = 0.5;
 
 void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileHeader& header, const CameraBasis& basis,
@@ -106,6 +109,15 @@ void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileH
     if (!hasLight(s)) return;
     c.occlusionRays = s.occlusionRays;
     c.hasShadows = s.shadows ? 1 : 0;
+}
+
+/// Returns the error of a picture, in pixels, as rays of light need it: at least what is tolerated, or what the
+/// coarsest page errs by where that is less. So they begin at the same points whatever is drawn of what rays do not
+/// hit.
+double errorToLift(const Dataset& dataset, const FrameRequest& request, double errorPixels) {
+    if (dataset.pages.empty()) return errorPixels;
+    const double coarsest = shownError(dataset, dataset.pages[0], selectionView(request));
+    return std::max(errorPixels, std::min(request.errorPixels, coarsest));
 }
 
 }  // namespace
@@ -171,7 +183,7 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     const glm::dquat& q = placement.rotation;
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     setSections(c, request, header);
-    setLight(c, request, header, basis, errorPixels);
+    setLight(c, request, header, basis, dataset != nullptr ? errorToLift(*dataset, request, errorPixels) : 0);
     return c;
 }
 
@@ -198,6 +210,26 @@ std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
     return rows;
 }
 
+namespace {
+
+/// A number for what is cast beside the camera's place: planes that cut, and rays of light.
+uint64_t numberOfRays(const FrameRequest& request) {
+    uint64_t number = 0;
+    const auto add = [&](auto value) {
+        number = (std::rotl(number, 23) ^ std::hash<decltype(value)>{}(value)) * 0x9e3779b97f4a7c15;
+    };
+    const auto addPoint = [&](const auto& p) { add(p.x), add(p.y), add(p.z); };
+    for (const SectionPlane& plane : request.sections) addPoint(plane.normal), add(plane.offset);
+    if (!request.sections.empty()) add(request.sectionCaps);
+    const Shading& shading = request.shading;
+    if (!hasLight(shading)) return number;
+    add(shading.shadows), add(shading.occlusionRays), add(shading.occlusionRadius);
+    add(shading.lightFollowsCamera), addPoint(shading.lightDirection);
+    return number;
+}
+
+}  // namespace
+
 SelectionView selectionView(const FrameRequest& request) {
     const CameraBasis basis = basisOf(request);
     const PictureTile whole = wholePicture(request);
@@ -206,6 +238,8 @@ SelectionView selectionView(const FrameRequest& request) {
     view.orthographic = request.camera.projection == Projection::Orthographic;
     view.pixelsPerUnit = whole.fullHeight / (2 * basis.halfHeight);
     view.errorPixels = request.errorPixels;
+    view.pixels = double(request.width) * request.height;
+    view.rays = numberOfRays(request);
     // The picture's edges are tangents, or world units where the projection is orthographic.
     const auto across = [&](double x) { return basis.halfWidth * (2 * x / whole.fullWidth - 1); };
     const auto upward = [&](double y) { return basis.halfHeight * (1 - 2 * y / whole.fullHeight); };

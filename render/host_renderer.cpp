@@ -1,6 +1,7 @@
 #include "render/host_renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -60,18 +61,39 @@ PlacedCut placedCut(Residency& residency) {
     const std::vector<uint64_t>& cut = residency.cut();
     PlacedCut placed;
     placed.views.reserve(cut.size());
+    auto partial = residency.partial().begin();
     for (const uint64_t number : cut) {
         const PageEntry& entry = dataset.pages[number];
         const std::span<const std::byte> bytes = memory.bytesOf(residency.slotOf(number));
         const uint64_t colours = residency.hasColour() ? entry.colourBytes : 0;
         placed.views.push_back(viewOfChecked(bytes.first(entry.pageBytes), bytes.subspan(entry.pageBytes, colours)));
-        placed.pages.push_back({.view = &placed.views.back(),
-                                .number = number,
-                                .place = mortonDecode(entry.morton),
-                                .level = entry.level,
-                                .error = float(double(entry.certifiedError) / dataset.header.cell)});
+        HostPage page{.view = &placed.views.back(),
+                      .number = number,
+                      .place = mortonDecode(entry.morton),
+                      .level = entry.level,
+                      .error = float(double(entry.certifiedError) / dataset.header.cell)};
+        if (partial == residency.partial().end() || partial->page != number) {
+            placed.pages.push_back(page);
+            continue;
+        }
+        for (uint32_t octants = partial++->octants; octants != 0; octants &= octants - 1) {
+            page.octant = uint32_t(std::countr_zero(octants));
+            placed.pages.push_back(page);
+        }
     }
     return placed;
+}
+
+/// Returns the numbers, in the directory, of the pages that rays marked, and of those in whose place these are drawn.
+std::vector<uint64_t> markedPages(const Dataset& dataset, const HostScene& scene, const PageMarks& marks) {
+    std::vector<uint64_t> pages;
+    for (uint32_t i = 0; i < scene.pages(); ++i) {
+        if (!marks.isMarked(i)) continue;
+        const HostScene::Page& page = scene.page(i);
+        pages.push_back(page.number);
+        if (page.octant) pages.push_back(childIn(dataset.pages[page.number], *page.octant));
+    }
+    return pages;
 }
 
 }  // namespace
@@ -137,12 +159,19 @@ Result<void> HostRenderer::drawDataset(size_t number, const FrameRequest& reques
     const PlacedCut cut = placedCut(*residency);
     VCP_TRY_ASSIGN(const auto scene, HostScene::create(hostGrid(dataset.header), cut.pages));
     const bool hasColour = residency->hasColour();
+    const bool reports = residency->asksRays() && request.sample == 0;
+    PictureMarks marks(scene.pages());
     const HostLayer layer{.scene = scene,
                           .rays = raysOf(seen),
                           .frame = frameConstants(seen, &dataset, 1, hasColour, errorPixels_[number], placement),
                           .hasColour = hasColour,
-                          .worldPerUnit = placement.scale};
-    return drawLayer(layer, options, picture);
+                          .worldPerUnit = placement.scale,
+                          .marks = reports ? &marks : nullptr};
+    VCP_TRY(drawLayer(layer, options, picture));
+    if (reports)
+        residency->see({markedPages(dataset, scene, marks.byCamera), markedPages(dataset, scene, marks.byLight)},
+                       selectionView(seen), residency->cutNumber());
+    return {};
 }
 
 Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::function<bool()>& cancel) {
@@ -161,7 +190,7 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
     stats.msFrame = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
     drawn_ = std::move(picture);
     request_ = request;
-    cuts_ = cuts();
+    cuts_ = cutNumbers();
     light_ = {};
     return stats;
 }
@@ -173,9 +202,9 @@ Result<HostPicture> HostRenderer::draw(const FrameRequest& request, const std::f
     return picture;
 }
 
-std::vector<std::vector<uint64_t>> HostRenderer::cuts() const {
-    std::vector<std::vector<uint64_t>> all;
-    for (const auto& [residency, placement] : datasets_) all.push_back(residency->cut());
+std::vector<uint64_t> HostRenderer::cutNumbers() const {
+    std::vector<uint64_t> all;
+    for (const auto& [residency, placement] : datasets_) all.push_back(residency->cutNumber());
     return all;
 }
 
@@ -183,7 +212,7 @@ Result<uint32_t> HostRenderer::refine(const std::function<bool()>& cancel) {
     if (!drawn_) return 0u;
     const uint32_t samples = std::max(light_.samples(), 1u);
     VCP_TRY(checkRefinable(request_, samples));
-    if (cuts() != cuts_) return 0u;
+    if (cutNumbers() != cuts_) return 0u;
     FrameRequest request = request_;
     request.sample = samples;
     VCP_TRY_ASSIGN(const auto more, draw(request, cancel));

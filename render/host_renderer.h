@@ -43,7 +43,7 @@ private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
     /// Draws all datasets.
     Result<HostPicture> draw(const FrameRequest& request, const std::function<bool()>& cancel);
-    [[nodiscard]] std::vector<std::vector<uint64_t>> cuts() const;
+    [[nodiscard]] std::vector<uint64_t> cutNumbers() const;
     /// Draws the cut of one dataset over what is in the picture.
     Result<void> drawDataset(size_t number, const FrameRequest& request, const HostCastOptions& options,
                              HostPicture& picture);
@@ -51,11 +51,11 @@ private:
     const RendererOptions options_;
     const DeviceInfo info_;
     std::vector<PlacedResidency> datasets_;
-    std::vector<double> errorPixels_;          // of each dataset's last update
-    std::optional<HostPicture> drawn_;         // the last picture; its colours may be of fewer samples than light_
-    FrameRequest request_;                     // of that picture
-    std::vector<std::vector<uint64_t>> cuts_;  // that it shows
-    SampledLight light_;                       // none before the second sample
+    std::vector<double> errorPixels_;   // of each dataset's last update
+    std::optional<HostPicture> drawn_;  // the last picture; its colours may be of fewer samples than light_
+    FrameRequest request_;              // of that picture
+    std::vector<uint64_t> cuts_;        // numbers of those that it shows
+    SampledLight light_;                // none before the second sample
 };
 
 }  // namespace vcp

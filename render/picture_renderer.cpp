@@ -1,27 +1,65 @@
 #include "render/picture_renderer.h"
 
+#include <iterator>
 #include <utility>
 
+#include "render/frame_setup.h"
 #include "render/pixel_samples.h"
 
 namespace vcp {
 
-Result<UpdateResult> PictureRenderer::settle(const FrameRequest& request, const std::function<bool()>& cancel) {
-    bool changed = false;
-    std::vector<Error> problems;
+namespace {
+
+/// Calls update() until settled, and draws where rays are to say what they hit. `drawn` is what the picture's last
+/// frame came to, where that is the picture that was settled on. What updates report is added to `all`.
+Result<void> settleOn(PictureRenderer& renderer, const FrameRequest& request, const std::function<bool()>& cancel,
+                      std::optional<FrameStats>& drawn, UpdateResult& all) {
     while (true) {
-        auto result = update(request);
-        if (!result) return result;
-        changed = changed || result->changed;
-        problems.insert(problems.end(), result->problems.begin(), result->problems.end());
-        if (result->settled) {
-            result->changed = changed;
-            result->problems = std::move(problems);
-            return result;
-        }
+        VCP_TRY_ASSIGN(auto next, renderer.update(request));
+        if (next.changed) drawn.reset();
+        next.changed = next.changed || all.changed;
+        next.problems.insert(next.problems.begin(), std::make_move_iterator(all.problems.begin()),
+                             std::make_move_iterator(all.problems.end()));
+        all = std::move(next);
+        if (all.settled) return {};
         if (cancel && cancel()) return Error::cancelled();
-        waitForPage(std::chrono::milliseconds(100));
+        if (all.awaitsRays) {
+            VCP_TRY_ASSIGN(drawn, renderer.render(request, cancel));
+        } else {
+            renderer.waitForPage(std::chrono::milliseconds(100));
+        }
     }
+}
+
+/// Settles on what the camera's rays hit before rays of light are cast: those begin where the former hit.
+Result<UpdateResult> settleAll(PictureRenderer& renderer, const FrameRequest& request,
+                               const std::function<bool()>& cancel, std::optional<FrameStats>& drawn) {
+    UpdateResult all;
+    if (hasLight(request.shading)) {
+        FrameRequest dark = request;
+        dark.shading.shadows = false;
+        dark.shading.occlusionRays = 0;
+        VCP_TRY(settleOn(renderer, dark, cancel, drawn, all));
+        drawn.reset();
+    }
+    VCP_TRY(settleOn(renderer, request, cancel, drawn, all));
+    return all;
+}
+
+}  // namespace
+
+Result<UpdateResult> PictureRenderer::settle(const FrameRequest& request, const std::function<bool()>& cancel) {
+    std::optional<FrameStats> drawn;
+    return settleAll(*this, request, cancel, drawn);
+}
+
+Result<SettledFrame> PictureRenderer::drawSettled(const FrameRequest& request, const std::function<bool()>& cancel) {
+    std::optional<FrameStats> drawn;
+    VCP_TRY_ASSIGN(auto update, settleAll(*this, request, cancel, drawn));
+    if (!drawn) {
+        VCP_TRY_ASSIGN(drawn, render(request, cancel));
+    }
+    return SettledFrame{std::move(update), *drawn};
 }
 
 Result<void> PictureRenderer::refineTo(uint32_t samples, const FrameRequest& request,

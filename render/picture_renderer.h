@@ -1,8 +1,8 @@
 // What draws pictures of datasets without a window: a Vulkan device (Renderer, renderer.h) or the processor alone
 // (HostRenderer, host_renderer.h). Whoever only wants pictures knows no more than this.
 //
-// A picture is settle(request), render(request), readPicture(), with refine() before the last where edges are to be
-// smooth. The same request and the same cut give the same bytes.
+// A picture is drawSettled(request), readPicture(), with refine() between them where edges are to be smooth. The same
+// request and the same cut give the same bytes.
 // One thread at a time may call a renderer.
 #pragma once
 
@@ -34,6 +34,12 @@ struct PlacedDataset {
     uint32_t loaderThreads = 2;  ///< threads that keep its source busy
 };
 
+/// A picture of which nothing is missing.
+struct SettledFrame {
+    UpdateResult update;  ///< with all problems since it began to settle
+    FrameStats stats;
+};
+
 struct MesoSurface;  // render/passes/meso_surface.h
 
 class PictureRenderer {
@@ -53,9 +59,11 @@ public:
     virtual Result<UpdateResult> update(const FrameRequest& request) = 0;
     /// Waits until a page was read, there is nothing to read, or the time is over.
     virtual void waitForPage(std::chrono::milliseconds timeout) = 0;
-    /// Calls update() until settled, and waits for the loader in between. Stops early with Cancelled where `cancel`
-    /// returns true (it is called several times a second).
+    /// Calls update() until settled; in between waits for the loader, and draws where rays are to say what they hit.
+    /// Stops early with Cancelled where `cancel` returns true (it is called several times a second).
     Result<UpdateResult> settle(const FrameRequest& request, const std::function<bool()>& cancel = {});
+    /// Does the same, and draws what was settled on, unless that was drawn to find out. Errors: as of render().
+    Result<SettledFrame> drawSettled(const FrameRequest& request, const std::function<bool()>& cancel = {});
 
     /// Draws the cut of the last update and waits for it; without a dataset, the background. `cancel` may be called by
     /// several threads: where it returns true, the processor stops with Cancelled; a device draws its frame to the end.

@@ -93,6 +93,8 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     LayerFrame& drawing = frame.layers[i];
     drawing.request = layer.drawable(frame.request);
     drawing.listened = layer.listens() && !frame.part;
+    drawing.asked = layer.asksRays(number) && !frame.part;
+    drawing.cutNumber = layer.residency != nullptr ? layer.residency->cutNumber(number) : 0;
     drawing.constants = constantsFor(layer, drawing.request);
     const FrameRequest& request = drawing.request;
     const PassConstants& constants = drawing.constants;
@@ -120,8 +122,8 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
         VCP_TRY(shared->trace.prepare(resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
     if (traceLight) VCP_TRY(shared->light.prepare(resources, constants));
-    if (drawing.listened)
-        VCP_TRY(shared->feedback.prepare(*shared->device, drawing.feedback, resources, constants, layer.table));
+    if (drawing.reports()) VCP_TRY(drawing.feedback.prepare(*shared->device, resources, layer.table));
+    if (drawing.listened) VCP_TRY(shared->feedback.prepare(resources, constants));
     return shared->shade.prepare(resources, constants, traceLight);
 }
 
@@ -141,6 +143,8 @@ void Renderer::View::record(VkCommandBuffer commands, Frame& frame, size_t i) {
         c.partRows = frame.part->rows;
         c.skippedRows = frame.part->skippedRows;
     }
+    if (drawing.asked) c.firstHitMark = drawing.feedback.firstHitMark();
+    if (drawing.reports()) drawing.feedback.clear(commands);
     resources.begin(commands, c);
     if (shared->composes() && i == 0) frame.target.clear(commands);
     timer.mark(commands, 0);
@@ -156,7 +160,8 @@ void Renderer::View::record(VkCommandBuffer commands, Frame& frame, size_t i) {
     shared->shade.record(commands, resources);
     if (shared->composes()) shared->compose.record(commands, resources);
     timer.mark(commands, 4);
-    if (drawing.listened) shared->feedback.record(commands, drawing.feedback);
+    if (drawing.listened) shared->feedback.record(commands);
+    if (drawing.reports()) drawing.feedback.recordReadback(commands);
     timer.mark(commands, 5);
     resources.recordReadback(commands, frame.cursor);
     if (shared->composes()) frame.target.recordReadback(commands);
@@ -349,8 +354,13 @@ Result<void> Renderer::View::addSurfaceStats(const Frame& frame, FrameStats& all
     return {};
 }
 
-/// Hands what the rays asked for to the residencies.
+/// Hands what the rays hit and asked for to the residencies.
 void Renderer::View::hear(const Frame& frame) {
+    for (size_t i = 0; i < frame.layers.size(); ++i) {
+        const LayerFrame& layer = frame.layers[i];
+        if (!layer.asked) continue;
+        layers[i].residency->see(layer.feedback.pagesHit(), selectionView(layer.request), layer.cutNumber, number);
+    }
     if (std::any_of(frame.layers.begin(), frame.layers.end(), [](const LayerFrame& layer) { return layer.listened; }))
         feedbackPicture.reset();
     for (size_t i = 0; i < frame.layers.size(); ++i) {

@@ -21,6 +21,7 @@ struct RendererOptions {
     uint64_t ramBytes =
         256ull << 20;  ///< most bytes of pages on their way to the pool, and of stored ones kept to be read again
     LoadOrder order = LoadOrder::Feedback;  ///< order in which pages are read; others than Feedback are for comparison
+    bool hiddenToo = false;                 ///< also reads what no ray hits: for comparison
     uint64_t uploadBytes = 16ull << 20;     ///< bytes that one update takes into the pool (one page at least)
     DeviceFaults faults;
     std::optional<SurfaceSource> surface;  ///< absent: no surface extension is asked for

@@ -233,6 +233,7 @@ std::vector<PageBox> Renderer::residentPages() const {
             const double edge = dataset.edgeOf(entry) * layer.placement.scale;
             PageBox box{
                 layer.placement.toWorld(low), {}, entry.level, std::binary_search(cut.begin(), cut.end(), page)};
+            box.number = page;
             for (int axis = 0; axis < 3; ++axis) {
                 glm::dvec3 along(0);
                 along[axis] = edge;

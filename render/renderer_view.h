@@ -45,6 +45,10 @@ struct Renderer::View {
         }
         /// Whether the next frame has a feedback pass.
         [[nodiscard]] bool listens() const { return residency != nullptr && residency->listens() && !isPaper(); }
+        /// Whether the next frame of the view says which pages its rays hit.
+        [[nodiscard]] bool asksRays(ViewNumber view) const {
+            return residency != nullptr && residency->asksRays(view) && !isPaper();
+        }
         /// World units per unit of the hits' depths.
         [[nodiscard]] double unit() const {
             return (residency != nullptr ? residency->dataset().header.cell : 1) * placement.scale;
@@ -61,6 +65,10 @@ struct Renderer::View {
         FrameRequest request;      // as seen from the dataset
         uint64_t tableNumber = 0;  // of the table that the resources have
         bool listened = false;     // the frame has a feedback pass
+        bool asked = false;        // its rays say which pages they hit
+        uint64_t cutNumber = 0;    // of what is drawn (Residency::cutNumber)
+
+        [[nodiscard]] bool reports() const { return listened || asked; }
     };
     struct Frame {
         std::vector<LayerFrame> layers;  // one for each of the view's; the first one's picture is the frame's

@@ -28,6 +28,7 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
                                                      std::vector<PlacedDataset> placed) {
     ResidencyOptions each;
     each.order = options.order;
+    each.hiddenToo = options.hiddenToo;
     each.loader.withColour = options.colour;
     const auto loaders = uint32_t(std::max<size_t>(placed.size(), 1));
     uint32_t threads = options.loaderThreads;
@@ -72,6 +73,7 @@ void waitForPage(std::span<const PlacedResidency> datasets, std::chrono::millise
 void add(UpdateResult& all, const UpdateResult& one) {
     all.changed = all.changed || one.changed;
     all.settled = all.settled && one.settled;
+    all.awaitsRays = all.awaitsRays || one.awaitsRays;
     all.relaxed = all.relaxed || one.relaxed;
     all.errorPixels = std::max(all.errorPixels, one.errorPixels);
     all.residentBytes += one.residentBytes;

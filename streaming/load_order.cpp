@@ -41,7 +41,7 @@ std::optional<uint64_t> childAt(const PageEntry& page, glm::ivec3 place) {
     const uint32_t octant =
         uint32_t(place.x >> bit & 1) | uint32_t(place.y >> bit & 1) << 1 | uint32_t(place.z >> bit & 1) << 2;
     if ((page.childMask >> octant & 1) == 0) return std::nullopt;
-    return uint64_t{page.firstChild} + std::popcount(page.childMask & ((1u << octant) - 1));
+    return childIn(page, octant);
 }
 
 void fade(std::unordered_map<uint64_t, double>& values, double remembered) {

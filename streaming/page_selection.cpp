@@ -1,11 +1,13 @@
 #include "streaming/page_selection.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <queue>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 namespace vcp {
 
@@ -16,6 +18,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 struct Candidate {
     double error;
     uint64_t page;
+    uint8_t octants;  // whose children are wanted
 
     /// The largest error comes first; among equals, the first in the directory.
     bool operator<(const Candidate& other) const {
@@ -32,6 +35,12 @@ double projectedError(const Dataset& dataset, const PageEntry& page, const Selec
     const glm::dvec3 lo = dataset.originOf(page), hi = lo + dataset.edgeOf(page);
     const double distance = glm::length(glm::clamp(view.eye, lo, hi) - view.eye);
     return distance > 0 ? error / distance : kInfinity;
+}
+
+double shownError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+    const double error = projectedError(dataset, page, view);
+    if (view.orthographic) return error;
+    return std::min(error, double(page.certifiedError) * view.pixelsPerUnit / dataset.cellOf(page.level));
 }
 
 bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
@@ -57,19 +66,70 @@ double errorInView(const Dataset& dataset, uint64_t page, const SelectionView& v
 
 bool isTooCoarse(double error, const SelectionView& view) { return error > view.errorPixels; }
 
-/// The page's error as a multiple of what is allowed, in the view where that is largest; 0: fine enough for all.
-double excessOf(const Dataset& dataset, uint64_t page, std::span<const SelectionView> views) {
-    double excess = 0;
-    for (const SelectionView& view : views)
-        if (const double error = errorInView(dataset, page, view); isTooCoarse(error, view))
-            excess = std::max(excess, error / std::max(view.errorPixels, kLeastErrorPixels));
-    return excess;
+/// Whether single children may replace a page in their octants: it has to have nodes that lie in one octant each.
+bool canBePartial(const Dataset& dataset, const PageEntry& page) { return dataset.isCovering() && page.leaves > 1; }
+
+/// Whether rays may begin inside of a box: those of a parallel projection begin in a plane through the eye.
+bool holdsOrigins(glm::dvec3 corner, double edge, const SelectionView& view) {
+    const glm::dvec3 half(0.5 * edge), middle = corner + half - view.eye;
+    if (!view.orthographic) return glm::all(glm::lessThanEqual(glm::abs(middle), half));
+    const glm::dvec3 forward = glm::cross(glm::dvec3(view.planes[0]), glm::dvec3(view.planes[2]));
+    return std::abs(glm::dot(middle, forward)) <= glm::dot(half, glm::abs(forward));
 }
 
-bool mayBeRefined(const PageEntry& page, std::span<const uint8_t> states) {
-    const EntryRange children = childrenOf(page);
-    return page.childMask != 0 &&
-           std::all_of(children.begin(), children.end(), [&](uint64_t child) { return states[child] != kUnavailable; });
+/// Returns the octants of a page that errs by so much in the view, whose children it wants. `seen`: what its rays hit;
+/// null: all pages count as hit.
+uint8_t octantsWanted(const Dataset& dataset, uint64_t page, double error, const SelectionView& view,
+                      const PagesSeen* seen) {
+    const PageEntry& entry = dataset.pages[page];
+    if (!isTooCoarse(error, view)) return 0;
+    if (seen == nullptr || error > kUnseenErrors * view.errorPixels) return entry.childMask;
+    const glm::dvec3 corner = dataset.originOf(entry);
+    const double edge = dataset.edgeOf(entry);
+    if (!canBePartial(dataset, entry))
+        return seen->contains(page) || holdsOrigins(corner, edge, view) ? entry.childMask : uint8_t{0};
+    uint8_t wanted = 0;
+    for (uint32_t octant = 0; octant < 8; ++octant) {
+        if ((entry.childMask >> octant & 1) == 0) continue;
+        const glm::dvec3 upper(octant & 1, octant >> 1 & 1, octant >> 2);
+        if (seen->contains(childIn(entry, octant)) || holdsOrigins(corner + 0.5 * edge * upper, 0.5 * edge, view))
+            wanted = uint8_t(wanted | 1u << octant);
+    }
+    return wanted;
+}
+
+/// Returns what views want of a page's children; the error is a multiple of what is allowed, in the view where that is
+/// largest, and 0 where no view wants any.
+Candidate candidate(const Dataset& dataset, uint64_t page, std::span<const SelectionView> views,
+                    std::span<const PagesSeen* const> seen) {
+    Candidate made{0, page, 0};
+    for (size_t i = 0; i < views.size(); ++i) {
+        const double error = errorInView(dataset, page, views[i]);
+        const uint8_t octants = octantsWanted(dataset, page, error, views[i], seen.empty() ? nullptr : seen[i]);
+        if (octants == 0) continue;
+        made.octants |= octants;
+        made.error = std::max(made.error, error / std::max(views[i].errorPixels, kLeastErrorPixels));
+    }
+    return made;
+}
+
+/// Calls visit(child, octant) for the children in octants that have one.
+template <class Visit>
+void forEachChild(const PageEntry& page, uint32_t octants, const Visit& visit) {
+    for (uint32_t rest = octants; rest != 0; rest &= rest - 1) {
+        const auto octant = uint32_t(std::countr_zero(rest));
+        visit(childIn(page, octant), octant);
+    }
+}
+
+/// Returns the octants whose children fulfil a condition; all or none where the page cannot be drawn in parts.
+template <class Fulfils>
+uint8_t octantsWhere(const Dataset& dataset, const PageEntry& page, uint8_t octants, const Fulfils& fulfils) {
+    uint8_t found = 0;
+    forEachChild(page, octants, [&](uint64_t child, uint32_t octant) {
+        if (fulfils(child)) found = uint8_t(found | 1u << octant);
+    });
+    return found == page.childMask || canBePartial(dataset, page) ? found : uint8_t{0};
 }
 
 struct ChildrenBytes {
@@ -77,97 +137,147 @@ struct ChildrenBytes {
     bool areKnown = true;
 };
 /// Returns the bytes of a page's children; those that are not known count as about as large as their parent.
-ChildrenBytes bytesOf(const PageEntry& parent, uint64_t parentBytes, std::span<const uint64_t> pageBytes) {
+ChildrenBytes bytesOf(const PageEntry& parent, uint8_t octants, uint64_t parentBytes,
+                      std::span<const uint64_t> pageBytes) {
     ChildrenBytes sum;
-    for (const uint64_t child : childrenOf(parent)) {
+    forEachChild(parent, octants, [&](uint64_t child, uint32_t) {
         const bool isKnown = pageBytes[child] != 0;
         sum.bytes += isKnown ? pageBytes[child] : parentBytes;
         sum.areKnown = sum.areKnown && isKnown;
-    }
+    });
     return sum;
 }
 
 }  // namespace
 
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
-                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> states) {
+                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> states,
+                       std::span<const PagesSeen* const> seen) {
     PageChoice choice;
-    choice.refined = SparseArray<uint8_t>(dataset.pages.size());  // all are kNotRefined
+    choice.refined = SparseArray<uint16_t>(dataset.pages.size());
     if (dataset.pages.empty() || states[0] != kAvailable || pageBytes[0] > budgetBytes) return choice;
     std::priority_queue<Candidate> open;
-    uint64_t bytes = pageBytes[0];
+    choice.bytes = pageBytes[0];
     choice.wanted.push_back({0, kInfinity});
-    open.push({excessOf(dataset, 0, views), 0});
+    open.push(candidate(dataset, 0, views, seen));
     while (!open.empty()) {
         const Candidate next = open.top();
         open.pop();
         if (next.error <= 0) break;
         const PageEntry& entry = dataset.pages[next.page];
-        if (!mayBeRefined(entry, states)) continue;
-        const ChildrenBytes more = bytesOf(entry, pageBytes[next.page], pageBytes);
+        const uint8_t octants =
+            octantsWhere(dataset, entry, next.octants, [&](uint64_t child) { return states[child] != kUnavailable; });
+        if (octants == 0) continue;
+        const ChildrenBytes more = bytesOf(entry, octants, pageBytes[next.page], pageBytes);
         if (!more.areKnown) {
             choice.awaited.push_back(next.page);
-            choice.refined[next.page] = kAwaited;
+            choice.refined[next.page] = octants | kAwaited;
         }
-        if (bytes + more.bytes > budgetBytes) {
+        if (choice.bytes + more.bytes > budgetBytes) {
             choice.relaxed = more.areKnown;
             break;
         }
         // Room is kept for children that are not there yet, so that less urgent pages do not take it.
-        bytes += more.bytes;
+        choice.bytes += more.bytes;
         if (!more.areKnown) continue;
-        choice.refined[next.page] = kRefined;
-        for (const uint64_t child : childrenOf(entry)) {
+        choice.refined[next.page] = octants;
+        forEachChild(entry, octants, [&](uint64_t child, uint32_t) {
             choice.wanted.push_back({child, next.error});
-            open.push({excessOf(dataset, child, views), child});
-        }
+            open.push(candidate(dataset, child, views, seen));
+        });
     }
     return choice;
 }
 
-DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice,
-                        std::span<const uint8_t> resident) {
-    DrawableCut drawable;
-    drawable.errorPixels = kInfinity;
-    drawable.complete = true;
-    if (choice.wanted.empty()) return drawable;
-    const bool hasRoot = resident[0] != 0;
-    if (hasRoot) drawable.errorPixels = 0;
-    // A page is refined where all its children are there; pages beneath what is drawn are only counted.
+namespace {
+
+/// Goes down the pages that a view draws or wants.
+class CutWalk {
+public:
+    CutWalk(const Dataset& dataset, const SelectionView& view, const PageChoice& choice,
+            std::span<const uint8_t> resident, const PagesSeen* seen)
+        : dataset_(dataset), view_(view), choice_(choice), resident_(resident), seen_(seen) {}
+
+    DrawableCut run() {
+        drawable_.errorPixels = kInfinity;
+        drawable_.complete = true;
+        if (choice_.wanted.empty()) return std::move(drawable_);
+        const bool hasRoot = resident_[0] != 0;
+        if (hasRoot) drawable_.errorPixels = 0;
+        places_.push_back({0, true, hasRoot});
+        while (!places_.empty()) {
+            const Place at = places_.back();
+            places_.pop_back();
+            visit(at);
+        }
+        drawable_.complete = drawable_.pagesMissing == 0;
+        std::sort(drawable_.cut.begin(), drawable_.cut.end());
+        std::sort(drawable_.partial.begin(), drawable_.partial.end(),
+                  [](const PartialPage& a, const PartialPage& b) { return a.page < b.page; });
+        return std::move(drawable_);
+    }
+
+private:
     struct Place {
         uint64_t page;
-        bool isCovered;
+        bool isWanted, isSeen;  // by this view; not beneath a page that is drawn there
     };
-    std::vector<Place> walk{{0, !hasRoot}};
-    while (!walk.empty()) {
-        const Place at = walk.back();
-        walk.pop_back();
-        ++drawable.pagesWanted;
-        drawable.pagesMissing += resident[at.page] != 0 ? 0 : 1;
-        const PageEntry& entry = dataset.pages[at.page];
-        const EntryRange children = childrenOf(entry);
-        const double error = errorInView(dataset, at.page, view);
-        const bool refined = choice.refined[at.page] == kRefined && isTooCoarse(error, view);
-        if (choice.refined[at.page] == kAwaited && isTooCoarse(error, view)) {
-            drawable.pagesWanted += children.size();
-            drawable.pagesMissing += children.size();
-        }
-        const bool drawn =
-            !at.isCovered && !(refined && std::all_of(children.begin(), children.end(),
-                                                      [&](uint64_t child) { return resident[child] != 0; }));
-        if (refined)
-            for (const uint64_t child : children) walk.push_back({child, at.isCovered || drawn});
-        if (!refined && isTooCoarse(error, view) && entry.childMask != 0)
-            drawable.isRelaxed = drawable.isRelaxed || choice.relaxed;
-        if (!drawn) continue;
-        drawable.cut.push_back(at.page);
-        // Inside a page's box the error has no bound; it is reported as seen from a cell away.
-        const double fromACell = double(entry.certifiedError) * view.pixelsPerUnit / dataset.cellOf(entry.level);
-        drawable.errorPixels = std::max(drawable.errorPixels, view.orthographic ? error : std::min(error, fromACell));
+
+    void visit(const Place& at) {
+        const PageEntry& entry = dataset_.pages[at.page];
+        const double error = errorInView(dataset_, at.page, view_);
+        const uint8_t asked = octantsWanted(dataset_, at.page, error, view_, seen_);
+        const uint8_t wanted = at.isWanted ? count(at.page, asked) : uint8_t{0};
+        // What nobody wants any more is drawn as long as it is there, but not where all are relaxed together.
+        const uint8_t allowed = choice_.relaxed ? wanted : isTooCoarse(error, view_) ? entry.childMask : uint8_t{0};
+        const uint8_t there =
+            at.isSeen ? octantsWhere(dataset_, entry, allowed, [&](uint64_t child) { return resident_[child] != 0; })
+                      : uint8_t{0};
+        forEachChild(entry, wanted | there, [&](uint64_t child, uint32_t octant) {
+            places_.push_back({child, (wanted >> octant & 1) != 0, (there >> octant & 1) != 0});
+        });
+        if (at.isSeen && (there != entry.childMask || there == 0)) draw(at.page, error, asked, there);
     }
-    drawable.complete = drawable.pagesMissing == 0;
-    std::sort(drawable.cut.begin(), drawable.cut.end());
-    return drawable;
+
+    /// Counts a wanted page, and children that are not known. Returns the octants whose children are wanted.
+    uint8_t count(uint64_t page, uint8_t asked) {
+        const uint16_t refined = choice_.refined[page];
+        const auto chosen = uint8_t(asked & refined);
+        ++drawable_.pagesWanted;
+        drawable_.pagesMissing += resident_[page] != 0 ? 0 : 1;
+        drawable_.isRelaxed = drawable_.isRelaxed || (choice_.relaxed && chosen != asked);
+        if ((refined & kAwaited) == 0) return chosen;
+        drawable_.pagesWanted += uint64_t(std::popcount(chosen));
+        drawable_.pagesMissing += uint64_t(std::popcount(chosen));
+        return 0;
+    }
+
+    /// Draws a page but where children are drawn in its place.
+    void draw(uint64_t page, double error, uint8_t asked, uint8_t there) {
+        const PageEntry& entry = dataset_.pages[page];
+        const auto own = uint8_t(entry.childMask & ~there);
+        const auto unseen = isTooCoarse(error, view_) ? uint8_t(own & ~asked) : uint8_t{0};
+        drawable_.cut.push_back(page);
+        drawable_.pagesUnseen += uint64_t(std::popcount(unseen));
+        if (canBePartial(dataset_, entry) && (there != 0 || unseen != 0)) drawable_.partial.push_back({page, own});
+        if (error > 0 && (unseen == 0 || unseen != own))
+            drawable_.errorPixels = std::max(drawable_.errorPixels, shownError(dataset_, entry, view_));
+    }
+
+    const Dataset& dataset_;
+    const SelectionView& view_;
+    const PageChoice& choice_;
+    const std::span<const uint8_t> resident_;
+    const PagesSeen* const seen_;
+    DrawableCut drawable_;
+    std::vector<Place> places_;
+};
+
+}  // namespace
+
+DrawableCut drawableCut(const Dataset& dataset, const SelectionView& view, const PageChoice& choice,
+                        std::span<const uint8_t> resident, const PagesSeen* seen) {
+    return CutWalk(dataset, view, choice, resident, seen).run();
 }
 
 Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_t budgetBytes,

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "streaming/page_source.h"
 
@@ -84,7 +85,7 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
 }
 
 ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
-                                 LoadOrder order)
+                                 LoadOrder order, bool hiddenToo)
     : dataset_(std::move(dataset)),
       allocator_(pool.units, pool.unitsPerChunk),
       pageUnits_(unitsOfAll(*dataset_, withColour)),
@@ -96,6 +97,7 @@ ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool wi
     loadedIn_ = SparseArray<uint64_t>(pages);
     ranks_ = SparseArray<Rank>(pages);
     withColour_ = withColour;
+    asksRays_ = dataset_->isCovering() && !hiddenToo;
     if (isWhole(*dataset_)) {
         if (pages > 0) largestUnits_ = *std::max_element(pageUnits_.data(), pageUnits_.data() + pages);
     } else {
@@ -138,6 +140,11 @@ void ResidencyPolicy::setPool(PoolShape pool) {
     clear();
     allocator_ = SlotAllocator(pool.units, pool.unitsPerChunk);
     planFor(pool);
+    askAgain();
+}
+
+void ResidencyPolicy::askAgain() {
+    lacksRoom_ = false;
     stale_ = true;
 }
 
@@ -146,16 +153,21 @@ void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber
     seconds_ = seconds;
     evictable_.reset();
     learnBlocks();
-    const auto known = motions_.find(number);
-    Motion next{view, seconds, std::nullopt, known == motions_.end() || known->second.view != view};
-    if (next.moves && known != motions_.end())
-        next.later = aheadOf(view, known->second.view, seconds - known->second.seconds);
+    const auto [known, isNew] = motions_.try_emplace(number);
+    Motion& motion = known->second;
+    const bool moves = isNew || motion.view != view;
+    motion.later.reset();
+    if (moves && !isNew) motion.later = aheadOf(view, motion.view, seconds - motion.seconds);
+    if (moves) motion.seen.begin();
     // A view that stands still plans nothing ahead.
-    stale_ = stale_ || next.moves || known->second.moves;
-    if (next.moves || emptied_) stillSince_ = round_;
+    stale_ = stale_ || moves || motion.moves;
+    if (moves || emptied_) stillSince_ = round_;
     emptied_ = false;
-    motions_[number] = next;
-    moving_ = std::any_of(motions_.begin(), motions_.end(), [](const auto& motion) { return motion.second.moves; });
+    motion.view = view;
+    motion.seconds = seconds;
+    const bool stops = std::exchange(motion.moves, moves) && !moves;
+    moving_ = std::any_of(motions_.begin(), motions_.end(), [](const auto& each) { return each.second.moves; });
+    if (stops && !moving_) askAgain();
     if (stale_) choose();
     for (const WantedPage& wanted : choice_.wanted)
         if (const auto at = slots_.find(wanted.page); at != slots_.end()) at->second.lastWanted = round_;
@@ -163,7 +175,28 @@ void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber
 
 void ResidencyPolicy::forgetView(ViewNumber number) {
     motions_.erase(number);
-    stale_ = true;
+    askAgain();
+}
+
+void ResidencyPolicy::see(const PagesHit& hit, const SelectionView& view, ViewNumber number) {
+    const auto known = motions_.find(number);
+    if (!asksRays_ || known == motions_.end()) return;
+    // Rays of light begin where the camera's rays hit: as long as those ask for finer pages, it is not known where.
+    const bool isFinal = std::all_of(hit.byCamera.begin(), hit.byCamera.end(),
+                                     [&](uint64_t page) { return isResident(page) || states_[page] == kUnavailable; });
+    std::vector<uint64_t> pages = hit.byCamera;
+    if (isFinal) pages.insert(pages.end(), hit.byLight.begin(), hit.byLight.end());
+    Motion& motion = known->second;
+    if (motion.view != view)
+        motion.seen.guess(*dataset_, pages);
+    else if (motion.seen.add(*dataset_, pages))
+        stale_ = true;
+}
+
+PageChoice ResidencyPolicy::chosenFor(std::span<const SelectionView> views) const {
+    std::vector<const PagesSeen*> seen;
+    for (const auto& [number, motion] : motions_) seen.push_back(seenBy(motion));
+    return choosePages(*dataset_, views, planned_, pageUnits_, states_, seen);
 }
 
 void ResidencyPolicy::choose() {
@@ -175,13 +208,35 @@ void ResidencyPolicy::choose() {
     }
     for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Stale;
     for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Stale;
-    choice_ = choosePages(*dataset_, views_, planned_, pageUnits_, states_);
+    chooseForViews();
     ahead_ = {};
-    if (later != views_) ahead_ = choosePages(*dataset_, later, planned_, pageUnits_, states_);
+    if (later != views_) ahead_ = chosenFor(later);
     for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Ahead;
     for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
     stale_ = false;
     ++version_;
+}
+
+void ResidencyPolicy::chooseForViews() {
+    wantsHidden_ = true;
+    choice_ = chosenFor(views_);
+    if (!asksRays_ || lacksRoom_) return;
+    double pixels = 0;
+    for (const SelectionView& view : views_) pixels += view.pixels;
+    const bool isAllKnown = choice_.awaited.empty() && !choice_.relaxed;
+    if (isAllKnown && double(choice_.bytes * kPoolUnitBytes) <= kFewBytesAPixel * pixels) return;
+    wantsHidden_ = false;
+    PageChoice hit = chosenFor(views_);
+    if (hit.relaxed && !moving_) {
+        // What still views want must not depend on what was seen before.
+        for (auto& [number, motion] : motions_) motion.seen.dropGuess();
+        hit = chosenFor(views_);
+    }
+    lacksRoom_ = wantsHidden_ = hit.relaxed;
+    if (lacksRoom_)
+        stillSince_ = round_;
+    else
+        choice_ = std::move(hit);
 }
 
 bool ResidencyPolicy::mayEvict(uint64_t page, const Resident& resident, Rank forRank) const {
@@ -303,7 +358,8 @@ uint64_t ResidencyPolicy::unitsWithin(Rank forRank) const {
 
 DrawableCut ResidencyPolicy::drawable(ViewNumber number) const {
     assert(hasLooked(number));
-    return drawableCut(*dataset_, motions_.at(number).view, choice_, resident_);
+    const Motion& motion = motions_.at(number);
+    return drawableCut(*dataset_, motion.view, choice_, resident_, seenBy(motion));
 }
 
 PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
@@ -365,7 +421,7 @@ bool ResidencyPolicy::giveUp(Request request) {
     const std::span<uint8_t> states = statesOf(request);
     if (states[0] == kUnavailable) return false;
     std::fill(states.begin(), states.end(), uint8_t{kUnavailable});
-    stale_ = true;
+    askAgain();
     return true;
 }
 
@@ -376,6 +432,7 @@ uint64_t ResidencyPolicy::bytesHeld() const {
                      loadedIn_.bytes() + bytesOf(views_) + bytesOf(ahead_.wanted) + ahead_.refined.bytes() +
                      ranks_.bytes();
     bytes += bytesOf(choice_.wanted) + choice_.refined.bytes() + priorities_.bytesHeld() + allocator_.bytesHeld();
+    for (const auto& [number, motion] : motions_) bytes += motion.seen.bytesHeld();
     bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);
 }
@@ -383,7 +440,7 @@ uint64_t ResidencyPolicy::bytesHeld() const {
 void ResidencyPolicy::restore(Request request) {
     const std::span<uint8_t> states = statesOf(request);
     std::fill(states.begin(), states.end(), uint8_t{kAvailable});
-    stale_ = true;
+    askAgain();
 }
 
 void ResidencyPolicy::clear() {

@@ -25,6 +25,10 @@
 //   known has not settled.
 // - While a view moves, what it would want a little later (its motion continued for kAheadSeconds) is
 //   wished for last, and only into places that are free or hold what no view wants.
+// - Where pages cover the surface of those below them, a view wants what its rays hit (pages_seen.h), as see() is told
+//   after each frame. Where the pool has no room for that, views want all that is in their frustum, so that what they
+//   settle on does not depend on what was there before; views that stand still again are asked anew. So they do where
+//   all that takes few bytes a pixel: asking would cost more time than reading.
 #pragma once
 
 #include <cstdint>
@@ -46,6 +50,8 @@ namespace vcp {
 
 inline constexpr double kSettlingSeconds = 0.5;
 inline constexpr double kAheadSeconds = 0.2;
+/// Where pages take no more bytes for each pixel of the views, rays are not asked which of them they hit.
+inline constexpr double kFewBytesAPixel = 32;
 
 /// Identifies a view among those that share a pool.
 using ViewNumber = uint32_t;
@@ -89,9 +95,10 @@ struct PolicyOutcome {
 
 class ResidencyPolicy {
 public:
-    /// `pool` is made by poolShapeFor. `order` decides what is read first, and nothing else.
+    /// `pool` is made by poolShapeFor. `order` decides what is read first, and nothing else. `hiddenToo`: views want
+    /// what no ray hits, too, also where pages cover what is below them.
     ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
-                    LoadOrder order = LoadOrder::Feedback);
+                    LoadOrder order = LoadOrder::Feedback, bool hiddenToo = false);
 
     /// Whether the coarsest page fits into the pool.
     [[nodiscard]] bool hasRoom() const { return !pageUnits_.empty() && pageUnits_[0] <= planned_; }
@@ -104,6 +111,9 @@ public:
     void hear(const RayFeedback& feedback, const SelectionView& view) {
         priorities_.hear(feedback, view, views_.size());
     }
+    /// Takes in which pages the rays of a frame hit, and where they began: a frame of `view`, which is what that view
+    /// saw at its last look() or before. What it asks for is wanted from the next look() on.
+    void see(const PagesHit& hit, const SelectionView& view, ViewNumber number = 0);
     Placement place(uint64_t page);
     /// Returns what the view can draw and what to read. Precondition: hasLooked(number).
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
@@ -161,6 +171,7 @@ private:
         double seconds = 0;                  // time of the last look
         std::optional<SelectionView> later;  // where the view will be, while it moves
         bool moves = false;
+        PagesSeen seen;
     };
     [[nodiscard]] Rank rankOf(uint64_t page) const { return ranks_[page]; }
     /// Whether a page may go to make room for one of rank `forRank`.
@@ -171,6 +182,15 @@ private:
     void planFor(PoolShape pool);
     void learnBlocks();
     void choose();
+    [[nodiscard]] PageChoice chosenFor(std::span<const SelectionView> views) const;
+    /// Chooses what views_ want, and whether that depends on rays.
+    void chooseForViews();
+    /// What a view's rays hit; null: all pages count as hit.
+    [[nodiscard]] const PagesSeen* seenBy(const Motion& motion) const {
+        return asksRays_ && !wantsHidden_ ? &motion.seen : nullptr;
+    }
+    /// Has views want only what rays hit, as far as there is room.
+    void askAgain();
     [[nodiscard]] std::span<uint8_t> statesOf(Request request);
     void wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
                        std::vector<Wish>& wishes) const;
@@ -198,6 +218,9 @@ private:
     PageChoice choice_;
     PageChoice ahead_;  // what views will want where they are going, while they move
     SparseArray<Rank> ranks_;
+    bool asksRays_ = false;     // pages cover the surface of those below them
+    bool wantsHidden_ = false;  // views want all that is in their frustum
+    bool lacksRoom_ = false;    // for what rays hit, as was found since views stand still
     bool moving_ = false, stale_ = true, emptied_ = false;
     double seconds_ = 0;
     uint64_t round_ = 0, stillSince_ = 0, version_ = 0;

@@ -483,7 +483,7 @@ FrameRequest Viewer::pictureOf(glm::ivec2 size) const {
 
 bool Viewer::refinementIsDue(double now) const {
     if (!pagesChanged_) return false;
-    if (status_.update.settled || !drawn_) return true;
+    if (status_.update.settled || status_.update.awaitsRays || !drawn_) return true;
     return now - drawnAt_ >= std::max(kRefineSeconds, kRefineFrames * 1e-3 * status_.frame.msFrame);
 }
 
@@ -519,7 +519,8 @@ NextStep Viewer::nextStep(double now) {
     NextStep next;
     // Without a dataset, and where its coarsest page cannot be read, the background is shown.
     const bool canDraw = status_.update.drawable || !status_.problem.empty() || !isOpen_;
-    const bool isNew = !drawn_ || *drawn_ != request_ || refinementIsDue(now);
+    const bool raysAreAsked = status_.update.awaitsRays && !renderer_->isDrawing();
+    const bool isNew = !drawn_ || *drawn_ != request_ || refinementIsDue(now) || raysAreAsked;
     addsSample_ = !isNew && !isMoving(now) && wantsSamples();
     next.draw = canDraw && (isNew || addsSample_);
     const bool samplesFollow =

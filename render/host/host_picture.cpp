@@ -78,7 +78,11 @@ private:
     /// A pixel's edge at a depth; both in finest cells.
     [[nodiscard]] float pixelEdgeAt(float depth) const { return frame_.pixelEdge + frame_.pixelEdgePerDepth * depth; }
 
+    [[nodiscard]] PageMarks* lightMarks() const { return layer_.marks != nullptr ? &layer_.marks->byLight : nullptr; }
+
     void drawTile(const TileHits& hits) {
+        if (layer_.marks != nullptr)
+            for (const HitLeaf& leaf : hits.leaves) layer_.marks->byCamera.mark(leaf.page);
         TileSurface surface;
         findNormals(layer_.rays, hits, surface);
         alignas(32) uint32_t colours[kTilePixels];
@@ -148,7 +152,7 @@ private:
             pixels[count++] = i;
         });
         float distances[kTilePixels];
-        castLightRays(layer_.scene, {rays, count}, distances);
+        castLightRays(layer_.scene, {rays, count}, distances, lightMarks());
         for (size_t k = 0; k < count; ++k) surface.sun[pixels[k]] = distances[k] < kNothing ? 0.0f : 1.0f;
     }
 
@@ -170,7 +174,7 @@ private:
                                                               uint32_t(pixel.y), frame_.sampleNumber);
                 rays[count++] = {origins[i], direction, reach};
             });
-            castLightRays(layer_.scene, {rays, count}, distances);
+            castLightRays(layer_.scene, {rays, count}, distances, lightMarks());
             size_t next = 0;
             forEachHit(hits, [&](glm::ivec2, int i) {
                 const float distance = distances[next++];

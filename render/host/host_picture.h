@@ -13,6 +13,7 @@
 #include <glm/vec4.hpp>
 
 #include "render/host/host_caster.h"
+#include "render/host/page_marks.h"
 #include "render/shared/frame.h"
 
 namespace vcp {
@@ -45,10 +46,11 @@ private:
 /// A dataset as a picture shows it.
 struct HostLayer {
     const HostScene& scene;
-    PictureRays rays;             ///< in the dataset's own space
-    frame::FrameConstants frame;  ///< as the shaders get it
-    bool hasColour = false;       ///< hits have colours
-    double worldPerUnit = 1;      ///< world units per unit of the dataset's own
+    PictureRays rays;               ///< in the dataset's own space
+    frame::FrameConstants frame;    ///< as the shaders get it
+    bool hasColour = false;         ///< hits have colours
+    double worldPerUnit = 1;        ///< world units per unit of the dataset's own
+    PictureMarks* marks = nullptr;  ///< where given, gets the pages that rays hit; one for each page of the scene
 };
 
 /// Draws a layer over what is in the picture. Precondition: frame.shadingMode is none of the counts of a ray's work,

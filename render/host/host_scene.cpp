@@ -45,12 +45,29 @@ Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint
     return create(hostGrid(header), pages);
 }
 
+std::optional<uint32_t> HostScene::pageAt(glm::dvec3 point) const {
+    const double subcells = double(1u << kMaxSubcellDepth), edge = double(uint64_t{1} << rootBits());
+    const glm::dvec3 at = point * subcells;
+    for (int axis = 0; axis < 3; ++axis)
+        if (!(at[axis] >= 0 && at[axis] < edge)) return std::nullopt;
+    const glm::uvec3 place(at);
+    Child child = root_;
+    for (uint32_t bit = rootBits(); child.kind == Child::Kind::Node;) {
+        --bit;
+        child = nodes_[child.index][(place.x >> bit & 1u) | (place.y >> bit & 1u) << 1 | (place.z >> bit & 1u) << 2];
+    }
+    return child.kind == Child::Kind::Page ? std::optional(child.index) : std::nullopt;
+}
+
 Result<void> HostScene::add(const HostPage& page) {
-    const uint32_t level = page.level;
+    const uint32_t part = page.octant.value_or(0);
+    const uint32_t level = page.level + (page.octant ? 1 : 0);  // of the box that is drawn
+    const glm::uvec3 place =
+        page.octant ? 2u * page.place + glm::uvec3(part & 1, part >> 1 & 1, part >> 2) : page.place;
     if (level >= grid_.levels || page.view->header.log2Cells != grid_.log2Cells)
         return badCut(page, "is no page of this grid");
     for (int axis = 0; axis < 3; ++axis)
-        if (page.place[axis] >> level != 0) return badCut(page, "lies outside of the grid");
+        if (place[axis] >> level != 0) return badCut(page, "lies outside of the grid");
     Child at = root_;
     Node* parent = nullptr;
     uint32_t octant = 0;
@@ -67,12 +84,14 @@ Result<void> HostScene::add(const HostPage& page) {
         }
         if (isPlace) break;
         const uint32_t bit = level - 1 - depth;
-        octant = (page.place.x >> bit & 1u) | (page.place.y >> bit & 1u) << 1 | (page.place.z >> bit & 1u) << 2;
+        octant = (place.x >> bit & 1u) | (place.y >> bit & 1u) << 1 | (place.z >> bit & 1u) << 2;
         parent = &nodes_[at.index];
         at = (*parent)[octant];
     }
-    const uint32_t bits = rootBits() - level;
-    pages_.push_back({page.view, page.number, page.place << bits, bits, grid_.levels - 1 - level, page.error});
+    const uint32_t root = page.view->header.root;
+    pages_.push_back({page.view, page.number, page.octant,
+                      page.octant ? page.view->nodes[8 * (root & kNodePayloadMask) + part] : root,
+                      page.place << (rootBits() - page.level), grid_.levels - 1 - page.level, page.error});
     return {};
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,13 +24,15 @@ struct HostGrid {
 
 HostGrid hostGrid(const FileHeader& header);
 
-/// A page of a cut. The view must outlive the scene.
+/// A page of a cut, or one octant of it. The view must outlive the scene.
 struct HostPage {
     const PageView* view = nullptr;
     uint64_t number = 0;  ///< in the directory
     glm::uvec3 place{0};  ///< among the subvolumes of its level
     uint32_t level = 0;   ///< 0 is the coarsest
     float error = 0;      ///< certified error, finest cells
+    /// Only this octant is drawn. Precondition: the page's root is an internal node.
+    std::optional<uint32_t> octant = {};
 };
 
 /// An immutable tree down to the pages of a cut. Any thread may read it.
@@ -46,10 +49,11 @@ public:
     struct Page {
         const PageView* view;
         uint64_t number;
-        glm::uvec3 corner;  ///< subcells
-        uint32_t edgeBits;  ///< log2 of its edge in subcells
-        uint32_t cellBits;  ///< log2 of the edge of a cell of its level in finest cells
-        float error;        ///< certified error, finest cells
+        std::optional<uint32_t> octant;  ///< of which alone it is drawn
+        uint32_t root;                   ///< word of its root node, or that of the octant
+        glm::uvec3 corner;               ///< of the whole page; subcells
+        uint32_t cellBits;               ///< log2 of the edge of a cell of its level in finest cells
+        float error;                     ///< certified error, finest cells
     };
     /// A child of the tree: nothing, another node, or a page.
     struct Child {
@@ -63,6 +67,9 @@ public:
     [[nodiscard]] uint32_t rootBits() const;  ///< log2 of the root's edge in subcells
     [[nodiscard]] const Node& node(uint32_t index) const { return nodes_[index]; }
     [[nodiscard]] const Page& page(uint32_t index) const { return pages_[index]; }
+    [[nodiscard]] size_t pages() const { return pages_.size(); }
+    /// Returns the index of the page that holds a point, in finest cells from the root's lowest corner.
+    [[nodiscard]] std::optional<uint32_t> pageAt(glm::dvec3 point) const;
     /// The level of a page; 0 is the coarsest.
     [[nodiscard]] uint32_t levelOf(const Page& page) const { return grid_.levels - 1 - page.cellBits; }
 

@@ -23,7 +23,7 @@ namespace vcp::HWY_NAMESPACE {
 /// Casts one ray after the other: eight children of a node at a time, one leaf after the other.
 class LightRayCaster {
 public:
-    explicit LightRayCaster(const HostScene& scene) : scene_(scene), walk_(scene) {}
+    LightRayCaster(const HostScene& scene, PageMarks* marks) : scene_(scene), marks_(marks), walk_(scene) {}
 
     float cast(const LightRay& ray) {
         origin_ = ray.origin;
@@ -35,6 +35,8 @@ public:
             nearest_ |= uint32_t(direction_[axis] < 0) << axis;
         }
         inverse_ = 1.0f / direction_;
+        if (marks_ != nullptr)
+            if (const auto page = scene_.pageAt(origin_)) marks_->mark(*page);
         for (walk_.restart(); !walk_.isDone();) {
             const WalkEntry at = walk_.next();
             if (isNode(at)) {
@@ -43,12 +45,16 @@ public:
             }
             // Boxes do not overlap and come front to back: the first hit is the nearest.
             const float distance = castLeaf(at);
-            if (distance < reach_) return distance;
+            if (distance == kNothing) continue;
+            if (marks_ != nullptr) marks_->mark(at.page);
+            return distance < reach_ ? distance : kNothing;
         }
-        return std::numeric_limits<float>::infinity();
+        return kNothing;
     }
 
 private:
+    static constexpr float kNothing = std::numeric_limits<float>::infinity();
+
     void visitNode(const WalkEntry& at) {
         const double half = 0.5 * cellsOf(at.bits);
         const glm::vec3 middle(glm::dvec3(at.corner) * kSubcell + half - origin_);
@@ -97,15 +103,14 @@ private:
 
     /// Returns the distance of the hit, or infinity.
     [[nodiscard]] float castLeaf(const WalkEntry& at) const {
-        constexpr float kNone = std::numeric_limits<float>::infinity();
         const double edge = cellsOf(at.bits);
         Part part;
-        if (!enterLeaf(glm::dvec3(at.corner) * kSubcell - origin_, edge, part)) return kNone;
+        if (!enterLeaf(glm::dvec3(at.corner) * kSubcell - origin_, edge, part)) return kNothing;
         const HostScene::Page& page = scene_.page(at.page);
         if (nodeType(at.word) == kNodeHard) return castHard(page, at, float(edge), part);
         const float u =
             nodeType(at.word) == kNodeSlab ? castSlab(*page.view, at.word, part) : castSoft(*page.view, at.word, part);
-        return u < 0 ? kNone : float(part.distance) + (part.first + u * (part.last - part.first)) * float(edge);
+        return u < 0 ? kNothing : float(part.distance) + (part.first + u * (part.last - part.first)) * float(edge);
     }
 
     static float castSlab(const PageView& view, uint32_t node, const Part& part) {
@@ -146,7 +151,7 @@ private:
                 isHit = true;
             }
         }
-        if (!isHit) return std::numeric_limits<float>::infinity();
+        if (!isHit) return kNothing;
         return std::max(float(part.distance) + (part.first * edgeInCells + best) * cell, 0.0f);
     }
 
@@ -166,6 +171,7 @@ private:
     }
 
     const HostScene& scene_;
+    PageMarks* const marks_;  // or null
     SceneWalk walk_;
     glm::dvec3 origin_{0};
     glm::vec3 direction_{0}, inverse_{0};
@@ -173,8 +179,8 @@ private:
     uint32_t nearest_ = 0;  // octant
 };
 
-void castLightRaysHere(const HostScene& scene, std::span<const LightRay> rays, float* distances) {
-    LightRayCaster caster(scene);
+void castLightRaysHere(const HostScene& scene, std::span<const LightRay> rays, float* distances, PageMarks* marks) {
+    LightRayCaster caster(scene, marks);
     for (const LightRay& ray : rays) *distances++ = caster.cast(ray);
 }
 
@@ -186,8 +192,8 @@ namespace vcp {
 
 HWY_EXPORT(castLightRaysHere);
 
-void castLightRays(const HostScene& scene, std::span<const LightRay> rays, float* distances) {
-    HWY_DYNAMIC_DISPATCH(castLightRaysHere)(scene, rays, distances);
+void castLightRays(const HostScene& scene, std::span<const LightRay> rays, float* distances, PageMarks* marks) {
+    HWY_DYNAMIC_DISPATCH(castLightRaysHere)(scene, rays, distances, marks);
 }
 
 }  // namespace vcp

@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 
 #include "render/host/host_scene.h"
+#include "render/host/page_marks.h"
 
 namespace vcp {
 
@@ -17,7 +18,8 @@ struct LightRay {
 };
 
 /// Finds how far each ray comes, in finest cells: below its reach where something is in its way, else infinite.
-/// `distances`: one a ray. Any thread.
-void castLightRays(const HostScene& scene, std::span<const LightRay> rays, float* distances);
+/// `distances`: one a ray. `marks`, where given, gets the pages that they hit or begin in. Any thread.
+void castLightRays(const HostScene& scene, std::span<const LightRay> rays, float* distances,
+                   PageMarks* marks = nullptr);
 
 }  // namespace vcp

@@ -80,7 +80,7 @@ private:
     void push(HostScene::Child child, glm::uvec3 corner, uint32_t bits) {
         if (child.kind == HostScene::Child::Kind::None) return;
         const bool isPage = child.kind == HostScene::Child::Kind::Page;
-        const uint32_t word = isPage ? scene_.page(child.index).view->header.root : child.index;
+        const uint32_t word = isPage ? scene_.page(child.index).root : child.index;
         if (isPage && nodeType(word) == kNodeEmpty) return;
         stack_[size_t(count_++)] = {corner, bits, isPage ? child.index : kNoPage, word};
     }

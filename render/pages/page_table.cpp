@@ -17,16 +17,24 @@ Part partOf(const Parts& parts, uint64_t page) {
     return found != parts.end() ? found->second : Part::None;
 }
 
-/// Finds the parts of the cut; reads only the pages above the cut, and nothing behind its last page.
-Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut) {
+/// The octants in which a page of the cut is drawn by itself; 0: it is drawn whole, or not at all.
+uint8_t ownOctants(std::span<const PartialPage> partial, uint64_t page) {
+    const auto at = std::ranges::lower_bound(partial, page, {}, &PartialPage::page);
+    return at != partial.end() && at->page == page ? at->octants : uint8_t{0};
+}
+
+/// Finds the parts of the cut: pages that are drawn whole, and pages above what is drawn. Reads only the pages above
+/// the cut, and nothing behind its last page.
+Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut, std::span<const PartialPage> partial) {
     Parts parts;
     parts.reserve(2 * cut.size());
-    for (const uint64_t page : cut) parts.emplace(page, Part::Cut);
+    for (const uint64_t page : cut) parts.emplace(page, ownOctants(partial, page) != 0 ? Part::Above : Part::Cut);
     const uint64_t last = *std::max_element(cut.begin(), cut.end());
     const auto visit = [&](const auto& self, uint64_t page) -> bool {
-        if (parts.contains(page)) return true;
+        const Part known = partOf(parts, page);
+        if (known == Part::Cut) return true;
         if (page > last || !dataset.pages.knows(page)) return false;
-        bool isAbove = false;
+        bool isAbove = known == Part::Above;
         for (const uint64_t child : childrenOf(dataset.pages[page])) isAbove = self(self, child) || isAbove;
         if (isAbove) parts.emplace(page, Part::Above);
         return isAbove;
@@ -50,37 +58,59 @@ frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, float erro
             .colours = {.faces = page.colourTexel,
                         .vertices = page.colourTexel + page.header.faces,
                         .entry = uint32_t(entry),
-                        .unused = 0}};
+                        .asked = uint32_t(entry)}};
+}
+
+frame::TableRecord octantOf(const Dataset& dataset, const frame::TableRecord& page, uint32_t octant, uint32_t root) {
+    frame::TableRecord record = page;
+    record.node.flags = (page.node.flags & frame::kRecordErrorMask) | frame::kRecordResident | frame::kRecordInCut |
+                        frame::kRecordIsOctant;
+    record.node.firstChild = 0;
+    record.node.root = root;
+    record.colours.asked = uint32_t(childIn(dataset.pages[page.colours.entry], octant));
+    return record;
 }
 
 }  // namespace
 
 std::vector<frame::TableRecord> pageTable(const Dataset& dataset, std::span<const uint64_t> cut,
+                                          std::span<const PartialPage> partial,
                                           const std::function<std::optional<ResidentPage>(uint64_t)>& pageOf) {
     if (cut.empty()) return {frame::TableRecord{}};
-    const Parts parts = partsOf(dataset, cut);
-    // The order is breadth first, so that the children of a page stand together.
-    std::vector<uint64_t> order{0};
+    const Parts parts = partsOf(dataset, cut, partial);
+    // The order is breadth first, so that the children of a page stand together: pages, and octants of those drawn in
+    // parts, whose records are made with the page's.
+    struct Place {
+        uint64_t page = 0;
+        std::optional<frame::TableRecord> octant;
+    };
+    std::vector<Place> order{{}};
     std::vector<frame::TableRecord> table;
     for (size_t next = 0; next < order.size(); ++next) {
-        const uint64_t page = order[next];
+        if (order[next].octant) {
+            table.push_back(*order[next].octant);
+            continue;
+        }
+        const uint64_t page = order[next].page;
         frame::TableRecord record{};
         const PageEntry& entry = dataset.pages[page];
-        if (const auto resident = pageOf(page))
-            record = recordOf(*resident, page, float(double(entry.certifiedError) / dataset.header.cell));
+        const auto resident = pageOf(page);
+        if (resident) record = recordOf(*resident, page, float(double(entry.certifiedError) / dataset.header.cell));
         if (partOf(parts, page) == Part::Cut) {
             record.node.flags |= frame::kRecordInCut;
-        } else {
-            record.node.firstChild = uint32_t(order.size());
-            uint64_t child = entry.firstChild;
-            for (uint32_t octant = 0; octant < 8; ++octant) {
-                if ((entry.childMask >> octant & 1) == 0) continue;
-                if (partOf(parts, child) != Part::None) {
-                    record.node.flags |= 1u << octant;
-                    order.push_back(child);
-                }
-                ++child;
-            }
+            table.push_back(record);
+            continue;
+        }
+        const uint8_t own = ownOctants(partial, page);
+        record.node.firstChild = uint32_t(order.size());
+        for (uint32_t octant = 0; octant < 8; ++octant) {
+            if ((entry.childMask >> octant & 1) == 0) continue;
+            const uint64_t child = childIn(entry, octant);
+            const bool isOwn = (own >> octant & 1) != 0;
+            if (!isOwn && partOf(parts, child) == Part::None) continue;
+            record.node.flags |= 1u << octant;
+            order.push_back({child, isOwn ? std::optional(octantOf(dataset, record, octant, resident->octants[octant]))
+                                          : std::nullopt});
         }
         table.push_back(record);
     }

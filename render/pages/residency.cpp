@@ -50,7 +50,8 @@ Result<void> Residency::createPool(const PageMemorySource& memory) {
         if (policy_)
             policy_->setPool(shape);
         else
-            policy_ = std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order);
+            policy_ =
+                std::make_unique<ResidencyPolicy>(dataset_, hasColour(), shape, options_.order, options_.hiddenToo);
         if (!dataset_->pages.empty() && !policy_->hasRoom())
             return Error{
                 .code = ErrorCode::Limit,
@@ -124,13 +125,24 @@ void Residency::forgetView(ViewNumber number) {
     cuts_.erase(number);
 }
 
-const std::vector<uint64_t>& Residency::cut(ViewNumber number) {
+Residency::ViewCut& Residency::current(ViewNumber number) {
     ViewCut& cut = cuts_[number];
-    if (cut.version != version() && policy_->hasLooked(number)) {
-        cut.pages = policy_->drawable(number).cut;
-        cut.version = version();
-    }
-    return cut.pages;
+    if (cut.version != version() && policy_->hasLooked(number)) take(policy_->drawable(number), cut);
+    return cut;
+}
+
+void Residency::take(DrawableCut drawable, ViewCut& cut) {
+    if (cut.number == 0 || drawable.cut != cut.pages || drawable.partial != cut.partial) cut.number = ++cutsDrawn_;
+    cut.pages = std::move(drawable.cut);
+    cut.partial = std::move(drawable.partial);
+    cut.pagesUnseen = drawable.pagesUnseen;
+    cut.version = version();
+}
+
+void Residency::see(const PagesHit& hit, const SelectionView& view, uint64_t cutNumber, ViewNumber number) {
+    policy_->see(hit, view, number);
+    if (const auto cut = cuts_.find(number); cut != cuts_.end() && cut->second.view == view)
+        cut->second.answered = cutNumber;
 }
 
 Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber number) {
@@ -149,19 +161,22 @@ Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber num
     PolicyOutcome outcome = policy_->finish(number);
     loader_->request(std::move(outcome.wishes), uploadBytes());
     listens_ = outcome.missing > 0 && options_.order == LoadOrder::Feedback;
-    UpdateResult result = report(outcome);
     ViewCut& cut = cuts_[number];
-    result.changed = cut.version == UINT64_MAX || outcome.drawable.cut != cut.reported;
-    cut = {outcome.drawable.cut, version(), outcome.drawable.cut};
+    if (cut.view != view) cut.answered = 0;
+    cut.view = view;
+    take(outcome.drawable, cut);
+    UpdateResult result = report(outcome, cut);
+    result.changed = std::exchange(cut.reported, cut.number) != cut.number;
     result.problems = std::exchange(problems_, {});
     return result;
 }
 
-UpdateResult Residency::report(const PolicyOutcome& outcome) const {
+UpdateResult Residency::report(const PolicyOutcome& outcome, const ViewCut& drawn) const {
     const LoaderStats loader = loader_->stats();
     const PolicyCounts& counts = policy_->counts();
     UpdateResult result;
-    result.settled = outcome.drawable.complete;
+    result.awaitsRays = outcome.drawable.complete && drawn.pagesUnseen > 0 && drawn.answered != drawn.number;
+    result.settled = outcome.drawable.complete && !result.awaitsRays;
     const std::vector<uint64_t>& cut = outcome.drawable.cut;
     result.drawable = !cut.empty();
     result.relaxed = outcome.drawable.isRelaxed;
@@ -196,9 +211,14 @@ Result<void> Residency::place(uint64_t page, const PageBytes& bytes) {
     VCP_TRY_ASSIGN(const auto slot, slotFor(page));
     if (!slot) return {};
     const std::span geometry = bytes.geometryBytes();
-    PageHeader& header = headers_[page];
+    PageRoot& root = roots_[page];
     // Pages of the other method have all they need in a header of their own, which the shader reads.
-    if (dataset_->header.method == Method::Certified) std::memcpy(&header, geometry.data(), sizeof(PageHeader));
+    if (dataset_->header.method == Method::Certified) {
+        const PageView view = viewOfChecked(geometry, {});
+        root.header = view.header;
+        if (nodeType(view.header.root) == kNodeInternal)
+            std::copy_n(&view.nodes[8 * (view.header.root & kNodePayloadMask)], 8, root.octants.begin());
+    }
     VCP_TRY(pool_->write(*slot, 0, geometry));
     if (!bytes.colour.empty()) VCP_TRY(pool_->write(*slot, geometry.size(), bytes.colourBytes()));
     return {};
@@ -211,11 +231,13 @@ uint64_t Residency::colourBytes() const {
 }
 
 std::vector<frame::TableRecord> Residency::table(ViewNumber number) {
-    return pageTable(*dataset_, cut(number), [&](uint64_t page) -> std::optional<ResidentPage> {
+    return pageTable(*dataset_, cut(number), partial(number), [&](uint64_t page) -> std::optional<ResidentPage> {
         if (!policy_->isResident(page)) return {};
         const auto texel = uint32_t(slotOf(page).firstUnit * (kPoolUnitBytes / 16));
         const bool colour = hasColour() && dataset_->pages[page].colourBytes > 0;
-        return ResidentPage{headers_.at(page), texel, colour ? texel + dataset_->pages[page].pageBytes / 16 : 0};
+        const PageRoot& root = roots_.at(page);
+        return ResidentPage{root.header, root.octants, texel,
+                            colour ? texel + dataset_->pages[page].pageBytes / 16 : 0};
     });
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <unordered_map>
@@ -25,6 +26,7 @@ struct ResidencyOptions {
     uint64_t budgetBytes = 512ull << 20;  ///< bytes of the pool
     uint64_t uploadBytes = 16ull << 20;   ///< taken in by one update, half of it while a view moves; one page at least
     LoadOrder order = LoadOrder::Feedback;
+    bool hiddenToo = false;  ///< views want what no ray hits, too
     LoaderOptions loader;
 };
 
@@ -55,12 +57,25 @@ public:
     [[nodiscard]] bool listens() const { return listens_; }
     void hear(const RayFeedback& feedback, const SelectionView& view) { policy_->hear(feedback, view); }
 
+    /// A number of what the view draws: frames of one cut have the same.
+    [[nodiscard]] uint64_t cutNumber(ViewNumber number = 0) { return current(number).number; }
+    /// Whether the view's next frame is to say which pages its rays hit: some that could be refined are in the cut, and
+    /// no frame of it has said so yet.
+    [[nodiscard]] bool asksRays(ViewNumber number = 0) {
+        const ViewCut& cut = current(number);
+        return cut.pagesUnseen > 0 && cut.answered != cut.number;
+    }
+    /// Takes in which pages a frame of `view` hit that drew the cut of that number.
+    void see(const PagesHit& hit, const SelectionView& view, uint64_t cutNumber, ViewNumber number = 0);
+
     /// Waits until the loader has a page, or the time is over.
     bool waitForPage(std::chrono::milliseconds timeout) { return loader_->waitForPage(timeout); }
 
     [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
     /// The pages that the view can draw now, in directory order.
-    [[nodiscard]] const std::vector<uint64_t>& cut(ViewNumber number = 0);
+    [[nodiscard]] const std::vector<uint64_t>& cut(ViewNumber number = 0) { return current(number).pages; }
+    /// Those of them that it draws only in some octants.
+    [[nodiscard]] const std::vector<PartialPage>& partial(ViewNumber number = 0) { return current(number).partial; }
     [[nodiscard]] std::vector<frame::TableRecord> table(ViewNumber number = 0);
     /// A number that changes whenever the page table may: with another cut, or with pages in other places.
     [[nodiscard]] uint64_t version() const { return policy_->version(); }
@@ -92,14 +107,21 @@ private:
     Result<void> place(uint64_t page, const PageBytes& bytes);
     struct ViewCut {
         std::vector<uint64_t> pages;
+        std::vector<PartialPage> partial;
         uint64_t version = UINT64_MAX;
-        std::vector<uint64_t> reported;  // as reported by its last update
+        uint64_t number = 0, reported = 0;  // of the cut, and of that of its last update
+        uint64_t answered = 0;              // of the cut of which a frame of this view said what its rays hit
+        uint64_t pagesUnseen = 0;
+        SelectionView view;
     };
+    /// Returns what a view draws as pages are now.
+    ViewCut& current(ViewNumber number);
+    void take(DrawableCut drawable, ViewCut& cut);
     /// Bytes that one update takes in, and that the loader reads before it.
     [[nodiscard]] uint64_t uploadBytes() const {
         return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes);
     }
-    UpdateResult report(const PolicyOutcome& outcome) const;
+    UpdateResult report(const PolicyOutcome& outcome, const ViewCut& cut) const;
 
     ResidencyOptions options_;
     std::shared_ptr<const Dataset> dataset_;
@@ -107,9 +129,14 @@ private:
     std::unique_ptr<PageMemory> pool_;
     std::shared_ptr<const PageSource> source_;
     std::unique_ptr<PageLoader> loader_;
-    LoaderStats past_;                                  // counts of the loaders before this one
-    std::unordered_map<uint64_t, PageHeader> headers_;  // headers of pages that are or were resident
+    LoaderStats past_;  // counts of the loaders before this one
+    struct PageRoot {
+        PageHeader header;
+        std::array<uint32_t, 8> octants{};  // words of the root's octants, where it is an internal node
+    };
+    std::unordered_map<uint64_t, PageRoot> roots_;  // of pages that are or were resident
     std::map<ViewNumber, ViewCut> cuts_;
+    uint64_t cutsDrawn_ = 0;         // number of the last cut
     std::vector<Error> problems_;    // not reported yet
     std::vector<Request> tooLarge_;  // given up because reading them takes more memory than there is
     bool listens_ = false;

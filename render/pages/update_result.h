@@ -9,10 +9,12 @@
 namespace vcp {
 
 struct UpdateResult {
-    bool changed = false;        ///< the cut differs from that of the update before
-    bool settled = false;        ///< nothing that this view wants is missing, loading or queued
-    bool drawable = false;       ///< at least the coarsest page is there
-    double errorPixels = 0;      ///< largest projected certified error in the cut (inf without a page or certificate)
+    bool changed = false;     ///< the cut differs from that of the update before
+    bool settled = false;     ///< nothing that this view wants is missing, loading or queued
+    bool awaitsRays = false;  ///< no page is missing that the view is known to want: its next frame says whether rays
+                              ///< hit others that are too coarse
+    bool drawable = false;    ///< at least the coarsest page is there
+    double errorPixels = 0;   ///< largest projected certified error in the cut (inf without a page or certificate)
     uint64_t residentBytes = 0;  ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;      ///< decompressed page bytes the loader has delivered since open()
     bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels is what it reaches

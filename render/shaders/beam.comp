@@ -121,7 +121,7 @@ float tileStart(Bundle bundle) {
         if (isPage) {
             nodesTexel = record.pageTexel + kPageHeaderBytes / 16u;
             node = record.root;
-            cellBits = bits - int(frame.log2Cells);
+            cellBits = bits - int(frame.log2Cells) + ((record.flags & kRecordIsOctant) != 0u ? 1 : 0);
         }
         OctantTimes times = octantTimes(bundle, corner, bits);
         bool inPage = isPage || !inTable;

@@ -40,6 +40,7 @@ layout(set = 0, binding = 11, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
 layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint picturePixels[]; };
 layout(set = 0, binding = 14, std430) buffer CounterBlock { FrameCounters counters; };
+layout(set = 0, binding = 15, std430) buffer FeedbackBlock { uint feedback[]; };
 // clang-format on
 
 uvec2 pictureSize() { return uvec2(frame.width, frame.height); }

@@ -4,15 +4,17 @@
 // (triangles, changing the page) stands outside of the loops that are not.
 #include "render/shaders/leaves.glsl"
 
-const float kLastBelowOne = 0.99999994;
+const float kLastBelowOne = 0.99999994, kFirstAboveOne = 1.00000012;
 const float kSeamErrors = 8.0;  // a coarser surface reaches so many certified errors of the two pages beyond its page
 
-// A page of the cut, as the walk needs it.
+// A page of the cut, or one octant of a page, as the walk needs it.
 struct Page {
     uint nodesTexel, root;
     TableSections sections;
     ivec3 corner;  // lattice
     int bits;      // log2 of its edge on the lattice
+    int partBits;  // of the part's edge: one less where the part is an octant
+    ivec3 part;    // lowest corner of the part
     float cell;    // finest cells
     uint record;   // number in the table
 };
@@ -51,7 +53,12 @@ bool levelChanges(Region before, Region after) {
            ((before.isPage && after.bits < before.bits) || (after.isPage && after.bits > before.bits));
 }
 
+// Sets what a record says of the page whose part is in the box of page.corner and page.bits.
 void usePage(uint node, TableNode record, inout Page page) {
+    page.part = page.corner;
+    page.partBits = page.bits;
+    page.bits += (record.flags & kRecordIsOctant) != 0u ? 1 : 0;
+    page.corner = page.corner >> page.bits << page.bits;
     page.root = record.root;
     page.nodesTexel = record.pageTexel + kPageHeaderBytes / 16u;
     page.sections = fetchTableSections(node);
@@ -164,23 +171,24 @@ bool coarserPage(Seam seam, inout Page page, inout uint steps) {
 // Brings the ray into page space. Both points at the page's walls come from the lattice, as its neighbours see them. No
 // point is rounded onto a wall other than the one that the ray leaves by: its walk would end there.
 PageRay enterPage(Ray ray, Page page, out float sStart) {
-    ivec3 edge = ivec3(1 << page.bits);
+    ivec3 edge = ivec3(1 << page.partBits);
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
-    ivec3 nearWalls = mix(page.corner + edge, page.corner, ahead),
-          farWalls = mix(page.corner, page.corner + edge, ahead);
+    ivec3 nearWalls = mix(page.part + edge, page.part, ahead), farWalls = mix(page.part, page.part + edge, ahead);
     vec3 t0 = planeDistances(ray, nearWalls), t1 = planeDistances(ray, farWalls);
     float first = maxOf(t0), last = max(minOf(t1), first);
     sStart = max(first, 0.0);
-    ivec3 from = clamp(latticePoint(ray, sStart), page.corner, page.corner + edge);
-    ivec3 to = clamp(latticePoint(ray, last), page.corner, page.corner + edge);
+    ivec3 from = clamp(latticePoint(ray, sStart), page.part, page.part + edge);
+    ivec3 to = clamp(latticePoint(ray, last), page.part, page.part + edge);
     float toCells = powerOfTwo(int(frame.log2Cells) - page.bits);
     PageRay local;
-    local.cells = float(1u << frame.log2Cells);
-    local.farWalls = mix(vec3(0.0), vec3(local.cells), ahead);
-    float inward = kLastBelowOne * local.cells;
-    vec3 low = mix(vec3(local.cells - inward), vec3(0.0), ahead), high = mix(vec3(local.cells), vec3(inward), ahead);
+    local.low = vec3(page.part - page.corner) * toCells;
+    local.high = vec3(page.part + edge - page.corner) * toCells;
+    local.farWalls = mix(local.low, local.high, ahead);
+    vec3 nearest = mix(local.high, local.low, ahead);
+    vec3 inside = max(local.low * kFirstAboveOne, local.high - kLastBelowOne * local.high);
+    vec3 low = mix(inside, local.low, ahead), high = mix(local.high, kLastBelowOne * local.high, ahead);
     local.start = clamp(vec3(from - page.corner) * toCells, low, high);
-    if (first > 0.0) local.start = mix(local.start, local.cells - local.farWalls, equal(t0, vec3(first)));
+    if (first > 0.0) local.start = mix(local.start, nearest, equal(t0, vec3(first)));
     local.exit = clamp(vec3(to - page.corner) * toCells, low, high);
     local.exit = mix(local.exit, local.farWalls, equal(t1, vec3(last)));
     local.direction = ray.direction;
@@ -196,12 +204,12 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     PageRay local = enterPage(ray, page, sStart);
     Place at;
     at.tau = max(0.0, (s - sStart) / page.cell);
-    at.subcell = clamp(ivec3((local.start + at.tau * local.direction) * kSubcells), ivec3(0),
-                       ivec3(int(local.cells * kSubcells) - 1));
+    at.subcell = clamp(ivec3((local.start + at.tau * local.direction) * kSubcells), ivec3(local.low * kSubcells),
+                       ivec3(local.high * kSubcells) - 1);
     at.inPage = true;
     float tauUntil = (until - sStart) / page.cell;
 
-    int rootBits = int(frame.log2Cells + kMaxSubcellDepth);
+    int rootBits = int(frame.log2Cells + kMaxSubcellDepth) - (page.bits - page.partBits);
     uint rootOnly = page.root >> kNodeTypeShift == kNodeInternal ? 0u : 1u;
     uint rootGroup = page.nodesTexel + (rootOnly != 0u ? 0u : 2u * (page.root & kNodePayloadMask));
     if (rootOnly != 0u) rootBits++;
@@ -230,8 +238,8 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
                 edge = float(1 << bits) * (1.0 / kSubcells);
                 bool isEmpty = nodeType(descent.node) == kNodeEmpty;
                 float clearance = isEmpty ? float(descent.node & kNodePayloadMask) / kClearancePerCell : 0.0;
-                boxLo = max(lo - clearance, vec3(0.0));
-                boxHi = min(lo + (edge + clearance), vec3(local.cells));
+                boxLo = max(lo - clearance, local.low);
+                boxHi = min(lo + (edge + clearance), local.high);
                 leave = true;
                 if (!isEmpty) break;
             }
@@ -258,7 +266,17 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
 }
 
+// Notes that the rays of this shader, which are of kind kHitBy, hit a page or begin in it.
+void markPage(uint record, bool isMet) {
+    bool marks = isMet && frame.firstHitMark != 0u;
+    while (marks) {
+        feedback[frame.firstHitMark + 2u * record + kHitBy] = 1u;
+        marks = false;
+    }
+}
+
 // Returns the ray's first hit in the dataset at distance `from` or farther. Pages from `until` on are not looked at.
+// The shader that includes this says in kHitBy what its rays are.
 Hit castRay(Ray ray, float from, float until, inout Work work) {
     bvec3 ahead = greaterThan(ray.direction, vec3(0.0));
     ivec3 root = ivec3(1 << kLatticeBits);
@@ -273,6 +291,8 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
     while (inside) {
         Page page;
         if (!findPage(ray, reached, last, before, region, page, work.steps)) break;
+        // A ray that begins in a page may miss it and hit what is below.
+        markPage(page.record, region.isPage && reached.x <= 0.0);
         if (fromNew) seam = seamBetween(before, region, reached.x);
         onSeam = fromNew ? levelChanges(before, region) : onSeam;
         float first = onSeam ? seam.first : 0.0, start = onSeam ? seam.first : reached.x,
@@ -298,5 +318,6 @@ Hit castRay(Ray ray, float from, float until, inout Work work) {
             fromNew = true;
         }
     }
+    markPage(hit.record, hit.depth < kNoHit);
     return hit;
 }

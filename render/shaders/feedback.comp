@@ -8,8 +8,6 @@
 
 layout(local_size_x = 64) in;
 
-layout(set = 0, binding = 15, std430) buffer FeedbackBlock { uint feedback[]; };
-
 // A walk ends after so many pages; rays that matter meet fewer.
 const uint kMostBoxes = 512u;
 

@@ -6,6 +6,7 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/rays.glsl"
 #include "render/shaders/tiles.glsl"
+const uint kHitBy = kHitByLight;
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"

@@ -1,13 +1,13 @@
-// Walks along a ray through one page, leaf by leaf. Page space: cells of the page's level, origin at its lowest corner.
-// Positions are also kept as integers in eighths of a cell (the smallest leaf), so that rounding never decides which
-// node comes next across a face.
+// Walks along a ray through one page, or one octant of it, leaf by leaf. Page space: cells of the page's level, origin
+// at its lowest corner. Positions are also kept as integers in eighths of a cell (the smallest leaf), so that rounding
+// never decides which node comes next across a face.
 
 struct PageRay {
-    vec3 start;  // where the ray enters the page or begins
+    vec3 start;  // where the ray enters the page, or the octant, or begins
     vec3 direction, inverse;
     vec3 exit;        // where it leaves the page
-    vec3 farWalls;    // 0 or cells an edge: the page's walls it may leave by
-    float cells;      // an edge
+    vec3 farWalls;    // coordinates of the walls it may leave by
+    vec3 low, high;   // corners of the page, or of the octant
     float tauExit;    // distance from start to exit
     bool beginsHere;  // the ray begins inside the page
 };

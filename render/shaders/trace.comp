@@ -7,6 +7,7 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/rays.glsl"
 #include "render/shaders/tiles.glsl"
+const uint kHitBy = kHitByCamera;
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
@@ -73,7 +74,9 @@ bool isInside(Ray ray, inout Work work) {
 Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work work) {
     Ray rest = movedAlong(ray, kept.first);
     float last = kept.last - kept.first;
-    Hit hit = castRay(rest, max(from - kept.first, 0.0), last, work);
+    // Where pages are marked, rays are to begin in those that the plane cuts.
+    float start = frame.firstHitMark != 0u ? 0.0 : max(from - kept.first, 0.0);
+    Hit hit = castRay(rest, start, last, work);
     if (hit.depth > last) hit.depth = kNoHit;
     if (kSections == 2u) {
         // This loop runs once; a device that skips nothing skips it where no ray enters through a plane.

@@ -62,8 +62,9 @@ struct FrameConstants {
     uint sampleNumber;   // of the pixels (render/pixel_samples.h): 0: their middles
     // Rows of another picture that accumulate.comp adds this one to: from partRow on, partRows of them, for which this
     // one has skippedRows above (render/picture_parts.h).
-    uint partRow, partRows, skippedRows, unused0;
-    vec4 rotation;  // quaternion: world from the dataset's axes
+    uint partRow, partRows, skippedRows;
+    uint firstHitMark;  // word of the feedback buffer with the first mark of a page that was hit; 0: there are none
+    vec4 rotation;      // quaternion: world from the dataset's axes
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];
 };
@@ -71,10 +72,12 @@ struct FrameConstants {
 // A record of the table is a node of the frame's page tree: three structs, each one texel.
 struct TableNode {
     // Bits 0..7: octants that have a child; bit 8: this page is in the cut; bit 9: it is resident, so that its fields
-    // are there; bits 16..31: its certified error in finest cells, the upper half of a float, rounded up.
+    // are there; bit 10: this is an octant of a page, which is drawn in the place of the page that would be here: all
+    // but `root` is that page's; bits 16..31: its certified error in finest cells, the upper half of a float, rounded
+    // up.
     uint flags;
     uint firstChild;  // number in the table
-    uint root;        // root word of the page
+    uint root;        // root word of the page, or that of the octant
     uint pageTexel;   // of the page in the pool
 };
 struct TableSections {
@@ -83,7 +86,7 @@ struct TableSections {
 struct TableColours {
     uint faces, vertices;  // texels in the colour pool
     uint entry;            // of the page in the directory
-    uint unused;
+    uint asked;            // entry of the page that is here, or would be
 };
 struct TableRecord {
     TableNode node;
@@ -93,6 +96,7 @@ struct TableRecord {
 const uint kRecordTexels = 3u;
 const uint kRecordInCut = 256u;
 const uint kRecordResident = 512u;
+const uint kRecordIsOctant = 1024u;
 const uint kRecordErrorMask = 0xffff0000u;
 
 // The list of tiles to trace. Three words of an indirect dispatch, the count, then each tile's place: x + 2^16 y.
@@ -108,11 +112,14 @@ const float kGaveUp = 3.1e38f;
 
 // Feedback: a ray for each of 24 x 16 parts of the picture. Its buffer has four words a ray (lattice point of the
 // hit; number in the table, plus 1, of the page that was hit, or 0), then a word a record of the table: the sum of
-// kNearnessOne eps / (a + eps) over the rays that went into that page at a distance a.
+// kNearnessOne eps / (a + eps) over the rays that went into that page at a distance a. Then come two words a record, of
+// which the first is 1 where rays of the camera hit that page or begin in it, and the second where rays of light do.
 const uint kFeedbackWidth = 24u;
 const uint kFeedbackHeight = 16u;
 const uint kFeedbackRays = 384u;
 const uint kFeedbackRayWords = 4u;
+const uint kHitByCamera = 0u;
+const uint kHitByLight = 1u;
 const float kNearnessOne = 65536.0f;
 const float kNearnessEps = 0.015625f;  // edges of the root page
 

@@ -84,7 +84,7 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(partRow),
                                                                    OFFSET(partRows),
                                                                    OFFSET(skippedRows),
-                                                                   OFFSET(unused0),
+                                                                   OFFSET(firstHitMark),
                                                                    OFFSET(rotation),
                                                                    OFFSET(sections)}));
 }

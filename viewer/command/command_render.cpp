@@ -66,7 +66,7 @@ struct RenderCommand {
 struct Drawing {
     UpdateResult update;
     FrameStats stats;         ///< statistics of the last frame
-    double firstFrameMs = 0;  ///< time of the first frame, with what is compiled on first use
+    double firstFrameMs = 0;  ///< time of the frame before those, with what is compiled on first use
     std::vector<double> frameMs;
     uint32_t samples = 1;
     double samplesMs = 0;  ///< time of all samples of the picture together
@@ -76,11 +76,14 @@ struct Drawing {
     [[nodiscard]] double raysPerSecond() const { return double(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
 };
 
-/// Without --settle: updates until the coarsest page is there, and shows what there is.
-Result<UpdateResult> updateUntilDrawable(PictureRenderer& renderer, const FrameRequest& request) {
+/// Without --settle: updates until the coarsest page is there, and draws what there is.
+Result<SettledFrame> drawWhenDrawable(PictureRenderer& renderer, const FrameRequest& request) {
     for (;;) {
-        auto update = renderer.update(request);
-        if (!update || update->drawable || !update->problems.empty() || update->settled) return update;
+        VCP_TRY_ASSIGN(auto update, renderer.update(request));
+        if (update.drawable || !update.problems.empty() || update.settled) {
+            VCP_TRY_ASSIGN(const auto stats, renderer.render(request, interrupted));
+            return SettledFrame{std::move(update), stats};
+        }
         if (interrupted()) return Error::cancelled();
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -101,19 +104,17 @@ Result<void> refine(PictureRenderer& renderer, const FrameRequest& request, cons
 }
 
 Result<Drawing> draw(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command) {
-    VCP_TRY_ASSIGN(auto update,
-                   command.settle ? renderer.settle(request, interrupted) : updateUntilDrawable(renderer, request));
-    if (!update.problems.empty()) return update.problems.front();
+    VCP_TRY_ASSIGN(auto first,
+                   command.settle ? renderer.drawSettled(request, interrupted) : drawWhenDrawable(renderer, request));
+    if (!first.update.problems.empty()) return first.update.problems.front();
     Drawing drawing;
-    drawing.update = std::move(update);
-    for (int i = 0; i <= command.framesToTime(); ++i) {
+    drawing.update = std::move(first.update);
+    drawing.stats = first.stats;
+    drawing.firstFrameMs = first.stats.msFrame;
+    for (int i = 0; i < command.framesToTime(); ++i) {
         if (interrupted()) return Error::cancelled();
-        VCP_TRY_ASSIGN(auto stats, renderer.render(request, interrupted));
-        drawing.stats = stats;
-        if (i == 0)
-            drawing.firstFrameMs = stats.msFrame;
-        else
-            drawing.frameMs.push_back(stats.msFrame);
+        VCP_TRY_ASSIGN(drawing.stats, renderer.render(request, interrupted));
+        drawing.frameMs.push_back(drawing.stats.msFrame);
     }
     VCP_TRY(refine(renderer, request, command, drawing));
     return drawing;

@@ -66,11 +66,16 @@ Result<bool> TiledPicture::step() {
         VCP_TRY_ASSIGN(auto update, renderer_->update(request));
         if (!update.problems.empty() && !options_.problem) return update.problems.front();
         for (const Error& problem : update.problems) options_.problem(problem);
-        isWaiting_ = !update.settled;
+        if (update.changed) drawn_.reset();
+        isWaiting_ = !update.settled && !update.awaitsRays;
         if (isWaiting_) return false;
+        if (!drawn_ || update.awaitsRays) {
+            VCP_TRY_ASSIGN(drawn_, renderer_->render(request, options_.cancel));
+        }
+        if (!update.settled) return false;  // what its rays hit may be too coarse
         stats_.errorPixels = std::max(stats_.errorPixels, update.errorPixels);
         stats_.update = std::move(update);
-        VCP_TRY(draw(request));
+        begin(*std::exchange(drawn_, std::nullopt));
     }
     if (samples_ < samplesOf(request, options_.samples)) return false;
     const Rect tile = inner();
@@ -87,13 +92,11 @@ Result<bool> TiledPicture::step() {
     return y_ >= whole_.height;
 }
 
-Result<void> TiledPicture::draw(const FrameRequest& request) {
-    VCP_TRY_ASSIGN(const auto stats, renderer_->render(request, options_.cancel));
+void TiledPicture::begin(const FrameStats& tile) {
     samples_ = 1;
-    tileHits_ = stats.hitPixels;
-    stats_.rays += stats.rays;
-    stats_.ms += stats.msFrame;
-    return {};
+    tileHits_ = tile.hitPixels;
+    stats_.rays += tile.rays;
+    stats_.ms += tile.msFrame;
 }
 
 /// Adds a sample to the tile; where it cannot go on, the next step draws it anew.

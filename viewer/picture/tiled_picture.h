@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -35,7 +36,7 @@ struct PictureBand {
 
 struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
-    double ms = 0;           ///< time of drawing alone, of all samples, as are the rays
+    double ms = 0;           ///< time of drawing alone, of each tile's last frame and its samples, as are the rays
     double errorPixels = 0;  ///< largest over the tiles
     UpdateResult update;     ///< the last tile's
 };
@@ -49,9 +50,9 @@ public:
     TiledPicture(PictureRenderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 
-    /// Takes in pages and draws the next tile, or adds a sample to it, where all that it wants is there; never waits
-    /// for reads. Returns true when the last band was taken. Errors: those of PictureRenderer; those of `take`; the
-    /// first page that cannot be read.
+    /// Takes in pages and draws the next tile, or adds a sample to it, where all that it is known to want is there;
+    /// never waits for reads. Returns true when the last band was taken. Errors: those of PictureRenderer; those of
+    /// `take`; the first page that cannot be read.
     Result<bool> step();
     /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return isWaiting_; }
@@ -64,7 +65,8 @@ private:
     };
     [[nodiscard]] Rect inner() const;
     [[nodiscard]] Rect outer() const;
-    Result<void> draw(const FrameRequest& request);
+    /// Takes a tile's frame as its first sample.
+    void begin(const FrameStats& tile);
     Result<void> addSample();
     [[nodiscard]] FrameRequest tileRequest() const;
     Result<void> copyTile(const Rect& outer, const Rect& inner);
@@ -76,8 +78,9 @@ private:
     uint32_t x_ = 0, y_ = 0;  // place of the next tile
     PictureBand band_;
     bool isWaiting_ = false;
-    uint32_t samples_ = 0;   // that the tile has
-    uint64_t tileHits_ = 0;  // of the tile
+    std::optional<FrameStats> drawn_;  // of the tile, as it was drawn last
+    uint32_t samples_ = 0;             // that the tile has
+    uint64_t tileHits_ = 0;            // of the tile
     TiledPictureStats stats_;
 };
 

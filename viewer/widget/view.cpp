@@ -86,8 +86,8 @@ Result<void> settle(vcp_view& view, double seconds) {
         VCP_TRY(update(view));
         const Viewer& viewer = *view.viewer;
         if (viewer.status().update.settled && std::isinf(view.next.waitSeconds)) break;
-        // Then what is drawn stays, and gets its samples.
-        if (viewer.isAtRest()) VCP_TRY(render(view));
+        // Then what is drawn stays and gets its samples, or its rays say what they hit.
+        if (viewer.isAtRest() || viewer.status().update.awaitsRays) VCP_TRY(render(view));
         const double left = begin + seconds - view.context->now();
         isLate = left <= 0;
         if (viewer.isAtRest() && view.next.waitSeconds <= 0) continue;

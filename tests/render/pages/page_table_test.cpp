@@ -33,7 +33,7 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
         std::memcpy(&resident[page].header, made.pages[page].geometryBytes().data(), sizeof(PageHeader));
         resident[page].texel = uint32_t(1000 * page);
     }
-    const auto table = pageTable(dataset, cut, [&](uint64_t page) { return std::optional(resident[page]); });
+    const auto table = pageTable(dataset, cut, {}, [&](uint64_t page) { return std::optional(resident[page]); });
 
     std::vector<uint64_t> found;
     const std::function<void(uint32_t, uint64_t)> walk = [&](uint32_t node, uint64_t page) {
@@ -59,9 +59,45 @@ TEST(PageTable, LeadsToEveryPageOfTheCutAndNoOther) {
     EXPECT_EQ(found, cut);
 }
 
+TEST(PageTable, AnOctantOfAPageIsInThePlaceOfItsChild) {
+    const test::AnalyticDataset made = sphereDataset();
+    const Dataset& dataset = made.dataset;
+    // The root, but one octant replaced by the child there, which is drawn in two octants and nowhere else.
+    const uint64_t child = childIn(dataset.pages[0], 3);
+    const auto own = uint8_t(dataset.pages[0].childMask & 0xf7),
+               childOwn = uint8_t(dataset.pages[child].childMask & 0x11);
+    ASSERT_EQ(std::popcount(childOwn), 2);
+    const std::vector<uint64_t> cut{0, child};
+    const std::vector<PartialPage> partial{{0, own}, {child, childOwn}};
+    const auto table = pageTable(dataset, cut, partial, [&](uint64_t page) {
+        ResidentPage resident;
+        std::memcpy(&resident.header, made.pages[page].geometryBytes().data(), sizeof(PageHeader));
+        resident.texel = uint32_t(1000 * page);
+        for (uint32_t octant = 0; octant < 8; ++octant) resident.octants[octant] = uint32_t(100 * page + octant);
+        return std::optional(resident);
+    });
+    ASSERT_EQ(table.size(), 1 + 8 + 2u);
+    const auto expectOctant = [&](const frame::TableRecord& record, uint64_t page, uint32_t octant) {
+        EXPECT_EQ(record.node.flags & ~frame::kRecordErrorMask,
+                  frame::kRecordInCut | frame::kRecordResident | frame::kRecordIsOctant);
+        EXPECT_EQ(record.node.root, 100 * page + octant);
+        EXPECT_EQ(record.node.pageTexel, 1000 * page);
+        EXPECT_EQ(record.colours.entry, page);
+        EXPECT_EQ(record.colours.asked, childIn(dataset.pages[page], octant));
+    };
+    EXPECT_EQ(table[0].node.flags & 255, 255u);
+    for (uint32_t octant = 0; octant < 8; ++octant)
+        if (octant != 3) expectOctant(table[1 + octant], 0, octant);
+    EXPECT_EQ(table[4].node.flags & 255, childOwn);
+    EXPECT_EQ(table[4].node.flags & frame::kRecordInCut, 0u);
+    EXPECT_EQ(table[4].node.firstChild, 9u);
+    expectOctant(table[9], child, 0);
+    expectOctant(table[10], child, 4);
+}
+
 TEST(PageTable, WithoutACutTheRootIsEmpty) {
     const auto table =
-        pageTable(sphereDataset().dataset, {}, [](uint64_t) -> std::optional<ResidentPage> { std::abort(); });
+        pageTable(sphereDataset().dataset, {}, {}, [](uint64_t) -> std::optional<ResidentPage> { std::abort(); });
     ASSERT_EQ(table.size(), 1u);
     EXPECT_EQ(table[0].node.flags, 0u);
 }

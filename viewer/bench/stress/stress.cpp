@@ -7,8 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "render/frame_setup.h"
-#include "streaming/residency_policy.h"
 #include "viewer/bench/stress/stress_path.h"
 #include "viewer/camera/camera_path.h"
 
@@ -54,7 +52,7 @@ public:
     void check(const UpdateResult& update) {
         require(update.residentBytes <= budgetBytes_, "more bytes are resident than the budget allows");
         require(update.heldBytesMax <= ramBytes_, "pages on their way and kept take more memory than --ram allows");
-        require(update.settled == (update.pagesMissing == 0), "settled is not what it says");
+        require(update.settled == (update.pagesMissing == 0 && !update.awaitsRays), "settled is not what it says");
         require(update.reloads == 0, "a page was loaded twice in a still view");
         for (const Error& problem : update.problems) {
             require(reported_.insert(problem.line()).second, "a page that cannot be read was reported twice");
@@ -168,7 +166,10 @@ private:
             invariants_.require(secondsSince(changedAt) < kHopelessSeconds, "a view does not settle");
             if (!report_.violations.empty() && secondsSince(changedAt) >= kHopelessSeconds) return update;
             VCP_TRY(ask("settling", 0));
-            renderer_->waitForPage(std::chrono::milliseconds(20));
+            if (update->awaitsRays)
+                VCP_TRY(renderer_->render(request));
+            else
+                renderer_->waitForPage(std::chrono::milliseconds(20));
         }
     }
 
@@ -236,11 +237,9 @@ private:
         return {};
     }
 
-    /// Draws the same frames, each with all pages that it wants, and notes which pages those are.
+    /// Draws the same frames, each with all pages that it wants, and notes what is drawn and what is above it.
     Result<void> withoutLoads() {
         const bool colour = o_.renderer.colour && open_.dataset->hasColour();
-        ResidencyPolicy wants(open_.dataset, colour,
-                              poolShapeFor(*open_.dataset, colour, o_.renderer.budgetBytes, uint64_t{1} << 40));
         std::set<uint64_t> needed;
         std::vector<float> times;
         for (size_t i = 0; i < cameras_.size(); ++i) {
@@ -250,15 +249,19 @@ private:
             double ms = 0;
             if (const auto update = frame(request, ms); !update) return update.error();
             times.push_back(float(ms));
-            // It looks twice, since a still view looks at nothing ahead. No page is ever placed, so all it wants is
-            // wished for.
-            for (int k = 0; k < 2; ++k) wants.look(selectionView(request), 0);
-            for (const Wish& wish : wants.finish().wishes)
-                if (wish.request.isPage()) needed.insert(wish.request.number);
+            for (const PageBox& page : renderer_->residentPages())
+                if (page.isDrawn) needed.insert(page.number);
         }
         report_.frameMsNoLoads = quantilesOf(std::move(times));
         report_.bytesRead = counted_->bytes;
         report_.requests = counted_->requests;
+        // Children come later in the directory than their parents.
+        const PageDirectory& pages = open_.dataset->pages;
+        for (uint64_t page = pages.size(); page-- > 0;) {
+            const EntryRange children = childrenOf(pages[page]);
+            if (std::any_of(children.begin(), children.end(), [&](uint64_t child) { return needed.contains(child); }))
+                needed.insert(page);
+        }
         for (const uint64_t page : needed) {
             const PageEntry& entry = open_.dataset->pages[page];
             report_.bytesNeeded += entry.storedBytes + (colour ? entry.colourStoredBytes : 0);

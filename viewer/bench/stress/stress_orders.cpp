@@ -35,11 +35,13 @@ public:
         for (;;) {
             VCP_TRY_ASSIGN(const auto update, renderer_->update(request_));
             step = std::max<uint64_t>(1, update.pagesWanted / uint64_t(draws_));
-            if (update.drawable && (pictures_.empty() || update.settled || update.loads >= drawnAt + step)) {
+            const bool isDue = pictures_.empty() || update.settled || update.awaitsRays;
+            if (update.drawable && (isDue || update.loads >= drawnAt + step)) {
                 drawnAt = update.loads;
                 VCP_TRY(draw(update));
             }
             if (update.settled) break;
+            if (update.awaitsRays) continue;
             if (!progress(1 - double(update.pagesMissing) / std::max(1u, update.pagesWanted)))
                 return Error::cancelled();
             renderer_->waitForPage(std::chrono::milliseconds(20));

@@ -71,7 +71,10 @@ private:
         auto changedAt = began;
         uint64_t loads = 0;
         for (bool settled = false; !settled;) {
-            for (size_t view = 0; view < views_.size(); ++view) VCP_TRY(update(view, path_.size() - 1));
+            for (size_t view = 0; view < views_.size(); ++view) {
+                VCP_TRY(update(view, path_.size() - 1));
+                if (last_[view].awaitsRays) VCP_TRY(views_[view]->render(requestOf(view, path_.size() - 1)));
+            }
             settled =
                 std::all_of(last_.begin(), last_.end(), [](const UpdateResult& update) { return update.settled; });
             if (result_.loads != loads) changedAt = Clock::now();
