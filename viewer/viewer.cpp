@@ -65,7 +65,7 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
     const std::string device = status.device + (status.software ? " (software)" : "");
     if (status.name.empty()) return device.substr(0, most);
     // The most important parts come first: a narrow window has no room for the rest.
-    std::vector<std::string> parts{shortened(status.name, most / 3), status.update.settled ? "settled" : "loading"};
+    std::vector<std::string> parts{shortened(status.name, most / 3), textOf(status.detail)};
     if (!status.without.empty()) parts.push_back(status.without);
     if (status.update.drawable && status.levels > 0) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
@@ -149,6 +149,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     flySpeed_ = 1;
     status_.name = std::move(name);
     status_.update = {};
+    status_.detail = Detail::Loading;
     status_.problem.clear();
 }
 
@@ -498,6 +499,7 @@ Result<NextStep> Viewer::update(double now) {
     VCP_TRY_ASSIGN(auto update, renderer_->update(request_));
     pagesChanged_ = pagesChanged_ || update.changed;
     if (!update.problems.empty()) status_.problem = update.problems.back().line();
+    status_.detail = detailOf(update, request_.errorPixels);
     status_.update = std::move(update);
     if (options_.framesAhead && renderer_->lastDone()) takeStats(*renderer_->lastDone());
     return nextStep(now);

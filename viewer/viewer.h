@@ -91,6 +91,7 @@ struct ViewerStatus {
     uint64_t triangles = 0;
     uint32_t levels = 0;
     UpdateResult update;
+    Detail detail = Detail::Loading;
     FrameStats frame;      ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
     int reduction = 1;     ///< the last picture has 1/reduction of the width and height
     uint32_t samples = 0;  ///< whole samples of the last picture

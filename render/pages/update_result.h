@@ -1,6 +1,7 @@
 // What an update of the pages that a view draws came to.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -31,5 +32,33 @@ struct UpdateResult {
     uint32_t coarsestLevel = 0, finestLevel = 0;  ///< levels of the pages in the cut
     std::vector<Error> problems;                  ///< pages that cannot be read; each is reported once
 };
+
+/// What limits the detail of a picture.
+enum class Detail {
+    Loading,  ///< pages are still to come
+    Settled,  ///< nothing: it errs by no more than was asked for
+    Finest,   ///< the file: its finest level is drawn where it errs by more
+    Budget,   ///< the budget
+};
+
+/// `askedPixels`: the error that the view may have.
+inline Detail detailOf(const UpdateResult& update, double askedPixels) {
+    if (!update.settled) return Detail::Loading;
+    if (update.relaxed) return Detail::Budget;
+    // Without a certificate, and without a page, the error is infinite.
+    return std::isfinite(update.errorPixels) && update.errorPixels > askedPixels ? Detail::Finest : Detail::Settled;
+}
+
+/// Returns "loading", "settled", "finest" or "budget": for programs.
+inline const char* nameOf(Detail detail) {
+    const char* const names[] = {"loading", "settled", "finest", "budget"};
+    return names[int(detail)];
+}
+
+/// Returns the same for people.
+inline const char* textOf(Detail detail) {
+    const char* const texts[] = {"loading", "settled", "settled, finest level", "settled, budget full"};
+    return texts[int(detail)];
+}
 
 }  // namespace vcp

@@ -627,6 +627,25 @@ TEST_F(ViewerTest, StatusLineSaysWhatMatters) {
     EXPECT_EQ(line.find('\n'), std::string::npos);
 }
 
+TEST_F(ViewerTest, StatusSaysWhatLimitsTheDetail) {
+    UpdateResult update;
+    update.errorPixels = 3;
+    EXPECT_EQ(detailOf(update, 0.5), Detail::Loading);
+    update.settled = true;
+    EXPECT_EQ(detailOf(update, 3), Detail::Settled);
+    EXPECT_EQ(detailOf(update, 0.5), Detail::Finest);
+    update.relaxed = true;
+    EXPECT_EQ(detailOf(update, 0.5), Detail::Budget);
+
+    openViewer();
+    settle();
+    EXPECT_EQ(viewer_->status().detail, Detail::Settled);
+    viewer_->setErrorPixels(1e-6);
+    settle();
+    EXPECT_EQ(viewer_->status().detail, Detail::Finest);
+    EXPECT_NE(statusLine(viewer_->status()).find("settled, finest level"), std::string::npos);
+}
+
 TEST_F(ViewerTest, StatusLineKeepsToItsRoom) {
     ViewerStatus status;
     status.name = "a_rather_long_name_of_a_scan_from_a_museum.ply";

@@ -158,6 +158,7 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"device", device.name},
             {"software", device.software},
             {"settled", drawing.update.settled},
+            {"detail", nameOf(detailOf(drawing.update, request.errorPixels))},
             {"error_pixels", drawing.update.errorPixels},
             {"subvolumes_in_cut", stats.pagesInCut},
             {"resident_bytes", drawing.update.residentBytes},
@@ -166,7 +167,8 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"camera", Json::parse(cameraToJson(camera))}};
 }
 
-std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device) {
+std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device,
+                    double askedPixels) {
     const UpdateResult& update = drawing.update;
     const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
                                                                 : "no certified error";
@@ -177,7 +179,7 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
                        command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples, device.name,
                        device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
-                       error, update.settled ? "settled" : "not settled");
+                       error, textOf(detailOf(update, askedPixels)));
 }
 
 Result<void> report(const RenderCommand& command, const Drawing& drawing, const std::vector<MethodPanel>& panels,
@@ -189,7 +191,7 @@ Result<void> report(const RenderCommand& command, const Drawing& drawing, const 
             if (!command.methods.empty()) json["methods"].push_back(toJson(panel));
         return printJson(json);
     }
-    std::string text = summary(command, drawing, device);
+    std::string text = summary(command, drawing, device, request.errorPixels);
     for (const MethodPanel& panel : panels)
         if (!command.methods.empty()) text += "\n  " + summary(panel);
     return printLineAbout(command.output, text);
@@ -223,6 +225,7 @@ Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, c
             {"device", device.name},
             {"software", device.software},
             {"settled", total.update.settled},
+            {"detail", nameOf(detailOf(total.update, request.errorPixels))},
             {"error_pixels", total.errorPixels},
             {"resident_bytes", total.update.residentBytes},
             {"bytes_read", total.update.bytesRead}};

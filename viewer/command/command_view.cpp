@@ -40,6 +40,7 @@ Json toJson(const WindowReport& report) {
             {"device", status.device},
             {"software", status.software},
             {"settled", status.update.settled},
+            {"detail", nameOf(status.detail)},
             {"error_pixels", status.update.errorPixels},
             {"resident_bytes", status.update.residentBytes},
             {"bytes_read", status.update.bytesRead},

@@ -52,9 +52,10 @@ py::dict toDict(const vcp_stats& s) {
     using namespace py::literals;
     return py::dict("settled"_a = s.settled != 0, "relaxed"_a = s.relaxed != 0, "frames"_a = s.frames,
                     "frame_ms"_a = s.frame_ms, "error_pixels"_a = s.error_pixels, "rays"_a = s.rays,
-                    "hit_pixels"_a = s.hit_pixels, "samples"_a = s.samples, "resident_bytes"_a = s.resident_bytes,
-                    "pool_bytes"_a = s.pool_bytes, "bytes_read"_a = s.bytes_read, "pages_resident"_a = s.pages_resident,
-                    "pages_drawn"_a = s.pages_drawn, "device_losses"_a = s.device_losses);
+                    "hit_pixels"_a = s.hit_pixels, "samples"_a = s.samples, "detail"_a = s.detail,
+                    "resident_bytes"_a = s.resident_bytes, "pool_bytes"_a = s.pool_bytes, "bytes_read"_a = s.bytes_read,
+                    "pages_resident"_a = s.pages_resident, "pages_drawn"_a = s.pages_drawn,
+                    "device_losses"_a = s.device_losses);
 }
 
 py::object pickOf(View& view, double x, double y) {

@@ -381,7 +381,7 @@ typedef struct vcp_stats {
     uint32_t pages_resident, pages_drawn, pages_wanted, pages_missing;
     uint32_t coarsest_level, finest_level;
     uint32_t samples; /* rays a pixel, so far, of the last picture */
-    uint32_t reserved;
+    uint32_t detail;  /* limited by 0: loading, 1: nothing, 2: the finest level, 3: the budget */
 } vcp_stats;
 
 VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);

@@ -278,6 +278,7 @@ vcp_stats statsOf(const Viewer& viewer) {
     stats.device_losses = update.deviceLosses;
     stats.frames = viewer.framesDrawn();
     stats.samples = status.samples;
+    stats.detail = uint32_t(status.detail);
     stats.frame_ms = status.frame.msFrame;
     stats.error_pixels = update.errorPixels;
     stats.rays = status.frame.rays;

@@ -259,8 +259,10 @@ void Interface::layOutLimits() {
     if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic))
         viewer.setErrorPixels(double(error));
     const UpdateResult& update = status.update;
-    wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels),
-                        update.relaxed ? ": the budget is too small for less" : ""));
+    const char* const limit = status.detail == Detail::Budget   ? ": the budget is too small for less"
+                              : status.detail == Detail::Finest ? ": this is the finest level"
+                                                                : "";
+    wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels), limit));
     const float part = float(update.residentBytes) / float(std::max<uint64_t>(status.budgetBytes, 1));
     const std::string filled =
         fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));

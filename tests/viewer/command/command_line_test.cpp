@@ -343,6 +343,7 @@ TEST_F(CommandLine, RenderReportsWhatProgramsRelyOn) {
                               "error_pixels", "pipelines"})
         EXPECT_TRUE(json.contains(field) && json[field].is_number()) << field;
     EXPECT_EQ(json["settled"], true);
+    EXPECT_EQ(json["detail"], "settled");
     EXPECT_TRUE(json["device"].is_string());
     EXPECT_GT(json["hit_pixels"], 160 * 120 / 5);
     EXPECT_LE(json["error_pixels"].get<double>(), 0.5);
