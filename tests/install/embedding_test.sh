@@ -58,7 +58,7 @@ if nm -D --defined-only "$prefix/$libdir/libvcp.so" | grep -v ' vcp_[a-z_]*$'; t
 fi
 [ ! -x build/host_device ] || shows build/host_device "$tree"
 if command -v xvfb-run >/dev/null; then
-    display=(xvfb-run -a -s "-noreset -screen 0 1280x1024x24")
+    display=(xvfb-run -a -s "-screen 0 1280x1024x24")
     [ ! -x build/glfw_host ] || shows "${display[@]}" build/glfw_host "$tree" --frames 5
     [ ! -x build/qt_widget ] || QT_QPA_PLATFORM=xcb shows "${display[@]}" build/qt_widget "$tree" --frames 3
 else

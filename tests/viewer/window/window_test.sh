@@ -21,7 +21,7 @@ awk 'BEGIN { R=48; S=100; pi=atan2(0,-1)
         print 3, r*S+s, r*S+t, (r+1)*S+s; print 3, r*S+t, (r+1)*S+t, (r+1)*S+s } }' >ball.ply
 
 exec 3>display
-Xvfb -noreset -displayfd 3 -screen 0 1000x800x24 >xvfb.log 2>&1 &
+Xvfb -displayfd 3 -screen 0 1000x800x24 >xvfb.log 2>&1 &
 xvfb=$!
 trap 'kill $xvfb 2>/dev/null || true' EXIT
 for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
@@ -38,6 +38,8 @@ ended() {
 # starts NAME ARGUMENT...: opens a window whose title has NAME; sets viewer and window.
 starts() {
     local name=$1; shift
+    # When the last program has left a display, that begins anew, and lets nobody in meanwhile.
+    sleep 1
     "$vcp" view "$@" --json >report.json 2>log &
     viewer=$!
     window=
