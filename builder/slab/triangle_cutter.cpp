@@ -6,6 +6,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/type_precision.hpp>
 
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/morton.h"
@@ -53,9 +54,11 @@ bool TriangleCutter::mayReach(uint32_t triangle) const {
     constexpr int kSteps = kLatticePerCell / 2;  // an edge of the cutter's cells
     const auto& [a, b, c] = mesh_.triangles[triangle];
     const glm::i32vec3 &p = mesh_.positions[a], &q = mesh_.positions[b], &r = mesh_.positions[c];
-    const glm::i32vec3 low = origin_ + within_.lower * kSteps, high = low + (kSteps << within_.log2Edge);
-    return glm::all(glm::lessThanEqual(glm::min(p, glm::min(q, r)), high)) &&
-           glm::all(glm::greaterThanEqual(glm::max(p, glm::max(q, r)), low));
+    // The last page of the largest grid ends beyond 31 bits.
+    const glm::i64vec3 low = glm::i64vec3(origin_) + glm::i64vec3(within_.lower) * int64_t{kSteps};
+    const glm::i64vec3 high = low + (int64_t{kSteps} << within_.log2Edge);
+    return glm::all(glm::lessThanEqual(glm::i64vec3(glm::min(p, glm::min(q, r))), high)) &&
+           glm::all(glm::greaterThanEqual(glm::i64vec3(glm::max(p, glm::max(q, r))), low));
 }
 
 void TriangleCutter::cut(uint32_t triangle) {
