@@ -45,9 +45,9 @@ void halveLattice(LatticeMesh& mesh);
 std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 
 /// Computes vertex normals (octree/surface/vertex_normal.h): the mean of the incident triangles' normals by area, taken
-/// without orientation (a mesh need not have one); the page codec predicts them from a page's triangles. A vertex around
-/// which triangles with a sixteenth of the area turn away by more than 40 degrees is marked as a crease: its normal is
-/// not to be interpolated. Uses the calling arena's threads.
+/// without orientation (a mesh need not have one); the page codec predicts them from a page's triangles. A vertex
+/// around which triangles with a sixteenth of the area turn away by more than 40 degrees is marked as a crease: its
+/// normal is not to be interpolated. Uses the calling arena's threads.
 void computeNormals(LatticeMesh& mesh);
 
 }  // namespace vcp

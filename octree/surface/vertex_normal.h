@@ -20,9 +20,9 @@ WideVector areaNormal(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 /// Adds a triangle's normal to a vertex' sum, without orientation: the normal is turned to the side of the sum.
 void addNormal(WideVector& sum, WideVector normal);
 
-/// Returns for each vertex whether its triangles turn away from its normal by more than 40 degrees: any of them, or, for
-/// a `share`, so many that they have 1 / share of the area around it. Scans are full of slivers that face anywhere, and
-/// these alone make no crease.
+/// Returns for each vertex whether its triangles turn away from its normal by more than 40 degrees: any of them, or,
+/// for a `share`, so many that they have 1 / share of the area around it. Scans are full of slivers that face anywhere,
+/// and these alone make no crease.
 std::vector<uint8_t> creases(std::span<const WideVector> normals, std::span<const WideVector> sums,
                              std::span<const std::array<uint32_t, 3>> triangles, int64_t share = 0);
 
