@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <utility>
 #if defined(__GLIBC__)
 #include <malloc.h>
 #endif
@@ -470,8 +471,7 @@ private:
         const std::string stage = stageOf(pass_);
         if (!progress(stage, at(0))) return cancelled();
         return arena_.execute([&]() -> Result<void> {
-            LatticeMesh mesh = std::move(mesh_);
-            mesh_ = {};
+            LatticeMesh mesh = std::exchange(mesh_, {});
             if (mesh.positions.empty()) {
                 VCP_TRY_ASSIGN(mesh, loadMesh(bin));
             }

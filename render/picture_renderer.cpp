@@ -69,8 +69,7 @@ Result<void> PictureRenderer::refineTo(uint32_t samples, const FrameRequest& req
     for (uint32_t drawn = 1; drawn < wanted;) {
         VCP_TRY_ASSIGN(drawn, refine(cancel));
         if (drawn == 0) {
-            VCP_TRY(settle(request, cancel));
-            VCP_TRY(render(request, cancel));
+            VCP_TRY(drawSettled(request, cancel));
             drawn = 1;
         }
         if (progress) progress(drawn);

@@ -28,8 +28,8 @@ namespace {
 /// Cuts triangles, box by box where they make too many pieces at once.
 class SurfaceCutter {
 public:
-    SurfaceCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth)
-        : mesh_(mesh), origin_(origin), depth_(depth) {}
+    SurfaceCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth, size_t mostPieces)
+        : mesh_(mesh), origin_(origin), depth_(depth), mostPieces_(mostPieces) {}
 
     /// Appends the cells of a box, in Morton order.
     void run(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
@@ -43,27 +43,26 @@ private:
         TriangleCutter cutter(mesh_, origin_, depth_, box);
         for (const uint32_t k : triangles) {
             cutter.cut(k);
-            if (cutter.pieces() > kMostPieces && box.log2Edge > 0) return false;
+            if (cutter.pieces() > mostPieces_ && box.log2Edge > 0) return false;
         }
-        const SurfaceCells found = cutter.take();
-        cells.codes.insert(cells.codes.end(), found.codes.begin(), found.codes.end());
-        cells.cells.insert(cells.cells.end(), found.cells.begin(), found.cells.end());
+        cutter.appendTo(cells);
         return true;
     }
 
     const LatticeMesh& mesh_;
     glm::i32vec3 origin_;
     int depth_;
+    size_t mostPieces_;
 };
 
 }  // namespace
 
 PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                      uint32_t log2Cells) {
+                      uint32_t log2Cells, size_t mostPieces) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
     const int depth = int(log2Cells) + 1;
     PageSurface surface;
-    SurfaceCutter(mesh, origin, depth).run(triangles, {glm::ivec3(0), depth}, surface.halves);
+    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, surface.halves);
     surface.cells = foldCells(surface.halves);
     return surface;
 }

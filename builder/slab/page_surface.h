@@ -26,10 +26,14 @@ struct PageSurface {
     SurfaceCells cells, halves, quarters = {};
 };
 
+/// So many pieces of triangles are in memory at a time, unless they are all in half a cell.
+inline constexpr size_t kMostPieces = 1 << 19;
+
 /// Cuts triangles into the cells of a page and their halves; quarters stay empty. `triangles`: numbers in `mesh`, among
-/// them all that touch the page at `page` (Morton position, in pages of 2^log2Cells cells).
+/// them all that touch the page at `page` (Morton position, in pages of 2^log2Cells cells). The result does not depend
+/// on `mostPieces`.
 PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                      uint32_t log2Cells);
+                      uint32_t log2Cells, size_t mostPieces = kMostPieces);
 
 /// Puts together the page above up to eight pages. `octants`: where each of them is, ascending.
 PageSurface foldPages(std::span<const PageSurface> pages, std::span<const uint32_t> octants, uint32_t log2Cells);
@@ -45,9 +49,6 @@ SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes);
 /// surface in what was stored; quarters are left out.
 StoredPage storedSurface(const PageSurface& surface);
 PageSurface surfaceFrom(const StoredPage& stored);
-
-/// surfaceOf has no more pieces of triangles in memory at a time, unless they are all in half a cell.
-inline constexpr size_t kMostPieces = 1 << 19;
 
 /// Returns the bytes that surfaceOf needs for triangles with so large areas and perimeters together, in cells: a piece
 /// for each half cell that a triangle touches, and the cells themselves where the pieces come in parts.

@@ -66,10 +66,10 @@ void TriangleCutter::cut(uint32_t triangle) {
     source_ = sourceOf(triangle);
     Polygon piece;
     clipToBox(source_.corners, glm::dvec3(0), glm::dvec3(std::ldexp(1.0, depth_)), piece);
-    if (!piece.empty()) split(piece, glm::ivec3(0), depth_);
+    if (!piece.empty()) split(piece, {glm::ivec3(0), depth_});
 }
 
-TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, glm::ivec3 lower, int log2Edge) {
+TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, const CutterBox& whole) {
     glm::dvec3 least = piece[0], most = piece[0];
     for (const glm::dvec3& p : piece) {
         least = glm::min(least, p);
@@ -81,9 +81,9 @@ TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, glm::i
         // A piece that only reaches a wall is in the cell that it comes from; one in a wall is on both sides of it.
         const double floor = std::floor(least[axis]);
         const bool isInWall = least[axis] == most[axis] && least[axis] == floor;
-        const int upper = lower[axis] + (1 << log2Edge) - 1;
-        first[axis] = std::clamp(int(floor) - (isInWall ? 1 : 0), lower[axis], upper);
-        last[axis] = std::clamp(isInWall ? int(floor) : int(std::ceil(most[axis])) - 1, lower[axis], upper);
+        const int lower = whole.lower[axis], upper = lower + (1 << whole.log2Edge) - 1;
+        first[axis] = std::clamp(int(floor) - (isInWall ? 1 : 0), lower, upper);
+        last[axis] = std::clamp(isInWall ? int(floor) : int(std::ceil(most[axis])) - 1, lower, upper);
         differ |= first[axis] ^ last[axis];
     }
     const int bits = int(std::bit_width(unsigned(differ)));
@@ -99,20 +99,19 @@ bool TriangleCutter::isWanted(const CutterBox& box) const {
     return box.lower >> bits == within_.lower >> bits;
 }
 
-void TriangleCutter::split(const Polygon& piece, glm::ivec3 lower, int log2Edge) {
-    const OctreeBox box = boxAround(piece, lower, log2Edge);
+void TriangleCutter::split(const Polygon& piece, const CutterBox& whole) {
+    const OctreeBox box = boxAround(piece, whole);
     if (!isWanted(box)) return;
     if (box.log2Edge == 0) return keep(piece, box.lower);
-    const int half = 1 << (box.log2Edge - 1);
-    const glm::dvec3 middle(box.lower + half);
+    const glm::dvec3 middle(box.child(7).lower);
     Polygon room[3][2];
     const auto sidesOf = [&](const Polygon& part, int axis) -> PolygonSides {
         const uint32_t halves = box.halves[size_t(axis)];
         if (halves == 3) return partAt(part, axis, middle[axis], room[axis][0], room[axis][1]);
         return {halves == 1 ? &part : nullptr, halves == 2 ? &part : nullptr};
     };
-    const auto splitHalf = [&](const Polygon* part, int x, int y, int z) {
-        if (part != nullptr) split(*part, box.lower + half * glm::ivec3(x, y, z), box.log2Edge - 1);
+    const auto splitOctant = [&](const Polygon* part, int octant) {
+        if (part != nullptr) split(*part, box.child(octant));
     };
     const PolygonSides x = sidesOf(piece, 0);
     for (int i = 0; i < 2; ++i) {
@@ -123,8 +122,8 @@ void TriangleCutter::split(const Polygon& piece, glm::ivec3 lower, int log2Edge)
             const Polygon* byY = j == 0 ? y.below : y.above;
             if (byY == nullptr) continue;
             const PolygonSides z = sidesOf(*byY, 2);
-            splitHalf(z.below, i, j, 0);
-            splitHalf(z.above, i, j, 1);
+            splitOctant(z.below, i + 2 * j);
+            splitOctant(z.above, i + 2 * j + 4);
         }
     }
 }
@@ -172,21 +171,19 @@ CellSurface TriangleCutter::sum(std::span<const CellPiece> pieces) const {
     return cell;
 }
 
-SurfaceCells TriangleCutter::take() {
+void TriangleCutter::appendTo(SurfaceCells& cells) const {
     // Cells in order, and in each the pieces as they were cut.
     std::vector<uint64_t> order(pieces_.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = uint64_t{pieces_[i].code} << 32 | i;
     std::sort(order.begin(), order.end());
-    SurfaceCells surface;
     std::vector<CellPiece> inCell;
     for (size_t i = 0; i < order.size();) {
         const uint32_t code = uint32_t(order[i] >> 32);
         inCell.clear();
         for (; i < order.size() && uint32_t(order[i] >> 32) == code; ++i) inCell.push_back(pieces_[uint32_t(order[i])]);
-        surface.codes.push_back(code);
-        surface.cells.push_back(sum(inCell));
+        cells.codes.push_back(code);
+        cells.cells.push_back(sum(inCell));
     }
-    return surface;
 }
 
 }  // namespace vcp

@@ -32,8 +32,8 @@ public:
     /// Cuts a triangle of the mesh; what lies outside of the box is left out. A piece in a wall belongs to both sides.
     void cut(uint32_t triangle);
     [[nodiscard]] size_t pieces() const { return pieces_.size(); }
-    /// Returns what is known of the cells. To be called once, after all cuts.
-    SurfaceCells take();
+    /// Appends what is known of the box's cells, in Morton order. To be called once, after all cuts.
+    void appendTo(SurfaceCells& cells) const;
 
 private:
     /// The triangle that is being cut, in the cutter's cells from the page's lowest corner, and what is blended over
@@ -62,9 +62,9 @@ private:
     [[nodiscard]] bool mayReach(uint32_t triangle) const;
     [[nodiscard]] Source sourceOf(uint32_t triangle) const;
     /// Returns the smallest box around the part of a piece that is in a box.
-    [[nodiscard]] static OctreeBox boxAround(const Polygon& piece, glm::ivec3 lower, int log2Edge);
+    [[nodiscard]] static OctreeBox boxAround(const Polygon& piece, const CutterBox& whole);
     /// Cuts what is in a box into pieces that lie in one cell each.
-    void split(const Polygon& piece, glm::ivec3 lower, int log2Edge);
+    void split(const Polygon& piece, const CutterBox& whole);
     /// Whether a box and the one that pieces are kept of have cells in common.
     [[nodiscard]] bool isWanted(const CutterBox& box) const;
     void keep(const Polygon& piece, glm::ivec3 cell);

@@ -187,18 +187,11 @@ Result<void> RawBins::load(size_t bin, std::span<std::byte> out) const {
         begin.push_back(at);
         at += block.records * recordBytes_;
     }
+    std::vector<Result<void>> done(blocks.size());
+    tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t i) { done[i] = read(blocks[i], out.data() + begin[i]); });
     // Of several damaged blocks the first is named.
-    std::mutex mutex;
-    size_t firstWrong = blocks.size();
-    Result<void> result;
-    tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t i) {
-        auto done = read(blocks[i], out.data() + begin[i]);
-        if (done) return;
-        const std::scoped_lock lock(mutex);
-        if (i < firstWrong) result = std::move(done);
-        firstWrong = std::min(firstWrong, i);
-    });
-    return result;
+    for (auto& each : done) VCP_TRY(std::move(each));
+    return {};
 }
 
 }  // namespace vcp

@@ -252,6 +252,22 @@ TEST(Slabs, ExtentsAreThoseOfTheBoxCutByTheSlab) {
     }
 }
 
+TEST(Slabs, APageCutPartByPartIsTheSame) {
+    for (const Scene& scene : scenes()) {
+        SCOPED_TRACE(scene.name);
+        for (uint32_t octant = 0; octant < 8; ++octant) {
+            const glm::u32vec3 page(octant & 1, octant >> 1 & 1, octant >> 2);
+            const StoredPage whole = storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kLog2Cells));
+            for (const size_t pieces : {size_t{0}, size_t{20}}) {
+                const StoredPage parts =
+                    storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kLog2Cells, pieces));
+                ASSERT_EQ(whole.geometry, parts.geometry) << octant << ", " << pieces << " pieces";
+                ASSERT_EQ(whole.colour, parts.colour) << octant << ", " << pieces << " pieces";
+            }
+        }
+    }
+}
+
 TEST(Slabs, SurfacesComeBackFromTheirBytes) {
     const Pages pages = pagesOf(scenes()[0].mesh);
     const SurfaceCells& cells = pages.above.cells;
