@@ -53,7 +53,7 @@ struct BuildOptions {
     uint64_t memoryBytes = 0;      ///< cap on what the build allocates; 0: defaultMemoryBytes()
     std::filesystem::path temp;    ///< folder for temporary files; empty: beside the output
     bool resume = false;           ///< go on where an interrupted build of the same output was
-    double checkpointSeconds = 5;  ///< least time between checkpoints, which make what is done durable
+    double checkpointSeconds = 15;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
     CoarseLeaves coarseLeaves = CoarseLeaves::Slabs;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;

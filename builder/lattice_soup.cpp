@@ -15,10 +15,8 @@ namespace {
 /// Returns the middle of two colours, channel by channel.
 uint32_t middleColour(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); }
 
-/// Returns the multiple of a power of two that is nearest to a point.
-glm::i32vec3 roundTo(glm::dvec3 p, int step) {
-    return glm::i32vec3(std::lround(p.x / step), std::lround(p.y / step), std::lround(p.z / step)) * step;
-}
+/// Returns the multiple of a power of two that is nearest to a point, which has no negative coordinates.
+glm::i32vec3 roundTo(glm::dvec3 p, int step) { return glm::i32vec3(p / double(step) + 0.5) * step; }
 
 // A piece that was cut says that it may have strayed by so many roundings at least: those beside it that lost their
 // area are left out, and rays in single precision miss long needles by about as much.
@@ -49,14 +47,16 @@ bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
 }
 
 LatticeSnapper::Point LatticeSnapper::pointOf(const Piece& piece, int corner) {
-    return {piece.triangle.corner[corner], piece.moved[corner], piece.triangle.colour[corner], piece.uv[corner]};
+    return {piece.triangle.corner[corner], piece.moved[corner], piece.step[corner], piece.triangle.colour[corner],
+            piece.uv[corner]};
 }
 
 LatticeSnapper::Point LatticeSnapper::middle(const Point& a, const Point& b) const {
     const glm::dvec3 exact = (glm::dvec3(a.at) + glm::dvec3(b.at)) / 2.0;
     glm::i32vec3 at(glm::floor(exact));
-    if (const int step = pages_.stepAt(at); step > 1) at = roundTo(exact, step);
-    return {at, (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact), middleColour(a.colour, b.colour),
+    const int step = pages_.stepAt(at);
+    if (step > 1) at = roundTo(exact, step);
+    return {at, (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact), step, middleColour(a.colour, b.colour),
             (a.uv + b.uv) * 0.5f};
 }
 
@@ -85,6 +85,7 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
             p.triangle.corner[i] = point.at;
             p.triangle.colour[i] = point.colour;
             p.moved[i] = point.moved;
+            p.step[i] = point.step;
             p.uv[i] = point.uv;
         }
     };
@@ -115,7 +116,7 @@ float LatticeSnapper::strayOf(const Piece& piece) const {
     // A point of the piece has moved by a mean of its corners' ways, so by no more than the longest of them.
     double longest = 0;
     for (int i = 0; i < 3; ++i) {
-        const double rounding = kLatticeRounding * kLatticePerCell * pages_.stepAt(piece.triangle.corner[i]);
+        const double rounding = kLatticeRounding * kLatticePerCell * piece.step[i];
         const double roundings = std::min(piece.cuts + 1, kMostRoundings) * rounding;
         longest = std::max({longest, roundings, glm::length(piece.moved[i]) * (1 + 1e-6)});
     }
@@ -130,7 +131,8 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
         const glm::dvec3 q =
             glm::clamp((glm::dvec3(triangle.corner[i]) - origin_) * scale_, glm::dvec3(0), glm::dvec3(2147483647.0));
         t.corner[i] = roundTo(q, 1);
-        if (const int step = pages_.stepAt(t.corner[i]); step > 1) t.corner[i] = roundTo(q, step);
+        piece.step[i] = pages_.stepAt(t.corner[i]);
+        if (piece.step[i] > 1) t.corner[i] = roundTo(q, piece.step[i]);
         piece.moved[i] = glm::dvec3(t.corner[i]) - q;
         t.colour[i] = triangle.colour[i];
         piece.uv[i] = triangle.uv[i];

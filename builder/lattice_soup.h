@@ -37,6 +37,7 @@ private:
     struct Piece {
         LatticeTriangle triangle;
         glm::dvec3 moved[3];  ///< how far each corner lies from where the mesh has it, in steps of the lattice
+        int step[3];          ///< each corner lies on multiples of so many
         int cuts;
         glm::vec2 uv[3];
         uint32_t material;
@@ -47,6 +48,7 @@ private:
     struct Point {
         glm::i32vec3 at;
         glm::dvec3 moved;
+        int step;
         uint32_t colour;
         glm::vec2 uv;
     };

@@ -31,13 +31,12 @@ EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh
 Result<BuiltPage> storedPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
                              std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
-    // A page that cannot be read back must not spoil the whole file.
-    if (const auto view = parsePage(encoded.geometry); encoded.leaves > 0 && !view)
-        return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format(
-                         "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller cell edge",
-                         triangles.size(), encoded.leaves)};
-    return builtPage(settings, code, encoded);
+    auto page = builtPage(settings, code, encoded);
+    if (page) return page;
+    return Error{.code = ErrorCode::Limit,
+                 .message = fmt::format(
+                     "a subvolume of {} triangles and {} leaves is more than a page holds; use a smaller cell edge",
+                     triangles.size(), encoded.leaves)};
 }
 
 Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
@@ -88,7 +87,7 @@ uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::spa
 
 }  // namespace
 
-BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded) {
+Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded) {
     BuiltPage page;
     page.entry.morton = code;
     page.entry.level = uint8_t(settings.grid.level);
@@ -97,7 +96,9 @@ BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedP
     page.entry.hardLeaves = encoded.hardLeaves;
     page.entry.certifiedError =
         std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
-    if (encoded.leaves > 0) page.stored = compressPage(encoded.geometry, encoded.colour);
+    if (encoded.leaves > 0) {
+        VCP_TRY_ASSIGN(page.stored, compressPage(encoded.draft, encoded.colour));
+    }
     return page;
 }
 

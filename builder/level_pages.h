@@ -25,8 +25,9 @@ struct LevelSettings {
     std::function<Result<void>()> makeRoom;
 };
 
-/// Returns a page of the level at a Morton code, coded, with its entry; without its surface.
-BuiltPage builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded);
+/// Returns a page of the level at a Morton code, coded, with its entry; without its surface. Errors: InvalidInput (it
+/// holds more than a page can name).
+Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded);
 
 /// Builds the pages of `bins`, numbers in the bin's mesh, and appends those with surface to `spool`; where `surfaces`
 /// is not null, it takes the surface in each page, from which the level above is made (slab_pages.h). `progress` is

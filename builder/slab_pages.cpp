@@ -26,8 +26,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& belo
                             bool withSurface) {
     VCP_TRY_ASSIGN(const auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
     PageTree tree = buildSlabTree(surface, settings.grid.log2Cells);
-    BuiltPage page =
-        builtPage(settings, below.entries()[siblings.first].morton >> 3, encodeSlabPage(tree, settings.withColour));
+    const uint64_t code = below.entries()[siblings.first].morton >> 3;
+    VCP_TRY_ASSIGN(auto page, builtPage(settings, code, encodeSlabPage(tree, settings.withColour)));
     if (withSurface) page.surface = storedSurface(surface);
     return page;
 }

@@ -12,16 +12,22 @@ namespace {
 uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
 uint64_t directoryBytes(uint64_t pages) { return blocksOf(pages) * kBlockBytes; }
 
+StoredPage storedPage(PackedPage packed, std::span<const std::byte> colour) {
+    return {.geometry = std::move(packed.geometry),
+            .colour = std::move(packed.colour),
+            .geometryBytes = uint32_t(packed.geometryBytes),
+            .colourBytes = uint32_t(colour.size())};
+}
+
 }  // namespace
 
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
-    StoredPage page;
-    PackedPage packed = packPage(geometry, colour);
-    page.geometry = std::move(packed.geometry);
-    page.colour = std::move(packed.colour);
-    page.geometryBytes = uint32_t(packed.geometryBytes);
-    page.colourBytes = uint32_t(colour.size());
-    return page;
+    return storedPage(packPage(geometry, colour), colour);
+}
+
+Result<StoredPage> compressPage(const PageDraft& draft, std::span<const std::byte> colour) {
+    VCP_TRY_ASSIGN(auto packed, packPage(draft, colour));
+    return storedPage(std::move(packed), colour);
 }
 
 Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path& output, uint64_t pages,

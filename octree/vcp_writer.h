@@ -6,6 +6,7 @@
 
 #include "octree/io/output_file.h"
 #include "octree/io/result.h"
+#include "octree/page/page_draft.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {
@@ -18,8 +19,10 @@ struct StoredPage {
     uint32_t colourBytes = 0;
 };
 
-/// Packs a page with octree/page/page_codec.h; the same page gives the same bytes everywhere.
+/// Packs a page with octree/page/page_codec.h; the same page gives the same bytes everywhere. Errors of a draft:
+/// InvalidInput (there is no such page).
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
+Result<StoredPage> compressPage(const PageDraft& draft, std::span<const std::byte> colour);
 
 /// Writes one file, in one thread. Removes the partial file when destroyed before commit.
 class VcpWriter {

@@ -35,6 +35,7 @@ public:
         tree_.triangles = triangles;
         tree_.originLattice = origin;
         tree_.cells = cells;
+        tree_.listsAreCertain = true;
         tree_.occupied.assign(size_t(cells) * cells * cells, 0);
     }
 

@@ -65,6 +65,7 @@ struct PageTree {
     int cells = 0;                        ///< an edge
     double stray = 0;                     ///< the largest of the triangles that touch the page, in cells
     std::vector<uint8_t> occupied;        ///< cells that the mesh touches, x fastest
+    bool listsAreCertain = false;         ///< as PageDraft's
     /// Makes node `index` an inner one, with eight empty children; returns the first one's number.
     uint32_t addChildren(uint32_t index);
     /// Makes node `index` a hard leaf. `locals`: local numbers, ascending.

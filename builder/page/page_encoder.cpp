@@ -11,6 +11,7 @@
 #include "octree/surface/clearance.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/packing.h"
+#include "octree/surface/position_map.h"
 
 namespace vcp {
 
@@ -169,41 +170,51 @@ Clearance clearanceOf(const PageTree& tree) {
     return clearance;
 }
 
-/// Packs strips and vertices of the hard leaves.
+/// Gives the triangles of the hard leaves and their vertices numbers in the page.
 class TrianglePacker {
 public:
-    TrianglePacker(const PageTree& tree, const LatticeMesh& mesh) : tree_(tree), mesh_(mesh) {}
-
-    /// Appends a leaf's triangles; returns its node word.
-    uint32_t add(const HardLeaf& leaf) {
-        list_.clear();
-        for (const uint32_t k : leaf.triangles) {
-            const auto& v = mesh_.triangles[tree_.triangles[k]];
-            list_.push_back({vertex(v[0]), vertex(v[1]), vertex(v[2])});
-        }
-        return appendHardLeaf(list_, entries);
+    TrianglePacker(const PageTree& tree, const LatticeMesh& mesh, PageDraft& draft)
+        : tree_(tree), mesh_(mesh), draft_(draft), numbers_(tree.triangles.size(), kNone), local_(tree.triangles.size()) {
     }
 
-    std::vector<uint32_t> entries;
-    std::vector<glm::u32vec2> vertices;
-    std::vector<uint32_t> normals, colours;
+    /// Appends a leaf's list; returns its node word.
+    uint32_t add(const HardLeaf& leaf) {
+        for (const uint32_t k : leaf.triangles) {
+            if (numbers_[k] == kNone) numbers_[k] = triangle(tree_.triangles[k]);
+            draft_.lists.push_back(numbers_[k]);
+        }
+        draft_.begin.push_back(uint32_t(draft_.lists.size()));
+        return draftLeaf(uint32_t(draft_.begin.size() - 2));
+    }
+
+    std::vector<uint32_t> colours;
 
 private:
+    static constexpr uint32_t kNone = 0xffffffff;
+
+    uint32_t triangle(uint32_t global) {
+        const auto& v = mesh_.triangles[global];
+        draft_.triangles.push_back({vertex(v[0]), vertex(v[1]), vertex(v[2])});
+        return uint32_t(draft_.triangles.size() - 1);
+    }
+
     uint32_t vertex(uint32_t global) {
-        const auto [entry, isNew] = local_.try_emplace(global, uint32_t(vertices.size()));
-        if (isNew) {
+        uint32_t& number = local_.findOrAdd(global);  // plus 1
+        if (number == 0) {
             const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
-            vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
-            normals.push_back(mesh_.normals[global]);
+            draft_.vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
+            draft_.normals.push_back(mesh_.normals[global]);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
+            number = uint32_t(draft_.vertices.size());
         }
-        return entry->second;
+        return number - 1;
     }
 
     const PageTree& tree_;
     const LatticeMesh& mesh_;
-    std::unordered_map<uint32_t, uint32_t> local_;
-    std::vector<Index3> list_;
+    PageDraft& draft_;
+    std::vector<uint32_t> numbers_;  ///< of triangles, by local number
+    PositionMap<uint32_t> local_;
 };
 
 /// Node words in breadth-first groups, so that children come after their parent.
@@ -249,7 +260,7 @@ private:
 };
 
 template <class T>
-void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>& items) {
+void copyTo(std::span<std::byte> bytes, uint64_t offset, const std::vector<T>& items) {
     if (!items.empty()) std::memcpy(bytes.data() + offset, items.data(), items.size() * sizeof(T));
 }
 
@@ -271,41 +282,38 @@ struct SlabVectors {
 EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     const LeafMap map(tree.soft);
     setWalls(tree, map);
-    const FacePacker faces(tree, map, withColour);
+    FacePacker faces(tree, map, withColour);
     const SlabVectors slabs(tree);
-    TrianglePacker triangles(tree, mesh);
-    Clearance clearance = clearanceOf(tree);
-    const NodePacker nodes(tree, faces, triangles, clearance);
-
     EncodedPage page;
+    PageDraft& draft = page.draft;
+    TrianglePacker triangles(tree, mesh, draft);
+    Clearance clearance = clearanceOf(tree);
+    NodePacker nodes(tree, faces, triangles, clearance);
+
     page.certifiedError = pageError(tree);
     page.hardLeaves = uint32_t(tree.hard.size());
     page.slabLeaves = uint32_t(tree.slabs.size());
     page.leaves = uint32_t(tree.soft.size()) + page.slabLeaves + page.hardLeaves;
-    PageHeader header;
+    const size_t softFaces = faces.faces.size();
+    draft.listsAreCertain = tree.listsAreCertain;
+    draft.nodes = std::move(nodes.words);
+    draft.faces = std::move(faces.faces);
+    draft.faces.resize(softFaces + (tree.slabs.size() + 3) / 4, uint4(0));
+    copyTo(std::as_writable_bytes(std::span(draft.faces)), 16 * softFaces, slabs.vectors);
+    PageHeader& header = draft.header;
     header.log2Cells = uint32_t(std::countr_zero(unsigned(tree.cells)));
     header.root = nodes.root;
-    header.groups = uint32_t(nodes.words.size() / 8);
-    header.faces = uint32_t(faces.faces.size() + (tree.slabs.size() + 3) / 4);
-    header.entries = uint32_t(triangles.entries.size());
-    header.vertices = uint32_t(triangles.vertices.size());
+    header.groups = uint32_t(draft.nodes.size() / 8);
+    header.faces = uint32_t(draft.faces.size());
+    header.vertices = uint32_t(draft.vertices.size());
     header.softLeaves = uint32_t(tree.soft.size());
     header.hardLeaves = page.hardLeaves;
     header.slabLeaves = page.slabLeaves;
     header.certifiedError = std::nextafter(float(page.certifiedError), std::numeric_limits<float>::infinity());
-    const PageSections s = pageSections(header);
-    page.geometry.resize(s.end);
-    std::memcpy(page.geometry.data(), &header, sizeof header);
-    copyTo(page.geometry, s.nodes, nodes.words);
-    copyTo(page.geometry, s.faces, faces.faces);
-    copyTo(page.geometry, s.faces + 16 * faces.faces.size(), slabs.vectors);
-    copyTo(page.geometry, s.vertices, triangles.vertices);
-    copyTo(page.geometry, s.normals, triangles.normals);
-    storeEntries(triangles.entries, header.vertices, page.geometry.data() + s.strips);
     if (withColour && page.leaves > 0) {
         page.colour.resize(colourPageBytes(header));
         copyTo(page.colour, 0, faces.colours);
-        copyTo(page.colour, 16 * faces.faces.size(), slabs.colours);
+        copyTo(page.colour, 16 * softFaces, slabs.colours);
         copyTo(page.colour, uint64_t{16} * header.faces, triangles.colours);
     }
     return page;

@@ -1,4 +1,4 @@
-// Turns the octree of a page into the bytes of octree/shared/page_layout.h.
+// Turns the octree of a page into a draft of the page (octree/page/page_draft.h).
 #pragma once
 
 #include <cstddef>
@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "builder/page/page_builder.h"
+#include "octree/page/page_draft.h"
 
 namespace vcp {
 
-/// A page's bytes, ready for compression.
+/// A page, ready for compression.
 struct EncodedPage {
-    std::vector<std::byte> geometry;
+    PageDraft draft;
     std::vector<std::byte> colour;  ///< empty when the mesh has no colour
     uint32_t leaves = 0;            ///< leaves of all kinds with surface
     uint32_t slabLeaves = 0;

@@ -1,8 +1,10 @@
 #include "builder/slab/triangle_cutter.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <numeric>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -23,6 +25,20 @@ glm::dvec3 areaVector(const Polygon& polygon) {
     glm::dvec3 sum(0);
     for (size_t i = 2; i < polygon.size(); ++i) sum += glm::cross(polygon[i - 1] - polygon[0], polygon[i] - polygon[0]);
     return sum;
+}
+
+/// Sorts words by the lowest `bits` bits of their high halves, the others of which are 0; equal ones keep their order.
+void sortHighHalves(std::vector<uint64_t>& words, int bits) {
+    constexpr int kDigitBits = 9;
+    constexpr uint64_t kDigits = uint64_t{1} << kDigitBits;
+    std::vector<uint64_t> sorted(words.size());
+    for (int shift = 32; shift < 32 + bits; shift += kDigitBits) {
+        std::array<size_t, kDigits> next{};
+        for (const uint64_t word : words) ++next[word >> shift & (kDigits - 1)];
+        std::exclusive_scan(next.begin(), next.end(), next.begin(), size_t{0});
+        for (const uint64_t word : words) sorted[next[word >> shift & (kDigits - 1)]++] = word;
+        words.swap(sorted);
+    }
 }
 
 }  // namespace
@@ -175,7 +191,7 @@ void TriangleCutter::appendTo(SurfaceCells& cells) const {
     // Cells in order, and in each the pieces as they were cut.
     std::vector<uint64_t> order(pieces_.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = uint64_t{pieces_[i].code} << 32 | i;
-    std::sort(order.begin(), order.end());
+    sortHighHalves(order, 3 * depth_);
     std::vector<CellPiece> inCell;
     for (size_t i = 0; i < order.size();) {
         const uint32_t code = uint32_t(order[i] >> 32);

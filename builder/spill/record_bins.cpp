@@ -61,10 +61,22 @@ void fromPlanes(const std::byte* planes, size_t count, size_t recordBytes, std::
     }
 }
 
+/// Codes records into a block, behind its header, and cuts it to size. Returns false where that saves nothing.
+bool code(const std::vector<std::byte>& records, size_t count, size_t recordBytes, std::vector<std::byte>& block) {
+    std::vector<std::byte> planes(records.size());
+    toPlanes(records.data(), count, recordBytes, planes.data());
+    const size_t stored = ZSTD_compress(block.data() + sizeof(BlockHeader), block.size() - sizeof(BlockHeader),
+                                        planes.data(), planes.size(), kFastCompression);
+    if (ZSTD_isError(stored) || stored == records.size()) return false;
+    block.resize(sizeof(BlockHeader) + stored);
+    return true;
+}
+
 }  // namespace
 
 RawBins::RawBins(TempSpace& space, std::string name, size_t recordBytes, size_t bins, uint64_t bufferBytes)
-    : file_(space, name + ".spill"),
+    : space_(space),
+      file_(space, name + ".spill"),
       recordBytes_(recordBytes),
       blockRecords_(std::clamp<size_t>(bufferBytes / std::max<size_t>(bins, 1) / recordBytes, kMinBlockRecords,
                                        kMaxBlockRecords)),
@@ -99,19 +111,17 @@ Result<void> RawBins::append(size_t bin, const std::byte* records, size_t count)
 // Coding, which takes the time, runs outside of the lock.
 Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& records) {
     const size_t count = records.size() / recordBytes_;
-    std::vector<std::byte> planes(records.size());
-    toPlanes(records.data(), count, recordBytes_, planes.data());
-    std::vector<std::byte> coded(sizeof(BlockHeader) + ZSTD_compressBound(planes.size()));
-    const size_t stored = ZSTD_compress(coded.data() + sizeof(BlockHeader), coded.size() - sizeof(BlockHeader),
-                                        planes.data(), planes.size(), kFastCompression);
+    std::vector<std::byte> block(sizeof(BlockHeader) + records.size());
+    if (space_.isAmple(records.size()) || !code(records, count, recordBytes_, block))
+        std::memcpy(block.data() + sizeof(BlockHeader), records.data(), records.size());
     BlockHeader header;
     header.bin = uint32_t(bin);
     header.records = uint32_t(count);
-    header.storedBytes = uint32_t(stored);  // cannot fail with a buffer of compressBound
-    header.payloadHash = XXH3_64bits(coded.data() + sizeof header, stored);
+    header.storedBytes = uint32_t(block.size() - sizeof header);
+    header.payloadHash = XXH3_64bits(block.data() + sizeof header, header.storedBytes);
     header.hash = header.hashOfHeader();
-    std::memcpy(coded.data(), &header, sizeof header);
-    VCP_TRY_ASSIGN(const auto offset, file_.append(std::span(coded).first(sizeof header + stored)));
+    std::memcpy(block.data(), &header, sizeof header);
+    VCP_TRY_ASSIGN(const auto offset, file_.append(block));
     const std::scoped_lock lock(mutex_);
     blocks_[bin].push_back({offset, header.records, header.storedBytes});
     return {};
@@ -165,7 +175,7 @@ void RawBins::remove() {
 uint64_t RawBins::total() const { return std::accumulate(counts_.begin(), counts_.end(), uint64_t{0}); }
 
 Result<void> RawBins::read(const Block& block, std::byte* out) const {
-    std::vector<std::byte> coded(sizeof(BlockHeader) + block.storedBytes), planes(block.records * recordBytes_);
+    std::vector<std::byte> coded(sizeof(BlockHeader) + block.storedBytes);
     VCP_TRY(file_.read(block.offset, coded));
     BlockHeader header;
     std::memcpy(&header, coded.data(), sizeof header);
@@ -173,6 +183,11 @@ Result<void> RawBins::read(const Block& block, std::byte* out) const {
     const bool isIntact = header.records == block.records && header.storedBytes == block.storedBytes &&
                           header.hash == header.hashOfHeader() &&
                           header.payloadHash == XXH3_64bits(payload.data(), payload.size());
+    if (isIntact && isPlain(header.records, header.storedBytes)) {
+        std::memcpy(out, payload.data(), payload.size());
+        return {};
+    }
+    std::vector<std::byte> planes(block.records * recordBytes_);
     if (!isIntact || ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size())
         return damagedTempFile(file_.path(), block.offset);
     fromPlanes(planes.data(), block.records, recordBytes_, out);

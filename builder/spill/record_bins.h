@@ -1,8 +1,9 @@
 // Bins of fixed-size records on a temporary file: written in any order, read back bin by bin.
 //
 // Each bin fills a block; a full block is coded (words as differences to the record before, byte planes, zstd
-// at its fastest) and appended with a header that names its bin, so that the index can be made again from the
-// file after an interruption. Headers and blocks carry hashes: a temporary disk that returns wrong bytes is noticed.
+// at its fastest), or left as it is while there is ample memory, and appended with a header that names its bin, so that
+// the index can be made again from the file after an interruption. Headers and blocks carry hashes: a temporary disk
+// that returns wrong bytes is noticed.
 #pragma once
 
 #include <algorithm>
@@ -59,7 +60,12 @@ public:
 
 private:
     Result<void> writeBlock(size_t bin, const std::vector<std::byte>& records);
+    /// Whether a block is not coded: it has as many bytes as its records.
+    [[nodiscard]] bool isPlain(uint32_t records, uint32_t storedBytes) const {
+        return storedBytes == uint64_t{records} * recordBytes_;
+    }
 
+    TempSpace& space_;
     TempFile file_;
     size_t recordBytes_, blockRecords_;
     std::vector<std::vector<std::byte>> open_;

@@ -39,6 +39,9 @@ public:
     /// Writes to the disk what the files hold in memory. No file may be appended to meanwhile. Errors: Io.
     Result<void> spill();
 
+    /// Whether the files hold so little that there is no need to code so many bytes more: they stay in memory.
+    [[nodiscard]] bool isAmple(uint64_t bytes) const { return held_ + bytes <= memoryBytes_ / 2; }
+
     /// The most bytes that lay in the folder at one time.
     [[nodiscard]] uint64_t peakDiskBytes() const { return peakDisk_; }
     [[nodiscard]] uint64_t diskBytes() const { return disk_; }

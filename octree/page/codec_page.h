@@ -9,7 +9,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/page/page.h"
+#include "octree/page/page_draft.h"
 
 namespace vcp {
 
@@ -68,7 +68,7 @@ struct CodecPage {
     std::vector<uint32_t> entries;  ///< of strips (strips.h)
     std::vector<NodePlace> places;  ///< places of the nodes in `nodes`
 
-    const PageView* source = nullptr;  ///< the page that the encoder codes
+    const PageDraft* source = nullptr;  ///< the page that the encoder codes
     /// Encoder: which element of `source` each one is; faces are those of soft leaves, vectors those of slab leaves.
     std::vector<uint32_t> groupSource, faceSource, vectorSource, vertexSource;
 

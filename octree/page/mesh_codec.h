@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
+#include <optional>
 
 #include "octree/page/codec_page.h"
 #include "octree/page/mesh_source.h"
@@ -244,18 +246,17 @@ private:
 
     /// Makes the hard leaves' strips, in the order of the leaves, and their words.
     void fillLeaves() {
-        if (!findLists()) {
+        const std::optional<Lists> lists = Coder::kEncodes ? listsOfSource() : findLists(page_.mostEntries);
+        if (!lists) {
             page_.wrong = true;
             return;
         }
         std::vector<Index3> list;
-        page_.forEachNode([&](uint32_t& word, uint32_t source, const NodePlace&) {
+        page_.forEachNode([&](uint32_t& word, uint32_t, const NodePlace&) {
             if (nodeType(word) != kNodeHard) return;
-            const std::span triangles = listOf(word & kNodePayloadMask);
             list.clear();
-            for (const uint32_t t : triangles) list.push_back(triangles_[t]);
-            if (list.empty() || page_.entries.size() > kHardFirstMask ||
-                (Coder::kEncodes && !isList(source, triangles)))
+            for (const uint32_t t : lists->of(word & kNodePayloadMask)) list.push_back(triangles_[t]);
+            if (list.empty() || page_.entries.size() > kHardFirstMask)
                 page_.wrong = true;
             else
                 word = appendHardLeaf(list, page_.entries);
@@ -263,46 +264,72 @@ private:
         if (page_.entries.size() > page_.mostEntries) page_.wrong = true;
     }
 
-    /// Finds the triangles of each hard leaf, in ascending order. Returns false where they are more than the page has
-    /// entries.
-    bool findLists() {
+    /// The triangles of each hard leaf, in ascending order.
+    struct Lists {
+        std::vector<uint32_t> triangles, begin;
+
+        [[nodiscard]] std::span<const uint32_t> of(uint32_t leaf) const {
+            return std::span(triangles).subspan(begin[leaf], begin[leaf + 1] - begin[leaf]);
+        }
+        bool operator==(const Lists&) const = default;
+    };
+
+    /// How many nodes may be looked at for the lists of a page whose leaves name so many triangles.
+    static uint64_t mostVisits(uint32_t named) { return uint64_t{256} * named + 65536; }
+
+    /// Encoder: returns the lists, or nothing where the decoder would not find the same.
+    std::optional<Lists> listsOfSource() {
+        Lists lists;
+        lists.begin.push_back(0);
+        lists.triangles.reserve(page_.source->lists.size());
+        page_.forEachNode([&](uint32_t word, uint32_t source, const NodePlace&) {
+            if (nodeType(word) != kNodeHard) return;
+            for (const uint32_t t : page_.source->listOf(draftList(source)))
+                lists.triangles.push_back(source_.newNumber(t));
+            std::sort(lists.triangles.begin() + lists.begin.back(), lists.triangles.end());
+            lists.begin.push_back(uint32_t(lists.triangles.size()));
+        });
+        const uint32_t named = uint32_t(lists.triangles.size());
+        const bool isFound = page_.source->listsAreCertain && visitsAtMost() <= mostVisits(named);
+        assert(!isFound || findLists(named) == lists);
+        if (!isFound && findLists(named) != lists) return {};
+        return lists;
+    }
+
+    /// Returns a bound for the nodes that are looked at for all lists.
+    [[nodiscard]] uint64_t visitsAtMost() const {
+        const uint64_t inCell = places_.mostNodesInCell();
+        uint64_t visits = 0;
+        for (const auto& [a, b, c] : triangles_)
+            visits += 1 + places_.cellsAround({positions_[a], positions_[b], positions_[c]}) * (1 + inCell);
+        return visits;
+    }
+
+    /// Finds the lists. Returns nothing where they name more than `most` triangles.
+    std::optional<Lists> findLists(uint32_t most) const {
         struct Entry {
             uint32_t leaf, triangle;
         };
-        uint32_t most = page_.mostEntries;
-        if constexpr (Coder::kEncodes) most = source_.inLeaves();
         std::vector<Entry> entries;
         entries.reserve(2 * triangles_.size());
-        uint64_t work = uint64_t{256} * most + 65536;
+        uint64_t work = mostVisits(most);
         for (uint32_t t = 0; t < triangles_.size(); ++t) {
             const auto& [a, b, c] = triangles_[t];
             const uint64_t visits =
                 places_.hardLeavesOf({positions_[a], positions_[b], positions_[c]}, [&](uint32_t word) {
                     entries.push_back({word & kNodePayloadMask, t});
                 });
-            if (entries.size() > most || visits > work) return false;
+            if (entries.size() > most || visits > work) return {};
             work -= visits;
         }
-        listBegin_.assign(size_t{hardLeaves_} + 1, 0);
-        for (const Entry& e : entries) ++listBegin_[e.leaf + 1];
-        for (uint32_t leaf = 0; leaf < hardLeaves_; ++leaf) listBegin_[leaf + 1] += listBegin_[leaf];
-        lists_.resize(entries.size());
-        std::vector<uint32_t> next(listBegin_.begin(), listBegin_.end() - 1);
-        for (const Entry& e : entries) lists_[next[e.leaf]++] = e.triangle;
-        return true;
-    }
-
-    [[nodiscard]] std::span<const uint32_t> listOf(uint32_t leaf) const {
-        return std::span(lists_).subspan(listBegin_[leaf], listBegin_[leaf + 1] - listBegin_[leaf]);
-    }
-
-    /// Encoder: whether a leaf of the source has these triangles.
-    bool isList(uint32_t source, std::span<const uint32_t> triangles) {
-        std::vector<uint32_t> numbers;
-        for (StripWalk walk(page_.source->strips, source); walk.next();)
-            numbers.push_back(source_.newNumber(walk.entry()));
-        std::sort(numbers.begin(), numbers.end());
-        return std::ranges::equal(numbers, triangles);
+        Lists lists;
+        lists.begin.assign(size_t{hardLeaves_} + 1, 0);
+        for (const Entry& e : entries) ++lists.begin[e.leaf + 1];
+        for (uint32_t leaf = 0; leaf < hardLeaves_; ++leaf) lists.begin[leaf + 1] += lists.begin[leaf];
+        lists.triangles.resize(entries.size());
+        std::vector<uint32_t> next(lists.begin.begin(), lists.begin.end() - 1);
+        for (const Entry& e : entries) lists.triangles[next[e.leaf]++] = e.triangle;
+        return lists;
     }
 
     void codeNormals() {
@@ -362,7 +389,6 @@ private:
     std::vector<glm::i32vec3> positions_;  ///< the vertices' positions on the lattice, from the page's lowest corner
     std::vector<uint8_t> inHard_;          ///< whether a vertex is in a hard leaf
     std::vector<Index3> triangles_;
-    std::vector<uint32_t> lists_, listBegin_;  ///< the triangles of each leaf, and where its list begins
     uint32_t lastBorder_ = 0, lastLevel_ = 0;
     NumberModel count_, known_;
     BitModel border_[4][8], fresh_[4][8][8], next_[4][8][8], previous_[4][8][8], seedFresh_[3];

@@ -1,42 +1,20 @@
 #include "octree/page/mesh_source.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "octree/surface/packing.h"
-#include "octree/surface/position_map.h"
 
 namespace vcp {
 
-MeshSource::MeshSource(const PageView& page) : positions_(page.vertices), newVertex_(page.vertices.size(), kNone) {
-    collect(page);
-    newTriangle_.assign(vertices_.size(), kNone);
+MeshSource::MeshSource(const PageDraft& page)
+    : positions_(page.vertices),
+      vertices_(page.triangles),
+      newTriangle_(page.triangles.size(), kNone),
+      newVertex_(page.vertices.size(), kNone) {
+    for (const auto& [a, b, c] : vertices_)
+        if (a == b || b == c || c == a) wrong_ = true;
     oldVertex_.reserve(page.vertices.size());
     linkVertices(uint32_t(page.vertices.size()));
-}
-
-void MeshSource::collect(const PageView& page) {
-    triangleOf_.assign(page.strips.size(), kNone);
-    PositionMap<uint32_t> numbers(page.strips.size() / 4);
-    const auto visit = [&](uint32_t word) {
-        if (nodeType(word) != kNodeHard) return;
-        StripWalk walk(page.strips, word);
-        inLeaves_ += walk.count();
-        while (walk.next()) {
-            Index3 t = walk.triangle();
-            std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-            if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) wrong_ = true;
-            const uint64_t key = uint64_t{t[0]} << 42 | uint64_t{t[1]} << 21 | t[2];
-            uint32_t& number = numbers.findOrAdd(key);  // the number plus 1
-            if (number == 0) {
-                vertices_.push_back(t);
-                number = uint32_t(vertices_.size());
-            }
-            triangleOf_[walk.entry()] = number - 1;
-        }
-    };
-    visit(page.header.root);
-    for (const uint32_t word : page.nodes) visit(word);
 }
 
 void MeshSource::linkVertices(uint32_t vertices) {

@@ -1,4 +1,4 @@
-// The distinct triangles of a page's hard leaves, as the encoder finds and follows them. Part of page_codec.
+// The triangles of a page's hard leaves, as the encoder follows them. Part of page_codec.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "octree/page/page.h"
+#include "octree/page/page_draft.h"
 
 namespace vcp {
 
@@ -16,9 +16,10 @@ public:
     static constexpr uint32_t kNone = 0xffffffff;
 
     MeshSource() = default;
-    explicit MeshSource(const PageView& page);
+    /// The draft must outlive this.
+    explicit MeshSource(const PageDraft& page);
 
-    /// Whether the page has triangles that name a vertex twice, or edges that are too long.
+    /// Whether a triangle names a vertex twice.
     [[nodiscard]] bool wrong() const { return wrong_; }
     [[nodiscard]] uint32_t triangles() const { return uint32_t(vertices_.size()); }
     /// The vertices of a triangle, as the page numbers them.
@@ -27,10 +28,8 @@ public:
     [[nodiscard]] uint32_t numberOf(uint32_t vertex) const { return newVertex_[vertex]; }
     /// The page's numbers of the vertices, in their new order.
     [[nodiscard]] const std::vector<uint32_t>& vertexOrder() const { return oldVertex_; }
-    /// The new number of the triangle that an entry of the page's strips completes.
-    [[nodiscard]] uint32_t newNumber(uint32_t entry) const { return newTriangle_[triangleOf_[entry]]; }
-    /// The number of triangles of all leaves, each counted in each of its leaves.
-    [[nodiscard]] uint32_t inLeaves() const { return inLeaves_; }
+    /// The new number of a triangle that has been coded.
+    [[nodiscard]] uint32_t newNumber(uint32_t triangle) const { return newTriangle_[triangle]; }
 
     /// Returns a triangle that has not been coded, at the edge between two vertices (new numbers), or kNone.
     [[nodiscard]] uint32_t across(uint32_t from, uint32_t to) const;
@@ -44,16 +43,14 @@ public:
     void done(uint32_t triangle, uint32_t number) { newTriangle_[triangle] = number; }
 
 private:
-    void collect(const PageView& page);
     void linkVertices(uint32_t vertices);
 
     bool wrong_ = false;
     std::span<const glm::u32vec2> positions_;
-    std::vector<Index3> vertices_;
-    std::vector<uint32_t> triangleOf_;  ///< for each entry of a strip, the triangle that it completes
+    std::span<const Index3> vertices_;
     std::vector<uint32_t> newTriangle_, newVertex_, oldVertex_;
     std::vector<uint32_t> begin_, around_;  ///< triangles around each vertex
-    uint32_t third_ = kNone, seed_ = 0, inLeaves_ = 0;
+    uint32_t third_ = kNone, seed_ = 0;
 };
 
 }  // namespace vcp

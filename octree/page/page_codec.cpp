@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include <zstd.h>
 
@@ -96,30 +97,50 @@ bool codeColour(Coder& coder, const PageView& page, std::span<uint4> block) {
 
 }  // namespace
 
-PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
-    const auto plainly = [&] {
-        return PackedPage{plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour), geometry.size()};
-    };
-    const auto source = parsePage(geometry);
-    if (!source.ok()) return plainly();
+namespace {
+
+PackedPage plainPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
+    return {plain(geometry), colour.empty() ? std::vector<std::byte>{} : plain(colour), geometry.size()};
+}
+
+/// Returns the coded page, or nothing where only the plain form holds it.
+std::optional<PackedPage> codedPage(const PageDraft& draft, std::span<const std::byte> colour) {
     CodecPage page;
-    page.header = source->header;
+    page.header = draft.header;
     page.header.entries = 0;
-    page.source = &*source;
-    if (!plausible(page.header, geometry.size())) return plainly();
+    page.source = &draft;
+    // Whatever the strips will take, it is what the page is to be.
+    if (!plausible(page.header, pageSections(page.header).end)) return {};
     page.allocate();
     RangeEncoder coder;
     codeHeader(coder, page.header);
     codePage(coder, page);
-    if (page.wrong) return plainly();
+    if (page.wrong) return {};
+    const auto view = parsePage(std::as_bytes(std::span(page.block)));
+    if (!view) return {};
     PackedPage packed{coded(coder), {}, page.block.size() * sizeof(uint4)};
     if (colour.empty()) return packed;
-    const auto view = parsePage(std::as_bytes(std::span(page.block)));
     std::vector<uint4> block = inOrder(colour, page);
     RangeEncoder colourCoder;
-    if (!codeColour(colourCoder, *view, block)) return plainly();
+    if (!codeColour(colourCoder, *view, block)) return {};
     packed.colour = coded(colourCoder);
     return packed;
+}
+
+}  // namespace
+
+Result<PackedPage> packPage(const PageDraft& draft, std::span<const std::byte> colour) {
+    if (auto packed = codedPage(draft, colour)) return *std::move(packed);
+    const std::vector<std::byte> page = pageOf(draft);
+    VCP_TRY_ASSIGN(const auto whole, parsePage(page, colour));
+    static_cast<void>(whole);
+    return plainPage(page, colour);
+}
+
+PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
+    if (const auto page = parsePage(geometry))
+        if (auto packed = codedPage(draftOf(*page), colour)) return *std::move(packed);
+    return plainPage(geometry, colour);
 }
 
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {

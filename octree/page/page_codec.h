@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "octree/io/result.h"
-#include "octree/page/page.h"
+#include "octree/page/page_draft.h"
 
 namespace vcp {
 
@@ -35,6 +35,9 @@ struct PackedPage {
 /// same bytes everywhere. What was coded is not decoded to see whether it comes back: encoder and decoder are the same
 /// templates, and tests and a fuzz target prove them. Any thread.
 PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::byte> colour);
+
+/// Packs a page that has no strips yet. Errors: InvalidInput (there is no such page).
+Result<PackedPage> packPage(const PageDraft& draft, std::span<const std::byte> colour);
 
 /// Returns the page, `pageBytes` long. `packed` may be hostile: nothing is allocated before its counts match pageBytes,
 /// then at most a few times that much, and the result still has to be checked by parsePage. Errors: InvalidInput.

@@ -85,6 +85,20 @@ void NodePlaces::fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge)
         }
 }
 
+uint64_t NodePlaces::nodesIn(uint32_t word) const {
+    uint64_t nodes = 1;
+    if (nodeType(word) == kNodeInternal)
+        for (const uint32_t child : nodes_.subspan(size_t{8} * (word & kNodePayloadMask), 8)) nodes += nodesIn(child);
+    return nodes;
+}
+
+uint64_t NodePlaces::mostNodesInCell() const {
+    uint64_t most = 0;
+    for (const uint32_t word : word_)
+        if (nodeType(word) == kNodeInternal) most = std::max(most, nodesIn(word));
+    return most;
+}
+
 uint32_t NodePlaces::typeAt(glm::i32vec3 p) const {
     const glm::i32vec3 c = p >> kCellShift;
     if (std::min(c.x, std::min(c.y, c.z)) < 0 || std::max(c.x, std::max(c.y, c.z)) >= cells_) return kNodeEmpty;

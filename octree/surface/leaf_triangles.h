@@ -65,7 +65,34 @@ public:
     template <class Found>
     uint64_t hardLeavesOf(const std::array<glm::i32vec3, 3>& triangle, Found&& found) const;
 
+    /// Returns the number of cells that the closed box around a triangle touches: hardLeavesOf looks at one node in
+    /// each, and in a cell that is divided at no more than mostNodesInCell() others.
+    [[nodiscard]] uint64_t cellsAround(const std::array<glm::i32vec3, 3>& triangle) const {
+        return CellRange(*this, triangle).size();
+    }
+    [[nodiscard]] uint64_t mostNodesInCell() const;
+
 private:
+    /// The cells that the closed box around a triangle touches.
+    struct CellRange {
+        CellRange(const NodePlaces& places, const std::array<glm::i32vec3, 3>& t) {
+            for (int i = 0; i < 3; ++i) {
+                low[i] = std::min(t[0][i], std::min(t[1][i], t[2][i]));
+                high[i] = std::max(t[0][i], std::max(t[1][i], t[2][i]));
+                first[i] = std::max((low[i] - 1) >> kCellShift, 0);
+                last[i] = std::min(high[i] >> kCellShift, places.cells_ - 1);
+            }
+        }
+        [[nodiscard]] uint64_t size() const {
+            uint64_t cells = 1;
+            for (int i = 0; i < 3; ++i) cells *= uint64_t(std::max(last[i] - first[i] + 1, 0));
+            return cells;
+        }
+        glm::i32vec3 low, high;     ///< of the box, in steps of the lattice
+        glm::i32vec3 first, last;  ///< cells
+    };
+
+    [[nodiscard]] uint64_t nodesIn(uint32_t word) const;
     void fillCells(uint32_t word, glm::i32vec3 lower, uint32_t log2Edge);
     [[nodiscard]] size_t cell(int x, int y, int z) const {
         return size_t(x + (y << log2Cells_)) + (size_t(z) << (2 * log2Cells_));
@@ -83,15 +110,7 @@ private:
 
 template <class Found>
 uint64_t NodePlaces::hardLeavesOf(const std::array<glm::i32vec3, 3>& t, Found&& found) const {
-    const auto least = [&](int i) { return std::min(t[0][i], std::min(t[1][i], t[2][i])); };
-    const auto most = [&](int i) { return std::max(t[0][i], std::max(t[1][i], t[2][i])); };
-    const glm::i32vec3 low(least(0), least(1), least(2)), high(most(0), most(1), most(2));
-    // The cells that the closed bounding box touches.
-    glm::i32vec3 first, last;
-    for (int i = 0; i < 3; ++i) {
-        first[i] = std::max((low[i] - 1) >> kCellShift, 0);
-        last[i] = std::min(high[i] >> kCellShift, cells_ - 1);
-    }
+    const auto [low, high, first, last] = CellRange(*this, t);
     CubeTest test(t);
     uint64_t visits = 1;
     for (int z = first.z; z <= last.z; ++z)

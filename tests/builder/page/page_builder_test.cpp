@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <random>
 #include <set>
@@ -310,9 +309,8 @@ TEST(PageBuilder, MixedMeshes) {
 
             const EncodedPage encoded = encodePage(tree, page.mesh);
             ASSERT_EQ(encoded.leaves, tree.soft.size() + tree.hard.size());
-            std::vector<uint4> block(encoded.geometry.size() / 16);
-            std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
-            const auto view = parsePage(std::as_bytes(std::span(block)));
+            const std::vector<std::byte> bytes = pageOf(encoded.draft);
+            const auto view = parsePage(bytes);
             ASSERT_TRUE(view.ok()) << view.error().line();
             ASSERT_EQ(view->header.softLeaves, tree.soft.size());
             ASSERT_EQ(view->header.hardLeaves, tree.hard.size());
@@ -349,10 +347,8 @@ TEST(PageEncoder, LeavesComeBack) {
         for (size_t v = 0; v < page.mesh.colours.size(); ++v) page.mesh.colours[v] = uint32_t(v * 2654435761u);
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
         const EncodedPage encoded = encodePage(tree, page.mesh);
-        std::vector<uint4> block(encoded.geometry.size() / 16), colour(encoded.colour.size() / 16);
-        std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
-        std::memcpy(colour.data(), encoded.colour.data(), encoded.colour.size());
-        const auto view = parsePage(std::as_bytes(std::span(block)), std::as_bytes(std::span(colour)));
+        const std::vector<std::byte> bytes = pageOf(encoded.draft);
+        const auto view = parsePage(bytes, encoded.colour);
         ASSERT_TRUE(view.ok()) << view.error().line();
         for (const SoftLeaf& leaf : tree.soft) {
             const uint32_t node = nodeAt(*view, leaf.box);
@@ -411,11 +407,10 @@ TEST(PageBuilder, PagesAreStoredCoded) {
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
         const EncodedPage encoded = encodePage(tree, page.mesh);
         ASSERT_GT(encoded.leaves, 100u);
-        std::vector<uint4> block(encoded.geometry.size() / 16);
-        std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
-        const StoredPage stored = compressPage(std::as_bytes(std::span(block)), {});
-        EXPECT_EQ(stored.geometry[0], std::byte{1}) << "coded";
-        EXPECT_LT(stored.geometry.size() * factor, encoded.geometry.size());
+        const auto stored = compressPage(encoded.draft, {});
+        ASSERT_TRUE(stored.ok()) << stored.error().line();
+        EXPECT_EQ(stored->geometry[0], std::byte{1}) << "coded";
+        EXPECT_LT(stored->geometry.size() * factor, pageOf(encoded.draft).size());
     }
 }
 
@@ -493,9 +488,8 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
     EXPECT_LT(records, 120u * kNeedles);
     EXPECT_EQ(centre, kNeedles) << "the leaf with the centre has all of them: the long form";
     const EncodedPage encoded = encodePage(tree, page.mesh);
-    std::vector<uint4> block(encoded.geometry.size() / 16);
-    std::memcpy(block.data(), encoded.geometry.data(), encoded.geometry.size());
-    const auto view = parsePage(std::as_bytes(std::span(block)));
+    const std::vector<std::byte> bytes = pageOf(encoded.draft);
+    const auto view = parsePage(bytes);
     ASSERT_TRUE(view.ok()) << view.error().line();
     for (const HardLeaf& leaf : tree.hard)
         EXPECT_EQ(StripWalk(view->strips, nodeAt(*view, leaf.box)).count(), leaf.triangles.size());
@@ -523,7 +517,7 @@ TEST(PageBuilder, IsDeterministic) {
     const LatticeMesh mesh = mixedMesh(4);
     Page a(mesh, {0, 1, 0}), b(mesh, {0, 1, 0});
     PageTree ta = buildPageTree(*a.geometry, kTolerance), tb = buildPageTree(*b.geometry, kTolerance);
-    EXPECT_EQ(encodePage(ta, a.mesh).geometry, encodePage(tb, b.mesh).geometry);
+    EXPECT_EQ(pageOf(encodePage(ta, a.mesh).draft), pageOf(encodePage(tb, b.mesh).draft));
 }
 
 }  // namespace
