@@ -34,6 +34,7 @@ struct FrameStats {
     uint64_t surfaceBytes = 0;  ///< bytes of mesostructure on the device, beside the pool: assets and shells
     /// This frame's submissions, with those that present it before it has ended, and how often the CPU waited for one.
     uint64_t submissions = 0, hostWaits = 0;
+    bool onHost = false;          ///< the processor cast the rays itself, and no shader ran (RendererOptions::hostRays)
     uint64_t feedbackPasses = 0;  ///< frames since create() that asked rays what to read: none where nothing is missing
 };
 

@@ -1,15 +1,12 @@
 // Draws pictures on the processor, without Vulkan: no instance, driver or pipeline is touched. Pages are chosen, read
 // and kept as for a device (residency.h), in plain memory; rays, light and colours are those of the shaders, cast and
-// shaded tile by tile on all processors (render/host/host_picture.h).
-//
-// It does not draw sections, mesostructure, the march of the method `paper`, the false colours that count a shader's
-// work, and seams between levels (docs/rays.md): each is refused as Unsupported, and never left out.
+// shaded tile by tile on all processors (host_drawing.h, which also says what is not drawn).
 #pragma once
 
 #include <memory>
 #include <optional>
 
-#include "render/host/host_picture.h"
+#include "render/host_drawing.h"
 #include "render/picture_renderer.h"
 #include "render/residencies.h"
 
@@ -17,9 +14,6 @@ namespace vcp {
 
 /// The processor, as `vcp devices` lists it.
 DeviceInfo hostDevice();
-
-/// Refuses what the host does not draw of a request. Errors: Unsupported.
-Result<void> checkHostDraws(const FrameRequest& request);
 
 class HostRenderer final : public PictureRenderer {
 public:
@@ -41,21 +35,17 @@ public:
 
 private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
-    /// Draws all datasets.
-    Result<HostPicture> draw(const FrameRequest& request, const std::function<bool()>& cancel);
-    [[nodiscard]] std::vector<uint64_t> cutNumbers() const;
-    /// Draws the cut of one dataset over what is in the picture.
-    Result<void> drawDataset(size_t number, const FrameRequest& request, const HostCastOptions& options,
-                             HostPicture& picture);
+    /// Returns the datasets as render() draws them.
+    [[nodiscard]] std::vector<HostDataset> drawn() const;
 
     const RendererOptions options_;
     const DeviceInfo info_;
     std::vector<PlacedResidency> datasets_;
-    std::vector<double> errorPixels_;   // of each dataset's last update
-    std::optional<HostPicture> drawn_;  // the last picture; its colours may be of fewer samples than light_
-    FrameRequest request_;              // of that picture
-    std::vector<uint64_t> cuts_;        // numbers of those that it shows
-    SampledLight light_;                // none before the second sample
+    std::vector<double> errorPixels_;     // of each dataset's last update
+    std::optional<HostPicture> picture_;  // the last one; its colours may be of fewer samples than light_
+    FrameRequest request_;                // of that picture
+    std::vector<uint64_t> cuts_;          // numbers of those that it shows
+    SampledLight light_;                  // none before the second sample
 };
 
 }  // namespace vcp

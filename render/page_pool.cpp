@@ -154,6 +154,13 @@ Result<void> PagePool::read(PoolSlot slot, uint64_t at, std::span<std::byte> byt
     return {};
 }
 
+std::span<const std::byte> PagePool::bytesOf(PoolSlot slot) const {
+    const uint64_t from = slot.firstUnit * kPoolUnitBytes;
+    const std::byte* mapped = chunks_[from / chunkBytes()].buffer.mapped();
+    if (mapped == nullptr) return {};
+    return {mapped + from % chunkBytes(), slot.units * kPoolUnitBytes};
+}
+
 Result<void> PagePool::move(PoolSlot from, PoolSlot to) {
     const uint64_t bytes = from.units * kPoolUnitBytes;
     const uint64_t source = from.firstUnit * kPoolUnitBytes, target = to.firstUnit * kPoolUnitBytes;

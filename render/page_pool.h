@@ -25,6 +25,7 @@ public:
     Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes) override;
     Result<void> move(PoolSlot from, PoolSlot to) override;
     [[nodiscard]] uint64_t bytes() const override { return bytes_; }
+    [[nodiscard]] std::span<const std::byte> bytesOf(PoolSlot slot) const override;
 
     [[nodiscard]] uint32_t chunks() const { return uint32_t(chunks_.size()); }
     [[nodiscard]] uint32_t chunkShift() const { return chunkShift_; }

@@ -189,22 +189,26 @@ FrameRequest Renderer::View::Layer::drawable(const FrameRequest& wanted) const {
     return request;
 }
 
-Result<FrameStats> Renderer::render(const FrameRequest& request, const std::function<bool()>&) {
-    return view_->shared->tryAgain(*view_, [&] { return view_->draw(request); });
+Result<FrameStats> Renderer::render(const FrameRequest& request, const std::function<bool()>& cancel) {
+    return view_->shared->tryAgain(*view_, [&] { return view_->draw(request, cancel); });
 }
 
 Result<void> Renderer::renderAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor) {
     return view_->shared->tryAgain(*view_, [&] { return view_->drawAhead(request, cursor); });
 }
 
-Result<FrameStats> Renderer::View::draw(const FrameRequest& request) {
+Result<FrameStats> Renderer::View::draw(const FrameRequest& request, const std::function<bool()>& cancel) {
     drawn.reset();
     if (!shared->device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
     const DeviceWork before = shared->device->work();
     VCP_TRY(takeInAll());
-    VCP_TRY(submit(0, request, {}));
-    VCP_TRY(takeInAll());
+    if (isCastOnHost(request)) {
+        VCP_TRY(cast(0, request, {}, cancel));
+    } else {
+        VCP_TRY(submit(0, request, {}));
+        VCP_TRY(takeInAll());
+    }
     FrameStats& stats = lastDone->stats;
     stats.submissions = shared->device->work().submissions - before.submissions;
     stats.hostWaits = shared->device->work().waits - before.waits;
@@ -224,7 +228,8 @@ Result<void> Renderer::View::drawAhead(const FrameRequest& request, const std::o
     VCP_TRY(takeInDone());
     VCP_TRY(makeLayers(frame));
     const bool isInside = cursor && cursor->x < request.width && cursor->y < request.height;
-    VCP_TRY(submit(next, request, isInside ? cursor : std::nullopt));
+    const std::optional<PicturePixel> inside = isInside ? cursor : std::nullopt;
+    VCP_TRY(isCastOnHost(request) ? cast(next, request, inside, {}) : submit(next, request, inside));
     frame.isAhead = true;
     frame.stats.submissions = shared->device->work().submissions - before.submissions;
     frame.stats.hostWaits = shared->device->work().waits - before.waits;
@@ -237,6 +242,7 @@ Result<void> Renderer::View::drawAhead(const FrameRequest& request, const std::o
 Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
                                     const std::optional<PicturePixel>& cursor) {
     Frame& frame = frames[which];
+    frame.cast.reset();
     frame.request = request;
     frame.cursor = cursor;
     frame.stats = {.rays = uint64_t{request.width} * request.height};

@@ -20,6 +20,9 @@ struct RendererOptions {
     uint32_t loaderThreads = 0;  ///< threads for all datasets, at least one each; 0: as many as their sources need
     uint64_t ramBytes =
         256ull << 20;  ///< most bytes of pages on their way to the pool, and of stored ones kept to be read again
+    /// On a software device, what the host draws (host_drawing.h) is cast by the processor itself, several times as
+    /// fast as by the device's shaders, which are compiled only for what else is asked for.
+    bool hostRays = false;
     LoadOrder order = LoadOrder::Feedback;  ///< order in which pages are read; others than Feedback are for comparison
     bool hiddenToo = false;                 ///< also reads what no ray hits: for comparison
     uint64_t uploadBytes = 16ull << 20;     ///< bytes that one update takes into the pool (one page at least)

@@ -47,9 +47,8 @@ Result<std::vector<uint32_t>> Renderer::View::mesoPlane(const Frame& frame, uint
 
 Result<Picture> Renderer::readPicture() {
     VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
-    const FrameResources& resources = *frame->layers.front().resources;
-    const PictureSize size = resources.size();
-    VCP_TRY_ASSIGN(auto words, readWords(*view_->shared->device, resources.picture(), 0, size.pixels()));
+    const PictureSize size = frame->size();
+    VCP_TRY_ASSIGN(auto words, readWords(*view_->shared->device, frame->picture(), 0, size.pixels()));
     Picture picture{size.width, size.height, std::vector<uint8_t>(size.pixels() * 4)};
     std::memcpy(picture.rgba.data(), words.data(), picture.rgba.size());
     return picture;
@@ -57,6 +56,7 @@ Result<Picture> Renderer::readPicture() {
 
 Result<std::vector<float>> Renderer::readDepth() {
     VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    if (frame->cast) return frame->cast->picture.depth;
     auto depth = view_->depthOf(*frame, 0);
     for (size_t i = 1; depth && i < view_->layers.size(); ++i) {
         const auto other = view_->depthOf(*frame, i);
@@ -104,6 +104,7 @@ Result<std::vector<uint32_t>> Renderer::readWork() {
 
 Result<std::vector<glm::vec3>> Renderer::readNormals() {
     VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    if (frame->cast) return frame->cast->picture.normals;
     std::vector<float> nearest;
     std::vector<glm::vec3> normals;
     for (size_t layer = 0; layer < view_->layers.size(); ++layer) {
@@ -126,8 +127,9 @@ Result<std::vector<glm::vec3>> Renderer::readNormals() {
 
 Result<std::vector<uint32_t>> Renderer::readIterations() {
     VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+    if (frame->cast) return std::vector<uint32_t>(frame->size().pixels(), 0);
     auto words = view_->mesoPlane(*frame, frame::kMesoPlaneIterations);
-    if (words) words->resize(frame->layers.front().resources->size().pixels());
+    if (words) words->resize(frame->size().pixels());
     return words;
 }
 
@@ -148,8 +150,9 @@ Result<std::optional<PixelHit>> Renderer::pickAt(glm::dvec2 pixel, glm::dvec2 si
 Result<std::optional<PixelHit>> Renderer::View::pick(PicturePixel pixel) {
     VCP_TRY_ASSIGN(const auto last, lastFrame());
     const Frame& frame = *last;
-    const PictureSize size = frame.layers.front().resources->size();
+    const PictureSize size = frame.size();
     if (pixel.x >= size.width || pixel.y >= size.height) return std::optional<PixelHit>{};
+    if (frame.cast) return castHit(frame, pixel);
     const uint64_t tile = uint64_t{pixel.y / frame::kTileSize} * size.tilesX() + pixel.x / frame::kTileSize;
     const uint64_t at = uint64_t{pixel.y} * size.width + pixel.x;
     std::vector<WordPlace> places;
@@ -212,10 +215,9 @@ Result<void> Renderer::copyPicture(const ImageTarget& target) {
         return Error{.code = ErrorCode::Usage,
                      .message = "pictures are scaled to images by queues with graphics, which this is not"};
     if (!v.scaling) v.scaling = std::make_unique<PictureScaling>(*device);
-    const FrameResources& resources = *frame->layers.front().resources;
-    VCP_TRY(v.scaling->prepare(resources.size()));
+    VCP_TRY(v.scaling->prepare(frame->size()));
     VCP_TRY_ASSIGN(auto commands, device->beginCommands());
-    v.scaling->record(commands, resources.picture(), target.image, {target.width, target.height});
+    v.scaling->record(commands, frame->picture(), target.image, {target.width, target.height});
     changeLayout(commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter,
                  VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
     return device->endCommandsAndWait(target.wait, target.signal);
@@ -257,9 +259,8 @@ Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& 
     if (!v.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
     if (!v.drawn) return {};
     View::Frame& frame = v.frames[*v.drawn];
-    const FrameResources& resources = *frame.layers.front().resources;
     const DeviceWork before = v.shared->device->work();
-    const auto submission = v.swapchain->show(resources.picture(), resources.size(), {width, height}, drawOver);
+    const auto submission = v.swapchain->show(frame.picture(), frame.size(), {width, height}, drawOver);
     frame.stats.submissions += v.shared->device->work().submissions - before.submissions;
     frame.stats.hostWaits += v.shared->device->work().waits - before.waits;
     // A device that was lost with frames in flight is found by the next update, which makes it anew.

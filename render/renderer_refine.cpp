@@ -14,13 +14,13 @@ namespace {
 // What a ray through mesostructure costs, in rays through pages.
 constexpr uint32_t kSurfaceRays = 8;
 
+}  // namespace
+
 uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces) {
     const Shading& shading = request.shading;
     const uint32_t light = hasLight(shading) ? (shading.shadows ? 1 : 0) + shading.occlusionRays : 0;
     return 1 + light + (hasSurfaces ? kSurfaceRays : 0);
 }
-
-}  // namespace
 
 Result<uint32_t> Renderer::refineAhead() {
     return view_->shared->tryAgain(*view_, [&] { return view_->drawPart(); });
@@ -42,6 +42,7 @@ Result<uint32_t> Renderer::View::drawPart() {
     if (!drawn || !isComplete()) return 0u;
     Frame& shown = frames[*drawn];
     VCP_TRY(checkRefinable(shown.request, samples));
+    if (shown.cast) return castPart();
     for (size_t i = 0; i < layers.size(); ++i) {
         refreshTable(layers[i]);
         if (layers[i].tableNumber != shown.layers[i].tableNumber) return 0u;

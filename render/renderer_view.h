@@ -1,5 +1,6 @@
 // A view of a renderer: camera, pictures and window of its own. Included by renderer.cpp (its life), renderer_frame.cpp
-// (drawing), renderer_refine.cpp (further samples) and renderer_readback.cpp (what was drawn).
+// (drawing), renderer_cast.cpp (drawing by the processor), renderer_refine.cpp (further samples) and
+// renderer_readback.cpp (what was drawn).
 //
 // The life of a frame: it is recorded with resources that no frame in flight has, submitted as one submission, and,
 // when the device has ended it, taken in: its counts, what its rays asked for, and the hit under the cursor. Everything
@@ -10,6 +11,7 @@
 #include <array>
 #include <chrono>
 
+#include "render/host_drawing.h"
 #include "render/picture_parts.h"
 #include "render/picture_scaling.h"
 #include "render/renderer_shared.h"
@@ -70,6 +72,13 @@ struct Renderer::View {
 
         [[nodiscard]] bool reports() const { return listened || asked; }
     };
+    /// A picture that the processor drew.
+    struct CastPicture {
+        HostPicture picture;
+        std::vector<uint64_t> cuts;  // numbers of those that it shows
+        SampledLight light;          // none before the second sample
+        Buffer colours;              // what is shown of it, on the device
+    };
     struct Frame {
         std::vector<LayerFrame> layers;  // one for each of the view's; the first one's picture is the frame's
         ComposeTarget target;            // pictures are composed into it
@@ -80,9 +89,17 @@ struct Renderer::View {
         std::optional<PicturePixel> cursor;
         FrameStats stats;  // what is known when it is submitted
         std::chrono::steady_clock::time_point began;
-        uint64_t submission = 0;  // of the frame; 0: none that is to be taken in
-        uint64_t lastUse = 0;     // the last submission that uses any of this
-        bool isAhead = false;     // drawn with renderAhead()
+        uint64_t submission = 0;          // of the frame; 0: none that is to be taken in
+        uint64_t lastUse = 0;             // the last submission that uses any of this
+        bool isAhead = false;             // drawn with renderAhead()
+        std::optional<CastPicture> cast;  // in place of what the layers' passes draw
+
+        [[nodiscard]] const Buffer& picture() const {
+            return cast ? cast->colours : layers.front().resources->picture();
+        }
+        [[nodiscard]] PictureSize size() const {
+            return cast ? PictureSize{request.width, request.height} : layers.front().resources->size();
+        }
     };
 
     const std::shared_ptr<Shared> shared;
@@ -124,10 +141,20 @@ struct Renderer::View {
 
     Result<UpdateResult> updateAll(const FrameRequest& request);
     /// Draws a frame and waits for it.
-    Result<FrameStats> draw(const FrameRequest& request);
+    Result<FrameStats> draw(const FrameRequest& request, const std::function<bool()>& cancel);
     Result<void> drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor);
     /// Draws the next part of a further sample; as Renderer::refineAhead().
     Result<uint32_t> drawPart();
+    /// Whether the processor casts the rays of such a picture now, in place of the device.
+    [[nodiscard]] bool isCastOnHost(const FrameRequest& request) const;
+    /// Draws a frame by the processor, and takes it in. Precondition: isCastOnHost(), and nothing in flight uses it.
+    Result<void> cast(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor,
+                      const std::function<bool()>& cancel);
+    /// Does what drawPart() does for the last picture, which the processor drew.
+    Result<uint32_t> castPart();
+    [[nodiscard]] std::vector<HostDataset> hostDatasets() const;
+    [[nodiscard]] std::optional<PixelHit> castHit(const Frame& frame, PicturePixel pixel) const;
+
     Result<void> submit(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor);
     Result<void> checkLimits(const Layer& layer, const FrameRequest& request) const;
     [[nodiscard]] PassConstants constantsFor(const Layer& layer, const FrameRequest& request) const;
@@ -161,6 +188,9 @@ struct Renderer::View {
     [[nodiscard]] std::optional<PixelHit> nearestHit(const FrameRequest& request, PicturePixel pixel,
                                                      std::span<const HitWords> words, const MesoReport& surfaces) const;
 };
+
+/// Returns the rays that a pixel takes, about, for picturePart().
+uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces);
 
 /// Whether pixels show the work of their rays.
 constexpr bool showsWork(ShadingMode mode) {

@@ -580,9 +580,12 @@ Result<bool> Viewer::draw() {
 /// Takes a frame's statistics for the status, and for the size of frames while the camera moves.
 void Viewer::takeStats(const DoneFrame& done) {
     status_.frame = done.stats;
-    // The first frame also compiles: it says nothing about the next. Nor does a moving one, which has no occlusion.
-    if (done.number == 1) return;
-    const double light = done.request.shading.occlusionRays > 0 ? done.stats.msLight : 0;
+    status_.device = castBy(renderer_->device(), done.stats.onHost);
+    // The first frame also compiles: it says nothing about the next. Moving ones have no occlusion; what that took of
+    // this frame is known of a device's only.
+    const bool hasOcclusion = done.request.shading.occlusionRays > 0;
+    if (done.number == 1 || (hasOcclusion && done.stats.onHost)) return;
+    const double light = hasOcclusion ? done.stats.msLight : 0;
     fullFrameMs_ = double(size_.x) * size_.y / double(done.stats.rays) * (done.stats.msFrame - light);
 }
 

@@ -25,12 +25,13 @@ constexpr float kNothing = std::numeric_limits<float>::infinity();
 /// What is kept of each pixel until the sky that its neighbours see is known.
 struct SkyPlanes {
     explicit SkyPlanes(size_t pixels)
-        : depth(pixels, kNothing), normals(pixels), albedo(pixels), sun(pixels), sky(pixels) {}
+        : depth(pixels, kNothing), normals(pixels), albedo(pixels), sun(pixels), sky(pixels), pages(pixels) {}
 
     std::vector<float> depth;  // finest cells
     std::vector<glm::vec3> normals;
     std::vector<uint32_t> albedo;  // RGBA8
     std::vector<uint8_t> sun, sky;
+    std::vector<uint32_t> pages;  // indices in the scene
 };
 
 uint8_t toByte(float x) { return uint8_t(std::lround(255 * x)); }
@@ -192,6 +193,7 @@ private:
             if (isColoured_) planes_->albedo[to] = glm::packUnorm4x8(colourAt(layer_.scene, hits, i));
             planes_->sun[to] = toByte(surface.sun[i]);
             planes_->sky[to] = toByte(surface.sky[i]);
+            planes_->pages[to] = hits.leaves[hits.leaf[i]].page;
         });
     }
 
@@ -242,6 +244,7 @@ private:
             picture_.depth[to] = depth;
             picture_.colours[to] = colours[i];
             picture_.normals[to] = turn_ * surface.normal(i);
+            picture_.hits[to] = {layer_.number, planes_ ? planes_->pages[to] : hits.leaves[hits.leaf[i]].page};
         });
     }
 
@@ -259,24 +262,25 @@ HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> backg
     : size(pictureSize),
       colours(size_t(size.x) * size_t(size.y)),
       depth(colours.size(), kNothing),
-      normals(colours.size(), glm::vec3(0)) {
+      normals(colours.size(), glm::vec3(0)),
+      hits(colours.size()) {
     for (size_t y = 0; y < size_t(size.y); ++y)
         std::fill_n(colours.begin() + std::ptrdiff_t(y * size_t(size.x)), size.x, background[y]);
 }
 
-void SampledLight::add(std::span<const uint32_t> colours) {
+void SampledLight::add(std::span<const uint32_t> colours, size_t first) {
     static const std::array<float, 256> kLight = [] {
         std::array<float, 256> light;
         for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOfColour(glm::vec3(float(i) / 255)).x;
         return light;
     }();
-    sums_.resize(colours.size(), glm::vec4(0));
     for (size_t i = 0; i < colours.size(); ++i) {
         const uint32_t c = colours[i];
         const float alpha = float(c >> 24) / 255;
-        sums_[i] += glm::vec4(glm::vec3(kLight[c & 255], kLight[c >> 8 & 255], kLight[c >> 16 & 255]) * alpha, alpha);
+        sums_[first + i] +=
+            glm::vec4(glm::vec3(kLight[c & 255], kLight[c >> 8 & 255], kLight[c >> 16 & 255]) * alpha, alpha);
     }
-    ++samples_;
+    if (first + colours.size() == sums_.size()) ++samples_;
 }
 
 std::vector<uint32_t> SampledLight::mean() const {

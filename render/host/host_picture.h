@@ -18,6 +18,12 @@
 
 namespace vcp {
 
+/// The page that a pixel shows.
+struct HostHit {
+    uint32_t dataset = UINT32_MAX;  ///< number of its layer; UINT32_MAX where nothing is hit
+    uint32_t page = 0;              ///< index in the layer's scene
+};
+
 /// A picture in the making: width * height elements each, row by row from the upper left.
 struct HostPicture {
     /// `background`: RGBA8, one a row.
@@ -27,13 +33,17 @@ struct HostPicture {
     std::vector<uint32_t> colours;   ///< RGBA8
     std::vector<float> depth;        ///< world units along the unit ray; infinite where nothing is hit
     std::vector<glm::vec3> normals;  ///< unit, world axes, towards the viewer; 0 where nothing is hit
+    std::vector<HostHit> hits;
 };
 
 /// The light of a picture's samples: of each pixel the sum of light times alpha, and of alpha.
 class SampledLight {
 public:
-    /// Adds a sample's colours, RGBA8. Precondition: as many as before.
-    void add(std::span<const uint32_t> colours);
+    explicit SampledLight(size_t pixels = 0) : sums_(pixels, glm::vec4(0)) {}
+    /// Adds a sample's colours, RGBA8, or a part of them, which begins at pixel `first`. The last part makes the sample
+    /// whole.
+    void add(std::span<const uint32_t> colours, size_t first = 0);
+    /// Returns the number of whole samples.
     [[nodiscard]] uint32_t samples() const { return samples_; }
     /// Returns the colours of the mean, as accumulate.comp finds them.
     [[nodiscard]] std::vector<uint32_t> mean() const;
@@ -50,6 +60,7 @@ struct HostLayer {
     frame::FrameConstants frame;    ///< as the shaders get it
     bool hasColour = false;         ///< hits have colours
     double worldPerUnit = 1;        ///< world units per unit of the dataset's own
+    uint32_t number = 0;            ///< of the dataset in the picture
     PictureMarks* marks = nullptr;  ///< where given, gets the pages that rays hit; one for each page of the scene
 };
 

@@ -17,9 +17,7 @@ public:
     Result<void> read(PoolSlot slot, uint64_t at, std::span<std::byte> bytes) override;
     Result<void> move(PoolSlot from, PoolSlot to) override;
     [[nodiscard]] uint64_t bytes() const override { return bytes_; }
-
-    /// Returns a slot's bytes, 16-byte aligned; they are valid as long as the slot stays where it is.
-    [[nodiscard]] std::span<const std::byte> bytesOf(PoolSlot slot) const;
+    [[nodiscard]] std::span<const std::byte> bytesOf(PoolSlot slot) const override;
 
 private:
     HostPageMemory(uint64_t bytes, std::unique_ptr<std::byte[]> memory) : bytes_(bytes), memory_(std::move(memory)) {}

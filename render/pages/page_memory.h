@@ -27,6 +27,9 @@ public:
     /// and may overlap. Errors: Device.
     virtual Result<void> move(PoolSlot from, PoolSlot to) = 0;
     [[nodiscard]] virtual uint64_t bytes() const = 0;
+    /// Returns a slot's bytes, 16-byte aligned, valid as long as the slot stays where it is; nothing where the
+    /// processor does not see the memory.
+    [[nodiscard]] virtual std::span<const std::byte> bytesOf(PoolSlot slot) const = 0;
 };
 
 /// Where memory for pages comes from.

@@ -30,6 +30,8 @@ Result<std::vector<DeviceInfo>> listDevices(const std::string& choice = {});
 /// The processor as what draws pictures, without Vulkan: it is called so, in any case, among devices.
 inline constexpr const char* kHostName = "host";
 bool isHostName(const std::string& choice);
+/// Returns the name of what cast a frame's rays. `onHost`: as in FrameStats.
+inline std::string castBy(const DeviceInfo& device, bool onHost) { return onHost ? kHostName : device.name; }
 
 /// What a window gives: the instance extensions it needs and a function that makes the surface
 /// (glfwGetRequiredInstanceExtensions, glfwCreateWindowSurface).

@@ -155,7 +155,7 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"unresolved_rays", stats.unresolvedRays},
             {"far_hits", stats.farHits},
             {"surface_bytes", stats.surfaceBytes},
-            {"device", device.name},
+            {"device", castBy(device, stats.onHost)},
             {"software", device.software},
             {"settled", drawing.update.settled},
             {"detail", nameOf(detailOf(drawing.update, request.errorPixels))},
@@ -177,9 +177,9 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
                                                     : "";
     return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} subvolumes, {} resident, {}, {}",
                        command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
-                       drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples, device.name,
-                       device.software ? " (software)" : "", update.pagesInCut, formatBytes(update.residentBytes),
-                       error, textOf(detailOf(update, askedPixels)));
+                       drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples,
+                       castBy(device, drawing.stats.onHost), device.software ? " (software)" : "", update.pagesInCut,
+                       formatBytes(update.residentBytes), error, textOf(detailOf(update, askedPixels)));
 }
 
 Result<void> report(const RenderCommand& command, const Drawing& drawing, const std::vector<MethodPanel>& panels,
@@ -222,7 +222,7 @@ Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, c
             {"samples", samples},
             {"rays", total.rays},
             {"hit_pixels", total.hitPixels},
-            {"device", device.name},
+            {"device", castBy(device, total.onHost)},
             {"software", device.software},
             {"settled", total.update.settled},
             {"detail", nameOf(detailOf(total.update, request.errorPixels))},

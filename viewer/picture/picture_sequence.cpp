@@ -59,6 +59,7 @@ Result<void> PictureSequence::finish() {
     stats_.ms += drawn.ms;
     stats_.errorPixels = std::max(stats_.errorPixels, drawn.errorPixels);
     stats_.update = drawn.update;
+    stats_.onHost = drawn.onHost;
     depth_.clear();
     normals_.clear();
     picture_.reset();

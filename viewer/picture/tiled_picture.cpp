@@ -97,6 +97,7 @@ void TiledPicture::begin(const FrameStats& tile) {
     tileHits_ = tile.hitPixels;
     stats_.rays += tile.rays;
     stats_.ms += tile.msFrame;
+    stats_.onHost = tile.onHost;
 }
 
 /// Adds a sample to the tile; where it cannot go on, the next step draws it anew.

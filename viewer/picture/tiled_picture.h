@@ -39,6 +39,7 @@ struct TiledPictureStats {
     double ms = 0;           ///< time of drawing alone, of each tile's last frame and its samples, as are the rays
     double errorPixels = 0;  ///< largest over the tiles
     UpdateResult update;     ///< the last tile's
+    bool onHost = false;     ///< likewise, as in FrameStats
 };
 
 /// A picture in the making, tile by tile. What it is given must stay until it is done.

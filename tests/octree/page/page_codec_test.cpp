@@ -117,6 +117,23 @@ WholePage analyticPage(const test::SignedDistanceField& field, uint32_t log2Cell
     return {test::AnalyticPageBuilder(field, glm::dvec3(0), 1, log2Cells, axis, 0.05f, 3).build().bytes.geometry, {}};
 }
 
+TEST(PageCodec, ADraftIsItsPage) {
+    for (const uint32_t seed : {1u, 2u, 3u}) {
+        const WholePage page = withLeavesOfAllKinds(soup(seed, 2, 3, 20, 10).build(seed), seed);
+        PageDraft draft = draftOf(page.view());
+        EXPECT_EQ(draft.lists.size(), draft.begin.back());
+        const std::vector<std::byte> whole = pageOf(draft);
+        const auto view = parsePage(whole);
+        ASSERT_TRUE(view.ok()) << view.error().line();
+        expectSamePage(page.view(), *view);
+        const auto packed = packPage(draft, asBytes(page.colour));
+        ASSERT_TRUE(packed.ok()) << packed.error().line();
+        EXPECT_EQ(packed->geometry, packPage(asBytes(page.geometry), asBytes(page.colour)).geometry);
+        draft.header.log2Cells = 0;
+        EXPECT_FALSE(packPage(draft, {}).ok()) << "there is no such page";
+    }
+}
+
 TEST(PageCodec, SoftPagesComeBack) {
     for (uint32_t log2Cells = 1; log2Cells <= 5; ++log2Cells)
         for (uint32_t axis = 0; axis < 3; ++axis) {

@@ -2,6 +2,7 @@
 #include "render/host_renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <fstream>
@@ -145,6 +146,119 @@ Scene torusOfOneLevel() {
     o.levels = 1;
     o.axis = 2;
     return test::sceneOf("torus", test::analyticDataset(test::torus(glm::dvec3(8.2, 7.8, 8.1), 4.8, 1.8), o));
+}
+
+/// A renderer whose software device leaves the rays to the processor.
+class CastByRendererTest : public HostRendererTest {
+protected:
+    void SetUp() override {
+        HostRendererTest::SetUp();
+        if (!renderer_->device().software) GTEST_SKIP() << "the device casts rays itself";
+        RendererOptions options;
+        options.hostRays = true;
+        casting_ = Renderer::create(options).value();
+    }
+    void openAll(const std::vector<PlacedDataset>& datasets) {
+        open(datasets);
+        ASSERT_TRUE(casting_->open(datasets));
+    }
+    std::unique_ptr<Renderer> casting_;
+};
+
+TEST_F(CastByRendererTest, PicturesAreTheHosts) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    const Similarity beside{glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -0.5))), 0.6, {0.5, 0.2, 0.7}};
+    openAll({placed(built.file()), placed(built.file(), beside)});
+    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+        FrameRequest request = requestOf(named.camera);
+        request.shading.shadows = true;
+        request.shading.occlusionRays = 1;
+        for (const uint32_t samples : {1u, 3u}) {
+            SCOPED_TRACE(named.name);
+            const Planes host = drawnBy(*host_, request, samples), cast = drawnBy(*casting_, request, samples);
+            EXPECT_EQ(cast.picture, host.picture);
+            EXPECT_EQ(cast.depth, host.depth);
+            EXPECT_EQ(cast.normals, host.normals);
+        }
+        const FrameStats stats = casting_->render(request).value();
+        EXPECT_TRUE(stats.onHost);
+        EXPECT_EQ(stats.pipelines, 0u) << "no shader is compiled";
+        EXPECT_EQ(stats.submissions, 0u);
+    }
+}
+
+TEST_F(CastByRendererTest, PartsMakeTheSamePicture) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    openAll({placed(built.file())});
+    // So many rays a pixel that a sample has several parts.
+    FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera, 320, 240);
+    request.shading.occlusionRays = 16;
+    ASSERT_TRUE(casting_->settle(request));
+    ASSERT_TRUE(casting_->render(request));
+    uint32_t parts = 1;
+    while (casting_->refineAhead().value() < 2) ++parts;
+    EXPECT_GT(parts, 3u);
+    const Planes host = drawnBy(*host_, request, 2);
+    const Picture cast = casting_->readPicture().value();
+    uint64_t differing = 0;
+    for (size_t i = 0; i < host.depth.size(); ++i) differing += channelsApart(host.picture, cast, i) > 2 ? 1 : 0;
+    EXPECT_LE(differing, host.depth.size() / 10000);
+}
+
+TEST_F(CastByRendererTest, PicksWhatTheDevicePicks) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    const Similarity beside{glm::dquat(1, 0, 0, 0), 0.5, {3, 0, 0}};
+    openAll({placed(built.file()), placed(built.file(), beside)});
+    const FrameRequest request = requestOf(test::cameras(kLow, {4, 2, 2})[0].camera, 160, 120);
+    for (PictureRenderer* each :
+         {static_cast<PictureRenderer*>(renderer_.get()), static_cast<PictureRenderer*>(casting_.get())})
+        ASSERT_TRUE(each->drawSettled(request));
+    std::array<uint64_t, 2> hits{};
+    uint64_t state = 0;
+    for (uint32_t y = 2; y < request.height; y += 5)
+        for (uint32_t x = 2; x < request.width; x += 5) {
+            const auto device = renderer_->pick(x, y).value(), cast = casting_->pick(x, y).value();
+            state += device.has_value() != cast.has_value() ? 1 : 0;
+            if (!device || !cast) continue;
+            ASSERT_EQ(cast->dataset, device->dataset);
+            EXPECT_LT(glm::distance(cast->position, device->position), 1e-3);
+            ++hits[cast->dataset];
+        }
+    EXPECT_LE(state, 1u);
+    EXPECT_GT(hits[0], 20u);
+    EXPECT_GT(hits[1], 5u);
+    EXPECT_FALSE(casting_->pick(request.width, 0).value());
+}
+
+TEST_F(CastByRendererTest, WhatTheHostDoesNotDrawTheDeviceDraws) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    openAll({placed(built.file())});
+    FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
+    request.sections = {{{1, 0, 0}, 0.1}};
+    request.sectionCaps = true;
+    const Planes device = drawnBy(*renderer_, request), cut = drawnBy(*casting_, request);
+    EXPECT_EQ(cut.picture, device.picture);
+    EXPECT_FALSE(casting_->render(request)->onHost);
+    // And back again, frame by frame.
+    request.sections.clear();
+    EXPECT_EQ(drawnBy(*casting_, request).picture, drawnBy(*host_, request).picture);
+}
+
+TEST_F(CastByRendererTest, CancellingEndsAFrame) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    openAll({placed(built.file())});
+    const FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
+    ASSERT_TRUE(casting_->drawSettled(request));
+    const auto stopped = casting_->render(request, [] { return true; });
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+    EXPECT_FALSE(casting_->readPicture()) << "there is no half of a picture";
+    EXPECT_TRUE(casting_->render(request));
 }
 
 TEST_F(HostRendererTest, EveryKindOfLeafFromEveryCamera) {

@@ -1,0 +1,176 @@
+#include "render/host_drawing.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "octree/surface/morton.h"
+#include "render/frame_setup.h"
+
+namespace vcp {
+
+namespace {
+
+Error unsupported(const char* what) {
+    return {.code = ErrorCode::Unsupported,
+            .message = fmt::format("the host does not draw {}; take a Vulkan device", what)};
+}
+
+/// Returns the rays of the part of a picture that a request draws.
+PictureRays raysOf(const FrameRequest& request) {
+    const PictureTile whole = wholePicture(request);
+    PictureRays rays = pictureRays(request.camera, whole.fullWidth, whole.fullHeight);
+    const glm::dvec2 corner = upperLeft(request);
+    rays.origin = rays.originAt(corner.x, corner.y);
+    rays.direction = rays.directionAt(corner.x, corner.y);
+    rays.size = {int(request.width), int(request.height)};
+    return rays;
+}
+
+/// The pages of a cut, as rays are cast through them; the views that the scene points to.
+struct PlacedCut {
+    std::vector<PageView> views;
+    std::vector<HostPage> pages;
+};
+
+PlacedCut placedCut(Residency& residency, ViewNumber view) {
+    const Dataset& dataset = residency.dataset();
+    const std::vector<uint64_t>& cut = residency.cut(view);
+    const std::vector<PartialPage>& partials = residency.partial(view);
+    PlacedCut placed;
+    placed.views.reserve(cut.size());
+    auto partial = partials.begin();
+    for (const uint64_t number : cut) {
+        const PageEntry& entry = dataset.pages[number];
+        const std::span<const std::byte> bytes = residency.pages().bytesOf(residency.slotOf(number));
+        const uint64_t colours = residency.hasColour() ? entry.colourBytes : 0;
+        placed.views.push_back(viewOfChecked(bytes.first(entry.pageBytes), bytes.subspan(entry.pageBytes, colours)));
+        HostPage page{.view = &placed.views.back(),
+                      .number = number,
+                      .place = mortonDecode(entry.morton),
+                      .level = entry.level,
+                      .error = float(double(entry.certifiedError) / dataset.header.cell)};
+        if (partial == partials.end() || partial->page != number) {
+            placed.pages.push_back(page);
+            continue;
+        }
+        for (uint32_t octants = partial++->octants; octants != 0; octants &= octants - 1) {
+            page.octant = uint32_t(std::countr_zero(octants));
+            placed.pages.push_back(page);
+        }
+    }
+    return placed;
+}
+
+/// Returns the numbers, in the directory, of the pages that rays marked, and of those in whose place these are drawn.
+std::vector<uint64_t> markedPages(const Dataset& dataset, const HostScene& scene, const PageMarks& marks) {
+    std::vector<uint64_t> pages;
+    for (uint32_t i = 0; i < scene.pages(); ++i) {
+        if (!marks.isMarked(i)) continue;
+        const HostScene::Page& page = scene.page(i);
+        pages.push_back(page.number);
+        if (page.octant) pages.push_back(childIn(dataset.pages[page.number], *page.octant));
+    }
+    return pages;
+}
+
+/// Returns what rays of a grid over the picture met of one dataset: the pages that they hit.
+RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture) {
+    RayFeedback feedback;
+    const glm::dvec3 origin = dataset.originOf(dataset.pages[0]);
+    const double rootEdge = dataset.edgeOf(dataset.pages[0]), unit = std::ldexp(rootEdge, -int(frame::kLatticeBits));
+    for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
+        const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
+        const glm::dvec2 grid(frame::kFeedbackWidth, frame::kFeedbackHeight);
+        const glm::ivec2 pixel((part + 0.5) * glm::dvec2(picture.size) / grid);
+        const size_t at = size_t(pixel.y) * size_t(picture.size.x) + size_t(pixel.x);
+        if (picture.hits[at].dataset != layer.number) continue;
+        const glm::dvec3 from = layer.rays.originAt(pixel.x + 0.5, pixel.y + 0.5);
+        const glm::dvec3 along = glm::normalize(layer.rays.directionAt(pixel.x + 0.5, pixel.y + 0.5));
+        const double depth = double(picture.depth[at]) / layer.worldPerUnit;
+        const glm::dvec3 place = (from + depth * along - origin) / unit;
+        const uint64_t page = layer.scene.page(picture.hits[at].page).number;
+        constexpr double kLast = double((uint32_t{1} << frame::kLatticeBits) - 1);
+        feedback.hits.push_back({page, glm::ivec3(glm::clamp(place, 0.0, kLast)), ray});
+        feedback.passed.push_back({page, frame::kNearnessEps / (depth / rootEdge + frame::kNearnessEps)});
+    }
+    return feedback;
+}
+
+Result<void> drawDataset(const HostDataset& drawn, uint32_t number, const FrameRequest& request,
+                         const HostCastOptions& options, HostPicture& picture) {
+    Residency& residency = drawn.residency;
+    const FrameRequest seen = requestIn(drawn.placement, request);
+    const Dataset& dataset = residency.dataset();
+    const PlacedCut cut = placedCut(residency, drawn.view);
+    VCP_TRY_ASSIGN(const auto scene, HostScene::create(hostGrid(dataset.header), cut.pages));
+    const bool hasColour = residency.hasColour();
+    const bool isFirst = request.sample == 0, asked = isFirst && residency.asksRays(drawn.view);
+    PictureMarks marks(scene.pages());
+    const HostLayer layer{.scene = scene,
+                          .rays = raysOf(seen),
+                          .frame = frameConstants(seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
+                          .hasColour = hasColour,
+                          .worldPerUnit = drawn.placement.scale,
+                          .number = number,
+                          .marks = asked ? &marks : nullptr};
+    VCP_TRY(drawLayer(layer, options, picture));
+    if (asked)
+        residency.see({markedPages(dataset, scene, marks.byCamera), markedPages(dataset, scene, marks.byLight)},
+                      selectionView(seen), residency.cutNumber(drawn.view), drawn.view);
+    if (isFirst && residency.listens()) residency.hear(feedbackOf(layer, dataset, picture), selectionView(seen));
+    return {};
+}
+
+}  // namespace
+
+Result<void> checkHostDraws(const Dataset& dataset, const std::string& name) {
+    const auto refused = [&](const char* message) {
+        return Error{.code = ErrorCode::Unsupported, .message = message, .file = name};
+    };
+    if (dataset.header.method == Method::Paper)
+        return refused("the host does not draw files built by the paper's method; take a Vulkan device");
+    // Where pages do not cover the surface, the shaders continue coarser pages into finer ones.
+    if (dataset.header.levels > 1 && !dataset.isCovering())
+        return refused(
+            "the host does not draw the seams between levels that are no slabs, as this file's; take a Vulkan device");
+    return {};
+}
+
+Result<void> checkHostDraws(const FrameRequest& request) {
+    const ShadingMode mode = request.shading.mode;
+    if (!request.sections.empty()) return unsupported("section planes");
+    if (mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches || request.countSteps)
+        return unsupported("the work of rays");
+    return {};
+}
+
+Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, const FrameRequest& request,
+                               const std::function<bool()>& cancel) {
+    const HostCastOptions options{.cancel = cancel};
+    HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
+    for (size_t i = 0; i < datasets.size(); ++i)
+        VCP_TRY(drawDataset(datasets[i], uint32_t(i), request, options, picture));
+    return picture;
+}
+
+std::vector<uint64_t> cutNumbers(std::span<const HostDataset> datasets) {
+    std::vector<uint64_t> all;
+    for (const HostDataset& each : datasets) all.push_back(each.residency.cutNumber(each.view));
+    return all;
+}
+
+FrameStats hostStats(std::span<const HostDataset> datasets, const HostPicture& picture) {
+    FrameStats stats{.rays = picture.depth.size(), .tracedRays = picture.depth.size(), .onHost = true};
+    for (const HostDataset& each : datasets) {
+        stats.poolBytes += each.residency.pages().bytes();
+        stats.colourBytes += each.residency.colourBytes();
+        stats.pagesInCut += uint32_t(each.residency.cut(each.view).size());
+    }
+    stats.hitPixels = uint64_t(std::ranges::count_if(picture.depth, [](float depth) { return std::isfinite(depth); }));
+    return stats;
+}
+
+}  // namespace vcp

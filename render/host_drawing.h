@@ -1,0 +1,42 @@
+// Draws datasets with the processor (render/host/), whoever holds their pages: HostRenderer in plain memory, and
+// Renderer, on a software device, in memory that the processor sees.
+//
+// Sections, mesostructure, the march of the method `paper`, the false colours that count a shader's work, and seams
+// between levels are not drawn (docs/rays.md): each is refused as Unsupported, and never left out.
+#pragma once
+
+#include <functional>
+#include <span>
+
+#include "render/host/host_picture.h"
+#include "render/pages/residency.h"
+#include "render/picture_renderer.h"
+
+namespace vcp {
+
+/// A dataset as a view shows it. Precondition: the processor sees its pages (PageMemory::bytesOf).
+struct HostDataset {
+    Residency& residency;
+    Similarity placement;
+    double errorPixels = 0;  ///< of the view's last update
+    ViewNumber view = 0;
+};
+
+/// Refuses what the host does not draw of a dataset. `name`: its file's. Errors: Unsupported.
+Result<void> checkHostDraws(const Dataset& dataset, const std::string& name);
+
+/// Refuses what the host does not draw of a request. Errors: Unsupported.
+Result<void> checkHostDraws(const FrameRequest& request);
+
+/// Draws the cuts of datasets, the nearest surface at each pixel, and tells the residencies what the rays of a first
+/// sample hit. `cancel` is asked by several threads. Preconditions: checkHostDraws. Errors: Cancelled, Limit.
+Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, const FrameRequest& request,
+                               const std::function<bool()>& cancel);
+
+/// Returns the numbers of the cuts that drawOnHost would draw now: pictures of the same ones are the same.
+std::vector<uint64_t> cutNumbers(std::span<const HostDataset> datasets);
+
+/// Returns the statistics of a picture, without times.
+FrameStats hostStats(std::span<const HostDataset> datasets, const HostPicture& picture);
+
+}  // namespace vcp
