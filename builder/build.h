@@ -48,11 +48,11 @@ struct BuildOptions {
     bool overwrite = false;  ///< also replaces an output that is no dataset (octree/io/output_file.h); never an input
     double cell = 0;   ///< finest cell edge, world units, where triangles are not crowded; 0: chosen from the mesh
     double error = 0;  ///< tolerated distance to the mesh, world units; 0: the finest level is the mesh
-    bool errorIsRelative = false;  ///< `error` is a fraction of the bounding box's diagonal
-    unsigned threads = 0;          ///< 0: one a processor
-    uint64_t memoryBytes = 0;      ///< cap on what the build allocates; 0: defaultMemoryBytes()
-    std::filesystem::path temp;    ///< folder for temporary files; empty: beside the output
-    bool resume = false;           ///< go on where an interrupted build of the same output was
+    bool errorIsRelative = false;   ///< `error` is a fraction of the bounding box's diagonal
+    unsigned threads = 0;           ///< 0: one a processor
+    uint64_t memoryBytes = 0;       ///< cap on what the build allocates; 0: defaultMemoryBytes()
+    std::filesystem::path temp;     ///< folder for temporary files; empty: beside the output
+    bool resume = false;            ///< go on where an interrupted build of the same output was
     double checkpointSeconds = 15;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
     CoarseLeaves coarseLeaves = CoarseLeaves::Slabs;

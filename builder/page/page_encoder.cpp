@@ -174,8 +174,11 @@ Clearance clearanceOf(const PageTree& tree) {
 class TrianglePacker {
 public:
     TrianglePacker(const PageTree& tree, const LatticeMesh& mesh, PageDraft& draft)
-        : tree_(tree), mesh_(mesh), draft_(draft), numbers_(tree.triangles.size(), kNone), local_(tree.triangles.size()) {
-    }
+        : tree_(tree),
+          mesh_(mesh),
+          draft_(draft),
+          numbers_(tree.triangles.size(), kNone),
+          local_(tree.triangles.size()) {}
 
     /// Appends a leaf's list; returns its node word.
     uint32_t add(const HardLeaf& leaf) {

@@ -18,8 +18,8 @@ struct PageDraft {
     std::vector<uint4> faces;
     std::vector<glm::u32vec2> vertices;
     std::vector<uint32_t> normals;
-    std::vector<Index3> triangles;  ///< of all hard leaves, each once, in no order
-    std::vector<uint32_t> lists;    ///< the triangles of list 0, of list 1, and so on
+    std::vector<Index3> triangles;   ///< of all hard leaves, each once, in no order
+    std::vector<uint32_t> lists;     ///< the triangles of list 0, of list 1, and so on
     std::vector<uint32_t> begin{0};  ///< where in `lists` each begins, and the end
     /// Whether it is certain that each list names all triangles that touch its leaf's closed box, and no others.
     bool listsAreCertain = false;

@@ -88,7 +88,7 @@ private:
             for (int i = 0; i < 3; ++i) cells *= uint64_t(std::max(last[i] - first[i] + 1, 0));
             return cells;
         }
-        glm::i32vec3 low, high;     ///< of the box, in steps of the lattice
+        glm::i32vec3 low, high;    ///< of the box, in steps of the lattice
         glm::i32vec3 first, last;  ///< cells
     };
 

@@ -80,8 +80,7 @@ std::vector<std::vector<std::array<uint64_t, 3>>> trianglesByLeaf(const PageView
         auto& leaf = leaves.emplace_back();
         forEachTriangle(page.strips, word, [&](const Index3& t) {
             auto& triangle = leaf.emplace_back();
-            for (size_t i = 0; i < 3; ++i)
-                triangle[i] = uint64_t{page.vertices[t[i]].y} << 32 | page.vertices[t[i]].x;
+            for (size_t i = 0; i < 3; ++i) triangle[i] = uint64_t{page.vertices[t[i]].y} << 32 | page.vertices[t[i]].x;
             std::sort(triangle.begin(), triangle.end());
         });
         std::sort(leaf.begin(), leaf.end());
