@@ -139,6 +139,7 @@ Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
     VCP_TRY(checkHostDraws(request));
     std::optional<UpdateResult> all;
     for (size_t i = 0; i < datasets_.size(); ++i) {
+        if (isHidden(request, i)) continue;
         const auto& [residency, placement] = datasets_[i];
         VCP_TRY_ASSIGN(auto one, residency->update(selectionView(requestIn(placement, request))));
         errorPixels_[i] = one.errorPixels;
@@ -147,7 +148,9 @@ Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
         else
             all = std::move(one);
     }
-    if (!all) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
+    if (!all)
+        return UpdateResult{
+            .settled = true, .drawable = !datasets_.empty(), .errorPixels = std::numeric_limits<double>::infinity()};
     return *std::move(all);
 }
 
@@ -198,7 +201,8 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
 Result<HostPicture> HostRenderer::draw(const FrameRequest& request, const std::function<bool()>& cancel) {
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
-    for (size_t i = 0; i < datasets_.size(); ++i) VCP_TRY(drawDataset(i, request, options, picture));
+    for (size_t i = 0; i < datasets_.size(); ++i)
+        if (!isHidden(request, i)) VCP_TRY(drawDataset(i, request, options, picture));
     return picture;
 }
 
