@@ -1,4 +1,5 @@
-# Installs the libraries, their public headers, the program and the CMake package.
+# Installs the libraries, their public headers, the program and the CMake package, in four components: library
+# (libvcp.so), dev (headers, static libraries, packages of CMake and pkg-config), tools (the program), python.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -39,8 +40,6 @@ foreach(folder octree builder mesostructure streaming render viewer)
     if(BUILD_SHARED_LIBS)
         set_target_properties(vcp_${folder} PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR} INSTALL_RPATH "$ORIGIN")
     endif()
-    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vcp/${folder}
-        FILES_MATCHING PATTERN "*.h")
     get_target_property(links vcp_${folder} INTERFACE_LINK_LIBRARIES)
     foreach(link IN LISTS links)
         # A private dependency of a static library is wrapped in $<LINK_ONLY:...>.
@@ -63,33 +62,71 @@ if(TARGET vcp_widget)
         set_target_properties(vcp_widget PROPERTIES INSTALL_RPATH "$ORIGIN")
     endif()
     list(APPEND vcp_installed vcp_widget_static)
-    install(FILES ${PROJECT_SOURCE_DIR}/viewer/widget/vcp.h ${PROJECT_SOURCE_DIR}/viewer/widget/vcp.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vcp)
-    install(TARGETS vcp_widget EXPORT vcpWidgetTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-    install(EXPORT vcpWidgetTargets NAMESPACE vcp:: DESTINATION ${vcp_package})
+    set(headers ${PROJECT_SOURCE_DIR}/viewer/widget)
+    install(FILES ${headers}/vcp.h ${headers}/vcp.hpp ${headers}/vcp_qt.hpp
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vcp COMPONENT dev)
+    install(TARGETS vcp_widget EXPORT vcpWidgetTargets
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev)
+    install(EXPORT vcpWidgetTargets NAMESPACE vcp:: DESTINATION ${vcp_package} COMPONENT dev)
     file(RELATIVE_PATH VCP_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
     configure_file(${CMAKE_CURRENT_LIST_DIR}/vcp.pc.in ${PROJECT_BINARY_DIR}/vcp.pc @ONLY)
-    install(FILES ${PROJECT_BINARY_DIR}/vcp.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+    install(FILES ${PROJECT_BINARY_DIR}/vcp.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 endif()
 
+# The package `vcp` of Python: PYTHONPATH=PREFIX/lib/python3/dist-packages where the prefix is not the system's. In a
+# wheel the library lies beside the module.
+set(vcp_python_folder lib/python3/dist-packages/vcp)
 if(TARGET vcp_python)
-    # In the prefix's own folder of Python: PYTHONPATH=PREFIX/lib/python3/dist-packages.
-    set(vcp_python ${CMAKE_INSTALL_LIBDIR}/python3/dist-packages)
-    set_target_properties(vcp_python PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
-    install(TARGETS vcp_python LIBRARY DESTINATION ${vcp_python})
+    find_package(Python3 COMPONENTS Interpreter REQUIRED)
+    file(RELATIVE_PATH library_from_python /${vcp_python_folder} /${CMAKE_INSTALL_LIBDIR})
+    set_target_properties(vcp_python PROPERTIES INSTALL_RPATH "$ORIGIN;$ORIGIN/${library_from_python}")
+    install(TARGETS vcp_python LIBRARY DESTINATION ${vcp_python_folder} COMPONENT python)
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/viewer/widget/python/ DESTINATION ${vcp_python_folder} COMPONENT python
+        FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed")
+    # cmake --build BUILD --target wheel: a wheel, in the folder of the packages.
+    set(prefix ${PROJECT_BINARY_DIR}/wheel)
+    add_custom_target(wheel
+        COMMAND ${CMAKE_COMMAND} -E rm -rf ${prefix}
+        COMMAND ${CMAKE_COMMAND} --install ${PROJECT_BINARY_DIR} --prefix ${prefix} --component python --strip
+        COMMAND ${CMAKE_COMMAND} --install ${PROJECT_BINARY_DIR} --prefix ${prefix} --component library --strip
+        COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/make_wheel.py ${prefix} ${PROJECT_VERSION}
+            ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_BINARY_DIR}/packages
+        VERBATIM)
+    add_dependencies(wheel vcp_python vcp_widget)
 endif()
 
 if(TARGET vcp)
     if(BUILD_SHARED_LIBS)
         set_target_properties(vcp PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
     endif()
-    install(TARGETS vcp RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+    install(TARGETS vcp RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
+    set(desktop ${PROJECT_SOURCE_DIR}/viewer/desktop)
+    install(FILES ${desktop}/vcp.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT tools)
+    install(FILES ${desktop}/vcp.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT tools)
+    install(FILES ${desktop}/vcp.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT tools)
+    install(FILES ${desktop}/vcp.thumbnailer DESTINATION ${CMAKE_INSTALL_DATADIR}/thumbnailers COMPONENT tools)
+endif()
+
+# What the program wrote about itself.
+if(TARGET vcp_manual)
+    set(zsh zsh/site-functions)
+    if(EXISTS /etc/debian_version)
+        set(zsh zsh/vendor-completions)
+    endif()
+    set(manual ${PROJECT_BINARY_DIR}/manual)
+    install(DIRECTORY ${manual}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT tools)
+    install(FILES ${manual}/vcp.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME vcp COMPONENT tools)
+    install(FILES ${manual}/_vcp DESTINATION ${CMAKE_INSTALL_DATADIR}/${zsh} COMPONENT tools)
+    install(FILES ${manual}/vcp.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT tools)
 endif()
 
 install(TARGETS ${vcp_installed} EXPORT vcpTargets
-    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(EXPORT vcpTargets NAMESPACE vcp:: DESTINATION ${vcp_package})
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
+    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vcp COMPONENT dev)
+install(EXPORT vcpTargets NAMESPACE vcp:: DESTINATION ${vcp_package} COMPONENT dev)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/vcpConfig.cmake.in ${PROJECT_BINARY_DIR}/vcpConfig.cmake
     INSTALL_DESTINATION ${vcp_package})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/vcpConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/vcpConfig.cmake ${PROJECT_BINARY_DIR}/vcpConfigVersion.cmake DESTINATION ${vcp_package})
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES ${PROJECT_BINARY_DIR}/vcpConfig.cmake ${PROJECT_BINARY_DIR}/vcpConfigVersion.cmake
+    DESTINATION ${vcp_package} COMPONENT dev)

@@ -1,6 +1,7 @@
 // What a picture is to show, and how.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -81,8 +82,14 @@ struct FrameRequest {
     bool beam = true;                    ///< beam pass; the picture is the same without it, only slower
     bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
     PaperMarch march;                    ///< march through datasets of the method `paper`
+    std::vector<uint32_t> hidden;        ///< numbers of datasets that are neither drawn nor loaded, in any order
 
     bool operator==(const FrameRequest&) const = default;
 };
+
+/// Whether the request leaves a dataset out.
+inline bool isHidden(const FrameRequest& request, size_t dataset) {
+    return std::find(request.hidden.begin(), request.hidden.end(), dataset) != request.hidden.end();
+}
 
 }  // namespace vcp

@@ -48,7 +48,7 @@ PlacedCut placedCut(Residency& residency, ViewNumber view) {
         const uint64_t colours = residency.hasColour() ? entry.colourBytes : 0;
         placed.views.push_back(viewOfChecked(bytes.first(entry.pageBytes), bytes.subspan(entry.pageBytes, colours)));
         HostPage page{.view = &placed.views.back(),
-                      .number = number,
+                      .number = drawn.number,
                       .place = mortonDecode(entry.morton),
                       .level = entry.level,
                       .error = float(double(entry.certifiedError) / dataset.header.cell)};
@@ -99,8 +99,8 @@ RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const Hos
     return feedback;
 }
 
-Result<void> drawDataset(const HostDataset& drawn, uint32_t number, const FrameRequest& request,
-                         const HostCastOptions& options, HostPicture& picture) {
+Result<void> drawDataset(const HostDataset& drawn, const FrameRequest& request, const HostCastOptions& options,
+                         HostPicture& picture) {
     Residency& residency = drawn.residency;
     const FrameRequest seen = requestIn(drawn.placement, request);
     const Dataset& dataset = residency.dataset();
@@ -114,7 +114,7 @@ Result<void> drawDataset(const HostDataset& drawn, uint32_t number, const FrameR
                           .frame = frameConstants(seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
                           .hasColour = hasColour,
                           .worldPerUnit = drawn.placement.scale,
-                          .number = number,
+                          .number = drawn.number,
                           .marks = asked ? &marks : nullptr};
     VCP_TRY(drawLayer(layer, options, picture));
     if (asked)
@@ -151,8 +151,7 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, const Fram
                                const std::function<bool()>& cancel) {
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
-    for (size_t i = 0; i < datasets.size(); ++i)
-        VCP_TRY(drawDataset(datasets[i], uint32_t(i), request, options, picture));
+    for (const HostDataset& each : datasets) VCP_TRY(drawDataset(each, request, options, picture));
     return picture;
 }
 

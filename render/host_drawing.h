@@ -18,6 +18,7 @@ namespace vcp {
 struct HostDataset {
     Residency& residency;
     Similarity placement;
+    uint32_t number = 0;     ///< among those that are open
     double errorPixels = 0;  ///< of the view's last update
     ViewNumber view = 0;
 };

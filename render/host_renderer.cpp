@@ -51,6 +51,7 @@ Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
     VCP_TRY(checkHostDraws(request));
     std::optional<UpdateResult> all;
     for (size_t i = 0; i < datasets_.size(); ++i) {
+        if (isHidden(request, i)) continue;
         const auto& [residency, placement] = datasets_[i];
         VCP_TRY_ASSIGN(auto one, residency->update(selectionView(requestIn(placement, request))));
         errorPixels_[i] = one.errorPixels;
@@ -59,7 +60,9 @@ Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
         else
             all = std::move(one);
     }
-    if (!all) return UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
+    if (!all)
+        return UpdateResult{
+            .settled = true, .drawable = !datasets_.empty(), .errorPixels = std::numeric_limits<double>::infinity()};
     return *std::move(all);
 }
 
@@ -68,7 +71,7 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
     VCP_TRY(checkRequest(request));
     VCP_TRY(checkHostDraws(request));
     const auto began = std::chrono::steady_clock::now();
-    const std::vector<HostDataset> drawing = drawn();
+    const std::vector<HostDataset> drawing = drawn(request);
     VCP_TRY_ASSIGN(auto picture, drawOnHost(drawing, request, cancel));
     FrameStats stats = hostStats(drawing, picture);
     stats.msFrame = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
@@ -79,10 +82,11 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
     return stats;
 }
 
-std::vector<HostDataset> HostRenderer::drawn() const {
+std::vector<HostDataset> HostRenderer::drawn(const FrameRequest& request) const {
     std::vector<HostDataset> drawn;
     for (size_t i = 0; i < datasets_.size(); ++i)
-        drawn.push_back({*datasets_[i].residency, datasets_[i].placement, errorPixels_[i]});
+        if (!isHidden(request, i))
+            drawn.push_back({*datasets_[i].residency, datasets_[i].placement, uint32_t(i), errorPixels_[i]});
     return drawn;
 }
 
@@ -90,7 +94,7 @@ Result<uint32_t> HostRenderer::refine(const std::function<bool()>& cancel) {
     if (!picture_) return 0u;
     const uint32_t samples = std::max(light_.samples(), 1u);
     VCP_TRY(checkRefinable(request_, samples));
-    const std::vector<HostDataset> drawing = drawn();
+    const std::vector<HostDataset> drawing = drawn(request_);
     if (cutNumbers(drawing) != cuts_) return 0u;
     FrameRequest request = request_;
     request.sample = samples;

@@ -36,7 +36,7 @@ public:
 private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
     /// Returns the datasets as render() draws them.
-    [[nodiscard]] std::vector<HostDataset> drawn() const;
+    [[nodiscard]] std::vector<HostDataset> drawn(const FrameRequest& request) const;
 
     const RendererOptions options_;
     const DeviceInfo info_;

@@ -122,6 +122,9 @@ public:
 
     Result<uint32_t> refine(const std::function<bool()>& cancel = {}) override;
 
+    /// Lets `paint` paint over each picture of this view as it leaves the renderer (readPicture, copyPicture, present),
+    /// from now on; empty: nothing does. The picture then goes through the CPU, which waits for the device.
+    void paintOver(PaintOver paint);
     Result<Picture> readPicture() override;
     Result<std::vector<float>> readDepth() override;
     Result<std::vector<glm::vec3>> readNormals() override;

@@ -28,9 +28,9 @@ bool Renderer::View::isCastOnHost(const FrameRequest& request) const {
 
 std::vector<HostDataset> Renderer::View::hostDatasets() const {
     std::vector<HostDataset> datasets;
-    for (const Layer& layer : layers)
-        if (layer.residency != nullptr)
-            datasets.push_back({*layer.residency, layer.placement, layer.errorPixels, number});
+    for (size_t i = 0; i < layers.size(); ++i)
+        if (const Layer& layer = layers[i]; layer.residency != nullptr)
+            datasets.push_back({*layer.residency, layer.placement, uint32_t(i), layer.errorPixels, number});
     return datasets;
 }
 

@@ -45,13 +45,30 @@ Result<std::vector<uint32_t>> Renderer::View::mesoPlane(const Frame& frame, uint
     return readWords(*shared->device, frame.surfaces.hits, plane * size.pixels(), size.pixels());
 }
 
-Result<Picture> Renderer::readPicture() {
-    VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
+void Renderer::paintOver(PaintOver paint) { view_->paintOver = std::move(paint); }
+
+Result<Picture> Renderer::readPicture() { return view_->hostPicture(); }
+
+Result<Picture> Renderer::View::hostPicture() {
+    VCP_TRY_ASSIGN(const auto frame, lastFrame());
     const PictureSize size = frame->size();
-    VCP_TRY_ASSIGN(auto words, readWords(*view_->shared->device, frame->picture(), 0, size.pixels()));
+    VCP_TRY_ASSIGN(auto words, readWords(*shared->device, frame->picture(), 0, size.pixels()));
     Picture picture{size.width, size.height, std::vector<uint8_t>(size.pixels() * 4)};
     std::memcpy(picture.rgba.data(), words.data(), picture.rgba.size());
+    if (paintOver) paintOver(frame->request, picture);
     return picture;
+}
+
+Result<const Buffer*> Renderer::View::shownPicture() {
+    if (!paintOver) return &frames[*drawn].picture();
+    VCP_TRY_ASSIGN(const auto picture, hostPicture());
+    // Submissions that read the picture of before have ended: present() and copyPicture() wait for their own.
+    if (painted.bytes() != picture.rgba.size()) {
+        VCP_TRY_ASSIGN(painted, shared->device->createBuffer(picture.rgba.size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                                             MemoryUse::Upload));
+    }
+    std::memcpy(painted.mapped(), picture.rgba.data(), picture.rgba.size());
+    return &painted;
 }
 
 Result<std::vector<float>> Renderer::readDepth() {
@@ -216,8 +233,9 @@ Result<void> Renderer::copyPicture(const ImageTarget& target) {
                      .message = "pictures are scaled to images by queues with graphics, which this is not"};
     if (!v.scaling) v.scaling = std::make_unique<PictureScaling>(*device);
     VCP_TRY(v.scaling->prepare(frame->size()));
+    VCP_TRY_ASSIGN(const auto picture, v.shownPicture());
     VCP_TRY_ASSIGN(auto commands, device->beginCommands());
-    v.scaling->record(commands, frame->picture(), target.image, {target.width, target.height});
+    v.scaling->record(commands, *picture, target.image, {target.width, target.height});
     changeLayout(commands, target.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, target.layoutAfter,
                  VK_ACCESS_TRANSFER_WRITE_BIT, VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT);
     return device->endCommandsAndWait(target.wait, target.signal);
@@ -260,14 +278,15 @@ Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& 
     if (!v.drawn) return {};
     View::Frame& frame = v.frames[*v.drawn];
     const DeviceWork before = v.shared->device->work();
-    const auto submission = v.swapchain->show(frame.picture(), frame.size(), {width, height}, drawOver);
+    VCP_TRY_ASSIGN(const auto picture, v.shownPicture());
+    const auto submission = v.swapchain->show(*picture, frame.size(), {width, height}, drawOver);
     frame.stats.submissions += v.shared->device->work().submissions - before.submissions;
     frame.stats.hostWaits += v.shared->device->work().waits - before.waits;
     // A device that was lost with frames in flight is found by the next update, which makes it anew.
     if (!submission && frame.isAhead && v.shared->device->isLost()) return {};
     if (!submission) return submission.error();
     frame.lastUse = std::max(frame.lastUse, *submission);
-    return frame.isAhead ? Result<void>() : v.shared->device->waitFor(*submission);
+    return frame.isAhead && !v.paintOver ? Result<void>() : v.shared->device->waitFor(*submission);
 }
 
 Result<WindowDrawing> Renderer::windowDrawing() {

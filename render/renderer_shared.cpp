@@ -55,7 +55,7 @@ Result<void> Renderer::Shared::setShares(uint64_t budgetBytes, uint64_t ramBytes
 void Renderer::Shared::hidePool() {
     if (device) static_cast<void>(device->waitForAll());
     for (View* view : views) {
-        for (View::Layer& layer : view->layers) layer.residency = nullptr;
+        for (View::Layer& layer : view->layers) layer.dataset = layer.residency = nullptr;
         for (View::Frame& frame : view->frames) {
             frame.submission = 0;  // what its rays asked for is not what is shown next
             view->bindPools(frame);

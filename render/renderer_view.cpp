@@ -98,7 +98,7 @@ Result<void> Renderer::View::showDatasets() {
     VCP_TRY(makeLayers());
     const std::vector<PlacedResidency>& datasets = shared->datasets;
     for (size_t i = 0; i < layers.size(); ++i) {
-        layers[i].residency = i < datasets.size() ? datasets[i].residency.get() : nullptr;
+        layers[i].dataset = layers[i].residency = i < datasets.size() ? datasets[i].residency.get() : nullptr;
         layers[i].placement = i < datasets.size() ? datasets[i].placement : Similarity{};
         layers[i].tableStale = true;
     }
@@ -108,10 +108,27 @@ Result<void> Renderer::View::showDatasets() {
 
 bool Renderer::View::isComplete() const {
     const bool isBound = std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) {
-        return shared->datasets.empty() || layer.residency != nullptr;
+        return shared->datasets.empty() || layer.dataset != nullptr;
     });
     return isBound && layers.size() == std::max<size_t>(shared->datasets.size(), 1) &&
            frames.front().layers.size() == layers.size();
+}
+
+Result<void> Renderer::View::hideAsAsked(const FrameRequest& request) {
+    bool isNews = false;
+    for (size_t i = 0; i < layers.size(); ++i) {
+        Layer& layer = layers[i];
+        Residency* const visible = isHidden(request, i) ? nullptr : layer.dataset;
+        if (layer.residency == visible) continue;
+        if (!isNews) VCP_TRY(takeInAll());
+        isNews = true;
+        if (!visible) layer.dataset->forgetView(number);
+        layer.residency = visible;
+        layer.tableStale = true;
+    }
+    if (isNews)
+        for (Frame& frame : frames) bindPools(frame);
+    return {};
 }
 
 void Renderer::View::forgetFrames() {
@@ -130,6 +147,7 @@ void Renderer::View::release() {
     lastDone.reset();
     swapchain.reset();
     scaling.reset();
+    painted = {};
     layers.clear();
     frames = {};
     sums = {};
@@ -140,6 +158,7 @@ Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {
     const DeviceWork before = shared->device->work();
     if (shared->device->isLost()) return Error{.code = ErrorCode::Device, .message = "the device was lost"};
     VCP_TRY(takeInDone());
+    VCP_TRY(hideAsAsked(request));
     std::optional<UpdateResult> all;
     for (Layer& layer : layers) {
         if (layer.residency == nullptr) continue;
@@ -151,7 +170,10 @@ Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {
         else
             all = *std::move(one);
     }
-    if (!all) all = UpdateResult{.settled = true, .errorPixels = std::numeric_limits<double>::infinity()};
+    if (!all)
+        all = UpdateResult{.settled = true,
+                           .drawable = !shared->datasets.empty(),
+                           .errorPixels = std::numeric_limits<double>::infinity()};
     all->submissions = shared->device->work().submissions - before.submissions;
     all->hostWaits = shared->device->work().waits - before.waits;
     return *std::move(all);

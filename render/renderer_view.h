@@ -34,7 +34,8 @@ struct Renderer::View {
 
     /// What this view draws of one dataset.
     struct Layer {
-        Residency* residency = nullptr;  // null: nothing but the background is drawn
+        Residency* dataset = nullptr;    // null: none is open
+        Residency* residency = nullptr;  // the same; null where it is hidden: nothing but the background is drawn
         Similarity placement;
         bool tableStale = true;
         uint64_t tableVersion = 0;
@@ -108,6 +109,8 @@ struct Renderer::View {
     std::function<void()> gone;
     std::unique_ptr<Swapchain> swapchain;
     std::unique_ptr<PictureScaling> scaling;  // scales to the host's images; made on first use
+    PaintOver paintOver;                      // may be empty
+    Buffer painted;                           // the last picture, with what paintOver painted
     std::vector<Layer> layers;                // one for each dataset, and at least one
     /// render() draws with the first one only; the last one is for parts of further samples, and is as small.
     std::array<Frame, kFramesAhead + 1> frames;
@@ -136,6 +139,9 @@ struct Renderer::View {
     void bindPools(Frame& frame);
     /// Whether each dataset has its layer; false where the device failed half-way.
     [[nodiscard]] bool isComplete() const;
+    /// Lets the layers draw what the request does not hide; waits for frames in flight where that is news. Errors:
+    /// Device.
+    Result<void> hideAsAsked(const FrameRequest& request);
     /// Forgets the pictures, and what the frames would tell. Precondition: no frame is in flight.
     void forgetFrames();
 
@@ -177,6 +183,11 @@ struct Renderer::View {
 
     /// The frame with the last picture, of which nothing is in flight any more. Errors: Usage, without one; Device.
     Result<const Frame*> lastFrame();
+    /// Returns the picture as the host sees it: with what paintOver paints. Precondition: a picture was drawn. Errors:
+    /// Device.
+    Result<Picture> hostPicture();
+    /// Returns its bytes in a buffer that may be copied to windows and images.
+    Result<const Buffer*> shownPicture();
     /// Returns the words of a plane of a frame; pixels of empty tiles, which were not written, get `missing`.
     Result<std::vector<uint32_t>> hitPlane(const LayerFrame& layer, uint32_t plane, uint32_t missing) const;
     /// Returns the distances in one layer, as readDepth() gives them.

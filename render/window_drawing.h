@@ -6,6 +6,9 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "render/frame_request.h"
+#include "render/picture.h"
+
 namespace vcp {
 
 /// What a user interface needs to make pipelines that draw over the picture in the window.
@@ -19,6 +22,9 @@ struct WindowDrawing {
 };
 /// Records draws of an image of the window, inside of WindowDrawing::renderPass.
 using DrawOver = std::function<void(VkCommandBuffer commands, VkExtent2D size)>;
+
+/// Paints over a picture, which was drawn for the request.
+using PaintOver = std::function<void(const FrameRequest& request, Picture& picture)>;
 
 /// An image of the host's on the renderer's device: a colour image, not multisampled, of a UNORM format, with usage
 /// TRANSFER_DST.

@@ -96,9 +96,12 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
     return nearest;
 }
 
-Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections) {
+Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections,
+                                                std::span<const uint32_t> hidden) {
     std::optional<SceneHit> nearest;
     for (Part& part : parts_) {
+        const auto number = size_t(&part - parts_.data());
+        if (std::find(hidden.begin(), hidden.end(), number) != hidden.end()) continue;
         // All picks together keep no more than one alone may, beside the pages that are cast into now.
         uint64_t kept = 0;
         for (const Part& each : parts_) kept += each.pick.bytesKept();
@@ -112,7 +115,7 @@ Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const 
         for (const SectionPlane& plane : sections) planes.push_back(planeIn(placement, plane));
         VCP_TRY_ASSIGN(const auto hit, part.pick.cast(local, planes));
         if (!hit || (nearest && nearest->t <= hit->t * placement.scale)) continue;
-        nearest = SceneHit{*hit, size_t(&part - parts_.data())};
+        nearest = SceneHit{*hit, number};
         nearest->t *= placement.scale;
         nearest->certifiedError *= placement.scale;
         nearest->position = placement.toWorld(nearest->position);

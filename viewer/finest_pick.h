@@ -42,7 +42,9 @@ public:
     void add(std::shared_ptr<const ByteReader> reader, const Dataset& dataset, const Similarity& placement) {
         parts_.push_back({FinestPick(std::move(reader), dataset), placement});
     }
-    Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {});
+    /// `hidden`: numbers of datasets that are not there.
+    Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {},
+                                         std::span<const uint32_t> hidden = {});
     /// Interrupts the pick of each dataset. The read that is under way ends; another may follow.
     void interrupt() const {
         for (const Part& part : parts_) part.pick.interrupt();

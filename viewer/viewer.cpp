@@ -146,6 +146,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     move_.reset();
     sectionDrag_.reset();
     sectionAnchors_.clear();
+    hidden_.clear();
     flySpeed_ = 1;
     status_.name = std::move(name);
     status_.update = {};
@@ -471,6 +472,7 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.sections = sections_;
     request.sectionCaps = sectionCaps_;
     request.march = options_.march;
+    request.hidden = hidden_;
     return request;
 }
 

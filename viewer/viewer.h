@@ -199,7 +199,11 @@ public:
     void setShading(const Shading& shading) { shading_ = shading; }
     [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
     void setSections(std::vector<SectionPlane> planes);
+    [[nodiscard]] bool sectionCaps() const { return sectionCaps_; }
     void setSectionCaps(bool caps) { sectionCaps_ = caps; }
+    /// The numbers of the datasets that are not shown, in the order of open(); empty after it.
+    [[nodiscard]] const std::vector<uint32_t>& hidden() const { return hidden_; }
+    void setHidden(std::vector<uint32_t> datasets) { hidden_ = std::move(datasets); }
     /// Lets section planes be gripped from now on; for a host that draws the handles. `scale`: as for sectionHandle();
     /// 0: not any more.
     void showSectionHandles(double scale) { handleScale_ = scale; }
@@ -264,6 +268,7 @@ private:
     double handleScale_ = 0;
     std::optional<SectionDrag> sectionDrag_;
     bool sectionCaps_ = false;
+    std::vector<uint32_t> hidden_;
     glm::ivec2 size_{0};
     PictureMargins covered_;
 

@@ -56,9 +56,10 @@ const std::vector<Room>& rooms() {
         {"viewer/bench",
          {"octree/", "builder/", "mesostructure", "streaming", "render", "viewer/scene", "viewer",
           "viewer/bench/report", "viewer/bench/rays"}},
+        {"viewer/command/manual", {}},
         {"viewer/command",
          {"octree/", "builder/", "mesostructure/", "streaming", "render", "viewer/camera", "viewer/scene",
-          "viewer/picture", "viewer/asset", "viewer", "viewer/window", "viewer/bench/"}},
+          "viewer/picture", "viewer/asset", "viewer", "viewer/window", "viewer/bench/", "viewer/command/manual"}},
         {"viewer/examples", {}},
 
         {"datasets_scripts", {"octree/", "builder/"}},

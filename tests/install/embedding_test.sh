@@ -56,6 +56,11 @@ if nm -D --defined-only "$prefix/$libdir/libvcp.so" | grep -v ' vcp_[a-z_]*$'; t
     echo "libvcp.so exports more than its functions"
     exit 1
 fi
+# What installed headers include is installed, too. That of Qt is for programs with Qt, and those in shared/ are parts
+# of others.
+(cd "$prefix/include/vcp" && find . -name '*.h' -o -name '*.hpp' | sort | sed -n '/vcp_qt/d; \,/shared/,d; s|^\./\(.*\)|#include "\1"|p') >headers.cpp
+[ "$(wc -l <headers.cpp)" -gt 15 ]
+run "$cxx" -std=c++20 -fsyntax-only -I "$prefix/include/vcp" headers.cpp
 [ ! -x build/host_device ] || shows build/host_device "$tree"
 if command -v xvfb-run >/dev/null; then
     display=(xvfb-run -a -s "-screen 0 1280x1024x24")
@@ -72,7 +77,7 @@ run "$cc" -std=c99 -pedantic -Wall -Wextra -Werror "$source/viewer/examples/offs
 run ./offscreen "$tree" >/dev/null
 
 # Python, where the module was built and there is NumPy.
-export PYTHONPATH=$prefix/$libdir/python3/dist-packages
+export PYTHONPATH=$prefix/lib/python3/dist-packages
 if [ -d "$PYTHONPATH" ]; then
     for python in python3 /usr/bin/python3; do
         "$python" -c 'import numpy' 2>/dev/null || continue

@@ -135,8 +135,6 @@ static void picture(void) {
     CHECK(look.samples == 16);
     look.samples = 65;
     CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
-    look.samples = 0;
-    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
     /* One more sample is drawn where one more is wanted; fewer are not fewer than there are. */
     look.samples = 17;
     OK(vcp_view_set_look(view, &look));
@@ -404,8 +402,11 @@ static void wrong_calls(void) {
     camera.target[1] = camera.up[1] = 1;
     CHECK(vcp_view_set_camera(view, &camera) == VCP_USAGE);
     vcp_look look = VCP_INIT(vcp_look);
-    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE && vcp_view_set_look(view, NULL) == VCP_USAGE);
+    CHECK(vcp_view_set_look(view, NULL) == VCP_USAGE);
     OK(vcp_view_get_look(view, &look));
+    look.error_pixels = -1;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    look.error_pixels = 1;
     look.section_count = 7;
     CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
     look.section_count = 1;
@@ -413,6 +414,22 @@ static void wrong_calls(void) {
     look.section_count = 0;
     look.shading = -1;
     CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    vcp_line line = VCP_INIT(vcp_line);
+    line.point_count = 2;
+    CHECK(vcp_view_set_lines(view, NULL, 1) == VCP_USAGE && vcp_view_set_lines(view, &line, 1) == VCP_USAGE);
+    static const double points[6] = {0, 0, 0, 1, NAN, 1};
+    line.points = points;
+    CHECK(vcp_view_set_lines(view, &line, 1) == VCP_USAGE && strstr(vcp_view_last_error(view), "line 0"));
+    line.point_count = 1;
+    line.width = -1;
+    CHECK(vcp_view_set_lines(view, &line, 1) == VCP_USAGE);
+    uint32_t visible = 0;
+    CHECK(vcp_view_set_visible(view, 7, 0) == VCP_USAGE && vcp_view_is_visible(view, 7, &visible) == VCP_USAGE);
+    CHECK(vcp_view_save_png(view, NULL) == VCP_USAGE && vcp_view_save_png(view, "-") == VCP_USAGE);
+    CHECK(vcp_context_start_open(context, NULL, NULL) == VCP_USAGE &&
+          vcp_context_start_open_placed(context, NULL, 1, NULL) == VCP_USAGE &&
+          vcp_context_opening(context, NULL) == VCP_USAGE);
+    OK(vcp_context_cancel_opening(context));
     OK(vcp_view_update(view, &step));
     CHECK(!step.draw);
     OK(vcp_view_destroy(view));
@@ -560,6 +577,198 @@ static void placed(void) {
     OK(vcp_context_destroy(context));
 }
 
+/* A look of VCP_INIT is the usual one; what is not zero in it is as it says. */
+static void looks(void) {
+    build_ball(0);
+    vcp_context* context = make_context(NULL);
+    vcp_view* view = make_view(context);
+    OK(vcp_context_open(context, tree, NULL));
+    OK(vcp_view_settle(view, 60));
+    static uint8_t usual[4 * PIXELS], now[4 * PIXELS];
+    static float depth[PIXELS];
+    read_frame(view, usual, depth);
+    vcp_look before = VCP_INIT(vcp_look), look = VCP_INIT(vcp_look), after = VCP_INIT(vcp_look);
+    OK(vcp_view_get_look(view, &before));
+    look.shading = VCP_SHADING_CLAY;
+    look.samples = 4;
+    look.section_count = 1;
+    look.sections[0][0] = 1;
+    look.section_caps = 1;
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_get_look(view, &after));
+    CHECK(after.shading == VCP_SHADING_CLAY && after.samples == 4 && after.section_caps == 1);
+    CHECK(after.error_pixels == before.error_pixels && after.light[1] == before.light[1] &&
+          after.background_top[2] == before.background_top[2]);
+    /* Seen from the side that is cut away, the cap is at x = 0; without caps the ball's inside is, behind it. */
+    vcp_camera camera = VCP_INIT(vcp_camera);
+    camera.position[0] = -5;
+    OK(vcp_view_set_camera(view, &camera));
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, now, depth);
+    CHECK(fabs(depth[PIXELS / 2 + WIDTH / 2] - 5) < 0.01);
+    look.section_caps = 0;
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, now, depth);
+    CHECK(fabs(depth[PIXELS / 2 + WIDTH / 2] - 6) < 0.01);
+    look = (vcp_look)VCP_INIT(vcp_look);
+    OK(vcp_view_set_look(view, &look));
+    OK(vcp_view_get_look(view, &after));
+    CHECK(memcmp(&after, &before, sizeof(after)) == 0);
+    OK(vcp_view_act(view, VCP_RESET));
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, now, depth);
+    CHECK(memcmp(now, usual, sizeof(now)) == 0);
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(context));
+}
+
+/* Polls until nothing is under way; returns what the last call gave. */
+static vcp_status end_of_opening(vcp_context* context, uint32_t* opened) {
+    for (;;) {
+        vcp_opening state = VCP_INIT(vcp_opening);
+        const vcp_status status = vcp_context_opening(context, &state);
+        CHECK(state.fraction >= 0 && state.fraction <= 1 && state.opened <= state.datasets);
+        if (opened) *opened = state.opened;
+        if (!state.under_way) return status;
+        CHECK(status == VCP_OK);
+        OK(vcp_context_wait(context, 0.05));
+    }
+}
+
+/* What is opened in the background replaces what is open when it is there, and not before. */
+static void opening(void) {
+    build_ball(0);
+    vcp_context* context = make_context(NULL);
+    vcp_view* view = make_view(context);
+    OK(end_of_opening(context, NULL));
+    OK(vcp_context_start_open(context, tree, NULL));
+    vcp_dataset_info info = VCP_INIT(vcp_dataset_info);
+    CHECK(vcp_context_dataset(context, &info) == VCP_USAGE);
+    uint32_t opened = 0;
+    OK(end_of_opening(context, &opened));
+    CHECK(opened == 1);
+    OK(vcp_context_dataset(context, &info));
+    OK(vcp_view_settle(view, 60));
+    vcp_stats stats = VCP_INIT(vcp_stats);
+    OK(vcp_view_stats(view, &stats));
+    CHECK(stats.hit_pixels > 500);
+
+    /* A hundred of them; cancelled, or failing, they leave the one. */
+    static vcp_placed many[100];
+    for (int i = 0; i < 100; ++i) {
+        many[i] = (vcp_placed)VCP_INIT(vcp_placed);
+        many[i].path = tree;
+    }
+    OK(vcp_context_start_open_placed(context, many, 100, NULL));
+    OK(vcp_context_cancel_opening(context));
+    CHECK(end_of_opening(context, NULL) == VCP_CANCELLED);
+    many[99].path = "/nowhere/at.vcp";
+    OK(vcp_context_start_open_placed(context, many, 100, NULL));
+    CHECK(end_of_opening(context, &opened) == VCP_IO && opened == 99 &&
+          strstr(vcp_context_last_error(context), "/nowhere/at.vcp"));
+    OK(end_of_opening(context, NULL));
+    OK(vcp_context_dataset(context, &info));
+    CHECK(info.datasets == 1);
+
+    /* The later one counts; so does a call that waits; and a context may go while something is opened. */
+    OK(vcp_context_start_open(context, "/nowhere/at.vcp", NULL));
+    OK(vcp_context_start_open_placed(context, many, 2, NULL));
+    OK(end_of_opening(context, &opened));
+    OK(vcp_context_dataset(context, &info));
+    CHECK(info.datasets == 2 && opened == 2);
+    OK(vcp_context_start_open_placed(context, many, 99, NULL));
+    OK(vcp_context_open(context, tree, NULL));
+    OK(end_of_opening(context, NULL));
+    OK(vcp_context_dataset(context, &info));
+    CHECK(info.datasets == 1);
+    OK(vcp_context_start_open_placed(context, many, 99, NULL));
+    OK(vcp_view_destroy(view));
+    OK(vcp_context_destroy(context));
+}
+
+static int is_red(const uint8_t* pixel) { return pixel[0] == 255 && pixel[1] == 0 && pixel[2] == 0; }
+
+/* Datasets are hidden, for a view, without being read again; lines are painted over pictures; pictures become files. */
+static void layers(void) {
+    build_ball(0);
+    vcp_context* context = make_context(NULL);
+    vcp_view *view = make_view(context), *other = make_view(context);
+    open_two(context);
+    OK(vcp_view_settle(view, 60));
+    static uint8_t both[4 * PIXELS], rgba[4 * PIXELS];
+    static float depth[PIXELS];
+    read_frame(view, both, depth);
+    vcp_stats stats = VCP_INIT(vcp_stats);
+    OK(vcp_view_stats(view, &stats));
+    const uint64_t hits = stats.hit_pixels, bytes = stats.bytes_read;
+    const int left = PIXELS / 2 + WIDTH / 4, right = PIXELS / 2 + WIDTH * 8 / 10;
+    uint32_t visible = 0;
+    for (uint32_t hidden = 0; hidden < 2; ++hidden) {
+        OK(vcp_view_set_visible(view, hidden, 0));
+        OK(vcp_view_is_visible(view, hidden, &visible));
+        CHECK(visible == 0);
+        OK(vcp_view_settle(view, 60));
+        read_frame(view, rgba, depth);
+        CHECK(isfinite(depth[hidden ? left : right]) && isinf(depth[hidden ? right : left]));
+        vcp_pick pick = VCP_INIT(vcp_pick);
+        OK(vcp_view_pick(view, (hidden ? right : left) % WIDTH, HEIGHT / 2, &pick));
+        CHECK(!pick.hit);
+        OK(vcp_view_pick(view, (hidden ? left : right) % WIDTH, HEIGHT / 2, &pick));
+        CHECK(pick.hit && pick.dataset == 1 - hidden);
+        OK(vcp_view_settle(other, 60));
+        OK(vcp_view_stats(other, &stats));
+        CHECK(stats.hit_pixels == hits);
+        OK(vcp_view_set_visible(view, hidden, 1));
+    }
+    OK(vcp_view_set_visible(view, 0, 0));
+    OK(vcp_view_set_visible(view, 1, 0));
+    OK(vcp_view_settle(view, 60));
+    OK(vcp_view_stats(view, &stats));
+    CHECK(stats.hit_pixels == 0 && stats.settled);
+    CHECK(vcp_view_set_visible(view, 2, 0) == VCP_USAGE);
+    OK(vcp_view_set_visible(view, 0, 1));
+    OK(vcp_view_set_visible(view, 1, 1));
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, rgba, depth);
+    OK(vcp_view_stats(view, &stats));
+    CHECK(memcmp(rgba, both, sizeof(both)) == 0 && stats.bytes_read == bytes);
+
+    /* A line through both, behind their surface: it is seen, and a step draws it. */
+    const double points[6] = {-1, 0, 0, 4, 0, 0};
+    vcp_line line = VCP_INIT(vcp_line);
+    line.points = points;
+    line.point_count = 2;
+    line.colour[0] = line.colour[3] = 1;
+    line.width = 3;
+    OK(vcp_view_set_lines(view, &line, 1));
+    vcp_step step = VCP_INIT(vcp_step);
+    OK(vcp_view_update(view, &step));
+    CHECK(step.draw);
+    OK(vcp_view_render(view));
+    OK(vcp_view_update(view, &step));
+    CHECK(!step.draw);
+    read_frame(view, rgba, depth);
+    CHECK(is_red(rgba + 4 * left) && is_red(rgba + 4 * right) && memcmp(rgba, both, 4 * WIDTH) == 0);
+    char path[4200];
+    snprintf(path, sizeof(path), "%s.png", tree);
+    OK(vcp_view_save_png(view, path));
+    FILE* file = fopen(path, "rb");
+    unsigned char head[24];
+    CHECK(file && fread(head, 1, sizeof(head), file) == sizeof(head) && fclose(file) == 0);
+    CHECK(memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0 && head[19] == WIDTH && head[23] == HEIGHT);
+    /* It replaces a picture, but not a dataset. */
+    OK(vcp_view_save_png(view, path));
+    CHECK(vcp_view_save_png(view, tree) == VCP_IO && vcp_view_save_png(view, "/nowhere/a.png") == VCP_IO);
+    OK(vcp_view_set_lines(view, NULL, 0));
+    OK(vcp_view_settle(view, 60));
+    read_frame(view, rgba, depth);
+    CHECK(memcmp(rgba, both, sizeof(both)) == 0);
+    OK(vcp_view_destroy(view));
+    OK(vcp_view_destroy(other));
+    OK(vcp_context_destroy(context));
+}
+
 /* A scene file shows what the same datasets, camera, light and section set by calls show. */
 static void scenes(void) {
     build_ball(0);
@@ -702,9 +911,19 @@ int main(int argc, char** argv) {
     static const struct {
         const char* name;
         void (*run)(void);
-    } cases[] = {{"picture", picture},         {"input", input},     {"callbacks", callbacks}, {"progress", progress},
-                 {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"placed", placed},       {"scenes", scenes},
-                 {"cycles", cycles},           {"threads", threads}};
+    } cases[] = {{"picture", picture},
+                 {"input", input},
+                 {"callbacks", callbacks},
+                 {"progress", progress},
+                 {"wrong_calls", wrong_calls},
+                 {"sharing", sharing},
+                 {"placed", placed},
+                 {"scenes", scenes},
+                 {"looks", looks},
+                 {"opening", opening},
+                 {"layers", layers},
+                 {"cycles", cycles},
+                 {"threads", threads}};
     if (argc != 3) return 2;
     snprintf(ply, sizeof(ply), "%s/ball-%s.ply", argv[2], argv[1]);
     snprintf(tree, sizeof(tree), "%s/ball-%s.vcp", argv[2], argv[1]);

@@ -49,12 +49,12 @@ void addBuildSettings(CLI::App& app, BuildOptions& options) {
     addError(app, options);
     addParsed(app, "--colour,--color", options.colour, colourNamed, "auto, vertex, texture or none",
               "Colour to keep: auto (all there is), vertex, texture or none")
-        ->type_name("WHICH")
+        ->type_name("WHICH:{auto,vertex,texture,none}")
         ->default_str("auto");
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
-        ->type_name("KIND")
+        ->type_name("KIND:{slabs,mesh}")
         ->default_str(options.coarseLeaves == CoarseLeaves::Slabs ? "slabs" : "mesh");
     app.add_option("--threads", options.threads, "Threads that build [one a processor]")
         ->type_name("N")

@@ -28,7 +28,7 @@ void addJsonOption(CLI::App& app, ReportOptions& options) {
 
 void addProgressOption(CLI::App& app, ReportOptions& options) {
     app.add_option("--progress", options.progress, "Progress on stderr: bar, plain, json or none [a bar on a terminal]")
-        ->type_name("STYLE")
+        ->type_name("STYLE:{bar,plain,json,none}")
         ->check([](const std::string& name) {
             return progressStyleNamed(name) ? std::string() : "must be bar, plain, json or none, not \"" + name + "\"";
         });

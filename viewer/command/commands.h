@@ -36,6 +36,9 @@ Command addStress(CLI::App& vcp);
 Command addBench(CLI::App& vcp);
 Command addDevices(CLI::App& vcp);
 Command addMeso(CLI::App& vcp);
+/// Hidden commands, for the build and for packages.
+Command addManual(CLI::App& vcp);
+Command addCompletions(CLI::App& vcp);
 
 /// The name of an output that stands for standard output.
 inline constexpr const char* kStandardOutput = "-";

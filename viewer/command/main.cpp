@@ -91,7 +91,7 @@ int runCommandLine(int argc, char** argv) {
     vcp.footer("`vcp help CMD` says how a command is used.");
     const std::vector<Command> commands = {addBuild(vcp),   addInfo(vcp),   addVerify(vcp), addRender(vcp),
                                            addView(vcp),    addStress(vcp), addBench(vcp),  addMeso(vcp),
-                                           addDevices(vcp), addHelp(vcp)};
+                                           addDevices(vcp), addHelp(vcp),   addManual(vcp), addCompletions(vcp)};
     try {
         vcp.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

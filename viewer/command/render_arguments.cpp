@@ -64,7 +64,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
               fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
               "lit or unlit (with colour where there is any), clay, normals; false colours: steps, cells, fetches "
               "(work of each ray), level, error (certified, up to a pixel)")
-        ->type_name("MODE")
+        ->type_name(fmt::format("MODE:{{{}}}", fmt::join(kShadingNames, ",")))
         ->default_str("lit");
     app.add_flag("--shadows", settings.shading.shadows, "Hard shadows: a further ray a pixel");
     app.add_option("--occlusion", settings.shading.occlusionRays,

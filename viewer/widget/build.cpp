@@ -89,6 +89,9 @@ Result<BuildOptions> buildOptions(const vcp_build_options& given) {
     options.memoryBytes = given.memory_bytes;
     options.threads = given.threads;
     options.resume = given.resume != 0;
+    options.format = textOf(given.format);
+    if (given.colour < VCP_COLOUR_AUTO || given.colour > VCP_COLOUR_NONE) return wrong("there is no such colour");
+    options.colour = static_cast<ColourChoice>(given.colour);
     return options;
 }
 
@@ -122,6 +125,8 @@ Result<void> buildFor(const vcp_build_options& given, vcp_build_report* out) {
 }
 
 }  // namespace
+
+static_assert(VCP_COLOUR_TEXTURE == int(ColourChoice::Texture) && VCP_COLOUR_NONE == int(ColourChoice::None));
 
 }  // namespace vcp::widget
 

@@ -74,16 +74,8 @@ void cancelOpening(vcp_context& context) {
     if (context.openingIsCancelled) *context.openingIsCancelled = true;
 }
 
-Result<OpenedScene> openCancellably(vcp_context& context, SceneFile file, const std::string& name,
-                                    const vcp_open_options* options) {
-    VCP_TRY_ASSIGN(auto access, accessFor(options));
-    const Opening opening(context);
-    access.cancelled = opening.cancelled();
-    return openScene(std::move(file), name, [&](const std::string& each) { return openDataset(each, access); });
-}
-
-Result<void> openFor(vcp_context& context, SceneFile file, const std::string& name, const vcp_open_options* options) {
-    VCP_TRY_ASSIGN(auto open, openCancellably(context, std::move(file), name, options));
+/// Shows what was opened in all views.
+Result<void> show(vcp_context& context, OpenedScene open, const std::string& name) {
     context.finest.reset();
     context.open.reset();
     VCP_TRY(context.renderer->open(open.placed(), open.surfaces.surfaces));
@@ -104,15 +96,51 @@ Result<void> openFor(vcp_context& context, SceneFile file, const std::string& na
     return {};
 }
 
-Result<void> openPath(vcp_context& context, const char* path, const vcp_open_options* options) {
-    if (!path || *path == '\0') return wrong("there is no path to open");
-    SceneFile file;
-    if (!isSceneName(path)) {
-        file.datasets.push_back({path, {}});
-        return openFor(context, std::move(file), path, options);
+/// Opens and shows what is wanted before it returns.
+Result<void> openNow(vcp_context& context, Result<WantedScene> wanted) {
+    if (!wanted) return wanted.error();
+    context.opening.reset();
+    const Opening opening(context);
+    wanted->access.cancelled = opening.cancelled();
+    VCP_TRY_ASSIGN(auto open, openWanted(*wanted, [](const std::string&, size_t) {}));
+    return show(context, std::move(open), wanted->name);
+}
+
+Result<void> openInBackground(vcp_context& context, Result<WantedScene> wanted) {
+    if (!wanted) return wanted.error();
+    context.opening.reset();
+    context.opening = std::make_unique<BackgroundOpening>(*std::move(wanted));
+    return {};
+}
+
+/// Says how far the opening is, and shows what it opened when it is done.
+Result<void> tellOfOpening(vcp_context& context, vcp_opening* out) {
+    vcp_opening now{};
+    if (context.opening) {
+        // In this order: what is done has all of its progress.
+        now.under_way = context.opening->isDone() ? 0 : 1;
+        const BackgroundOpening::Progress progress = context.opening->progress();
+        now.datasets = uint32_t(progress.datasets);
+        now.opened = uint32_t(progress.opened);
+        now.fraction = progress.datasets > 0 ? double(progress.opened) / double(progress.datasets) : 0;
+        copyText(now.file, sizeof(now.file), utf8Of(progress.file));
     }
-    VCP_TRY_ASSIGN(auto read, readScene(path));
-    return openFor(context, std::move(read), path, options);
+    VCP_TRY(give(out, now));
+    if (!context.opening || now.under_way != 0) return {};
+    const std::unique_ptr<BackgroundOpening> done = std::move(context.opening);
+    VCP_TRY_ASSIGN(auto open, done->take());
+    return show(context, std::move(open), done->name());
+}
+
+Result<WantedScene> wantedFrom(const char* path, const vcp_open_options* options) {
+    if (!path || *path == '\0') return wrong("there is no path to open");
+    WantedScene wanted{.name = path};
+    VCP_TRY_ASSIGN(wanted.access, accessFor(options));
+    if (isSceneName(path))
+        wanted.scenePath = path;
+    else
+        wanted.file.datasets.push_back({path, {}});
+    return wanted;
 }
 
 Result<SceneDataset> placedFrom(const vcp_placed& given, uint32_t number) {
@@ -132,24 +160,18 @@ Result<SceneDataset> placedFrom(const vcp_placed& given, uint32_t number) {
     return dataset;
 }
 
-Result<void> openPlaced(vcp_context& context, const vcp_placed* datasets, uint32_t count,
-                        const vcp_open_options* options) {
+Result<WantedScene> wantedFrom(const vcp_placed* datasets, uint32_t count, const vcp_open_options* options) {
     if (count < 1 || count > kMostSceneDatasets)
         return wrong(fmt::format("a scene has 1 to {} datasets", kMostSceneDatasets));
-    VCP_TRY_ASSIGN(const auto stride, structSize(datasets));
-    SceneFile file;
-    for (uint32_t i = 0; i < count; ++i) {
-        // The host's structs may be longer than ours.
-        const void* at = reinterpret_cast<const char*>(datasets) + size_t{stride} * i;
-        if (const auto size = structSize(at); !size || *size != stride)
-            return wrong("struct_size is not the same in all of an array");
-        vcp_placed each{};
-        VCP_TRY(takeStruct(at, &each, sizeof(each)));
-        VCP_TRY_ASSIGN(auto dataset, placedFrom(each, i));
-        file.datasets.push_back(std::move(dataset));
-    }
-    const std::string name = file.datasets.front().file;
-    return openFor(context, std::move(file), name, options);
+    WantedScene wanted;
+    VCP_TRY(takeArray(datasets, count, [&](const vcp_placed& given, uint32_t number) -> Result<void> {
+        VCP_TRY_ASSIGN(auto dataset, placedFrom(given, number));
+        wanted.file.datasets.push_back(std::move(dataset));
+        return {};
+    }));
+    wanted.name = wanted.file.datasets.front().file;
+    VCP_TRY_ASSIGN(wanted.access, accessFor(options));
+    return wanted;
 }
 
 vcp_dataset_info infoOf(const OpenedScene& open) {
@@ -208,12 +230,32 @@ const char* vcp_context_last_error(const vcp_context* context) {
 }
 
 vcp_status vcp_context_open(vcp_context* context, const char* path, const vcp_open_options* options) {
-    return inTurn(context, [&] { return openPath(*context, path, options); });
+    return inTurn(context, [&] { return openNow(*context, wantedFrom(path, options)); });
 }
 
 vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count,
                                    const vcp_open_options* options) {
-    return inTurn(context, [&] { return openPlaced(*context, datasets, count, options); });
+    return inTurn(context, [&] { return openNow(*context, wantedFrom(datasets, count, options)); });
+}
+
+vcp_status vcp_context_start_open(vcp_context* context, const char* path, const vcp_open_options* options) {
+    return inTurn(context, [&] { return openInBackground(*context, wantedFrom(path, options)); });
+}
+
+vcp_status vcp_context_start_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count,
+                                         const vcp_open_options* options) {
+    return inTurn(context, [&] { return openInBackground(*context, wantedFrom(datasets, count, options)); });
+}
+
+vcp_status vcp_context_opening(vcp_context* context, vcp_opening* opening) {
+    return inTurn(context, [&] { return tellOfOpening(*context, opening); });
+}
+
+vcp_status vcp_context_cancel_opening(vcp_context* context) {
+    return inTurn(context, [&]() -> vcp::Result<void> {
+        if (context->opening) context->opening->cancel();
+        return {};
+    });
 }
 
 vcp_status vcp_context_dataset(vcp_context* context, vcp_dataset_info* info) {
@@ -247,7 +289,11 @@ vcp_status vcp_context_set_budgets(vcp_context* context, uint64_t gpuBytes, uint
 vcp_status vcp_context_wait(vcp_context* context, double seconds) {
     return inTurn(context, [&]() -> vcp::Result<void> {
         if (!(seconds >= 0)) return wrong("a time to wait that is below 0 or not a number");
-        context->renderer->waitForPage(std::chrono::milliseconds(std::lround(1000 * std::min(seconds, kLongestWait))));
+        const std::chrono::milliseconds time(std::lround(1000 * std::min(seconds, kLongestWait)));
+        if (context->opening)
+            context->opening->waitFor(time);
+        else
+            context->renderer->waitForPage(time);
         return {};
     });
 }

@@ -19,6 +19,7 @@
 #include "viewer/finest_pick.h"
 #include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
+#include "viewer/widget/opening.h"
 #include "viewer/widget/vcp.h"
 
 namespace vcp::widget {
@@ -41,6 +42,7 @@ struct vcp_context {
     std::optional<vcp::OpenedScene> open;
     std::string name;
     std::unique_ptr<vcp::ScenePick> finest;
+    std::unique_ptr<vcp::widget::BackgroundOpening> opening;  // null: nothing is opened in the background
 
     [[nodiscard]] double now() const {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -58,6 +60,7 @@ struct vcp_view {
     vcp::UpAxis up = vcp::UpAxis::Y;
     bool isUpdated = false;  // it was updated since it was made
     bool wasSettled = false;
+    bool hasNewLines = false;                              // they are not on the last picture
     bool hasSceneLight = false, hasSceneSections = false;  // whether the open scene file has them
     uint32_t losses = 0;
     vcp::NextStep next;  // result of the last update, without what was drawn since
@@ -164,6 +167,26 @@ template <class T>
 Result<void> give(T* out, const T& value) {
     return giveStruct(out, &value, sizeof(T));
 }
+
+/// Reads an array of the host's structs, which may be longer or shorter than ours: take(value, number) returns a
+/// Result<void> for each. Errors: Usage; those of `take`.
+template <class T, class Take>
+Result<void> takeArray(const T* given, uint32_t count, Take take) {
+    if (count == 0) return {};
+    VCP_TRY_ASSIGN(const auto stride, structSize(given));
+    for (uint32_t i = 0; i < count; ++i) {
+        const void* at = reinterpret_cast<const char*>(given) + size_t{stride} * i;
+        if (const auto size = structSize(at); !size || *size != stride)
+            return wrong("struct_size is not the same in all of an array");
+        T value{};
+        VCP_TRY(takeStruct(at, &value, sizeof(T)));
+        VCP_TRY(take(value, i));
+    }
+    return {};
+}
+
+/// Paints the lines over the view's pictures, from now on. Errors: Usage.
+Result<void> setLines(vcp_view& view, const vcp_line* lines, uint32_t count);
 
 /// Copies as much of a text as there is room for.
 void copyText(char* to, size_t size, const std::string& text);

@@ -119,7 +119,7 @@ typedef struct vcp_context_options {
 
 VCP_API vcp_status vcp_context_create(const vcp_context_options* options, vcp_context** context);
 /* Destroys a context. VCP_USAGE while it has views. While another thread opens something: VCP_BUSY, and that call ends
- * soon, with VCP_CANCELLED; then call again. NULL: nothing is done. */
+ * soon, with VCP_CANCELLED; then call again. What is opened in the background is cancelled. NULL: nothing is done. */
 VCP_API vcp_status vcp_context_destroy(vcp_context* context);
 /* Returns the last error of the context as a line of text; "" when there was none. It lives until the next call.
  * VCP_BUSY leaves it as it is; do not read it while another thread's call is under way. */
@@ -155,6 +155,33 @@ typedef struct vcp_placed {
 VCP_API vcp_status vcp_context_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count,
                                            const vcp_open_options* options);
 
+/* Opening without waiting: what is open stays, and is shown, until the new is there.
+ *   vcp_context_start_open(context, path, NULL);
+ *   each time round:
+ *     vcp_opening opening = VCP_INIT(vcp_opening);
+ *     status = vcp_context_opening(context, &opening);
+ *     opening.under_way: show opening.fraction, and go on; else it is there, or status says why not */
+typedef struct vcp_opening {
+    uint32_t struct_size;
+    uint32_t under_way; /* 1: something is being opened */
+    uint32_t datasets;  /* number of datasets in it; 0: not known yet */
+    uint32_t opened;    /* number of those that are open by now */
+    double fraction;    /* opened / datasets, 0 to 1 */
+    char file[256];     /* the dataset that is opened now, without its folder; may be cut off */
+} vcp_opening;
+
+/* Begins what vcp_context_open and vcp_context_open_placed do, in a thread of the library's, and returns at once. What
+ * was being opened before is cancelled, by those two calls as well. VCP_USAGE as they say; all other errors come with
+ * vcp_context_opening. */
+VCP_API vcp_status vcp_context_start_open(vcp_context* context, const char* path, const vcp_open_options* options);
+VCP_API vcp_status vcp_context_start_open_placed(vcp_context* context, const vcp_placed* datasets, uint32_t count,
+                                                 const vcp_open_options* options);
+/* Says how far it is, without waiting for a disk or a server. The call that finds it done shows it in all views, or
+ * returns the error that ended it, and then what was open before stays open; later calls find nothing under way. */
+VCP_API vcp_status vcp_context_opening(vcp_context* context, vcp_opening* opening);
+/* Ends what is being opened soon: vcp_context_opening then gives VCP_CANCELLED. */
+VCP_API vcp_status vcp_context_cancel_opening(vcp_context* context);
+
 typedef struct vcp_dataset_info {
     uint32_t struct_size;
     uint32_t levels;
@@ -179,7 +206,8 @@ VCP_API vcp_status vcp_context_device(vcp_context* context, vcp_device_info* inf
 
 /* Sets other budgets, from now on; 0: as it is. VCP_LIMIT where the coarsest page has no room: all stays as it was. */
 VCP_API vcp_status vcp_context_set_budgets(vcp_context* context, uint64_t gpu_bytes, uint64_t ram_bytes);
-/* Waits until something was read, nothing is left to read, or the time is over. */
+/* Waits until something was read, nothing is left to read, or the time is over; while something is being opened, until
+ * that is done. */
 VCP_API vcp_status vcp_context_wait(vcp_context* context, double seconds);
 
 /* ---- View ---- */
@@ -284,28 +312,50 @@ enum {
     VCP_SHADING_ERROR = 8
 };
 
-/* How things look: get it, change it, set it. */
+/* How things look. With all zero it is the usual look: lit, by a light that follows the camera, before a grey that
+ * grows darker upwards. Get it, change it, set it; or set one of VCP_INIT. */
 typedef struct vcp_look {
     uint32_t struct_size;
     vcp_shading shading;
-    double error_pixels;     /* certified error at which refining ends, in pixels; above 0 */
+    double error_pixels;     /* certified error at which refining ends, in pixels; 0: half a pixel */
     uint32_t shadows;        /* 1: hard shadows */
     uint32_t occlusion_rays; /* rays a pixel, at most 64; 0: no ambient occlusion */
     double occlusion_radius; /* 0: a tenth of the diagonal */
     uint32_t light_in_world; /* 0: the light follows the camera */
     uint32_t transparent;    /* 1: the background is black with alpha 0, edges have alpha between */
-    float light[3];          /* towards the light; camera axes (right, up, back), or world */
-    float background_top[3], background_bottom[3]; /* linear, 0 to 1 */
+    float light[3];          /* towards the light; camera axes (right, up, back), or world; zero: from the upper left */
+    float background_top[3], background_bottom[3]; /* linear, 0 to 1; both zero: the usual (black: 1e-6) */
     uint32_t section_count;                        /* at most 6 planes; what lies beyond them is cut away */
     double sections[6][4];                         /* n, d: what has dot(n, x) >= d is kept */
-    /* Rays a pixel of a picture at rest, 1 to 64, whose light is averaged: smooth edges. From the beginning 16, and 64
-     * where the view has a window. Pictures in motion, false colours and normals have one. */
+    /* Rays a pixel of a picture at rest, 1 to 64, whose light is averaged: smooth edges. 0, and from the beginning: 16,
+     * and 64 where the view has a window. Pictures in motion, false colours and normals have one. */
     uint32_t samples;
-    uint32_t reserved;
+    uint32_t section_caps; /* 1: what the planes cut open is filled; right for closed surfaces */
 } vcp_look;
 
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
 VCP_API vcp_status vcp_view_set_look(vcp_view* view, const vcp_look* look);
+
+/* Shows (1) or hides (0) a dataset in this view, by its number in the order in which they were placed. What is hidden
+ * is neither drawn, loaded nor picked; surfaces with mesostructure stay. What is opened next is shown. VCP_USAGE where
+ * there is no such dataset. */
+VCP_API vcp_status vcp_view_set_visible(vcp_view* view, uint32_t dataset, uint32_t visible);
+VCP_API vcp_status vcp_view_is_visible(vcp_view* view, uint32_t dataset, uint32_t* visible);
+
+/* A line from point to point, painted over the picture: nothing hides it. */
+typedef struct vcp_line {
+    uint32_t struct_size; /* the same in all of an array */
+    uint32_t point_count;
+    const double* points; /* x, y, z of each point, in the world */
+    float colour[4];      /* red, green, blue, opacity, 0 to 1, as on screens (sRGB); all zero: white */
+    float width;          /* in pixels of the view; 0: 2 */
+    uint32_t reserved;
+} vcp_line;
+
+/* Paints these lines over the view's pictures, wherever they go, in place of those before; copied. Depth and picks know
+ * nothing of them. Pictures with lines pass through the processor's memory, which takes some milliseconds each.
+ * VCP_USAGE where a number is not finite or out of its range. */
+VCP_API vcp_status vcp_view_set_lines(vcp_view* view, const vcp_line* lines, uint32_t count);
 
 typedef struct vcp_step {
     uint32_t struct_size;
@@ -336,6 +386,10 @@ typedef struct vcp_frame {
 
 /* VCP_USAGE where nothing was rendered yet; VCP_LIMIT, with width and height written, where the room is too small. */
 VCP_API vcp_status vcp_view_read(vcp_view* view, vcp_frame* frame);
+
+/* Writes the last picture as a PNG of RGBA, which appears whole or not at all, in place of a PNG of that name.
+ * VCP_USAGE where nothing was rendered yet; VCP_IO where the file cannot be written, or is of another kind. */
+VCP_API vcp_status vcp_view_save_png(vcp_view* view, const char* path);
 
 /* An image on your device: colour, one sample, a UNORM format, with usage TRANSFER_DST. */
 typedef struct vcp_host_image {
@@ -396,6 +450,14 @@ typedef struct vcp_progress {
     double seconds;
 } vcp_progress;
 
+typedef int32_t vcp_colour;
+enum {
+    VCP_COLOUR_AUTO = 0, /* all that there is */
+    VCP_COLOUR_VERTEX = 1,
+    VCP_COLOUR_TEXTURE = 2,
+    VCP_COLOUR_NONE = 3
+};
+
 typedef struct vcp_build_options {
     uint32_t struct_size;
     uint32_t input_count;
@@ -413,6 +475,10 @@ typedef struct vcp_build_options {
     void* user;
     char* error_text;
     size_t error_text_size;
+    const char*
+        format; /* of meshes whose content does not tell it: "stl", "obj", ...; NULL: the content, then the name */
+    vcp_colour colour; /* which colour is kept */
+    uint32_t reserved;
 } vcp_build_options;
 
 typedef struct vcp_build_report {

@@ -56,6 +56,13 @@ struct Placed {
     std::array<double, 16> worldFromDataset{};
 };
 
+/// A line from point to point, painted over pictures (vcp_line).
+struct Line {
+    std::vector<std::array<double, 3>> points;
+    std::array<float, 4> colour{1, 1, 1, 1};
+    float width = 2;
+};
+
 /// A picture: RGBA, and the distance of each pixel.
 struct Frame {
     uint32_t width = 0, height = 0;
@@ -93,15 +100,20 @@ public:
     }
     /// Opens several datasets together, each in its place.
     void open(const std::vector<Placed>& datasets, const vcp_open_options* options = nullptr) {
-        std::vector<vcp_placed> placed;
-        for (const Placed& dataset : datasets) {
-            placed.push_back(sized<vcp_placed>());
-            placed.back().path = dataset.path.c_str();
-            std::copy(dataset.worldFromDataset.begin(), dataset.worldFromDataset.end(),
-                      placed.back().world_from_dataset);
-        }
+        const std::vector<vcp_placed> placed = structsOf(datasets);
         check(vcp_context_open_placed(handle(), placed.data(), uint32_t(placed.size()), options));
     }
+    /// Begins to open in the background, and returns at once.
+    void startOpen(const std::string& path, const vcp_open_options* options = nullptr) {
+        check(vcp_context_start_open(handle(), path.c_str(), options));
+    }
+    void startOpen(const std::vector<Placed>& datasets, const vcp_open_options* options = nullptr) {
+        const std::vector<vcp_placed> placed = structsOf(datasets);
+        check(vcp_context_start_open_placed(handle(), placed.data(), uint32_t(placed.size()), options));
+    }
+    /// Says how far that is; the call that finds it done shows it, or throws what ended it.
+    vcp_opening opening() { return got(vcp_context_opening); }
+    void cancelOpening() { check(vcp_context_cancel_opening(handle())); }
     [[nodiscard]] vcp_dataset_info dataset() const { return got(vcp_context_dataset); }
     [[nodiscard]] vcp_device_info device() const { return got(vcp_context_device); }
     /// Sets budgets; 0: as it is.
@@ -121,6 +133,16 @@ private:
         ~Shared() { vcp_context_destroy(handle); }
     };
 
+    static std::vector<vcp_placed> structsOf(const std::vector<Placed>& datasets) {
+        std::vector<vcp_placed> placed;
+        for (const Placed& dataset : datasets) {
+            placed.push_back(sized<vcp_placed>());
+            placed.back().path = dataset.path.c_str();
+            std::copy(dataset.worldFromDataset.begin(), dataset.worldFromDataset.end(),
+                      placed.back().world_from_dataset);
+        }
+        return placed;
+    }
     // No exception may cross the library.
     template <class F, class... T>
     static void call(const F& f, T... values) noexcept {
@@ -175,6 +197,27 @@ public:
     [[nodiscard]] vcp_look look() const { return got(vcp_view_get_look); }
     void setLook(const vcp_look& look) { check(vcp_view_set_look(handle(), &look)); }
 
+    void setVisible(uint32_t dataset, bool isVisible) {
+        check(vcp_view_set_visible(handle(), dataset, isVisible ? 1 : 0));
+    }
+    [[nodiscard]] bool isVisible(uint32_t dataset) const {
+        uint32_t visible = 0;
+        check(vcp_view_is_visible(handle(), dataset, &visible));
+        return visible != 0;
+    }
+    /// Paints lines over pictures, in place of those before.
+    void setLines(const std::vector<Line>& lines) {
+        std::vector<vcp_line> structs;
+        for (const Line& line : lines) {
+            vcp_line& made = structs.emplace_back(sized<vcp_line>());
+            made.points = line.points.empty() ? nullptr : line.points.front().data();
+            made.point_count = uint32_t(line.points.size());
+            std::copy(line.colour.begin(), line.colour.end(), made.colour);
+            made.width = line.width;
+        }
+        check(vcp_view_set_lines(handle(), structs.data(), uint32_t(structs.size())));
+    }
+
     vcp_step update() { return got(vcp_view_update); }
     void render() { check(vcp_view_render(handle())); }
     /// Returns false where the time was over before it was settled.
@@ -196,6 +239,7 @@ public:
         check(vcp_view_read(handle(), &frame));
         return read;
     }
+    void savePng(const std::string& path) { check(vcp_view_save_png(handle(), path.c_str())); }
     void copyTo(const vcp_host_image& image) { check(vcp_view_copy_to_image(handle(), &image)); }
     [[nodiscard]] vcp_pick pick(double x, double y) {
         vcp_pick picked = sized<vcp_pick>();

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "render/picture.h"
 #include "viewer/key_map.h"
 #include "viewer/widget/handles.h"
 #include "viewer/widget/window_surface.h"
@@ -19,6 +20,8 @@ constexpr uint32_t kLargestSide = 16384;
 constexpr glm::ivec2 kUsualSize(1280, 720);
 constexpr double kPollSeconds = 0.1;
 
+uint32_t usualSamples(bool hasWindow) { return hasWindow ? kMostSamples : kUsualSamples; }
+
 Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_view_options& given) {
     VCP_TRY_ASSIGN(auto surface, surfaceSource(given));
     if (surface && !context.hasWindows) return wrong("the context was made without windows");
@@ -31,7 +34,7 @@ Result<std::unique_ptr<vcp_view>> createView(vcp_context& context, const vcp_vie
     options.renderer.ramBytes = context.ramBytes;
     options.movingFrameMs = given.moving_frame_ms;
     options.moveSeconds = given.move_seconds;
-    options.samples = surface ? kMostSamples : kUsualSamples;
+    options.samples = usualSamples(surface.has_value());
     auto made = std::make_unique<vcp_view>();
     made->context = &context;
     made->hasWindow = surface.has_value();
@@ -73,6 +76,8 @@ Result<void> render(vcp_view& view) {
         VCP_TRY_ASSIGN(isNew, view.viewer->draw());
     }
     view.next.draw = false;
+    const bool hasNewLines = std::exchange(view.hasNewLines, false);
+    isNew = isNew || hasNewLines;
     const glm::ivec2 size = view.viewer->size();
     if (!isNew || !view.hasWindow || size.x == 0 || size.y == 0) return {};
     return view.viewer->renderer().present(uint32_t(size.x), uint32_t(size.y));
@@ -122,6 +127,28 @@ Result<void> readFrame(vcp_view& view, vcp_frame* out) {
     return {};
 }
 
+Result<void> savePng(vcp_view& view, const char* path) {
+    if (!path || *path == '\0' || std::string_view(path) == "-") return wrong("there is no path to write to");
+    VCP_TRY_ASSIGN(const auto picture, view.viewer->renderer().readPicture());
+    return writePng(picture, path);
+}
+
+/// Refuses numbers of datasets that are not there.
+Result<void> checkDataset(const vcp_view& view, uint32_t dataset) {
+    const size_t datasets = view.context->open ? view.context->open->parts.size() : 0;
+    if (dataset < datasets) return {};
+    return wrong(fmt::format("there is no dataset {}: {} are open", dataset, datasets));
+}
+
+Result<void> setVisible(vcp_view& view, uint32_t dataset, bool isVisible) {
+    VCP_TRY(checkDataset(view, dataset));
+    std::vector<uint32_t> hidden = view.viewer->hidden();
+    std::erase(hidden, dataset);
+    if (!isVisible) hidden.push_back(dataset);
+    view.viewer->setHidden(std::move(hidden));
+    return {};
+}
+
 Result<void> copyToImage(vcp_view& view, const vcp_host_image* given) {
     if (!given) return wrong("there is no image");
     VCP_TRY_ASSIGN(const auto image, taken(given));
@@ -142,8 +169,8 @@ Result<void> pick(vcp_view& view, double x, double y, vcp_pick* out) {
     vcp_pick picked{};
     if (x >= 0 && y >= 0 && x < size.x && y < size.y) {
         const CameraRay through = view.viewer->camera().rayThrough({x, y}, size);
-        VCP_TRY_ASSIGN(const auto hit,
-                       view.context->finest->cast({through.origin, through.direction}, view.viewer->sections()));
+        VCP_TRY_ASSIGN(const auto hit, view.context->finest->cast({through.origin, through.direction},
+                                                                  view.viewer->sections(), view.viewer->hidden()));
         if (hit) {
             picked.hit = 1;
             for (int i = 0; i < 3; ++i) picked.position[i] = hit->position[i], picked.normal[i] = hit->normal[i];
@@ -213,6 +240,7 @@ vcp_look lookOf(const Viewer& viewer) {
     look.light_in_world = shading.lightFollowsCamera ? 0 : 1;
     look.transparent = shading.transparent ? 1 : 0;
     look.samples = viewer.samples();
+    look.section_caps = viewer.sectionCaps() ? 1 : 0;
     for (int i = 0; i < 3; ++i) {
         look.light[i] = shading.lightDirection[i];
         look.background_top[i] = shading.backgroundTop[i];
@@ -224,6 +252,22 @@ vcp_look lookOf(const Viewer& viewer) {
         to[3] = plane.offset;
     }
     return look;
+}
+
+/// Puts the usual in place of what is zero.
+void fillIn(vcp_look& look, bool hasWindow) {
+    const Shading usual;
+    const auto isZero = [](const float* values) { return vectorFrom(values) == glm::vec3(0); };
+    if (look.error_pixels == 0) look.error_pixels = ViewerOptions{}.errorPixels;
+    if (look.samples == 0) look.samples = usualSamples(hasWindow);
+    const bool hasBackground = !isZero(look.background_top) || !isZero(look.background_bottom);
+    const bool hasLight = !isZero(look.light);
+    for (int i = 0; i < 3; ++i) {
+        if (!hasLight) look.light[i] = usual.lightDirection[i];
+        if (hasBackground) continue;
+        look.background_top[i] = usual.backgroundTop[i];
+        look.background_bottom[i] = usual.backgroundBottom[i];
+    }
 }
 
 Result<void> checkLook(const vcp_look& look) {
@@ -243,9 +287,11 @@ Result<void> checkLook(const vcp_look& look) {
     return {};
 }
 
-Result<void> setLook(Viewer& viewer, const vcp_look* given) {
+Result<void> setLook(vcp_view& view, const vcp_look* given) {
     if (!given) return wrong("there is no look");
-    VCP_TRY_ASSIGN(const auto look, taken(given, lookOf(viewer)));
+    Viewer& viewer = *view.viewer;
+    VCP_TRY_ASSIGN(auto look, taken(given, lookOf(viewer)));
+    fillIn(look, view.hasWindow);
     VCP_TRY(checkLook(look));
     Shading shading = viewer.shading();
     shading.mode = static_cast<ShadingMode>(look.shading);
@@ -264,6 +310,7 @@ Result<void> setLook(Viewer& viewer, const vcp_look* given) {
     viewer.setErrorPixels(look.error_pixels);
     viewer.setSamples(look.samples);
     viewer.setSections(std::move(sections));
+    viewer.setSectionCaps(look.section_caps != 0);
     return {};
 }
 
@@ -476,7 +523,29 @@ vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look) {
 }
 
 vcp_status vcp_view_set_look(vcp_view* view, const vcp_look* look) {
-    return changing(view, [&](vcp_view& v) { return setLook(*v.viewer, look); });
+    return changing(view, [&](vcp_view& v) { return setLook(v, look); });
+}
+
+vcp_status vcp_view_set_visible(vcp_view* view, uint32_t dataset, uint32_t visible) {
+    return changing(view, [&](vcp_view& v) { return setVisible(v, dataset, visible != 0); });
+}
+
+vcp_status vcp_view_is_visible(vcp_view* view, uint32_t dataset, uint32_t* visible) {
+    return inTurn(view, [&](vcp_view& v) -> vcp::Result<void> {
+        if (!visible) return wrong("there is nowhere to put the answer");
+        VCP_TRY(checkDataset(v, dataset));
+        const std::vector<uint32_t>& hidden = v.viewer->hidden();
+        *visible = std::find(hidden.begin(), hidden.end(), dataset) == hidden.end() ? 1 : 0;
+        return {};
+    });
+}
+
+vcp_status vcp_view_set_lines(vcp_view* view, const vcp_line* lines, uint32_t count) {
+    return changing(view, [&](vcp_view& v) { return setLines(v, lines, count); });
+}
+
+vcp_status vcp_view_save_png(vcp_view* view, const char* path) {
+    return inTurn(view, [&](vcp_view& v) { return savePng(v, path); });
 }
 
 vcp_status vcp_view_update(vcp_view* view, vcp_step* step) {
@@ -484,7 +553,7 @@ vcp_status vcp_view_update(vcp_view* view, vcp_step* step) {
         if (const auto size = structSize(step); !size) return size.error();
         VCP_TRY(update(v));
         vcp_step next{};
-        next.draw = v.next.draw ? 1 : 0;
+        next.draw = v.next.draw || v.hasNewLines ? 1 : 0;
         next.settled = v.viewer->status().update.settled ? 1 : 0;
         next.wait_seconds = v.next.waitSeconds;
         return give(step, next);

@@ -44,6 +44,9 @@ public:
         if (!glfwVulkanSupported()) return displayError("Vulkan cannot draw into windows here");
         glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
         glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+        // The name of the entry in the desktop's menu.
+        glfwWindowHintString(GLFW_X11_CLASS_NAME, "vcp");
+        glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "vcp");
         window_ = glfwCreateWindow(size.x, size.y, title.c_str(), nullptr, nullptr);
         if (!window_) return displayError("the window cannot be opened");
         return {};
